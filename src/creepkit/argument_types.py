@@ -85,11 +85,9 @@ class Kind(typing.NamedTuple):
     def mismatch(self, value: Any) -> Mismatch | None:
         """Where a value is not what is allowed, deepest in it; None of a value that is right."""
         if self.members:
-            wrong = []
-            for member in self.members:
-                if not (one := member.mismatch(value)):
-                    return None
-                wrong.append(one)
+            wrong = [one for member in self.members if (one := member.mismatch(value))]
+            if len(wrong) < len(self.members):
+                return None
             deepest = max(wrong, key=lambda one: one.place.count("["))
             return deepest._replace(allowed=_listed(one.allowed for one in wrong if one.place == deepest.place))
         if not self.test(value):
@@ -107,7 +105,7 @@ def kind_of(annotation: Any, finite: bool) -> Kind:
     if annotation in SCALARS:
         return SCALARS[annotation]
     if annotation is float:
-        return Kind("a finite number", _is_finite) if finite else Kind("a number", _is_number)
+        return Kind(f"a {'finite ' * finite}number", lambda value: _is_number(value, finite))
     if annotation is Array or getattr(origin or annotation, "__name__", "") == "ndarray":
         return Kind("an array of numbers", _is_array)
     if origin in (Union, types.UnionType):
@@ -165,18 +163,15 @@ def _listed(allowed: Iterable[str]) -> str:
     return unique[0] if len(unique) == 1 else f"{', '.join(unique[:-1])} or {unique[-1]}"
 
 
-def _is_number(value: Any) -> bool:
-    number_of_numpy = getattr(value, "shape", None) == () and getattr(value.dtype, "kind", "") in "fiu"
-    if isinstance(value, bool) or not (number_of_numpy or isinstance(value, numbers.Real)):
-        return False
+def _is_number(value: Any, finite: bool) -> bool:
+    if type(value) is not float:
+        number_of_numpy = getattr(value, "shape", None) == () and getattr(value.dtype, "kind", "") in "fiu"
+        if isinstance(value, bool) or not (number_of_numpy or isinstance(value, numbers.Real)):
+            return False
     try:
-        return math.isfinite(value) or True
+        return math.isfinite(value) or not finite
     except OverflowError:
         return False
-
-
-def _is_finite(value: Any) -> bool:
-    return (type(value) is float or _is_number(value)) and math.isfinite(value)
 
 
 def _is_integer(value: Any) -> bool:
@@ -201,7 +196,7 @@ def _is_series(value: Any) -> bool:
 
 def _is_array(value: Any) -> bool:
     """Real numbers in an array, or what numpy makes one of."""
-    if isinstance(value, str | bytes | Mapping) or not (hasattr(value, "__len__") or _is_number(value)):
+    if isinstance(value, str | bytes | Mapping) or not (hasattr(value, "__len__") or _is_number(value, finite=False)):
         return False
     import numpy as np  # which the definition of a law does without
 

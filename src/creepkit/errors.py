@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import importlib
+import os
 import re
+import traceback
 from collections.abc import Iterable
 
 LONGEST_QUOTE, LONGEST_MESSAGE = 40, 2000
@@ -118,6 +121,25 @@ class StudyError(CreepkitError):
 
 POWER_REMEDY = "write ** for powers"
 """For ^, which sympy takes for the exclusive or."""
+
+
+_OURS = (os.path.dirname(__file__) + os.sep, os.path.dirname(importlib.__file__), "<frozen importlib")
+"""Where files begin that are none of a plugin."""
+
+
+def raised_text(error: BaseException) -> str:
+    """One sentence for what a plugin raised, with the deepest line of the plugin's own file."""
+    if isinstance(error, SyntaxError):
+        return f"{type(error).__name__}: {error.msg} ({error.filename}, line {error.lineno})"
+    description = " ".join(str(error).split())
+    if not isinstance(error, CreepkitError):
+        of_power = isinstance(error, TypeError) and ("for ^:" in description or "'Xor'" in description)
+        remedy = f"; {POWER_REMEDY}" if of_power else ""
+        description = f"{type(error).__name__}: {quoted(description, 300) or 'no message'}{remedy}"
+    frames = traceback.extract_tb(error.__traceback__)
+    outside = [frame for frame in frames if not frame.filename.startswith(_OURS)] or frames[-1:]
+    of_plugin = [frame for frame in outside if frame.filename == outside[0].filename]
+    return f"{description} ({of_plugin[-1].filename}, line {of_plugin[-1].lineno})" if of_plugin else description
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

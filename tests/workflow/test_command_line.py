@@ -83,16 +83,10 @@ def test_a_cut_forgets_how_every_test_ended():
     from creepkit.cli.identify import _truncate_at_strain
 
     times = np.linspace(3600, 36000, 5)
+    curves = {name: {"strain": np.linspace(0.01, end, 5)} for name, end in (("far", 0.1), ("near", 0.03))}
     tests = [
-        ck.History(
-            name=name,
-            times=times,
-            outputs={"strain": np.linspace(0.01, end, 5)},
-            loading=ck.constant_stress(100),
-            temperature=1000.0,
-            unruptured=True,
-        )
-        for name, end in (("far", 0.1), ("near", 0.03))
+        ck.History(name, times, outputs, ck.constant_stress(100), 1000.0, unruptured=True)
+        for name, outputs in curves.items()
     ]
     assert [(h.rupture_time, h.unruptured) for h in _truncate_at_strain(tests, 0.05)] == [(None, False)] * 2
 

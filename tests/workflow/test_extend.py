@@ -17,7 +17,7 @@ from helpers.paths import ROOT
 
 GUIDE = ROOT / "docs" / "extend"
 
-PLUGINS = dict(law=3, specimen=2, reader=3, camera_format=2, exporter=3, instrument_format=1) | dict(
+PLUGINS = dict(law=2, specimen=2, reader=3, camera_format=2, exporter=3, instrument_format=1) | dict(
     temperature_form=2, command=2
 )
 """{kind: examples on its page, each longer than the one before}."""

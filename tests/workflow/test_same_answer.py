@@ -43,15 +43,8 @@ def dimples(folder):
     """A simulated dimple at each temperature, by the surrogate."""
     rng, times = np.random.default_rng(2), np.arange(600.0, 6 * 3600 + 1, 300.0)
     for T, A in zip(TEMPERATURES, RATES, strict=True):
-        run = ck.simulate(
-            "norton",
-            ck.surrogate("dimple"),
-            {"A": A, "n": 5.0},
-            loading=PressureJump(8, 10, 3 * 3600),
-            times=times,
-            temperature=T,
-            elastic=Elastic(150e3),
-        )
+        how = {"loading": PressureJump(8, 10, 3 * 3600), "times": times, "elastic": Elastic(150e3)}
+        run = ck.simulate("norton", ck.surrogate("dimple"), {"A": A, "n": 5.0}, temperature=T, **how)
         noise = {"amplitude": 1.5e-3, "width": 0.02, "shape": 0.02}
         outputs = {name: run.outputs[name] + sd * rng.standard_normal(times.size) for name, sd in noise.items()}
         if T == TEMPERATURES[0]:

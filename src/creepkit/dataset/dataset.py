@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.errors import DatasetError, quoted
+from creepkit.errors import quoted
 from creepkit.presentation import Presentable
 from creepkit.records import Status, outputs_of
 from creepkit.sampling.conditions import planned_test
@@ -146,12 +146,6 @@ class Dataset(Presentable, text="reports.dataset:dataset_text"):
         # a relative grid has no end of its own to fall back on
         end = conditions["end_time"] if "end_time" in conditions else self.grid.end  # noqa: SIM401
         return self.grid.times(end)
-
-    def output(self, name: str) -> NDArray[np.float32]:
-        """(n, frames) in its unit, one output."""
-        if name not in self.outputs:
-            raise DatasetError(f"a data set of {self.specimen.name} has no output '{name}'; it has {self.outputs}")
-        return self.values[..., self.outputs.index(name)]
 
 
 def concatenate(parts: Sequence[Dataset]) -> Dataset:

@@ -40,7 +40,7 @@ from creepkit.arrays import Bools
 from creepkit.checked_arguments import checked
 from creepkit.dataset.dataset import COLUMNS, NOT_SIMULATED, Dataset, empty_columns
 from creepkit.errors import DatasetError, LawError, printable, quoted, quoted_value
-from creepkit.files.hdf5_files import open_hdf5, write_hdf5, write_names
+from creepkit.files.hdf5_files import open_hdf5, write_hdf5
 from creepkit.files.json_documents import compact_json, parse_json
 from creepkit.files.reading import FileKind
 from creepkit.language.law_codec import law_from_json, law_to_json
@@ -134,7 +134,7 @@ def write_header(file: h5py.File, data: Dataset) -> None:
     """Write everything but the samples, with space for these."""
     file.attrs.update({"format": FORMAT, "layout": LAYOUT_VERSION, "units": FILE_UNITS})
     for name in NAME_LISTS:
-        write_names(file, name, getattr(data, name))
+        file.attrs[name] = [*map(str, getattr(data, name))]  # outputs are more than texts
     documents = {
         "law": law_to_json(data.law),
         "specimen": specimen_to_json(data.specimen),

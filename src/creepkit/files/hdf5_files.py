@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 
 from creepkit.errors import CreepkitError, quoted
 from creepkit.files.limits import how_to_raise, raised
@@ -98,11 +97,6 @@ def open_hdf5(path: Path, kind: FileKind) -> Iterator[h5py.File]:
     except FAILURES as error:
         text = " ".join(str(error).split())
         raise kind.error(f"{path}: cannot be read, it seems damaged: {quoted(text, 300)}") from None
-
-
-def write_names(group: h5py.Group, name: str, words: tuple[str, ...]) -> None:
-    """Write an attribute that is a list of texts."""
-    group.attrs.create(name, np.array(words, dtype=object), dtype=h5py.string_dtype())
 
 
 def _check(file: h5py.File, path: Path, kind: FileKind) -> None:

@@ -99,8 +99,7 @@ class ProcessWorkers:
         with suppress(pickle.PicklingError, AttributeError, TypeError):
             pickled = pickle.dumps(job)
             self._message = b"" if b"__main__" in pickled else setup_message() + pickled
-        self._is_sent = bool(self._message)
-        self.size = processes if self._is_sent else 1
+        self.size = processes if self._message else 1
         self._threads = ThreadPoolExecutor(self.size)
         self._own = threading.local()
         self._processes: list[subprocess.Popen[bytes]] = []
@@ -108,7 +107,7 @@ class ProcessWorkers:
 
     def submit(self, number: int) -> Future[TaskResult]:
         """Have a task done by the next worker that is free."""
-        if not self._is_sent:
+        if not self._message:
             return self._threads.submit(run_task, self._job.on_one_thread(), number)
         return self._threads.submit(self._run, number)
 

@@ -31,6 +31,7 @@ from creepkit.kernels.kernel_functions import (
     Tanh,
     in_sympy_functions,
 )
+from creepkit.language.expression_trees import KNOWN_FUNCTIONS, KNOWN_NODES
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, strain, temperature, time
 
@@ -77,23 +78,6 @@ small enough to be nothing and large enough for its slope, which is the term ove
 def floor_of(symbol: sympy.Symbol) -> sympy.Float:
     """The floor of a variable of the point, or of a state, as the base of a power."""
     return sympy.Float(TIME_FLOOR if symbol == time else FLOOR)
-
-
-KNOWN_FUNCTIONS = (
-    *(sympy.exp, sympy.log, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth, sympy.asinh),
-    *(sympy.sin, sympy.cos, sympy.atan, sympy.erf),
-    *(sympy.Abs, sympy.sign, sympy.Heaviside, sympy.Max, sympy.Min, sympy.Piecewise),
-)
-"""The functions that a law may call."""
-
-
-_ALGEBRAIC_NODES = (sympy.Add, sympy.Mul, sympy.Pow, sympy.functions.elementary.piecewise.ExprCondPair)
-
-
-_CONDITIONS = (
-    *(sympy.GreaterThan, sympy.StrictGreaterThan, sympy.LessThan, sympy.StrictLessThan, sympy.And, sympy.Or),
-    *(type(sympy.true), type(sympy.false)),
-)
 
 
 @dataclass(frozen=True)
@@ -178,7 +162,7 @@ def _log_symbols(law: CreepLaw) -> dict[sympy.Symbol, sympy.Symbol]:
 def _check_expression(expression: sympy.Expr, origin: str) -> None:
     """Refuse what has no kernel, and branches that leave a gap."""
     for node in sympy.preorder_traversal(expression):
-        if not (node.is_Atom or isinstance(node, (*KNOWN_FUNCTIONS, *_ALGEBRAIC_NODES, *_CONDITIONS))):
+        if not (node.is_Atom or isinstance(node, KNOWN_NODES)):
             allowed = ", ".join(sorted(f.__name__ for f in KNOWN_FUNCTIONS))
             raise LawError(
                 f"{origin}: the function {node.func.__name__} in {quoted(node, 200)} has no kernel; allowed are "

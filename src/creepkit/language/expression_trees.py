@@ -15,6 +15,7 @@ from typing import Any
 
 import mpmath
 import sympy
+from sympy.core.function import Application
 from sympy.logic.boolalg import Boolean
 
 from creepkit.errors import LawError, nearest
@@ -144,6 +145,17 @@ _NODE_TYPES = {
 
 
 _HEAD_OF_TYPE = {head.type: name for name, head in _NODE_TYPES.items()}
+
+
+KNOWN_NODES = (
+    *_HEAD_OF_TYPE,
+    *(sympy.Piecewise, sympy.functions.elementary.piecewise.ExprCondPair, type(sympy.true), type(sympy.false)),
+)
+"""What expressions and conditions of laws are made of, beside symbols and numbers."""
+
+
+KNOWN_FUNCTIONS = tuple(t for t in KNOWN_NODES if issubclass(t, Application) and not issubclass(t, Boolean))
+"""The functions that a law may call."""
 
 
 _CONSTANTS = {"pi": sympy.pi, "e": sympy.E, "true": sympy.true, "false": sympy.false}

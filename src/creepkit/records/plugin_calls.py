@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-import os
-import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
-import creepkit
-from creepkit.errors import POWER_REMEDY, CreepkitError, HistoryError, quoted
+from creepkit.errors import CreepkitError, HistoryError, quoted, raised_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,25 +33,6 @@ def call_of_plugin(call: Callable[[], _T], owner: object, what: str, error: type
         if type(owner).__module__.partition(".")[0] == OWN_PACKAGE:
             raise
         raise error(f"{what} raised {raised_text(raised)}") from raised
-
-
-_OURS = (os.path.dirname(creepkit.__file__) + os.sep, os.path.dirname(importlib.__file__), "<frozen importlib")
-"""Where files begin that are none of a plugin."""
-
-
-def raised_text(error: BaseException) -> str:
-    """One sentence for what a plugin raised, with the deepest line of the plugin's own file."""
-    if isinstance(error, SyntaxError):
-        return f"{type(error).__name__}: {error.msg} ({error.filename}, line {error.lineno})"
-    description = " ".join(str(error).split())
-    if not isinstance(error, CreepkitError):
-        of_power = isinstance(error, TypeError) and ("for ^:" in description or "'Xor'" in description)
-        remedy = f"; {POWER_REMEDY}" if of_power else ""
-        description = f"{type(error).__name__}: {quoted(description, 300) or 'no message'}{remedy}"
-    frames = traceback.extract_tb(error.__traceback__)
-    outside = [frame for frame in frames if not frame.filename.startswith(_OURS)] or frames[-1:]
-    of_plugin = [frame for frame in outside if frame.filename == outside[0].filename]
-    return f"{description} ({of_plugin[-1].filename}, line {of_plugin[-1].lineno})" if of_plugin else description
 
 
 def call_of_reader(call: Callable[[], _T], reader: Reader, path: Path, method: str) -> _T:

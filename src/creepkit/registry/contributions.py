@@ -10,8 +10,17 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from creepkit import hookspecs
-from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, nearest, quoted
-from creepkit.records.plugin_calls import raised_text
+from creepkit.errors import (
+    CreepkitError,
+    ExportError,
+    HistoryError,
+    LawError,
+    PluginError,
+    SolveError,
+    nearest,
+    quoted,
+    raised_text,
+)
 from creepkit.registry.plugin_sources import Provenance
 
 if TYPE_CHECKING:

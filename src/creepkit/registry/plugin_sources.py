@@ -28,8 +28,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 
 import creepkit
-from creepkit.errors import PluginError
-from creepkit.records.plugin_calls import raised_text
+from creepkit.errors import PluginError, raised_text
 
 GROUP_PREFIX = "creepkit."
 

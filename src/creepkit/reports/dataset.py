@@ -94,7 +94,12 @@ def history_figure(data: Dataset, path: str | Path | None = None, *, seed: int =
     colour_map = _load_colours(loads)
     for axes, name in zip(panels, data.outputs, strict=True):
         for row, load in zip(selected, loads, strict=True):
-            axes.plot(data.times(row) / 3600.0, data.output(name)[row], lw=0.9, color=colour_map.to_rgba(load))
+            axes.plot(
+                data.times(row) / 3600.0,
+                data.values[row, :, data.outputs.index(name)],
+                lw=0.9,
+                color=colour_map.to_rgba(load),
+            )
         axes.set(xlabel="time, h", ylabel=f"{name}{_unit_label(column_units(data)[f'last {name}'])}")
         axes.grid(alpha=0.25)
     for axes in panels:

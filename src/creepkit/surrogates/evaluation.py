@@ -82,21 +82,12 @@ def relative_squared_error(true: Floats, predicted: Floats, mask: Bools, scale: 
     true, predicted : (n, frames, outputs). mask : (n, frames) which frames are data. scale : (outputs,).
     """
     scale = np.ones(true.shape[-1]) if scale is None else scale
+    mean = np.where(mask[..., None], true, 0.0).sum(axis=0) / np.maximum(mask.sum(axis=0), 1)[:, None]
     error_squares, deviation_squares = (
-        _sum_of_squares(v / scale, mask) for v in (predicted - true, deviations_from_mean(true, mask))
+        np.where(mask[..., None], v / scale, 0.0) ** 2 for v in (predicted - true, true - mean)
     )
-    return float(error_squares.sum() / deviation_squares.sum()) if deviation_squares.sum() > 0 else float("nan")
-
-
-def deviations_from_mean(true: Floats, mask: Bools) -> Floats:
-    """Outputs true (n, frames, outputs) less their mean over samples at each time; mask : (n, frames)."""
-    count = np.maximum(mask.sum(axis=0), 1)[:, None]
-    mean = np.where(mask[..., None], true, 0.0).sum(axis=0) / count
-    return np.asarray(true - mean)
-
-
-def _sum_of_squares(values: Floats, mask: Bools) -> Floats:
-    return np.asarray((np.where(mask[..., None], values, 0.0) ** 2).sum(axis=(0, 1)))
+    sums = error_squares.sum(axis=(0, 1)).sum(), deviation_squares.sum(axis=(0, 1)).sum()
+    return float(sums[0] / sums[1]) if sums[1] > 0 else float("nan")
 
 
 def error_metrics(true: Floats, predicted: Floats, mask: Bools) -> dict[str, float]:

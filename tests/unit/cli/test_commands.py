@@ -81,6 +81,17 @@ def test_a_misspelt_command_is_suggested() -> None:
     assert "Usage: creepkit fit" in creepkit("fit", "--help").stdout
 
 
+UNKNOWN = {
+    "report norton": "norton is a law: give --app for a page of its sliders",
+    "export my-law --to latex": "creepkit --plugin FILE.py before the command, or ck.load_plugin",
+    "export norton --to umat": "choose one of those that serve it: ",
+}
+
+
+def test_what_is_meant_is_said_for_what_there_is_not() -> None:
+    assert answers(UNKNOWN.items()) == []
+
+
 def test_version() -> None:
     assert creepkit("--version").stdout.startswith("creepkit 0.")
 

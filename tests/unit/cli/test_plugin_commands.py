@@ -70,11 +70,6 @@ def section(text: str, title: str) -> list[str]:
     return text.split(f"{title}:\n")[1].split("\n\n")[0].splitlines() if f"{title}:" in text else []
 
 
-def test_a_plugin_adds_a_command() -> None:
-    Path("mine.py").write_text(COMMAND.format(name="greet"))
-    assert creepkit("--plugin", "mine.py", "greet").stdout == "from a plugin\n"
-
-
 def test_help_lists_commands_of_plugins_in_a_section_of_their_own(install: Install, monkeypatch) -> None:
     Path("mine.py").write_text(COMMAND.format(name="greet"))
     Path("named.py").write_text(COMMAND.format(name="welcome"))
@@ -91,10 +86,6 @@ def test_help_lists_commands_of_plugins_in_a_section_of_their_own(install: Insta
     assert "greet" not in text.split("Commands of plugins")[0]
     assert "Plugins that failed" not in text
     assert "Commands of plugins" in creepkit().output, "without words the help is shown"
-
-
-def test_help_has_no_such_section_without_such_plugins() -> None:
-    assert "plugins:" not in creepkit("--help").stdout
 
 
 def test_help_imports_no_plugin_that_adds_no_command(install: Install) -> None:

@@ -67,7 +67,6 @@ def test_what_is_wrong_is_said_in_one_line(saved):
 
 
 def test_a_file_of_something_else_is_refused(tmp_path):
-    path = tmp_path / "x.json"
-    path.write_text("{}")
-    result = creepkit(f"predict {path} --stress 80 --end-h 1")
-    assert "this is not an identification" in one_line(result)
+    (tmp_path / "x.json").write_text("{}")
+    said = one_line(creepkit(f"predict {tmp_path / 'x.json'} --stress 80 --end-h 1"))
+    assert "this is not an identification" in said

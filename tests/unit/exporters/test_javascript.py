@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import sympy
 
-from creepkit.exporters.c import STABLE_FUNCTIONS
 from creepkit.exporters.javascript import JavaScriptExporter, law_expression
 from creepkit.language import CreepLaw, Param, State, parameters, states, stress
 from creepkit.laws.combined import COMBINED
@@ -74,12 +73,6 @@ def test_every_law_agrees_with_50_digits(tmp_path):
         return np.concatenate([rates[:, :, None], slopes], axis=2), update[:, 0]
 
     assert disagreements(evaluate) == []
-
-
-def test_these_laws_call_every_stable_function():
-    texts = [JavaScriptExporter().text(LawWithValues(case(name).law, case(name).sets[0])) for name in LAWS]
-    called_names = {name for text in texts for name in STABLE_FUNCTIONS if f"const {name} = (" in text}
-    assert called_names == {*STABLE_FUNCTIONS}
 
 
 # ---- what the module does ------------------------------------------------------------------------------------------

@@ -87,24 +87,6 @@ def test_between_the_rows_of_a_table_abaqus_is_within_a_thousandth(case):
     assert -1e-11 < min(errors) < 1e-4 < max(errors) < 1e-3
 
 
-@pytest.mark.parametrize(
-    ("name", "case"), [(n, c) for n in HAS for c in ("strain hardening", "time hardening") if c in HAS[n]]
-)
-def test_the_same_strain_after_the_same_time_in_pascal_and_hours(name, case):
-    """100 MPa from 1 to 100 h, from a strain of 1e-4: the card in Pa and h against the law in MPa and s."""
-    source = CASES[case]
-    hourly = READERS[name](exported(name, case, Units("Pa", "h")))
-    kernel = lower(source.law, "numpy")
-
-    def own(t, e):
-        return kernel.rate(source.values, stress=100.0, strain=e[0], time=t)
-
-    in_hours = solve_ivp(lambda t, e: [hourly(1e8, e[0], t, 1000.0)], (1, 100), [1e-4], rtol=1e-10, atol=1e-13)
-    in_seconds = solve_ivp(own, (3600, 360_000), [1e-4], rtol=1e-10, atol=1e-13)
-    assert in_hours.y[0, -1] > 2e-4
-    assert in_hours.y[0, -1] == pytest.approx(in_seconds.y[0, -1], rel=1e-8)
-
-
 def test_what_a_code_does_not_have_is_refused_with_a_way_out():
     refused = [(name, case) for name, cases in HAS.items() for case in sorted({*CASES} - cases)]
     for name, case in refused:

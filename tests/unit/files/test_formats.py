@@ -116,15 +116,11 @@ def test_documents_follow_the_schemas_of_their_kind(name: str) -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_data_sets_and_surrogates_are_read(version: str) -> None:
+def test_data_sets_surrogates_and_rupture_assessments_are_read(version: str) -> None:
     data = ck.read_dataset(FORMATS / version / "data_set.h5")
     assert (data.law.name, data.status.size) == ("norton", 16)  # rejected samples among them
     surrogate = ck.surrogate(FORMATS / version / "surrogate.safetensors")
     assert surrogate.metadata.law.name == "norton"
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-def test_rupture_assessments_are_read(version: str) -> None:
     assessment = ck.load_rupture_assessment(FORMATS / version / "rupture_assessment.json")
     assert {one.fit.method for one in assessment.ranked} == {"larson-miller"}
     assert len(assessment.tests) == 8

@@ -2,7 +2,6 @@
 
 import os
 import socket
-from pathlib import Path
 
 import pytest
 
@@ -41,12 +40,6 @@ def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path, monkeypatc
     assert "there is no such file" in refused(tmp_path / "none")
     with pytest.raises(FitError, match="is no regular file"):
         check_readable(tmp_path / "pipe", NOTE)
-
-
-@pytest.mark.skipif(not os.path.exists("/dev/zero"), reason="there is no /dev/zero here")
-def test_a_device_without_end_is_refused():
-    with pytest.raises(FitError, match="is no regular file"):
-        read_bytes(Path("/dev/zero"), NOTE)
 
 
 def test_a_large_file_is_refused_but_for_its_beginning(tmp_path):

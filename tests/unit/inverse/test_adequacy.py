@@ -106,17 +106,17 @@ def test_p_values_of_one_output_are_uniform(stated):
     assert np.abs(p - (np.arange(200) + 0.5) / 200).max() < 1.95 / np.sqrt(200)
 
 
-@pytest.mark.parametrize(("repeats", "most"), [(1, 6), (3, 6)])
-def test_false_alarms_with_noise_estimated_from_neighbours_are_few(repeats, most, monkeypatch):
-    """Three and nine whole tests drawn 150 times without stated noise: 1 % is 1.5, and four sigma more 6."""
+@pytest.mark.parametrize("repeats", [1, 3])
+def test_false_alarms_with_noise_estimated_from_neighbours_are_few(repeats, monkeypatch):
+    """Three and nine whole tests drawn 100 times without stated noise: 1 % is 1, and four sigma more 5."""
     monkeypatch.setattr(sys.modules[__name__], "CONDITIONS", CONDITIONS * repeats)
     alarms = 0
-    for seed in range(150):
+    for seed in range(100):
         tests = gauged(100 + seed, stated=False)
         found = judged(tests, *at_the_truth(tests))
         assert found.outputs[0].noise_source == "estimated"
         alarms += not found.explains
-    assert alarms <= most
+    assert alarms <= 5
 
 
 def test_a_frame_gives_a_fifth_of_a_degree_of_freedom_to_its_noise():

@@ -58,61 +58,61 @@ def test_a_sheet_of_a_spreadsheet(tmp_path):
     assert (second.unruptured, second.times[-1]) == (True, 1.8e7)
 
 
-@pytest.mark.parametrize(
-    ("written", "meant"),
-    [
-        ("sigma (ksi)", ("stress", "ksi")),
-        ("T_C", ("temperature", "C")),
-        ("t (h)", ("end_time", "h")),
-        ("MCR, h^-1", ("minimum_rate", "1/h")),
-        ("steady-state creep rate (s-1)", ("minimum_rate", "1/s")),
-        ("min rate per h", ("minimum_rate", "1/h")),
-        ("minimum_rate_%/h", ("minimum_rate", "pct/h")),
-        ("tr_h", ("rupture", "h")),
-        ("rupture life, hr", ("rupture", "h")),
-        ("elongation (%)", ("label elongation_pct", "")),
-        ("Heat No", ("label heat", "")),
-        ("strain rate (1/s)", ("", "")),
-    ],
-)
-def test_names_of_columns(written, meant):
-    assert key_of_column(written) == meant
+NAMES = [
+    ("sigma (ksi)", ("stress", "ksi")),
+    ("T_C", ("temperature", "C")),
+    ("t (h)", ("end_time", "h")),
+    ("MCR, h^-1", ("minimum_rate", "1/h")),
+    ("steady-state creep rate (s-1)", ("minimum_rate", "1/s")),
+    ("min rate per h", ("minimum_rate", "1/h")),
+    ("minimum_rate_%/h", ("minimum_rate", "pct/h")),
+    ("tr_h", ("rupture", "h")),
+    ("rupture life, hr", ("rupture", "h")),
+    ("elongation (%)", ("label elongation_pct", "")),
+    ("Heat No", ("label heat", "")),
+    ("strain rate (1/s)", ("", "")),
+]
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (("[%/h]", ""), r"table.csv:3: column 'min creep rate' has no unit; allowed: 1/s, 1/min, 1/h"),
-        (("[%/h]", "[%]"), r"table.csv:3: column 'min creep rate \[%\]' has the unit 'pct', which is not understood"),
-        (("2.1e-4", "0"), r"table.csv:4: 'min_?.*' is 0; a creep rate must lie above 0"),
-        (("2.1e-4", "slow"), r"table.csv:4: .* is 'slow'"),
-        (("A2,", "A1,"), r"table.csv:5: test 'A1' already stands in .*table.csv:4; give each row its own name"),
-        (("1e-3", ""), r"table.csv:6: no frames, no minimum creep rate and no end of the test"),
-        ((">10000", "10000*"), r"table.csv:5: .* is '10000\*'"),
-        (("heat", "stres_MPa"), r"table.csv:3: column 'stres_MPa' is not understood; did you mean 'stress'\?"),
-        (("heat", "sigma_MPa"), r"table.csv:3: 'stress_MPa' and 'sigma_MPa' mean the same; keep one of them"),
-        (("# control: stress", "# stress_MPa: 80"), r"table.csv:2: 'stress_MPa' is also a column"),
-        (("grain size", "ended"), r"table.csv:4: the test ended '40'; allowed: ruptured, stopped"),
-        (("Temperature (C)", "note"), r"table.csv:4: no temperature"),
-    ],
-)
-def test_bad_tables_are_refused_in_one_sentence(tmp_path, change, said):
-    assert change[0] in TABLE
-    with pytest.raises(HistoryError, match=said) as caught:
-        read(tmp_path, TABLE.replace(*change))
-    assert "\n" not in str(caught.value)
+def test_names_of_columns():
+    assert [(written, key_of_column(written)) for written, _ in NAMES] == NAMES
+
+
+REFUSED = [
+    (("[%/h]", ""), r"table.csv:3: column 'min creep rate' has no unit; allowed: 1/s, 1/min, 1/h"),
+    (("[%/h]", "[%]"), r"table.csv:3: column 'min creep rate \[%\]' has the unit 'pct', which is not understood"),
+    (("2.1e-4", "0"), r"table.csv:4: 'min_?.*' is 0; a creep rate must lie above 0"),
+    (("2.1e-4", "slow"), r"table.csv:4: .* is 'slow'"),
+    (("A2,", "A1,"), r"table.csv:5: test 'A1' already stands in .*table.csv:4; give each row its own name"),
+    (("1e-3", ""), r"table.csv:6: no frames, no minimum creep rate and no end of the test"),
+    ((">10000", "10000*"), r"table.csv:5: .* is '10000\*'"),
+    (("heat", "stres_MPa"), r"table.csv:3: column 'stres_MPa' is not understood; did you mean 'stress'\?"),
+    (("heat", "sigma_MPa"), r"table.csv:3: 'stress_MPa' and 'sigma_MPa' mean the same; keep one of them"),
+    (("# control: stress", "# stress_MPa: 80"), r"table.csv:2: 'stress_MPa' is also a column"),
+    (("grain size", "ended"), r"table.csv:4: the test ended '40'; allowed: ruptured, stopped"),
+    (("Temperature (C)", "note"), r"table.csv:4: no temperature"),
+]
+
+
+def test_bad_tables_are_refused_in_one_sentence(tmp_path):
+    for (old, new), said in REFUSED:
+        assert old in TABLE
+        with pytest.raises(HistoryError, match=said) as caught:
+            read(tmp_path, TABLE.replace(old, new))
+        assert "\n" not in str(caught.value)
 
 
 def test_ends_that_contradict_one_another(tmp_path):
     head = "stress_MPa,temperature_C,t_r_h,ended\n"
-    with pytest.raises(HistoryError, match=r"'>900' is a time without rupture, and the test ruptured; keep one"):
-        read(tmp_path, head + "100,700,>900,ruptured\n")
-    with pytest.raises(HistoryError, match=r"the test ruptured, and nothing says when; write rupture_h"):
-        read(tmp_path, head + "100,700,,ruptured\n")
+    for end, said in (
+        (">900,ruptured", "'>900' is a time without rupture, and the test ruptured; keep one"),
+        (",ruptured", "the test ruptured, and nothing says when; write rupture_h"),
+        (",stopped", "the test was stopped, and nothing says when; write end_time_h"),
+    ):
+        with pytest.raises(HistoryError, match=said):
+            read(tmp_path, f"{head}100,700,{end}\n")
     (known,) = read(tmp_path, "stress_MPa,temperature_C,min rate (1/h),t_r_h,ended\n100,700,1e-6,,ruptured\n")
     assert (known.end_known, known.labels["ended"]) == (False, "ruptured")
-    with pytest.raises(HistoryError, match=r"the test was stopped, and nothing says when; write end_time_h"):
-        read(tmp_path, head + "100,700,,stopped\n")
 
 
 # ---- heads without frames -----------------------------------------------------------------------------------------
@@ -130,20 +130,20 @@ def test_a_head_without_frames(tmp_path):
         read(tmp_path, text.replace("# minimum_rate_%/h: 1e-4\n", "# rupture_h: 5\n"))
 
 
-@pytest.mark.parametrize(
-    ("row", "unknown"),
-    [
-        ("A,120,750,,900,", ["minimum_rate unknown (empty cell)", "ended ruptured (empty cell)"]),
-        ("A,120,750,2e-6,,", ["rupture unknown (empty cell)", "ended unknown (empty cell)"]),
-        ("A,120,750,2e-6,>900,", []),
-        ("A,120,750,,>900,stopped", ["minimum_rate unknown (empty cell)"]),
-        ("A,120,750,2e-6,900,ruptured", []),
-    ],
-)
-def test_what_an_empty_cell_leaves_unknown_is_said(row, unknown, tmp_path):
-    (history,) = read(tmp_path, f"test,stress_MPa,temperature_C,min creep rate (1/h),t_r (h),ended\n{row}\n")
-    assumed = history.labels["assumed"].split(", ")
-    assert [text for text in assumed if "cell" in text] == unknown
+EMPTY = [
+    ("A,120,750,,900,", ["minimum_rate unknown (empty cell)", "ended ruptured (empty cell)"]),
+    ("A,120,750,2e-6,,", ["rupture unknown (empty cell)", "ended unknown (empty cell)"]),
+    ("A,120,750,2e-6,>900,", []),
+    ("A,120,750,,>900,stopped", ["minimum_rate unknown (empty cell)"]),
+    ("A,120,750,2e-6,900,ruptured", []),
+]
+
+
+def test_what_an_empty_cell_leaves_unknown_is_said(tmp_path):
+    for row, unknown in EMPTY:
+        (history,) = read(tmp_path, f"test,stress_MPa,temperature_C,min creep rate (1/h),t_r (h),ended\n{row}\n")
+        assumed = history.labels["assumed"].split(", ")
+        assert [text for text in assumed if "cell" in text] == unknown, row
 
 
 def test_a_column_of_specimens_names_the_tests(tmp_path):

@@ -43,6 +43,7 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
         (BASE + '[specimen]\nname = "bulge"\nlengths = { apex_mm = 1 }\n', 7, "did you mean"),
         (BASE + '[specimen]\nname = "bulge"\nlengths = { apex_thickness_kg = 1 }\n', 7, "no unit of 'apex_thickness'"),
         (BASE + '[[export]]\ntarget = "abacus"\n', 6, "did you mean 'abaqus'"),
+        (BASE + '[[export]]\ntarget = "umat"\n', 6, "choose one of those that serve it: "),
         (BASE + '[[export]]\ntarget = "latex"\nfile = "../law.tex"\n', 7, "plain name"),
         (BASE + '[[export]]\ntarget = "latex"\nfile = "study.toml"\n', 7, "of the study itself"),
         (BASE + '[report]\nfile = "/tmp/report.html"\n', 6, "plain name"),

@@ -56,6 +56,14 @@ def test_the_full_file_is_valid_and_names_most_keys():
     assert len(MISSPELT) > 200
 
 
+def test_the_page_has_the_name_of_its_study_where_none_is_given():
+    """Several studies in one folder then do not replace each other's page."""
+    text = '[data]\nfiles = ["*.csv"]\n[report]\n'
+    named = {"study": "report.html", "blades": "blades.html"}
+    found = {name: parse_study(Path(f"{name}.toml"), text).model.report for name in named}
+    assert {name: report.file for name, report in found.items()} == named
+
+
 def test_a_misspelt_key_is_refused_with_its_line_and_nearly_always_the_right_one():
     right = 0
     for position, key, wrong in MISSPELT:

@@ -7,9 +7,8 @@ import pytest
 import sympy
 
 import creepkit as ck
-from creepkit.errors import ArgumentError, LawError, SolveError
+from creepkit.errors import ArgumentError, LawError, SolveError, raised_text
 from creepkit.language import parameters, states, stress
-from creepkit.records.plugin_calls import raised_text
 from helpers.command_line import creepkit, one_line
 from helpers.paths import ROOT
 
