@@ -63,7 +63,7 @@ class IdentificationSettings(Options, title="settings of an identification", err
         example="thickness=0.4935:0.027",
     )
     weights: OutputWeights = option(
-        "likelihood", "Of outputs; equal: Eq. (4), paper: Eq. (S3).", example="amplitude=0.99,width=0.005"
+        "noise", "Of outputs; equal: Eq. (4), paper: Eq. (S3).", example="amplitude=0.99,width=0.005"
     )
     test_loss: Literal["gaussian", "student"] = option(
         "gaussian", "Of whole tests; with student one far from its replicates weighs less."
