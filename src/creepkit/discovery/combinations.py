@@ -6,7 +6,8 @@ sec. 2.5),
     chi^2 / c + 2 k + 2 k (k + 1)/(N - k - 1) - 2 ln(prior odds),
 
 with k numbers, N rows and c = max(1, least chi^2/(N - k)), which widens covariances that are too small for every form.
-Few combinations are all tried; many are searched greedily, one parameter at a time with the others fixed.
+Few combinations are all tried; many are searched greedily, one parameter at a time with the others fixed. One that
+fails is recorded with its reason, and the others go on.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ from itertools import product
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.discovery.forms import ARRHENIUS, CandidateForm
+from creepkit.discovery.forms import ARRHENIUS, CandidateForm, law_with_forms
 from creepkit.discovery.regression import IsothermalEstimates, Regression, regress
-from creepkit.errors import FitError
+from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.information_criteria import criterion_weights
 from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.language import CreepLaw
 
 MAX_EXHAUSTIVE = 150
 """Up to so many combinations are all tried."""
@@ -32,6 +34,11 @@ MAX_SWEEPS = 4
 
 
 CREDIBLE_MASS = 0.95
+
+
+FAILURES = (CreepkitError, ArithmeticError, TypeError, ValueError)
+"""What one combination may end with: a law that is too large or impossible, a form that is no number, a regression that
+does not converge."""
 
 
 CHI_SQUARE_95 = 3.84
@@ -68,11 +75,14 @@ class RankedCombinations:
     overdispersion : c, by which the covariances of the estimates are too small.
     plausible_forms : {parameter: forms that remain, best first}: those that have 95 % of the weight, and those
         equivalent to the best with no more numbers.
+    law : the law with the best forms. failed : {forms, in the order of the parameters: why nothing came of them}.
     """
 
     combinations: tuple[WeightedCombination, ...]
     overdispersion: float
     plausible_forms: Mapping[str, tuple[FormWeight, ...]]
+    law: CreepLaw
+    failed: Mapping[tuple[str, ...], str]
 
     @property
     def best(self) -> Regression:
@@ -102,38 +112,52 @@ def rank_combinations(
         _coordinate_search(cache, candidates)
     admissible = [
         regression
-        for regression in cache.regressions
+        for regression in cache.regressions.values()
         if regression.parameter_count < regression.rows - 1 and regression.within_bounds()
     ]
-    if not admissible:
-        raise FitError(f"no form of {', '.join(names)} within its bounds has fewer numbers than these points allow")
-    overdispersion = max(1.0, min(one.chi_square / (one.rows - one.parameter_count) for one in admissible))
-    scores = np.array([_quasi_aicc(one, overdispersion) for one in admissible])
+    while admissible:
+        overdispersion = max(1.0, min(one.chi_square / (one.rows - one.parameter_count) for one in admissible))
+        scores = np.array([_quasi_aicc(one, overdispersion) for one in admissible])
+        order = np.argsort(scores, kind="stable")
+        best = admissible[order[0]]
+        try:
+            law = law_with_forms(points.law, best.candidate_forms)
+            break
+        except FAILURES as error:  # as of a law with so many numbers that its derivatives are too large
+            cache.failed[tuple(best.forms.values())] = str(error)
+            admissible.remove(best)
+    else:
+        reason = next(iter(cache.failed.values()), "none within its bounds has fewer numbers than these points allow")
+        raise FitError(f"no combination of forms of {', '.join(names)} is possible: {reason}")
     excess, weights = criterion_weights(scores)
-    order = np.argsort(scores, kind="stable")
     combinations = [WeightedCombination(admissible[k], float(excess[k]), float(weights[k])) for k in order]
     plausible_forms = {name: _plausible_forms(name, combinations, points, overdispersion) for name in names}
-    return RankedCombinations(tuple(combinations), overdispersion, plausible_forms)
+    return RankedCombinations(tuple(combinations), overdispersion, plausible_forms, law, cache.failed)
 
 
 class _RegressionCache:
-    """Regressions of combinations, each made once; total : how many there may be."""
+    """Regressions of combinations, each made once; total : how many there may be; failed : why of those that end."""
 
     def __init__(self, points: IsothermalEstimates, total: int, progress: IterationCallback | None) -> None:
         self.points, self.total, self.progress = points, total, progress
-        self._regressions: dict[tuple[str, ...], Regression] = {}
+        self.regressions: dict[tuple[str, ...], Regression] = {}
+        self.failed: dict[tuple[str, ...], str] = {}
 
-    def __call__(self, forms: Sequence[CandidateForm]) -> Regression:
+    def __call__(self, forms: Sequence[CandidateForm]) -> Regression | None:
         key = tuple(form.name for form in forms)
-        if key not in self._regressions:
-            self._regressions[key] = regress(self.points, forms)
+        if key not in self.regressions and key not in self.failed:
+            try:
+                self.regressions[key] = regress(self.points, forms)
+            except FAILURES as error:
+                self.failed[key] = str(error)
             if self.progress is not None:
-                self.progress("combination of forms", len(self._regressions), self.total)
-        return self._regressions[key]
+                self.progress("combination of forms", len(self.regressions) + len(self.failed), self.total)
+        return self.regressions.get(key)
 
-    @property
-    def regressions(self) -> list[Regression]:
-        return list(self._regressions.values())
+    def score(self, forms: Sequence[CandidateForm]) -> float:
+        """The quasi AICc of a combination; infinite where it fails."""
+        regression = self(forms)
+        return np.inf if regression is None else _quasi_aicc(regression, 1.0)
 
 
 def _coordinate_search(cache: _RegressionCache, candidates: Mapping[str, Sequence[CandidateForm]]) -> None:
@@ -142,8 +166,7 @@ def _coordinate_search(cache: _RegressionCache, candidates: Mapping[str, Sequenc
     for _ in range(MAX_SWEEPS):
         previous = [one.name for one in current]
         for k, own in enumerate(candidates.values()):
-            combinations = [[*current[:k], one, *current[k + 1 :]] for one in own]
-            current = min(combinations, key=lambda chosen: _quasi_aicc(cache(chosen), 1.0))
+            current = min(([*current[:k], one, *current[k + 1 :]] for one in own), key=cache.score)
         if [one.name for one in current] == previous:
             return
 

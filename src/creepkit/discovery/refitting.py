@@ -16,11 +16,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.discovery.combinations import CREDIBLE_MASS, FormWeight, squared_mahalanobis, weight_of_better_forms
+from creepkit.discovery.combinations import (
+    CREDIBLE_MASS,
+    FAILURES,
+    FormWeight,
+    squared_mahalanobis,
+    weight_of_better_forms,
+)
 from creepkit.discovery.forms import ARRHENIUS, CandidateForm, law_with_forms
 from creepkit.discovery.regression import IsothermalEstimates, Regression, check_temperatures, regress
 from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw, averaged_estimates
-from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
@@ -162,7 +167,8 @@ def refit(
     for name in [n for n in current if current[n].name != baseline[n].name]:
         current = cache.try_forms(current, name, [baseline[name]])
     if not cache.fitted:
-        raise FitError(f"no form could be refitted; the first said: {next(iter(cache.failed.values()))}")
+        note = f"no form could be refitted to the tests: {next(iter(cache.failed.values()))}"
+        return replace(temperature_law, notes=(*temperature_law.notes, note))
     if search_again:
         cache.search_again()
     return weigh_refits(temperature_law, list(cache.fitted.values()), cache.failed)
@@ -189,13 +195,17 @@ class _RefitCache:
         key = tuple(form.name for form in forms)
         if key in self.fitted or key in self.failed:
             return
-        regression = regress(self.estimates, forms)
-        law = law_with_forms(self.estimates.law, forms)
         fits, failure = [], ""
-        for start_values in self._starts(law, regression):
+        try:
+            regression = regress(self.estimates, forms)
+            law = law_with_forms(self.estimates.law, forms)
+            starts = self._starts(law, regression)
+        except FAILURES as error:
+            starts, failure = [], str(error)
+        for start_values in starts:
             try:
                 fits.append(self._identify(law, start_values))
-            except CreepkitError as error:
+            except FAILURES as error:
                 failure = str(error)
         if fits:
             fit = max(fits, key=lambda end: end.log_likelihood)

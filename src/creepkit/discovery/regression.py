@@ -26,7 +26,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, ReferencePoint
-from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile, lies_at_bound
 from creepkit.language import CreepLaw, Param, temperature
 from creepkit.records import ZERO_CELSIUS
 
@@ -152,7 +152,7 @@ def _theta_covariance(fit: Identification) -> Floats:
 
 def _bound_variance(fit: Identification) -> Floats:
     """(parameters, parameters) variance to add where an estimate lies at its bound, which says nothing but that."""
-    at_bound = [e.verdict == "at its bound" for e in fit.estimates]
+    at_bound = [lies_at_bound(fit.law.table[e.name], e) for e in fit.estimates]
     return np.asarray(np.diag(np.where(at_bound, np.ptp(fit.law.internal_bounds, axis=0) ** 2 / 12.0, 0.0)))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.discovery.combinations import FormWeight, RankedCombinations
-from creepkit.discovery.forms import CandidateForm, evaluate_forms, law_with_forms
+from creepkit.discovery.forms import CandidateForm, evaluate_forms
 from creepkit.discovery.regression import INFINITE_FREEDOM, IsothermalEstimates
 from creepkit.errors import FitError, nearest
 from creepkit.files.json_documents import DocumentFormat, write_json
@@ -227,8 +227,8 @@ def temperature_law_from_combinations(
         )
         for weighted, freedom_of_one in zip(combinations.combinations, degrees_of_freedom, strict=True)
     )
-    law = law_with_forms(estimates.law, candidates[0].candidate_forms)
-    notes = []
+    law = combinations.law
+    notes = failure_notes(combinations.failed)
     if combinations.overdispersion > NOTED_OVERDISPERSION:
         widening = np.sqrt(combinations.overdispersion)
         notes.append(f"no form follows the points within their errors, which were taken {widening:.2g} times wider")
@@ -246,6 +246,13 @@ def temperature_law_from_combinations(
         combinations=combinations,
         notes=tuple(notes),
     )
+
+
+def failure_notes(failed: Mapping[tuple[str, ...], str]) -> list[str]:
+    """How many combinations of forms failed, with the first of them and its reason, in one sentence; or none."""
+    first = next(iter(failed), ())
+    count = f"{len(failed)} combination{'s' * (len(failed) > 1)} of forms failed"
+    return [f"{count}; the first, {', '.join(first)}, with: {failed[first]}"] if failed else []
 
 
 def averaged_estimates(law: CreepLaw, candidates: Sequence[CandidateLaw]) -> tuple[Estimate, ...]:
@@ -274,7 +281,7 @@ def _estimate(name: str, form: CandidateForm, candidates: Sequence[CandidateLaw]
     _, low, high = (float(end) for end in mixture.interval())
     lower_bound, upper_bound = (param.to_internal(b) for b in param.bounds)
     value, low, high = (float(np.clip(v, lower_bound, upper_bound)) for v in (value, low, high))
-    verdict = verdict_of_interval(value, (low, high), (lower_bound, upper_bound))
+    verdict = verdict_of_interval(param, value, (low, high))
     from_internal = param.from_internal
     return Estimate(name, from_internal(value), from_internal(low), from_internal(high), param.unit, verdict)
 

@@ -19,7 +19,7 @@ from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig, variations_of_tests
 from creepkit.experiments.design_checks import edges_of, notes_of, rigs_for
 from creepkit.experiments.design_task import DesignTask, Goal, task_of
-from creepkit.experiments.expectations import Criterion, Expectation, PrecisionCriterion
+from creepkit.experiments.expectations import DesignCriterion, Expectation, PrecisionCriterion
 from creepkit.experiments.known_laws import KnownLaw
 from creepkit.experiments.law_discrimination import Alteration, LawCriterion
 from creepkit.experiments.planned_design import ALIKE, Design, PlannedTest
@@ -129,7 +129,7 @@ class _Search:
             known = [KnownLaw.from_identification(fit, noise_model) for fit in task.laws]
             known += [KnownLaw.from_altered(task.laws[k], altered, noise_model) for k, altered in task.altered]
         self.outcomes = PlannedOutcomes(known, progress, len(task.laws))
-        self.criterion: Criterion
+        self.criterion: DesignCriterion
         if task.goal == "law":
             self.criterion = _law_criterion(task, self.outcomes, seed)
         else:

@@ -63,7 +63,7 @@ class Expectation:
     chi_squares: tuple[ExpectedChiSquare, ...] = ()
 
 
-class Criterion(Protocol):
+class DesignCriterion(Protocol):
     """A goal, made a number for planned tests that were added to the outcomes.
 
     differs_at_draws : whether it is worked out at draws of the posterior where that is asked for.

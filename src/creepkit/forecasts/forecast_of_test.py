@@ -39,7 +39,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.tested_region import outside_combinations
-from creepkit.inverse.uncertainty.laplace_approximation import ONE_SIDED
+from creepkit.inverse.uncertainty.laplace_approximation import is_open
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, is_logarithmic, output_unit
 
@@ -380,7 +380,7 @@ def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputFo
 def _caution(laws: Sequence[LawDraws]) -> str:
     """Why a band may hold what the tests exclude: Gaussian draws of values that they do not determine; else ""."""
     for draws in laws:
-        open_ = [e.name for e in draws.fit.estimates if e.verdict not in ("determined", ONE_SIDED)]
+        open_ = [e.name for e in draws.fit.estimates if is_open(draws.fit.law.table[e.name], e)]
         if open_ and not has_sampled_draws(draws.fit):
             outside = f"{100 * draws.outside:.0f} % of them"
             names = ", ".join(open_)

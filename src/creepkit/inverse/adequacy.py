@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from creepkit.inverse.contradicting_values import ContradictingValues
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
+from creepkit.inverse.single_values import ContradictingValues
 from creepkit.inverse.variance_components import SMALLEST_RATE_SCATTER
 from creepkit.records import output_unit
 

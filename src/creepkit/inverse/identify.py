@@ -20,7 +20,6 @@ from creepkit.inverse.composite_predictor import (
     refined_of,
     through_for_law,
 )
-from creepkit.inverse.contradicting_values import contradicting_values
 from creepkit.inverse.defect_correction import (
     NumericalError,
     correct_defect,
@@ -50,19 +49,18 @@ from creepkit.inverse.iterative_estimation import (
 )
 from creepkit.inverse.judged_residuals import at_own_rates
 from creepkit.inverse.kept_fits import kept_where_asked
-from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
-from creepkit.inverse.rupture_prediction import compare_rupture_times
 from creepkit.inverse.rupture_use import compared_tests, compares_rupture_times
 from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import MultiStart
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.single_values import LawAtTests, contradicting_values
 from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.inverse.uncertainty.laplace_approximation import (
@@ -163,7 +161,7 @@ def _beside_the_others(fit: Identification, without: Identification, test: int, 
     others = at(0.0)
     if all(map(is_logarithmic, problem.observations.outputs)):
         size = float(others.rates.median_log_factors[test])
-    elif problem.every_rate_has_coefficient:
+    elif problem.coordinates.every_rate_has_coefficient:
         for _ in range(NEWTON_STEPS):
             step = float(at(size).rates.own_log_factors[test])
             size += step
@@ -330,10 +328,9 @@ def _result(
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
     law_covariance = positive_semidefinite(covariance[:count, :count])
-    known = coordinates, u, scatter, noise_model, histories, problem.predictor
+    values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)
-    ends = compare_rupture_times(*known, without_curves=used)
-    single_values = [*zip(ends, compare_minimum_rates(*known), strict=True)]
+    single_values = values_of_tests.compared(histories, without_curves=used)
     random_effects = predicted_random_effects(residuals, noise_model)
     tests = test_fits(problem, residuals, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(

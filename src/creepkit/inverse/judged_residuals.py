@@ -93,7 +93,7 @@ def at_own_rates(
 ) -> LinearisedProblem:
     """The problem made linear at x (unknowns,) and where the rate of each test is its own, by which a law is judged."""
     log_factors = predicted_random_effects(linear.residuals, noise_model)[1]
-    if np.abs(log_factors).max() < NOTEWORTHY_FACTOR or not problem.every_rate_has_coefficient:
+    if np.abs(log_factors).max() < NOTEWORTHY_FACTOR or not problem.coordinates.every_rate_has_coefficient:
         return linear
     there = problem.residuals_at_rates(x, log_factors)
     values = there.values - log_factors[:, None] * there.log_rate_sensitivity

@@ -1,8 +1,11 @@
-"""Minimum creep rates of tests that have no frames, predicted as one more output, with sensitivities.
+"""Minimum creep rates: predicted as one more output, with sensitivities, and measured on curves.
 
 The rate is the slope of the predicted curve of the leading strain between neighbouring times; its minimum lies on the
 parabola through the logarithms of three slopes, over ln t. Of a curve with a primary and a tertiary stage it is within
 0.2 % of the exact minimum, of steady creep exact, and the derivatives are those of the parabola.
+
+The measured rate of a curve is the least slope of straight lines through neighbouring readings. Each line spans a tenth
+of the test at least, and as many readings more as its slope needs to be known to LARGEST_ERROR from their noise.
 """
 
 from __future__ import annotations
@@ -16,9 +19,21 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for
 from creepkit.inverse.duration import compares_minimum_rate, duration_known, followed_duration, needs_durations
+from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import CreepLaw, strain, time
-from creepkit.records import History, NuisanceValues, Output, Prediction, Predictor, load_unit, outputs_of
+from creepkit.records import (
+    History,
+    NuisanceValues,
+    Output,
+    Prediction,
+    Predictor,
+    growing_output,
+    is_logarithmic,
+    load_unit,
+    outputs_of,
+)
 
 TIMES = np.concatenate([[0.0], np.geomspace(1e-6, 0.1, 48), np.linspace(0.1, 1.0, 25)[1:]])
 """Times between which rates are taken, over the duration of the test: early ones for predictions that break early."""
@@ -188,3 +203,72 @@ def _with_output(array: Floats, tests: Sequence[int], values: Floats) -> Floats:
     further = np.full((*array.shape[:3], 1, *array.shape[4:]), np.nan)
     further[:, tests, 0, 0] = values
     return np.concatenate([array, further], axis=3)
+
+
+SHORTEST_SPAN = 0.1
+"""Of the duration of a test: over less, a slope is not taken."""
+
+
+FEWEST_READINGS = 5
+"""Readings from which a slope is taken."""
+
+
+LARGEST_ERROR = 0.05
+"""Relative standard deviation of a slope from the noise of a reading."""
+
+
+def measured_minimum_rate(history: History) -> float:
+    """The minimum creep rate that a test states or its strain shows, 1/s; NaN where it is not known.
+
+    Load and temperature have to be constant, and the leading output a strain.
+    """
+    loads, temperatures = history.loading.program().values, history.temperature_program().values
+    held = history.loading.quantity == "stress" and np.ptp(temperatures) <= ISOTHERMAL_RANGE
+    if not (held and np.ptp(loads) <= CONSTANT_LOAD * np.abs(loads).max()):
+        return float("nan")
+    if history.minimum_rate is not None:
+        return history.minimum_rate
+    output = growing_output(history) if history.outputs else ""
+    if not is_logarithmic(output):
+        return float("nan")
+    used = usable_frames(history, output)
+    noise = noise_standard_deviation(history, output)[used]
+    return least_slope(history.times[used], history.outputs[output][used], noise)
+
+
+def least_slope(times: Floats, strains: Floats, noise: Floats) -> float:
+    """The least slope of straight lines through neighbouring readings, 1/s; NaN where no slope is known well enough.
+
+    times, strains, noise : (readings,) s and -, noise the standard deviation of a reading.
+    """
+    least, span = float("nan"), SHORTEST_SPAN * float(times[-1]) if times.size else 0.0
+    for first in range(times.size - FEWEST_READINGS + 1):
+        start = max(first + FEWEST_READINGS, int(np.searchsorted(times, times[first] + span)) + 1)
+        for end in range(start, times.size + 1):
+            t = times[first:end] - times[first:end].mean()
+            squares = float((t**2).sum())
+            slope = float((t * strains[first:end]).sum()) / squares
+            error = float(np.sqrt((t**2 * noise[first:end] ** 2).sum())) / squares
+            if slope > 0.0 and error <= LARGEST_ERROR * slope:
+                least = slope if np.isnan(least) else min(least, slope)
+                break
+    return least
+
+
+def apparent_exponent(stresses: Floats, rates: Floats, temperatures: Floats) -> float:
+    """d ln rate / d ln stress by regression with a level of each temperature; NaN where the stresses do not differ.
+
+    stresses, rates, temperatures : (tests,) MPa, 1/s and K.
+    """
+    known = np.isfinite(rates) & (rates > 0)
+    x, y, levels = np.log(stresses[known]), np.log(rates[known]), np.round(temperatures[known] / ISOTHERMAL_RANGE)
+    for level in np.unique(levels):
+        same = levels == level
+        x[same] -= x[same].mean()
+        y[same] -= y[same].mean()
+    squares = float((x**2).sum())
+    return float((x * y).sum()) / squares if squares > LEAST_SPREAD * max(x.size, 1) else float("nan")
+
+
+LEAST_SPREAD = 0.03**2
+"""Mean square of ln stress about its means from which an exponent is taken."""

@@ -147,14 +147,14 @@ class RatePerturbations:
 
 
 @dataclass(frozen=True, eq=False)
-class Conditions:
+class RateConditions:
     """Of each test the stress, MPa, and temperature, K, and ln stress and -1/(R T), mol/J, less their means."""
 
     stresses: Floats
     temperatures: Floats
 
     @classmethod
-    def of_problem(cls, problem: LeastSquaresProblem) -> Conditions:
+    def of_problem(cls, problem: LeastSquaresProblem) -> RateConditions:
         """Medians over each test."""
         stresses = [float(np.median(reference_stresses(h, problem.predictor))) for h in problem.histories]
         return cls(np.maximum(stresses, 1e-6), np.array([h.mean_temperature for h in problem.histories]))
@@ -179,7 +179,7 @@ class RateExplanations:
         self.problem, self.x = problem, x
         fixed = ("", "rate") in components_fixed_by_priors(problem.settings.nuisances, list(noise.outputs))
         self.rates = RatePerturbations(linear, noise, scatter_known=fixed or not noise.rate > 0)
-        self.conditions = Conditions.of_problem(problem)
+        self.conditions = RateConditions.of_problem(problem)
         self.possible = len(problem.histories) >= FEWEST_TESTS and bool(linear.residuals.log_rate_sensitivity.any())
 
     @cached_property

@@ -34,7 +34,8 @@ def fit(tests):
 def test_planted_values_lie_in_their_intervals(fit):
     for e in fit.estimates:
         assert e.low <= TRUTH[e.name] <= e.high
-        assert e.verdict == "determined"
+        is_within_a_decade = e.name != "A" or e.high <= 10 * e.low
+        assert e.verdict == ("determined" if is_within_a_decade else "poorly determined")
 
 
 def test_without_scatter_the_values_are_exact():

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from creepkit.inverse.orthogonal_residual import orthogonal_distance
+from creepkit.inverse.residuals import orthogonal_distance
 from creepkit.inverse.scatter_of_lives import life_sensitivity
 
 

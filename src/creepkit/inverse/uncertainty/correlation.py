@@ -131,10 +131,11 @@ def _groups(fit: Identification, undetermined_indices: Ints) -> list[list[int]]:
 def _undetermined_sentence(fit: Identification, group: list[int]) -> str:
     names = [fit.law.names[k] for k in group]
     if len(group) == 1:
-        estimate, relative_width = fit.estimates[group[0]], float(_relative_widths(fit)[group[0]])
-        interval = f"[{estimate.low:.3g}, {estimate.high:.3g}]"
-        fills = f"its interval {interval} fills {relative_width:.0%} of its bounds"
-        return f"the parameter {names[0]} ({fit.law.table[names[0]].meaning}) is {estimate.verdict}: {fills}"
+        estimate, param = fit.estimates[group[0]], fit.law.table[names[0]]
+        of_bounds = f"fills {float(_relative_widths(fit)[group[0]]):.0%} of its bounds"
+        width = f"spans a factor of {estimate.high / estimate.low:.2g}" if param.scale == "log" else of_bounds
+        interval = f"its interval [{estimate.low:.3g}, {estimate.high:.3g}] {width}"
+        return f"the parameter {names[0]} ({param.meaning}) is {estimate.verdict}: {interval}"
     loose = [name for k, name in zip(group, names, strict=True) if fit.estimates[k].verdict in LOOSE]
     tied = [name for name in names if name not in loose]
     several = len(loose) > 1

@@ -26,7 +26,7 @@ from creepkit.inverse.noise_model import (
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import SINGLE_VALUES
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, scaled_inverse
-from creepkit.language import CreepLaw
+from creepkit.language import CreepLaw, Param
 from creepkit.records import Nuisance
 
 LOG_COMPONENT_STEP = 1e-3
@@ -127,8 +127,13 @@ def _covariance_derivative(residuals: Residuals, noise_model: NoiseModel, output
     return np.asarray((at(LOG_COMPONENT_STEP) - at(-LOG_COMPONENT_STEP)) / (2.0 * LOG_COMPONENT_STEP))
 
 
-UNDETERMINED_WIDTH = 1.0 / 3.0
-"""Width of a 95 % interval over that of the bounds from which on a parameter is determined poorly, or not at all."""
+DETERMINED_FACTOR, DETERMINED_SHARE = 10.0, 0.25
+"""Widest 95 % interval of a parameter that is determined: a factor of ten of a coefficient, and a quarter of the bounds
+of any parameter."""
+
+
+OPEN_SHARE = 1.0 / 3.0
+"""Share of the bounds from which on an interval is more that of the bounds than of the tests."""
 
 
 NOT_DETERMINED, POORLY_DETERMINED = "not determined", "poorly determined"
@@ -273,7 +278,7 @@ def parameter_estimates(
         value = low if value - low < 1e-9 * (high - low) else high if high - value < 1e-9 * (high - low) else value
         a, b = max(value - quantile * standard_deviation, low), min(value + quantile * standard_deviation, high)
         middle, bottom, top = (param.from_internal(float(v)) for v in (value, a, b))
-        verdict = verdict_of_interval(float(value), (float(a), float(b)), (low, high))
+        verdict = verdict_of_interval(param, float(value), (float(a), float(b)))
         results.append(Estimate(name, middle, bottom, top, param.unit, verdict))
     return tuple(results)
 
@@ -317,21 +322,44 @@ def interval_ends(law: CreepLaw, estimate: Estimate) -> tuple[str, str]:
     return f"{estimate.low:.4g}{marks[0]}", f"{estimate.high:.4g}{marks[1]}"
 
 
-def verdict_of_interval(value: float, interval: tuple[float, float], bounds: tuple[float, float]) -> str:
+def verdict_of_interval(param: Param, value: float, interval: tuple[float, float]) -> str:
     """What the tests say of a parameter, given its law: the one rule of tables, texts and exports.
 
-    Of a 95 % interval that fills a third of the bounds or more "not determined" where it ends at one of them, and
-    "poorly determined" where the tests bound it on both sides; "at its bound" where the value lies
-    there; "bounded on one side only" where the interval ends at a bound of the search; else "determined". All numbers
-    are on the internal scale of the parameter, the interval cut at the bounds.
+    A 95 % interval wider than a quarter of the bounds, or than a factor of ten where the scale is log, does not
+    determine it: "not determined" where it ends at a bound, "poorly determined" where the tests bound it on both sides.
+    Else "at its bound" where the value lies there; "bounded on one side only" where the interval ends at a bound of the
+    search; "determined". value, interval : on the internal scale, the interval cut at the bounds.
     """
-    (low, high), width = interval, bounds[1] - bounds[0]
-    cut = min(low - bounds[0], bounds[1] - high) <= 1e-9 * width
-    if high - low >= UNDETERMINED_WIDTH * width:
+    (low, high), (lowest, highest) = interval, (param.to_internal(bound) for bound in param.bounds)
+    width = highest - lowest
+    widest = DETERMINED_SHARE * width
+    if param.scale == "log":
+        widest = min(widest, float(np.log(DETERMINED_FACTOR)))
+    cut = min(low - lowest, highest - high) <= 1e-9 * width
+    if high - low > widest:
         return NOT_DETERMINED if cut else POORLY_DETERMINED
-    if min(value - bounds[0], bounds[1] - value) <= AT_BOUND * width:
+    if _lies_at_bound(param, value):
         return "at its bound"
     return ONE_SIDED if cut else "determined"
+
+
+def lies_at_bound(param: Param, estimate: Estimate) -> bool:
+    """Whether the value of an estimate lies at a bound of the search."""
+    return _lies_at_bound(param, param.to_internal(estimate.value))
+
+
+def is_open(param: Param, estimate: Estimate) -> bool:
+    """Whether bounds of the search say more of a parameter than the tests: its interval fills a third, or it is at one.
+
+    Gaussian draws about such a value are not those of the tests.
+    """
+    low, high, *bounds = (param.to_internal(x) for x in (estimate.low, estimate.high, *param.bounds))
+    return high - low >= OPEN_SHARE * (bounds[1] - bounds[0]) or lies_at_bound(param, estimate)
+
+
+def _lies_at_bound(param: Param, value: float) -> bool:
+    low, high = (param.to_internal(bound) for bound in param.bounds)
+    return min(value - low, high - value) <= AT_BOUND * (high - low)
 
 
 def delta_method(

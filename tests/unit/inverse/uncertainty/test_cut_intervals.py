@@ -51,7 +51,7 @@ def test_a_rate_far_below_1e_8_is_not_taken_for_its_bound() -> None:
     ("value", "interval", "verdict"),
     [
         (0.50, (0.40, 0.60), "determined"),
-        (0.50, (0.33, 0.67), "poorly determined"),  # 34 % of the bounds, and by the tests on both sides
+        (0.50, (0.37, 0.63), "poorly determined"),  # 26 % of the bounds, and by the tests on both sides
         (0.30, (0.00, 0.34), "not determined"),
         (0.50, (0.00, 1.00), "not determined"),
         (0.90, (0.60, 1.00), "not determined"),
@@ -61,11 +61,33 @@ def test_a_rate_far_below_1e_8_is_not_taken_for_its_bound() -> None:
     ],
 )
 def test_one_rule_says_what_is_determined(value: float, interval: tuple[float, float], verdict: str) -> None:
-    assert verdict_of_interval(value, interval, (0.0, 1.0)) == verdict
+    assert verdict_of_interval(ck.Param("exponent", bounds=(0.0, 1.0)), value, interval) == verdict
+
+
+@pytest.mark.parametrize(
+    ("interval", "verdict"),
+    [
+        ((1.4e-18, 3.0e-11), "poorly determined"),  # seven decades of fifty
+        ((1.0e-16, 1.1e-15), "poorly determined"),
+        ((1.0e-16, 0.9e-15), "determined"),
+        ((1.0e-40, 0.9e-39), "bounded on one side only"),
+        ((1.0e-40, 1.0e-30), "not determined"),
+    ],
+)
+def test_a_coefficient_is_determined_within_a_factor_of_ten(interval: tuple[float, float], verdict: str) -> None:
+    low, high = np.log(interval)
+    param = ck.Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e10), scale="log")
+    assert verdict_of_interval(param, 0.5 * (low + high), (low, high)) == verdict
+
+
+def test_a_coefficient_of_narrow_bounds_is_determined_by_a_quarter_of_them() -> None:
+    """Bounds that are a factor of ten apart do not make every interval within them a determination."""
+    param = ck.Param("rate coefficient", unit="1/s", bounds=(1e-6, 1e-5), scale="log")
+    assert verdict_of_interval(param, np.log(3e-6), (np.log(1.5e-6), np.log(6e-6))) == "poorly determined"
 
 
 def test_nearly_equal_intervals_from_near_zero_to_a_bound_have_one_verdict() -> None:
     """Two transients that the tests cannot tell apart: of each the interval goes over ten decades up to its bound."""
-    bounds = (np.log(1e-14), np.log(0.01))
+    param = ck.Param("rate coefficient", unit="1/s", bounds=(1e-14, 0.01), scale="log")
     for low in (5.132e-13, 5.195e-13):
-        assert verdict_of_interval(np.log(8.2e-6), (np.log(low), bounds[1]), bounds) == "not determined"
+        assert verdict_of_interval(param, np.log(8.2e-6), (np.log(low), np.log(0.01))) == "not determined"
