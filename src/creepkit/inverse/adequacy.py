@@ -19,6 +19,10 @@ IMPLAUSIBLE_CHI_SQUARE = 0.05
 """Reduced chi-square below which the noise that was stated is questioned: 4.5 times what the frames show."""
 
 
+SHAPE_MISFIT = 5.0
+"""Noises that a law leaves of an output, from which on it misses the shape of curves, and its rates are doubtful."""
+
+
 UNDETECTED_SCATTER = 1.5 * SMALLEST_RATE_SCATTER
 """Of ln rate between tests: an estimate that is not above is at its lower bound."""
 
@@ -129,7 +133,12 @@ class Adequacy:
     @property
     def lies_in_tests(self) -> bool:
         """Whether what is left is explained by one test or by two groups of tests, and not by another law."""
-        return bool(self.explanations) and not self.explanations[0].is_of_law
+        return self.is_explained and not self.explanations[0].is_of_law
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether rates of tests are what the law misses, and not the shape of their curves."""
+        return bool(self.explanations) and not self.discrepancy_in_noises > SHAPE_MISFIT
 
     @property
     def explanation_text(self) -> str:
@@ -256,7 +265,8 @@ class Adequacy:
         if self.explanations and not parts:
             return f"is contradicted by the rates of the tests: {self.explanation_text} {judged}"
         rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained {judged}{where}"
-        return f"{rest}; {self.explanation_text}" if self.explanations else rest
+        beside = "" if self.is_explained else "of its rates, "
+        return f"{rest}; {beside}{self.explanation_text}" if self.explanations else rest
 
 
 def p_value_text(p: float) -> str:
