@@ -144,6 +144,11 @@ class TestFit:
         raise FitError(f"test '{self.name}' has no output '{output}'; it has {known}")
 
     @property
+    def misses_readings(self) -> bool:
+        """Whether the misfit of an output is no number: not every reading of it was predicted."""
+        return any(one.errors.frames > 0 and np.isnan(one.errors.mean_squared_error) for one in self.outputs)
+
+    @property
     def offset(self) -> float:
         """Offset of its first output."""
         return self.outputs[0].offset if self.outputs else 0.0

@@ -75,7 +75,7 @@ from creepkit.inverse.unmodelled_effect import unmodelled_note
 from creepkit.inverse.unmodelled_effects import unmodelled_effects
 from creepkit.inverse.working_noise import WorkingNoiseEstimator
 from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor, is_length_nuisance, is_logarithmic
+from creepkit.records import History, Predictor, Status, is_length_nuisance, is_logarithmic
 
 MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
@@ -337,6 +337,7 @@ def _result(
     )
     implausible = implausible_nuisances(problem, random_effects, nuisance_estimates)
     failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]
+    failed |= (prediction.status[0] != Status.RUPTURED) & [test.misses_readings for test in tests]
     unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
     rates = RateExplanations(problem, x, linear, noise_model)
     judged = at_own_rates(problem, x, linear, noise_model)
