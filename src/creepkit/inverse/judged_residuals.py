@@ -148,18 +148,8 @@ def judged_residuals_of(fit: Identification) -> JudgedResiduals | None:
 
 def _of_judged(residuals: Residuals, known: KnownNoise) -> Residuals:
     """The residuals of observations that are judged, tests of equal weight; the others are not there."""
-    assert residuals.jacobian is not None
-    mask = known.judged & residuals.present
-    return replace(
-        residuals,
-        values=np.where(mask, residuals.values, 0.0),
-        jacobian=np.where(mask[..., None], residuals.jacobian, 0.0),
-        offset_sensitivity=np.where(mask, residuals.offset_sensitivity, 0.0),
-        log_rate_sensitivity=np.where(mask, residuals.log_rate_sensitivity, 0.0),
-        present=mask,
-        test_weights=np.ones(len(mask)),
-        relative_noise=known.sd,
-    )
+    judged = residuals.where(known.judged & residuals.present)
+    return replace(judged, test_weights=np.ones(len(known.sd)), relative_noise=known.sd)
 
 
 def _independent_noise(
