@@ -210,11 +210,6 @@ def _deviance(residuals: Residuals, noise_model: NoiseModel) -> float:
     return float((factor.whiten(residuals.values) ** 2).sum() + factor.log_determinant)
 
 
-def prediction_errors(fit: Identification, history: History) -> dict[str, OutputErrors]:
-    """{output: errors} of one history that the fit predicts as a new test: prior means of nuisances, and no offset."""
-    return Fold((history,), fit).errors(0)
-
-
 def _joined(strain: float, comparisons: Sequence[TimeComparison]) -> TimeComparison:
     names = tuple(name for one in comparisons for name in one.names)
     measured = np.concatenate([one.measured for one in comparisons])

@@ -336,7 +336,7 @@ class Identification(Presentable, text="reports.identification_text:identificati
             predictor = using
         else:
             raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
-        return cast(Identification, present("inverse.attached_histories:with_attached", self, tests, predictor))
+        return cast(Identification, present("inverse.identification_notes:with_attached", self, tests, predictor))
 
     def _predictor_or(self, using: Predictor | None) -> Predictor:
         """The predictor given, or the identification's own; FitError where a file does not give it."""

@@ -12,6 +12,7 @@ from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.bound_penalties import check_bounds
 from creepkit.inverse.chi_square_test import adequacy_with_remedies
+from creepkit.inverse.compared_tests import compared_tests, compares_rupture_times
 from creepkit.inverse.composite_predictor import (
     predict,
     prediction_errors_of,
@@ -57,7 +58,6 @@ from creepkit.inverse.perturbations import perturbations
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
-from creepkit.inverse.rupture_use import compared_tests, compares_rupture_times
 from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import MultiStart
@@ -185,8 +185,7 @@ def identify_values(
     """As identify(), without samples of the posterior where a value is at its bound."""
     settings = settings or IdentificationSettings()
     known, through, notes = predictors_for_law(law, using, through)
-    compared = compared_tests(law, histories, settings)
-    histories = compared.histories
+    histories, left_out = compared_tests(law, histories, settings)
     if notes:
         how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
         fit = identify_values(law, histories, known, through=through, **how)
@@ -210,7 +209,7 @@ def identify_values(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
         fit = _result(histories, best, search_outcome, numerical_error)
-    return replace(fit, notes=(*compared.notes, *fit.notes))
+    return replace(fit, notes=(*left_out, *fit.notes))
 
 
 def _gradient(best: EstimationResult) -> Floats:

@@ -12,13 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
+from creepkit.inverse.compared_tests import compares_minimum_rate, duration_known, followed_duration, needs_durations
 from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for
-from creepkit.inverse.duration import compares_minimum_rate, duration_known, followed_duration, needs_durations
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
@@ -97,61 +98,71 @@ def with_minimum_rates(
     tests = [k for k, history in enumerate(histories) if compares_minimum_rate(history)]
     if not tests:
         return prediction
-    curves = [_curve(histories[k]) for k in tests]
     given = {key: values[:, tests] for key, values in (nuisances or {}).items()}
-    if sensitivities and len(theta) == 1:
-        predicted = predict_with_sensitivities(predictor, law, theta[0], curves, given)
-    else:
-        predicted = predict(predictor, law, theta, curves, nuisances=given, sensitivities=sensitivities)
-    columns = [predicted.outputs.index(str(_leading_output(predictor_for(predictor, h)))) for h in curves]
-    rates = _slopes(_of_outputs(predicted.values, columns), curves)
-    index, weights = _minima(rates, curves)
-    values = np.exp(_at_minimum(np.log(np.where(rates > 0, rates, np.nan)), index, weights))
+    compared = [histories[k] for k in tests]
+    rates, by_parameter, by_nuisance = minimum_rates(predictor, law, theta, compared, given, sensitivities)
 
-    def derivative(array: Floats) -> Floats:
-        """Of the minimum rates, (candidates, tests, ...), from that of the outputs, as Prediction.jacobian."""
-        relative = _slopes(_of_outputs(array, columns), curves) / np.where(rates > 0, rates, np.nan).reshape(
-            *rates.shape, *(1,) * (array.ndim - 4)
-        )
-        of_logarithm = _at_minimum(relative, index, weights)
-        return np.asarray(values.reshape(*values.shape, *(1,) * (array.ndim - 4)) * of_logarithm)
+    def extended(array: Floats, of_tests: Floats) -> Floats:
+        """Array (candidates, tests, times, outputs, ...) with one output more, of values (candidates, tests, ...)."""
+        further = np.full((*array.shape[:3], 1, *array.shape[4:]), np.nan)
+        further[:, tests, 0, 0] = of_tests
+        return np.concatenate([array, further], axis=3)
 
-    jacobian = predicted.jacobian
+    jacobian = prediction.jacobian
     return replace(
         prediction,
-        values=_with_output(prediction.values, tests, values),
+        values=extended(prediction.values, rates),
         outputs=(*prediction.outputs, MINIMUM_RATE_OUTPUT),
-        jacobian=None
-        if prediction.jacobian is None or jacobian is None
-        else _with_output(prediction.jacobian, tests, derivative(jacobian)),
-        nuisance_jacobian={
-            key: _with_output(array, tests, derivative(predicted.nuisance_jacobian[key]))
-            for key, array in prediction.nuisance_jacobian.items()
-        },
+        jacobian=None if jacobian is None or by_parameter is None else extended(jacobian, by_parameter),
+        nuisance_jacobian={key: extended(a, by_nuisance[key]) for key, a in prediction.nuisance_jacobian.items()},
     )
+
+
+def minimum_rates(
+    predictor: Predictor,
+    law: CreepLaw,
+    theta: Floats,
+    histories: Sequence[History],
+    nuisances: NuisanceValues,
+    sensitivities: bool,
+) -> tuple[Floats, Floats | None, dict[str, Floats]]:
+    """(candidates, tests) 1/s, with derivatives to internal parameters, (..., parameters) or None, and to nuisances.
+
+    Each test is followed from loading to its end, at TIMES. Arguments as of with_minimum_rates().
+    """
+    known: dict[str, Any] = {"includes_elastic": False, "minimum_rate": None, "minimum_rate_sd": None}
+    curves = [h.replace(times=followed_duration(h) * TIMES, outputs={}, **known) for h in histories]
+    if sensitivities and len(theta) == 1:
+        predicted = predict_with_sensitivities(predictor, law, theta[0], curves, nuisances)
+    else:
+        predicted = predict(predictor, law, theta, curves, nuisances=nuisances, sensitivities=sensitivities)
+    columns = [predicted.outputs.index(str(_leading_output(predictor_for(predictor, h)))) for h in curves]
+    intervals = np.stack([np.diff(h.times) for h in curves])
+
+    def slopes(array: Floats) -> Floats:
+        """(candidates, tests, times - 1, ...) 1/s, of the leading ones of (candidates, tests, times, outputs, ...)."""
+        strains = np.stack([array[:, k, :, column] for k, column in enumerate(columns)], axis=1)
+        with np.errstate(invalid="ignore"):
+            return np.diff(strains, axis=2) / intervals.reshape(*intervals.shape, *(1,) * (strains.ndim - 3))
+
+    rates = slopes(predicted.values)
+    positive = np.where(rates > 0, rates, np.nan)
+    index, weights = _minima(rates, curves)
+    minima = np.exp(_at_minimum(np.log(positive), index, weights))
+
+    def derivative(array: Floats) -> Floats:
+        """Of the minima, (candidates, tests, ...), from that of the outputs, as Prediction.jacobian."""
+        further = (1,) * (array.ndim - 4)
+        of_logarithm = _at_minimum(slopes(array) / positive.reshape(*rates.shape, *further), index, weights)
+        return np.asarray(minima.reshape(*minima.shape, *further) * of_logarithm)
+
+    by_parameter = None if predicted.jacobian is None else derivative(predicted.jacobian)
+    return minima, by_parameter, {key: derivative(array) for key, array in predicted.nuisance_jacobian.items()}
 
 
 def _leading_output(predictor: Predictor) -> Output | None:
     """The output of a predictor that grows with creep; None where it names none."""
     return next((output for output in outputs_of(predictor) if output.grows), None)
-
-
-def _curve(history: History) -> History:
-    """The test whose curve is predicted: from loading to its end, at TIMES."""
-    times = followed_duration(history) * TIMES
-    return history.replace(times=times, outputs={}, includes_elastic=False, minimum_rate=None, minimum_rate_sd=None)
-
-
-def _of_outputs(array: Floats, columns: Sequence[int]) -> Floats:
-    """(candidates, tests, times, ...) of one output of each test; array : (candidates, tests, times, outputs, ...)."""
-    return np.stack([array[:, k, :, column] for k, column in enumerate(columns)], axis=1)
-
-
-def _slopes(strains: Floats, curves: Sequence[History]) -> Floats:
-    """(candidates, tests, times - 1, ...) 1/s, slopes between times of strains (candidates, tests, times, ...)."""
-    intervals = np.stack([np.diff(h.times) for h in curves])
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.diff(strains, axis=2) / intervals.reshape(*intervals.shape, *(1,) * (strains.ndim - 3)))
 
 
 def _minima(rates: Floats, curves: Sequence[History]) -> tuple[Ints, Floats]:
@@ -196,13 +207,6 @@ def _at_minimum(array: Floats, index: Ints, weights: Floats) -> Floats:
     three = np.take_along_axis(array, index.reshape(*index.shape, *trailing), axis=2)
     share = weights.reshape(*weights.shape, *trailing)
     return np.asarray(np.where(share != 0.0, share * three, 0.0).sum(axis=2))
-
-
-def _with_output(array: Floats, tests: Sequence[int], values: Floats) -> Floats:
-    """Array (candidates, tests, times, outputs, ...) with one output more, of values (candidates, tests, ...)."""
-    further = np.full((*array.shape[:3], 1, *array.shape[4:]), np.nan)
-    further[:, tests, 0, 0] = values
-    return np.concatenate([array, further], axis=3)
 
 
 SHORTEST_SPAN = 0.1

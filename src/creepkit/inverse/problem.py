@@ -21,6 +21,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.bound_penalties import BoundPenalties, constraint_points
 from creepkit.inverse.bounds import Bounds
+from creepkit.inverse.compared_tests import compares_rupture_times
 from creepkit.inverse.composite_predictor import (
     CompositePredictor,
     concatenated_tests,
@@ -44,7 +45,6 @@ from creepkit.inverse.residuals import (
     residuals_at_measured_values,
     residuals_of_prediction,
 )
-from creepkit.inverse.rupture_use import compares_rupture_times
 from creepkit.inverse.search.local_refinement import (
     AdditionalResiduals,
     Minimum,

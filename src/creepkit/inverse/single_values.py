@@ -21,15 +21,10 @@ from scipy.stats import f
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import (
-    predict_to_rupture,
-    predict_with_sensitivities,
-    predictor_for,
-    predicts_rupture,
-)
+from creepkit.inverse.compared_tests import compares_minimum_rate
+from creepkit.inverse.composite_predictor import predict_to_rupture, predictor_for, predicts_rupture
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.duration import compares_minimum_rate
-from creepkit.inverse.minimum_rates import measured_minimum_rate, with_minimum_rates
+from creepkit.inverse.minimum_rates import measured_minimum_rate, minimum_rates
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
 from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, MixtureDistribution
@@ -143,12 +138,10 @@ class LawAtTests:
         if not compared:
             return {}
         tests, law, theta = [histories[k] for k in compared], self.coordinates.law, self.coordinates.theta(self.u)
-        prediction = predict_with_sensitivities(self.predictor, law, theta, tests, {})
-        prediction = with_minimum_rates(prediction, self.predictor, law, theta[None], tests, sensitivities=True)
-        assert prediction.jacobian is not None
-        rates = prediction.values[0, :, 0, -1]
+        (rates,), jacobian, _ = minimum_rates(self.predictor, law, theta[None], tests, {}, sensitivities=True)
+        assert jacobian is not None
         rates = np.where(np.isfinite(rates) & (rates > 0), rates, np.nan)
-        by_parameter = np.nan_to_num(prediction.jacobian[0, :, 0, -1] / rates[:, None])
+        by_parameter = np.nan_to_num(jacobian[0] / rates[:, None])
         predicted = self._with_intervals(MINIMUM_RATE_OUTPUT, tests, rates, by_parameter, 1.0, np.nan)
         return {
             k: SingleValue(history.minimum_rate or 0.0, float(rate), float(low), float(high))
