@@ -23,13 +23,13 @@ from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
+from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.predictor_documents import predictor_documents, predictor_from_documents
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import ContradictingValues, SingleValue
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, RateScatter
-from creepkit.inverse.unmodelled_effect import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.records import Nuisance
@@ -71,7 +71,7 @@ CODEC = RecordCodec(
     omitted={
         Identification: ("histories", "predictor", "search_trace", "linearised", "problem"),
         Sparsity: ("path",),
-        UnmodelledEffect: ("residual_change",),
+        Perturbation: ("residual_change",),
     },
     ranges={
         Identification: {"rms": NOT_NEGATIVE_OR_NAN, "effective_frames": POSITIVE, "freedom": POSITIVE},
@@ -103,7 +103,7 @@ CODEC = RecordCodec(
         ImplausibleNuisance: {"standard_deviations": NOT_NEGATIVE, "size": POSITIVE, "share": NOT_NEGATIVE_OR_NAN},
         LargestDeviation: {"rms": NOT_NEGATIVE},
         NumericalError: {"noises": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},
-        UnmodelledEffect: {
+        Perturbation: {
             "size": NOT_NEGATIVE,
             "rate_change": NAN_ALLOWED,
             "tests": NOT_NEGATIVE,

@@ -26,10 +26,10 @@ import numpy as np
 from scipy.special import logsumexp
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.common_errors import USUAL_ACTIVATION_ENERGY
 from creepkit.inverse.explanation import Explanation, Kind, LeftOut
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
+from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
