@@ -27,9 +27,9 @@ from creepkit.inverse.judged_residuals import judged_residuals
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.largest_deviation import largest_deviation
 from creepkit.inverse.noise_model import NoiseModel
+from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.perturbations import with_random_effects
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.unmodelled_effect import UnmodelledEffect
-from creepkit.inverse.unmodelled_effects import with_random_effects
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.records import History, is_logarithmic
 
@@ -104,7 +104,7 @@ def adequacy_with_remedies(
     noise_model: NoiseModel,
     predictor_errors: Mapping[str, float],
     histories: Sequence[History],
-    effects: Sequence[UnmodelledEffect],
+    effects: Sequence[Perturbation],
     explanations: tuple[Explanation, ...],
 ) -> Adequacy:
     """The same, rejected where rates of tests are explained otherwise, with effects that would explain the tests."""

@@ -25,9 +25,9 @@ from functools import cached_property
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.common_errors import USUAL_ACTIVATION_ENERGY
 from creepkit.inverse.explanation import Explanation, Kind, LeftOut
 from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
+from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_perturbations import SMALLEST_FACTOR, Evidence, RatePerturbations
 from creepkit.inverse.reference_conditions import reference_stresses
@@ -322,5 +322,4 @@ class RateExplanations:
         return (self.x + evidence.step)[: self.problem.parameter_count]
 
     def _energy(self, u: Floats, stress: float, T: float) -> float:
-        up, down = (float(log_rate(self.problem.coordinates, stress, T + step)(u)) for step in (1.0, -1.0))
-        return 0.5 * (up - down) * GAS_CONSTANT * T**2
+        return log_rate_per_kelvin(self.problem, u, stress, T) * GAS_CONSTANT * T**2

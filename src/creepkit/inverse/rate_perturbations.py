@@ -55,12 +55,10 @@ class RatePerturbations:
         self.gram = gram[None] - own[..., None, None] * (row[:, :, None] * row[:, None, :])[None]
         self.own_log_factors = -gram[:, -1, 0] / np.maximum(gram[:, -1, -1], 1e-300)
         sensitive = residuals.present & (residuals.log_rate_sensitivity > 0.5)
-        ratios = np.where(sensitive, -residuals.values, np.nan) / np.where(
-            sensitive, residuals.log_rate_sensitivity, 1.0
-        )
-        self.median_log_factors = np.array(
-            [np.median(r[np.isfinite(r)]) if np.isfinite(r).any() else np.nan for r in ratios]
-        )
+        ratios = [
+            -r[k] / d[k] for r, d, k in zip(residuals.values, residuals.log_rate_sensitivity, sensitive, strict=True)
+        ]
+        self.median_log_factors = np.array([np.median(r) if r.size else np.nan for r in ratios])
         design = row[:, 1:-1] / np.maximum(row[:, -1:], 1e-300) / np.sqrt(np.maximum(linear.precision, 1e-300))
         self.contrasts = len(gram) - int((np.linalg.svd(design, compute_uv=False) > SMALLEST_FACTOR).sum())
         self.log_determinant = np.log1p(scatters[:, None] ** 2 * gram[None, :, -1, -1]).sum(axis=1)
@@ -68,23 +66,19 @@ class RatePerturbations:
 
     def evidence(self, weights: Floats, prior_sd: Floats) -> Evidence:
         """Of ln rates moved by weights (tests, columns) times coefficients of these prior deviations (columns,)."""
-        unknowns, count = self.precision.size, prior_sd.size
+        unknowns = self.precision.size
         total = self.gram.sum(axis=1)
         rows = np.einsum("tq,stm->sqm", weights, self.gram[..., -1])
-        normal = np.zeros((len(total), unknowns + count, unknowns + count))
-        normal[:, :unknowns, :unknowns] = total[:, 1:-1, 1:-1] + np.diag(self.precision)
-        normal[:, unknowns:, :unknowns] = rows[:, :, 1:-1]
-        normal[:, :unknowns, unknowns:] = np.swapaxes(rows[:, :, 1:-1], 1, 2)
-        normal[:, unknowns:, unknowns:] = np.einsum("tq,tp,st->sqp", weights, weights, self.gram[..., -1, -1])
-        normal[:, unknowns:, unknowns:] += np.diag(1.0 / prior_sd**2)
+        of_rates = np.einsum("tq,tp,st->sqp", weights, weights, self.gram[..., -1, -1]) + np.diag(1.0 / prior_sd**2)
+        across, own = rows[:, :, 1:-1], total[:, 1:-1, 1:-1] + np.diag(self.precision)
+        normal = np.block([[own, np.swapaxes(across, 1, 2)], [across, of_rates]])
         side = np.concatenate([total[:, 1:-1, 0] + self.precision * self.prior_residual, rows[:, :, 0]], axis=1)
         scale = np.sqrt(np.diagonal(normal, axis1=1, axis2=2))
-        inverse = np.linalg.inv(normal / scale[:, :, None] / scale[:, None, :]) / scale[:, :, None] / scale[:, None, :]
+        scaled = normal / scale[:, :, None] / scale[:, None, :]
+        inverse = np.linalg.inv(scaled) / scale[:, :, None] / scale[:, None, :]
         step = -np.einsum("spq,sq->sp", inverse, side)
         chi_square = total[:, 0, 0] + (self.precision * self.prior_residual**2).sum() + (side * step).sum(axis=1)
-        determinant = np.linalg.slogdet(normal / scale[:, :, None] / scale[:, None, :])[1] + 2 * np.log(scale).sum(
-            axis=1
-        )
+        determinant = np.linalg.slogdet(scaled)[1] + 2 * np.log(scale).sum(axis=1)
         logs = -0.5 * (self.log_determinant + determinant + 2 * np.log(prior_sd).sum() + chi_square)
         share = np.exp(logs - logsumexp(logs))
         mean = share @ step
