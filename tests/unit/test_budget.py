@@ -20,7 +20,7 @@ BUDGET = {
     "cli": 2300,
     "core": 100,
     "dataset": 820,
-    "discovery": 1240,
+    "discovery": 1500,
     "experiments": 1710,
     "exporters": 2690,
     "extraction": 1150,

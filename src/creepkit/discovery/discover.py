@@ -52,6 +52,7 @@ def discover(
     histories: Sequence[History] | None = None,
     using: Predictor | str | None = None,
     settings: IdentificationSettings | None = None,
+    joint_fit: Identification | None = None,
     progress: IterationCallback | None = None,
 ) -> TemperatureLaw:
     """Find closed forms of the parameters against temperature, and compare them on the tests where those are given.
@@ -63,6 +64,9 @@ def discover(
     parameters : those that may depend on temperature; by default all.
     histories : all tests; the forms are then put back into the law and refitted to them (see refit). using, settings :
         the predictor and the settings of that; by default those of the first identification.
+    joint_fit : an identification of the law times Arrhenius' factor from all tests, where the refits begin.
+
+    A combination of forms that fails is recorded in the notes with its reason, and the others go on.
     """
     estimates = IsothermalEstimates.from_identifications(fits)
     candidates = candidate_forms_of(estimates, forms, prior or {}, parameters)
@@ -79,7 +83,7 @@ def discover(
         raise FitError("the identifications were loaded from files: give using=, the specimen they were made with")
     settings = settings or fits[0].settings
     tests, _ = sound_tests(list(histories), settings)
-    return refit(temperature_law, tests, predictor, settings=settings, progress=progress)
+    return refit(temperature_law, tests, predictor, settings=settings, joint_fit=joint_fit, progress=progress)
 
 
 def candidate_forms_of(
@@ -211,8 +215,9 @@ def temperature_study(
         notes.append(str(error))
     else:
         temperature_law = discover(
-            isothermal_fits, histories=histories, using=predictor, settings=settings, progress=progress, **form_options
-        )
+            isothermal_fits, histories=histories, using=predictor, settings=settings, joint_fit=joint_fit,
+            progress=progress, **form_options
+        )  # fmt: skip
     return TemperatureStudy(
         tuple(histories), moduli_fit, joint_fit, tuple(isothermal_fits), temperature_law, tuple(notes)
     )

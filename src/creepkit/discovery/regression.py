@@ -52,6 +52,7 @@ class IsothermalEstimates:
         where an identification has few degrees of freedom; wide where a bound holds the value.
     reference : the point where rates are compared.
     ranges : {"stress", "temperature", "strain", "time": (low, high)} that they cover together.
+    fits : the identifications that they come from, in the same order.
     """
 
     law: CreepLaw
@@ -60,6 +61,7 @@ class IsothermalEstimates:
     covariance: Floats
     reference: ReferencePoint
     ranges: dict[str, tuple[float, float]]
+    fits: tuple[Identification, ...] = ()
 
     @classmethod
     def from_identifications(cls, fits: Sequence[Identification]) -> IsothermalEstimates:
@@ -74,6 +76,7 @@ class IsothermalEstimates:
             np.stack([_theta_covariance(fit) for fit in ordered]),
             _central_reference([fit.reference for fit in ordered]),
             _joint_ranges([dict(fit.ranges) for fit in ordered]),
+            tuple(ordered),
         )
 
     @cached_property
@@ -221,26 +224,24 @@ class Regression:
 
 
 class _DesignMatrix:
-    """The columns of all parameters' libraries, over temperatures."""
+    """The columns of all parameters' libraries over temperatures; those without nonlinear parameters are made once."""
 
-    def __init__(self, forms: Sequence[CandidateForm]) -> None:
-        self.forms = tuple(forms)
+    def __init__(self, forms: Sequence[CandidateForm], T: Floats) -> None:
+        self.forms, self.T = tuple(forms), T
         self.parameter_of_column = np.concatenate(
             [np.full(len(form.terms), parameter_index) for parameter_index, form in enumerate(forms)]
         )
         self.nonlinear_parameters: dict[sympy.Symbol, Param] = {
             s: p for one in forms for s, p in one.nonlinear_parameters.items()
         }
+        self._basis = [None if one.nonlinear_parameters else one.basis_values(T, ()) for one in forms]
 
-    def unweighted(self, T: Floats, nonlinear_values: Sequence[float] | Floats) -> tuple[Floats, Floats]:
+    def unweighted(self, nonlinear_values: Sequence[float] | Floats) -> tuple[Floats, Floats]:
         """Functions (temperatures, terms) and offsets (temperatures, parameters)."""
         basis, start = [], 0
-        for form in self.forms:
-            basis.append(
-                form.basis_values(
-                    T, [float(v) for v in nonlinear_values[start : start + len(form.nonlinear_parameters)]]
-                )
-            )
+        for form, fixed in zip(self.forms, self._basis, strict=True):
+            values = [float(v) for v in nonlinear_values[start : start + len(form.nonlinear_parameters)]]
+            basis.append(form.basis_values(self.T, values) if fixed is None else fixed)
             start += len(form.nonlinear_parameters)
         return np.concatenate([p[:, :-1] for p in basis], axis=1), np.stack([p[:, -1] for p in basis], axis=1)
 
@@ -248,17 +249,17 @@ class _DesignMatrix:
         self, estimates: IsothermalEstimates, nonlinear_values: Sequence[float] | Floats
     ) -> tuple[Floats, Floats]:
         """Features (temperatures * parameters, terms) and target (rows,) after multiplication by the whiteners."""
-        functions, offsets = self.unweighted(estimates.temperatures, nonlinear_values)
+        functions, offsets = self.unweighted(nonlinear_values)
         features = np.concatenate(estimates.whitening[:, :, self.parameter_of_column] * functions[:, None, :])
         return features, np.concatenate(np.einsum("kij,kj->ki", estimates.whitening, estimates.theta - offsets))
 
 
 def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm]) -> Regression:
     """The best numbers of one library for each parameter, with their covariance."""
-    design = _DesignMatrix(forms)
+    design = _DesignMatrix(forms, estimates.temperatures)
     nonlinear_values = _variable_projection(design, estimates) if design.nonlinear_parameters else np.zeros(0)
     features, target = design.whitened(estimates, nonlinear_values)
-    coefficients = solve_with_pysindy(features, target)
+    coefficients = solve_least_squares(features, target)
     sensitivities = np.concatenate(
         [features, _nonlinear_sensitivities(design, estimates, nonlinear_values, coefficients)], axis=1
     )
@@ -274,15 +275,11 @@ def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm]) -> R
     )
 
 
-def solve_with_pysindy(features: Floats, target: Floats) -> Floats:
-    """Coefficients (terms,) of target (rows,) on features (rows, terms), by pysindy; no term is dropped."""
-    import pysindy
-
+def solve_least_squares(features: Floats, target: Floats) -> Floats:
+    """Coefficients (terms,) of target (rows,) on features (rows, terms) in units of their norms; no term is dropped."""
     column_norms = np.linalg.norm(features, axis=0)
     column_norms = np.where(column_norms > 0, column_norms, 1.0)
-    model = pysindy.SINDy(optimizer=pysindy.STLSQ(threshold=0.0, alpha=0.0), feature_library=pysindy.IdentityLibrary())
-    model.fit(features / column_norms, t=np.arange(len(target), dtype=float), x_dot=target[:, None])
-    return np.asarray(model.coefficients()[0] / column_norms, float)
+    return np.asarray(np.linalg.lstsq(features / column_norms, target, rcond=None)[0] / column_norms, float)
 
 
 def _variable_projection(design: _DesignMatrix, estimates: IsothermalEstimates) -> Floats:
@@ -292,12 +289,11 @@ def _variable_projection(design: _DesignMatrix, estimates: IsothermalEstimates) 
 
     def residual(unit: Floats) -> Floats:
         white, target = design.whitened(estimates, low + unit * scale)
-        scaled = white / np.linalg.norm(white, axis=0)
-        return np.asarray(target - scaled @ np.linalg.lstsq(scaled, target, rcond=None)[0])
+        return np.asarray(target - white @ solve_least_squares(white, target))
 
     trials = qmc.Sobol(low.size, seed=0).random(SOBOL_STARTS)
     start = min(trials, key=lambda unit: float((residual(unit) ** 2).sum()))
-    solution = least_squares(residual, start, bounds=(0.0, 1.0), diff_step=1e-6, x_scale=0.1)
+    solution = least_squares(residual, start, bounds=(0.0, 1.0), diff_step=1e-6, x_scale=0.1, ftol=1e-6, xtol=1e-5)
     return np.asarray(low + solution.x * scale)
 
 
