@@ -16,6 +16,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -87,6 +88,7 @@ class RankedCombinations:
     candidates: Mapping[str, Sequence[CandidateForm]]
     law: CreepLaw
     failed: Mapping[tuple[str, ...], str]
+    optimizer: Any = None
 
     @property
     def best(self) -> Regression:
@@ -102,13 +104,15 @@ def rank_combinations(
     points: IsothermalEstimates,
     candidates: Mapping[str, Sequence[CandidateForm]],
     progress: IterationCallback | None = None,
+    optimizer: Any = None,
 ) -> RankedCombinations:
-    """Fit combinations of one library for each parameter, and weigh them."""
+    """Fit combinations of one library for each parameter, and weigh them; optimizer : see regress()."""
     names, combination_count = list(candidates), int(np.prod([len(forms) for forms in candidates.values()]))
     cache = _RegressionCache(
         points,
         min(combination_count, MAX_SWEEPS * sum(len(own) for own in candidates.values())),
         None if progress is None else progress_with_duration("combinations of forms", progress),
+        optimizer,
     )
     if combination_count <= MAX_EXHAUSTIVE:
         cache.total = combination_count
@@ -116,9 +120,10 @@ def rank_combinations(
             cache(forms_of_combination)
     else:
         _coordinate_search(cache, candidates)
+    distinct = {tuple(one.forms.values()): one for one in cache.regressions.values()}  # terms may have been dropped
     admissible = [
         regression
-        for regression in cache.regressions.values()
+        for regression in distinct.values()
         if regression.parameter_count < regression.rows - 1 and regression.within_bounds()
     ]
     while admissible:
@@ -138,7 +143,9 @@ def rank_combinations(
     excess, weights = criterion_weights(scores)
     combinations = [WeightedCombination(admissible[k], float(excess[k]), float(weights[k])) for k in order]
     plausible_forms = {name: _plausible_forms(name, combinations, points, overdispersion) for name in names}
-    return RankedCombinations(tuple(combinations), overdispersion, plausible_forms, candidates, law, cache.failed)
+    return RankedCombinations(
+        tuple(combinations), overdispersion, plausible_forms, candidates, law, cache.failed, optimizer
+    )
 
 
 def progress_with_duration(what: str, progress: IterationCallback) -> IterationCallback:
@@ -160,8 +167,10 @@ def progress_with_duration(what: str, progress: IterationCallback) -> IterationC
 class _RegressionCache:
     """Regressions of combinations, each made once; total : how many there may be; failed : why of those that end."""
 
-    def __init__(self, points: IsothermalEstimates, total: int, progress: IterationCallback | None) -> None:
-        self.points, self.total, self.progress = points, total, progress
+    def __init__(
+        self, points: IsothermalEstimates, total: int, progress: IterationCallback | None, optimizer: Any
+    ) -> None:
+        self.points, self.total, self.progress, self.optimizer = points, total, progress, optimizer
         self.regressions: dict[tuple[str, ...], Regression] = {}
         self.failed: dict[tuple[str, ...], str] = {}
 
@@ -169,7 +178,7 @@ class _RegressionCache:
         key = tuple(form.name for form in forms)
         if key not in self.regressions and key not in self.failed:
             try:
-                self.regressions[key] = regress(self.points, forms)
+                self.regressions[key] = regress(self.points, forms, self.optimizer)
             except FAILURES as error:
                 self.failed[key] = str(error)
             if self.progress is not None:

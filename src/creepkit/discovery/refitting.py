@@ -194,8 +194,8 @@ def refit(
                 break
             last = cache.best
             points = cache.linearised_about(last)
-            cache.refit_credible(rank_combinations(points, linear), points)
-        combinations = rank_combinations(points, every)
+            cache.refit_credible(rank_combinations(points, linear, optimizer=combinations.optimizer), points)
+        combinations = rank_combinations(points, every, optimizer=combinations.optimizer)
         cache.refit_credible(combinations, points)
         cache.refit_simpler(_baseline(combinations), points)
     except FAILURES as error:

@@ -3,24 +3,28 @@
 A coefficient and its exponent are correlated to -0.99999 at one temperature, so that estimates with separate error bars
 would mislead: all parameters of one temperature stay together, with their whole covariance. The rows of the generalised
 least squares are all parameters at all temperatures, multiplied by the inverse Cholesky factor of each temperature's
-covariance; the columns are the functions of the forms. pysindy solves it without threshold or ridge: over ten per cent
-of temperature the functions are collinear, and a threshold on one wide library keeps all of them with coefficients of
-+-1000. Parameters inside exponentials are found by variable projection (Golub and Pereyra (1973), SIAM J. Numer. Anal.
-10, 413): the coefficients are solved for at each trial of them.
+covariance; the columns are the functions of the forms. It is solved without threshold or ridge unless an optimizer of
+pysindy is given: over ten per cent of temperature the functions are collinear, and a threshold on one wide library
+keeps all of them with coefficients of +-1000. Parameters inside exponentials are found by variable projection (Golub
+and Pereyra (1973), SIAM J. Numer. Anal. 10, 413): the coefficients are solved for at each trial of them.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import sympy
+from scipy.linalg import block_diag
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Bools, Floats
 from creepkit.discovery.forms import CandidateForm, evaluate_forms
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
@@ -254,11 +258,55 @@ class _DesignMatrix:
         return features, np.concatenate(np.einsum("kij,kj->ki", estimates.whitening, estimates.theta - offsets))
 
 
-def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm]) -> Regression:
-    """The best numbers of one library for each parameter, with their covariance."""
+@dataclass(frozen=True, eq=False)
+class WhitenedSystem:
+    """The linear system y = X c that regression on temperature solves, with residuals of variance 1.
+
+    X : (rows, terms) functions of temperature; y : (rows,). A row is a parameter at a temperature, after multiplication
+    by the inverse Cholesky factor of the covariance of that temperature. covariance : (rows, rows) of the estimates
+    before, in internal values. terms : what the columns are. rows : (parameter, temperature in K) each.
+    """
+
+    X: Floats
+    y: Floats
+    covariance: Floats
+    terms: tuple[str, ...]
+    rows: tuple[tuple[str, float], ...]
+
+
+def whitened_system(
+    estimates: IsothermalEstimates, candidates: Mapping[str, Sequence[CandidateForm]]
+) -> WhitenedSystem:
+    """The system of all functions of the candidates side by side, without those that have nonlinear parameters."""
+    columns, terms, names, T = [], [], estimates.law.names, estimates.temperatures
+    for k, name in enumerate(names):
+        basis = {name: np.ones_like(T)}
+        for form in candidates[name]:
+            if not form.nonlinear_parameters and form.offset == 0:
+                own = form.basis_values(T, ())[:, :-1].T
+                basis |= {f"{c} ({form.name})": v for c, v in zip(form.terms, own, strict=True) if c != name}
+        columns += [(estimates.whitening[:, :, k] * values[:, None]).ravel() for values in basis.values()]
+        terms += list(basis)
+    target = np.einsum("kij,kj->ki", estimates.whitening, estimates.theta).ravel()
+    rows = tuple((name, float(one)) for one in T for name in names)
+    return WhitenedSystem(np.stack(columns, axis=1), target, block_diag(*estimates.covariance), tuple(terms), rows)
+
+
+def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm], optimizer: Any = None) -> Regression:
+    """The best numbers of one library for each parameter, with their covariance.
+
+    optimizer : of pysindy, which drops terms first; the parameters' values at T_ref stay.
+    """
     design = _DesignMatrix(forms, estimates.temperatures)
     nonlinear_values = _variable_projection(design, estimates) if design.nonlinear_parameters else np.zeros(0)
     features, target = design.whitened(estimates, nonlinear_values)
+    if optimizer is not None:
+        names = [name for form in forms for name in form.terms]
+        is_value = [name == form.parameter for form in forms for name in form.terms]
+        kept = _kept_terms(features, target, is_value, optimizer)
+        dropped = {name for name, is_kept in zip(names, kept, strict=True) if not is_kept}
+        if dropped:
+            return regress(estimates, [form.without(dropped) for form in forms])
     coefficients = solve_least_squares(features, target)
     sensitivities = np.concatenate(
         [features, _nonlinear_sensitivities(design, estimates, nonlinear_values, coefficients)], axis=1
@@ -280,6 +328,22 @@ def solve_least_squares(features: Floats, target: Floats) -> Floats:
     column_norms = np.linalg.norm(features, axis=0)
     column_norms = np.where(column_norms > 0, column_norms, 1.0)
     return np.asarray(np.linalg.lstsq(features / column_norms, target, rcond=None)[0] / column_norms, float)
+
+
+def _kept_terms(features: Floats, target: Floats, always: Sequence[bool], optimizer: Any) -> Bools:
+    """(terms,) which an optimizer of pysindy keeps, on columns of norm 1 without what those kept always can say."""
+    fixed, free = features[:, np.array(always)], features[:, ~np.array(always)]
+    kept = np.array(always)
+    if free.shape[1]:
+        basis = np.linalg.qr(fixed / np.linalg.norm(fixed, axis=0))[0]
+        columns, values = (array - basis @ (basis.T @ array) for array in (free, target))
+        norms = np.linalg.norm(columns, axis=0)
+        solver = deepcopy(optimizer)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # that every term was dropped, which is an answer
+            solver.fit(columns / np.where(norms > 0, norms, 1.0), values[:, None])
+        kept[~kept] = np.abs(np.ravel(solver.coef_)) > 0
+    return kept
 
 
 def _variable_projection(design: _DesignMatrix, estimates: IsothermalEstimates) -> Floats:
