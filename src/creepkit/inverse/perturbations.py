@@ -106,7 +106,9 @@ def perturbations(
     """
     fitting_noise = None if working_noise is None else with_single_value_weight(working_noise, problem.observations)
     factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
-    energy = log_rate_per_kelvin(problem, x) * GAS_CONSTANT * problem.coordinates.reference.temperature**2
+    reference = problem.coordinates.reference
+    slope = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature)
+    energy = slope * GAS_CONSTANT * reference.temperature**2
     found, without_energy = [], not problem.law.uses(temperature)
     for one in _all(problem, x, linear, full_histories):
         change, noise = one.residual_change, fitting_noise or noise_model
@@ -192,7 +194,8 @@ def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedPro
         return np.asarray(linear.residuals.offset_sensitivity * slope * size)
 
     if "temperature" not in shared:
-        change = of_rates([log_rate_per_kelvin(problem, x, test) for test in tests], COMMON_TEMPERATURE_ERROR)
+        slopes = [log_rate_per_kelvin(problem, x, *_conditions(problem, test)) for test in tests]
+        change = of_rates(slopes, COMMON_TEMPERATURE_ERROR)
         add("temperature", COMMON_TEMPERATURE_ERROR, "K", change)
     if any(loaded):
         exponents = [_stress_exponent(problem, x, test) if known else 0.0 for test, known in enumerate(loaded)]
@@ -254,7 +257,9 @@ def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -
             if index.size >= 3 and not observations.rupture_mask[test, index].any():
                 times = observations.times[test, index]
                 change[test, index] = _advance(history, times, predicted[test, index], explicit_time=by_time)
-    change = log_rate_per_kelvin(problem, x) * USUAL_DRIFT * change * residuals.offset_sensitivity
+    reference = problem.coordinates.reference
+    factor = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature) * USUAL_DRIFT
+    change = factor * change * residuals.offset_sensitivity
     return Perturbation(DRIFT, USUAL_DRIFT, "K over a test", residual_change=change, tests=len(change))
 
 
@@ -321,12 +326,11 @@ def _values(problem: LeastSquaresProblem, x: Floats) -> tuple[Floats, dict[str, 
     return problem.coordinates.theta(x[:count]), dict(problem.nuisance_parameters.predictor_values(x[count:]))
 
 
-def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, test: int | None = None) -> float:
-    """d ln rate / dT, 1/K, of the law; of one that knows no temperature by the usual activation energy.
+def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, stress: float, T: float) -> float:
+    """d ln rate / dT, 1/K, of the law at MPa and K; of one that knows no temperature by the usual activation energy.
 
-    x : (unknowns,). test : position of the test amid whose conditions it is, by default the reference point.
+    x : (unknowns,), or those of the law alone.
     """
-    stress, T = _conditions(problem, test)
     if not problem.law.uses(temperature):
         return USUAL_ACTIVATION_ENERGY / (GAS_CONSTANT * max(T, LOWEST_USUAL_TEMPERATURE) ** 2)
     u = x[: problem.parameter_count]
@@ -338,15 +342,12 @@ def _stress_exponent(problem: LeastSquaresProblem, x: Floats, test: int) -> floa
     return float(local_exponent(problem.coordinates, *_conditions(problem, test))(x[: problem.parameter_count]))
 
 
-def _conditions(problem: LeastSquaresProblem, test: int | None) -> tuple[float, float]:
-    """MPa and K, of a test or of the reference point."""
-    reference = problem.coordinates.reference
-    if test is None:
-        return reference.stress, reference.temperature
+def _conditions(problem: LeastSquaresProblem, test: int) -> tuple[float, float]:
+    """MPa and K, of a test by its position."""
     history = problem.histories[test]
     stresses = reference_stresses(history, problem.predictor)
     positive = stresses[stresses > 0]
-    stress = float(np.median(positive)) if positive.size else reference.stress
+    stress = float(np.median(positive)) if positive.size else problem.coordinates.reference.stress
     return stress, float(np.mean(history.temperature_program().values))
 
 

@@ -29,7 +29,7 @@ from creepkit.arrays import Bools, Floats
 from creepkit.inverse.explanation import Explanation, Kind, LeftOut
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
-from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY
+from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
@@ -109,34 +109,28 @@ class RatePerturbations:
         self.gram = gram[None] - own[..., None, None] * (row[:, :, None] * row[:, None, :])[None]
         self.own_log_factors = -gram[:, -1, 0] / np.maximum(gram[:, -1, -1], 1e-300)
         sensitive = residuals.present & (residuals.log_rate_sensitivity > 0.5)
-        ratios = np.where(sensitive, -residuals.values, np.nan) / np.where(
-            sensitive, residuals.log_rate_sensitivity, 1.0
-        )
-        self.median_log_factors = np.array(
-            [np.median(r[np.isfinite(r)]) if np.isfinite(r).any() else np.nan for r in ratios]
-        )
+        ratios = [
+            -r[k] / d[k] for r, d, k in zip(residuals.values, residuals.log_rate_sensitivity, sensitive, strict=True)
+        ]
+        self.median_log_factors = np.array([np.median(r) if r.size else np.nan for r in ratios])
         self.log_determinant = np.log1p(scatters[:, None] ** 2 * gram[None, :, -1, -1]).sum(axis=1)
         self.precision, self.prior_residual = linear.precision, linear.prior_residual
 
     def evidence(self, weights: Floats, prior_sd: Floats) -> Evidence:
         """Of ln rates moved by weights (tests, columns) times coefficients of these prior deviations (columns,)."""
-        unknowns, count = self.precision.size, prior_sd.size
+        unknowns = self.precision.size
         total = self.gram.sum(axis=1)
         rows = np.einsum("tq,stm->sqm", weights, self.gram[..., -1])
-        normal = np.zeros((len(total), unknowns + count, unknowns + count))
-        normal[:, :unknowns, :unknowns] = total[:, 1:-1, 1:-1] + np.diag(self.precision)
-        normal[:, unknowns:, :unknowns] = rows[:, :, 1:-1]
-        normal[:, :unknowns, unknowns:] = np.swapaxes(rows[:, :, 1:-1], 1, 2)
-        normal[:, unknowns:, unknowns:] = np.einsum("tq,tp,st->sqp", weights, weights, self.gram[..., -1, -1])
-        normal[:, unknowns:, unknowns:] += np.diag(1.0 / prior_sd**2)
+        of_rates = np.einsum("tq,tp,st->sqp", weights, weights, self.gram[..., -1, -1]) + np.diag(1.0 / prior_sd**2)
+        across, own = rows[:, :, 1:-1], total[:, 1:-1, 1:-1] + np.diag(self.precision)
+        normal = np.block([[own, np.swapaxes(across, 1, 2)], [across, of_rates]])
         side = np.concatenate([total[:, 1:-1, 0] + self.precision * self.prior_residual, rows[:, :, 0]], axis=1)
         scale = np.sqrt(np.diagonal(normal, axis1=1, axis2=2))
-        inverse = np.linalg.inv(normal / scale[:, :, None] / scale[:, None, :]) / scale[:, :, None] / scale[:, None, :]
+        scaled = normal / scale[:, :, None] / scale[:, None, :]
+        inverse = np.linalg.inv(scaled) / scale[:, :, None] / scale[:, None, :]
         step = -np.einsum("spq,sq->sp", inverse, side)
         chi_square = total[:, 0, 0] + (self.precision * self.prior_residual**2).sum() + (side * step).sum(axis=1)
-        determinant = np.linalg.slogdet(normal / scale[:, :, None] / scale[:, None, :])[1] + 2 * np.log(scale).sum(
-            axis=1
-        )
+        determinant = np.linalg.slogdet(scaled)[1] + 2 * np.log(scale).sum(axis=1)
         logs = -0.5 * (self.log_determinant + determinant + 2 * np.log(prior_sd).sum() + chi_square)
         share = np.exp(logs - logsumexp(logs))
         mean = share @ step
@@ -388,5 +382,4 @@ class RateExplanations:
         return (self.x + evidence.step)[: self.problem.parameter_count]
 
     def _energy(self, u: Floats, stress: float, T: float) -> float:
-        up, down = (float(log_rate(self.problem.coordinates, stress, T + step)(u)) for step in (1.0, -1.0))
-        return 0.5 * (up - down) * GAS_CONSTANT * T**2
+        return log_rate_per_kelvin(self.problem, u, stress, T) * GAS_CONSTANT * T**2
