@@ -1,6 +1,7 @@
-"""Predictors of several specimens as one, what a predictor offers, and sensitivities by finite differences.
+"""Predictors of several specimens as one, what a predictor offers, and what it need not know itself.
 
-Finite differences replace the derivatives that a predictor does not give.
+Finite differences replace derivatives that a predictor does not give. Nuisances of programs and rates become other
+histories, and a law with rate factors in time.
 """
 
 from __future__ import annotations
@@ -8,30 +9,40 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError, SolveError
-from creepkit.inverse.prediction_concatenation import concatenated_tests
-from creepkit.inverse.transformed_prediction import TRANSFORMING_NUISANCES, plain_prediction, predict_transformed
+from creepkit.inverse.rate_nuisances import law_with_rate_factors, rate_parameters
 from creepkit.language import CreepLaw
 from creepkit.records import (
+    PROGRAM_NUISANCES,
+    RATE_NUISANCES,
     History,
     NuisanceValues,
     Prediction,
     Predictor,
+    Status,
     SupportsReducedOrderModel,
     SupportsRefinement,
     SupportsRupturePrediction,
     SupportsSearchTolerance,
     TimesToStrain,
+    broadcast_candidates,
     call_of_plugin,
     checked_prediction,
     is_length_nuisance,
     kind_and_start,
     outputs_of_test,
+    predict_with,
+    with_program_nuisances,
 )
+
+TRANSFORMING_NUISANCES = (*PROGRAM_NUISANCES, *RATE_NUISANCES)
+"""Kinds that every predictor follows as other histories, or by another law."""
 
 
 @dataclass(frozen=True)
@@ -78,18 +89,13 @@ class CompositePredictor:
         for kind in nuisances or {}:
             if not any(supports_nuisance(self.predictor_for(h), kind) for h in histories):
                 raise SolveError(f"none of the predictors {self.name} knows the nuisance '{kind}'")
-        return self.concatenate(predictions, histories)
+        return concatenated_tests(predictions, histories)
 
     def groups(self, histories: Sequence[History]) -> list[tuple[Predictor, list[int]]]:
         """Each predictor with the positions of its histories."""
         chosen = [self.predictor_for(h) for h in histories]
         distinct = list({id(p): p for p in chosen}.values())
         return [(one, [k for k, p in enumerate(chosen) if p is one]) for one in distinct]
-
-    @staticmethod
-    def concatenate(groups: Sequence[tuple[list[int], Prediction]], histories: Sequence[History]) -> Prediction:
-        """The predictions of groups as one."""
-        return concatenated_tests(groups, histories)
 
 
 def predict(
@@ -115,8 +121,59 @@ def predict(
         if kind_and_start(key)[0] in TRANSFORMING_NUISANCES and kind_and_start(key)[0] not in own_kinds
     }
     if transformed:
-        return predict_transformed(predictor, law, theta, histories, given, transformed, sensitivities)
-    return plain_prediction(predictor, law, theta, histories, given, sensitivities)
+        return _predict_transformed(predictor, law, theta, histories, given, transformed, sensitivities)
+    return predict_with(predictor, law, theta, histories, nuisances=given, sensitivities=sensitivities)
+
+
+def _predict_transformed(
+    predictor: Predictor,
+    law: CreepLaw,
+    theta: Floats,
+    histories: Sequence[History],
+    nuisances: NuisanceValues,
+    transformed: NuisanceValues,
+    sensitivities: bool,
+) -> Prediction:
+    """Predict other histories, by a law with rate factors, in place of the nuisances `transformed`.
+
+    theta : (candidates, parameters) internal values. Consecutive candidates with the same programs are one batch, and
+    so are tests with the same rate factors.
+    """
+    if max(len(values) for values in transformed.values()) > 1:
+        theta, everything = broadcast_candidates(theta, {**nuisances, **transformed}, len(histories))
+        nuisances, transformed = ({key: everything[key] for key in part} for part in (nuisances, transformed))
+        joint = np.stack([*transformed.values()], axis=-1).reshape(len(theta), -1)
+        ends = [0, *(np.flatnonzero((np.diff(joint, axis=0) != 0.0).any(axis=1)) + 1), len(theta)]
+        if len(ends) > 2:
+            parts = []
+            for first, end in pairwise(ends):
+                own = {key: values[first:end] for key, values in nuisances.items()}
+                same = {key: values[first : first + 1] for key, values in transformed.items()}
+                batch = (predictor, law, theta[first:end], histories, own, same, sensitivities)
+                parts.append(_predict_transformed(*batch))
+            return concatenated_candidates(parts)
+    values_of_tests = [{key: float(values[0, k]) for key, values in transformed.items()} for k in range(len(histories))]
+    changed = [with_program_nuisances(h, values) for h, values in zip(histories, values_of_tests, strict=True)]
+    keys = tuple(key for key in transformed if kind_and_start(key)[0] in RATE_NUISANCES)
+    if not keys:
+        return predict_with(predictor, law, theta, changed, nuisances=nuisances, sensitivities=sensitivities)
+    law = law_with_rate_factors(law, keys)
+    rates = np.array([[values[key] for key in keys] for values in values_of_tests])
+    parameters, scales = rate_parameters(keys, rates, changed)
+    groups = []
+    for row in np.unique(parameters, axis=0):
+        tests = [int(k) for k in np.flatnonzero((parameters == row).all(axis=1))]
+        extended = np.concatenate([theta, np.tile(row, (len(theta), 1))], axis=1)
+        own = {key: values[:, tests] for key, values in nuisances.items()}
+        group = [changed[k] for k in tests]
+        prediction = predict_with(predictor, law, extended, group, nuisances=own, sensitivities=sensitivities)
+        if prediction.jacobian is not None:
+            by_parameter, by_rate = np.split(prediction.jacobian, [theta.shape[1]], axis=-1)
+            slopes = {key: by_rate[..., k] * scales[tests, k, None, None] for k, key in enumerate(keys)}
+            merged = {**prediction.nuisance_jacobian, **slopes}
+            prediction = replace(prediction, jacobian=by_parameter, nuisance_jacobian=merged)
+        groups.append((tests, prediction))
+    return groups[0][1] if len(groups) == 1 else concatenated_tests(groups, histories)
 
 
 def prediction_errors_of(predictor: Predictor) -> dict[str, float]:
@@ -254,9 +311,14 @@ def predict_with_sensitivities(
     on = np.isfinite(theta)  # a coefficient that is off stays off, and has a derivative of zero
     steps = RELATIVE_STEP * np.maximum(np.abs(np.where(on, theta, 0.0)), 1.0) if numeric else np.zeros(0)
     nuisance_steps = [_nuisance_step(key, nuisances[key]) for key in kinds]
-    points, shifted_nuisances = _difference_points(theta, steps, nuisances, kinds, nuisance_steps)
-    batch = predict(predictor, law, points, histories, nuisances=shifted_nuisances)
-    count = len(points) // 2
+    count = steps.size + len(kinds)
+    moved = np.zeros((count, theta.size))  # one step in each parameter, then in each nuisance of all tests at once
+    moved[: steps.size, : steps.size] = np.diag(steps)
+    shifted = {key: np.tile(values, (2 * count, 1)) for key, values in nuisances.items()}
+    for k, (kind, step) in enumerate(zip(kinds, nuisance_steps, strict=True), steps.size):
+        shifted[kind][k] += step
+        shifted[kind][count + k] -= step
+    batch = predict(predictor, law, np.concatenate([theta + moved, theta - moved]), histories, nuisances=shifted)
     with np.errstate(invalid="ignore"):  # of values that are not finite, whose derivatives are NaN
         differences = batch.values[:count] - batch.values[count:]
     jacobian = np.moveaxis(differences[: steps.size], 0, -1) / (2 * steps) if numeric else None
@@ -276,22 +338,6 @@ def _nuisance_step(key: str, values: Floats) -> float:
     return LENGTH_STEP * float(np.max(np.abs(values))) if is_length_nuisance(kind) else NUISANCE_STEPS[kind]
 
 
-def _difference_points(
-    theta: Floats, steps: Floats, nuisances: NuisanceValues, kinds: Sequence[str], nuisance_steps: Sequence[float]
-) -> tuple[Floats, dict[str, Floats]]:
-    """Candidates one step up, then one step down, in each parameter and then in each nuisance of all tests at once."""
-    count = steps.size + len(kinds)
-    points = np.tile(theta, (2 * count, 1))
-    for sign, offset in ((1.0, 0), (-1.0, count)):
-        moved = sign * np.eye(steps.size, theta.size) * steps[:, None]
-        points[offset : offset + steps.size] += np.where(np.isfinite(theta), moved, 0.0)
-    shifted_nuisances = {kind: np.tile(values, (2 * count, 1)) for kind, values in nuisances.items()}
-    for k, kind in enumerate(kinds):
-        shifted_nuisances[kind][steps.size + k] += nuisance_steps[k]
-        shifted_nuisances[kind][count + steps.size + k] -= nuisance_steps[k]
-    return points, shifted_nuisances
-
-
 def predict_to_rupture(
     predictor: Predictor, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
 ) -> Prediction:
@@ -299,29 +345,19 @@ def predict_to_rupture(
 
     theta : (candidates, parameters) internal values.
     """
-    groups = (
-        predictor.groups(histories)
-        if isinstance(predictor, CompositePredictor)
-        else [(predictor, list(range(len(histories))))]
-    )
-    group_predictions = []
-    for predictor, tests in groups:
-        group_histories = [histories[k] for k in tests]
-        if isinstance(predictor, SupportsRupturePrediction):
-            follow = partial(predictor.predict_to_rupture, law, theta, group_histories, sensitivities=sensitivities)
-            prediction = call_of_plugin(follow, predictor, "predict_to_rupture()", SolveError)
-            checked_prediction(prediction, predictor, group_histories, *theta.shape)
-            group_predictions.append((tests, prediction))
+    whole = [(predictor, [*range(len(histories))])]
+    predictions = []
+    for one, tests in predictor.groups(histories) if isinstance(predictor, CompositePredictor) else whole:
+        group = [histories[k] for k in tests]
+        if isinstance(one, SupportsRupturePrediction):
+            follow = partial(one.predict_to_rupture, law, theta, group, sensitivities=sensitivities)
+            prediction = call_of_plugin(follow, one, "predict_to_rupture()", SolveError)
+            checked_prediction(prediction, one, group, *theta.shape)
         else:
-            prediction = predict(predictor, law, theta, group_histories, sensitivities=sensitivities)
-            group_predictions.append(
-                (tests, replace(prediction, times_to_strain=_without_rupture(prediction, len(law.names))))
-            )
-    return (
-        group_predictions[0][1]
-        if len(group_predictions) == 1
-        else CompositePredictor.concatenate(group_predictions, histories)
-    )
+            prediction = predict(one, law, theta, group, sensitivities=sensitivities)
+            prediction = replace(prediction, times_to_strain=_without_rupture(prediction, len(law.names)))
+        predictions.append((tests, prediction))
+    return predictions[0][1] if len(predictions) == 1 else concatenated_tests(predictions, histories)
 
 
 def _without_rupture(prediction: Prediction, parameters: int) -> TimesToStrain:
@@ -331,4 +367,72 @@ def _without_rupture(prediction: Prediction, parameters: int) -> TimesToStrain:
     jacobians = np.full((*shape, parameters), np.nan), np.full((*shape[:2], parameters), np.nan)
     return TimesToStrain(
         no_strains, np.full(shape, np.inf), no_ruptures, np.array([t[-1] for t in prediction.times]), *jacobians
+    )
+
+
+TIMES_TO_STRAIN_FILLS = {
+    **{"times": np.nan, "log_time_derivatives": np.inf, "rupture_times": np.nan},
+    **{"time_jacobian": np.nan, "rupture_jacobian": np.nan},
+}
+"""What the times to strain of tests hold where they have no frame."""
+
+
+def concatenated_tests(groups: Sequence[tuple[list[int], Prediction]], histories: Sequence[History]) -> Prediction:
+    """One prediction, in the order of the histories, of groups of tests; with the union of outputs."""
+    outputs = tuple(dict.fromkeys(name for _, prediction in groups for name in prediction.outputs))
+    candidates, longest = len(groups[0][1].values), max(h.times.size for h in histories)
+    shape = (candidates, len(histories), longest, len(outputs))
+    columns = [[outputs.index(name) for name in prediction.outputs] for _, prediction in groups]
+
+    def gathered(arrays: Sequence[Any], axes: int, fill: float) -> Any:
+        """Arrays (candidates, tests[, times[, outputs]], ...) of the groups as one, None where one of them is."""
+        if any(array is None for array in arrays):
+            return None
+        out = np.full((*shape[:axes], *arrays[0].shape[axes:]), fill)
+        for (tests, _), array, of_group in zip(groups, arrays, columns, strict=True):
+            index = [range(candidates), tests, *(range(size) for size in array.shape[2:3]), of_group]
+            out[np.ix_(*index[:axes])] = array
+        return out
+
+    predictions = [prediction for _, prediction in groups]
+    kinds = {kind for prediction in predictions for kind in prediction.nuisance_jacobian}
+    times_to_strain = [prediction.times_to_strain for prediction in predictions]
+    whole = None
+    if all(times_to_strain):
+        arrays = {
+            name: gathered([getattr(times, name) for times in times_to_strain], 2 if "rupture" in name else 3, fill)
+            for name, fill in TIMES_TO_STRAIN_FILLS.items()
+        }
+        horizon = np.zeros(len(histories))
+        for (tests, _), times in zip(groups, times_to_strain, strict=True):
+            horizon[tests] = times.horizon  # type: ignore[union-attr]
+        whole = TimesToStrain(horizon=horizon, **arrays)
+    return Prediction(
+        gathered([p.values for p in predictions], 4, np.nan),
+        outputs,
+        np.array([h.times.size for h in histories], np.int64),
+        gathered([p.status for p in predictions], 2, int(Status.COMPLETE)),
+        gathered([p.end_times for p in predictions], 2, np.inf),
+        gathered([p.jacobian for p in predictions], 4, np.nan),
+        tuple(h.times for h in histories),
+        {
+            kind: gathered([p.nuisance_jacobian.get(kind, np.zeros_like(p.values)) for p in predictions], 4, 0.0)
+            for kind in kinds
+        },
+        whole,
+    )
+
+
+def concatenated_candidates(parts: Sequence[Prediction]) -> Prediction:
+    """The predictions of consecutive candidates as one."""
+    names = "values", "status", "end_times"
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(p, name) for p in parts]) for name in names}
+    jacobians = [part.jacobian for part in parts if part.jacobian is not None]
+    return replace(
+        parts[0],
+        **arrays,
+        jacobian=np.concatenate(jacobians) if jacobians else None,
+        nuisance_jacobian={
+            key: np.concatenate([part.nuisance_jacobian[key] for part in parts]) for key in parts[0].nuisance_jacobian
+        },
     )

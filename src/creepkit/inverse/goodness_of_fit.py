@@ -15,6 +15,7 @@ from creepkit.inverse.composite_predictor import compared_outputs
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.single_values import SingleValue
 from creepkit.records import History, Prediction, is_logarithmic
 
 
@@ -111,54 +112,12 @@ class OutputFit:
 
 
 @dataclass(frozen=True)
-class RuptureComparison:
-    """The end of one test.
-
-    measured : s, when it ruptured, or how long it lasted where it was stopped before (`censored`).
-    predicted : s, by the law alone; infinite where the law predicts no rupture.
-    low, high : 95 % interval for a single test, from the parameters and the scatter between tests.
-    used : whether the law was compared with it; else it stands beside a law that was identified without it.
-    """
-
-    measured: float
-    censored: bool
-    predicted: float
-    low: float
-    high: float
-    used: bool = True
-
-    @property
-    def ratio(self) -> float:
-        """Predicted over measured."""
-        return self.predicted / self.measured
-
-
-@dataclass(frozen=True)
-class RateComparison:
-    """The minimum creep rate of one test without frames.
-
-    measured, predicted : 1/s; predicted by the law alone, NaN where it gives none.
-    low, high : 95 % interval for a single test, from the parameters and the scatter between tests, 1/s.
-    """
-
-    measured: float
-    predicted: float
-    low: float
-    high: float
-
-    @property
-    def ratio(self) -> float:
-        """Predicted over measured."""
-        return self.predicted / self.measured
-
-
-@dataclass(frozen=True)
 class TestFit:
     """One test in the fit.
 
     frames : how many values count (strains above twice the floor of their transform, all frames of other outputs).
     log_strain_rms, log_strain_bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted
-        strains, else NaN. For a test followed to rupture, of its orthogonal residual (see inverse.orthogonal_residual).
+        strains, else NaN. For a test followed to rupture, of its orthogonal residual (see inverse.residuals).
     rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
     weight : of the test in the fit; below one where test_loss="student" found it far from the others.
     rupture : its end, where that is known and predicted. minimum_rate : of a test without frames, where it is stated.
@@ -174,8 +133,8 @@ class TestFit:
     rate_factor: float = 1.0
     weight: float = 1.0
     outputs: tuple[OutputFit, ...] = ()
-    rupture: RuptureComparison | None = None
-    minimum_rate: RateComparison | None = None
+    rupture: SingleValue | None = None
+    minimum_rate: SingleValue | None = None
 
     def __getitem__(self, output: str) -> OutputFit:
         for one in self.outputs:
@@ -183,6 +142,11 @@ class TestFit:
                 return one
         known = ", ".join(o.output for o in self.outputs) or "no frames"
         raise FitError(f"test '{self.name}' has no output '{output}'; it has {known}")
+
+    @property
+    def misses_readings(self) -> bool:
+        """Whether the misfit of an output is no number: not every reading of it was predicted."""
+        return any(one.errors.frames > 0 and np.isnan(one.errors.mean_squared_error) for one in self.outputs)
 
     @property
     def offset(self) -> float:
@@ -196,7 +160,7 @@ def test_fits(
     random_effects: tuple[Floats, Floats],
     histories: Sequence[History],
     prediction: Prediction,
-    single_values: Sequence[tuple[RuptureComparison | None, RateComparison | None]],
+    single_values: Sequence[tuple[SingleValue | None, SingleValue | None]],
 ) -> tuple[TestFit, ...]:
     """One TestFit for each test.
 
@@ -206,7 +170,7 @@ def test_fits(
     offsets, log_factors = random_effects
     observations = problem.observations
     ratios = _log_ratios(problem, residuals, np.take_along_axis(offsets, observations.output_index, axis=1))
-    logarithmic = observations.per_observation([float(is_logarithmic(name)) for name in observations.outputs]) > 0
+    logarithmic = observations.logarithmic_mask
     test_fits = []
     for k, history in enumerate(histories):
         test_ratios = ratios[k][np.isfinite(ratios[k])]

@@ -23,13 +23,14 @@ from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, has_nuisance, owner_of, prior_mean
+from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.predictor_documents import PredictorDocument, missing_predictor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.single_values import LawAtTests, constant_stress_tests
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, delta_method, interval_quantile
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
-from creepkit.inverse.unmodelled_effect import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import History, LawWithValues, Nuisance, Prediction, Predictor
@@ -95,7 +96,7 @@ class Identification(Presentable, text="reports.identification_text:identificati
     nuisances: tuple[NuisanceEstimate, ...] = ()
     adequacy: Adequacy | None = None
     numerical_error: NumericalError | None = None
-    unmodelled: tuple[UnmodelledEffect, ...] = ()
+    unmodelled: tuple[Perturbation, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     rate_scatter: RateScatter | None = None
     samples: Floats | None = None
@@ -250,8 +251,6 @@ class Identification(Presentable, text="reports.identification_text:identificati
         Infinite where nothing breaks within some thousand times the longest test. A stress or temperature outside
         `ranges` gives a FitWarning, a temperature that seems to be in Celsius a FitError, but for warn=False.
         """
-        from creepkit.inverse.rupture_prediction import constant_stress_tests
-
         T = self.reference.temperature if temperature is None else temperature
         tests, shape = constant_stress_tests(stress, T, self.ranges["time"][1], control)
         if warn:
@@ -264,11 +263,8 @@ class Identification(Presentable, text="reports.identification_text:identificati
         self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
     ) -> tuple[Floats, Floats, Floats]:
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
-        from creepkit.inverse.rupture_prediction import predict_rupture_times
-
-        predictor = self._predictor_or(using)
-        tests, noise_model = list(histories or self.histories), self.noise_model if test_scatter else None
-        return predict_rupture_times(self.coordinates, self.u, self.scatter_of_rates, noise_model, tests, predictor)
+        law = LawAtTests.of_fit(self, self._predictor_or(using), test_scatter=test_scatter)
+        return law.rupture_times(list(histories or self.histories))
 
     @checked
     def predict(
@@ -338,7 +334,7 @@ class Identification(Presentable, text="reports.identification_text:identificati
             predictor = using
         else:
             raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
-        return cast(Identification, present("inverse.attached_histories:with_attached", self, tests, predictor))
+        return cast(Identification, present("inverse.identification_notes:with_attached", self, tests, predictor))
 
     def _predictor_or(self, using: Predictor | None) -> Predictor:
         """The predictor given, or the identification's own; FitError where a file does not give it."""

@@ -1,12 +1,14 @@
 """Observation vector: the measured values of all tests, usable and thinned frames, and the noise of a frame.
 
-Each test is one row: the frames of all its outputs, then its rupture time where that is known, padded to the longest
-test.
+An observation is a functional of the trajectory of a test with a noise of its own: the values of an output at frames,
+the times at which strains are reached (of tests that are followed to rupture, see inverse.residuals), the minimum creep
+rate, or the end. Each test is one row: the frames of all its outputs, then its minimum rate or its end where that is
+known, padded to the longest test.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,8 +16,8 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
+from creepkit.inverse.compared_tests import compares_minimum_rate, followed_duration
 from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
-from creepkit.inverse.duration import compares_minimum_rate, followed_duration
 from creepkit.inverse.frame_noise import frame_noise, noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_series import SharedNoise
 from creepkit.inverse.output_transforms import (
@@ -115,6 +117,53 @@ LINEAR_COORDINATE_LENGTH = 5.0
 
 
 @dataclass(frozen=True, eq=False)
+class Observation:
+    """What one test says of one output: its values at frames, its minimum rate, or its end.
+
+    frames : (values,) their positions among the frames of the history; of a single value the first.
+    values, times : (values,) in the output's unit, and s.
+    noise : (frames,) standard deviation in the output's unit, 0 where it is not known; of a single value (1,).
+    relative : whether noise differs between values: it was stated, or the output has a linear transform.
+    stated : whether the test states the noise of all values.
+    """
+
+    frames: Ints
+    values: Floats
+    times: Floats
+    noise: Floats
+    relative: bool
+    stated: bool
+
+    @classmethod
+    def of_history(cls, history: History, full: History, name: str) -> Observation:
+        """Of one output of a history; its noise is that of `full`, the same before frames were left out."""
+        if name in SINGLE_VALUES:
+            value, time, noise = history.minimum_rate or 0.0, followed_duration(history), full.minimum_rate_sd
+            if name == RUPTURE_OUTPUT:
+                value = time = history.rupture_time or float(history.times[-1])
+                noise = None
+            first, noises = np.zeros(1, np.int64), np.array([noise or 0.0])
+            return cls(first, np.array([value]), np.array([time]), noises, relative=True, stated=noise is not None)
+        usable, sd = usable_frames(history, name), history.standard_deviation.get(name)
+        frames = np.flatnonzero(usable)
+        return cls(
+            frames,
+            history.outputs[name][frames],
+            history.times[frames],
+            noise_standard_deviation(full, name)[np.searchsorted(full.times, history.times)],
+            relative=sd is not None or not is_logarithmic(name),
+            stated=sd is not None and bool((np.isfinite(sd) & (sd > 0))[usable].all()),
+        )
+
+    def relative_noise(self, typical: float, *, single: bool) -> Floats | float:
+        """(values,) noise of each over a typical one."""
+        if typical <= 0 or not self.relative:
+            return 1.0
+        noise = self.noise[self.frames]
+        return noise / typical if single else np.where(noise > 0, noise, typical) / typical
+
+
+@dataclass(frozen=True, eq=False)
 class ObservationVector:
     """Measured values of all tests.
 
@@ -159,77 +208,51 @@ class ObservationVector:
 
         rupture_times : whether ends of tests without frames are among them.
         """
-        full = histories if full is None else full
-        followed_to_rupture = np.array(
+        followed = np.array(
             [h.end_known and (rupture_times or bool(h.outputs)) and predicts_rupture(predictor, h) for h in histories]
         )
-        outputs_by_test = [
-            _observed_outputs(h, predictor, followed=bool(w))
-            for h, w in zip(histories, followed_to_rupture, strict=True)
+        rows = [
+            {name: Observation.of_history(h, whole, name) for name in _observed_outputs(h, predictor, followed=bool(f))}
+            for h, whole, f in zip(histories, histories if full is None else full, followed, strict=True)
         ]
-        distinct = dict.fromkeys(name for names in outputs_by_test for name in names)
+        distinct = dict.fromkeys(name for row in rows for name in row)
         # Those of single values last: absent observations are padded as the first output, whose value may be zero.
         outputs = tuple(sorted(distinct, key=lambda name: name in SINGLE_VALUES and 1 + SINGLE_VALUES.index(name)))
-        tests_by_output = {name: [k for k, names in enumerate(outputs_by_test) if name in names] for name in outputs}
-        transforms = tuple(transform_for([histories[k] for k in tests_by_output[name]], name) for name in outputs)
-        noise, noise_levels = np.zeros(len(outputs)), {}
-        for position, name in ((k, n) for k, n in enumerate(outputs) if n != RUPTURE_OUTPUT):
-            noise_by_test = [_noise_at_frames(full[k], histories[k], name) for k in tests_by_output[name]]
-            known = [v for v in noise_by_test if v.any()] if name == MINIMUM_RATE_OUTPUT else noise_by_test
-            noise[position] = np.median([np.median(v) for v in known]) if known else 0.0
-            noise_levels.update({(k, name): v for k, v in zip(tests_by_output[name], noise_by_test, strict=True)})
-        rows = [
-            [(n, _observed_frames(h, n)) for n in names] for h, names in zip(histories, outputs_by_test, strict=True)
-        ]
-        shape = len(histories), max(sum(f.size for _, f in row) for row in rows)
-        observations = cls(
+        transforms, typical, stated = [], np.zeros(len(outputs)), []
+        for position, name in enumerate(outputs):
+            transforms.append(transform_for([h for h, row in zip(histories, rows, strict=True) if name in row], name))
+            observed = [row[name] for row in rows if name in row]
+            stated.append(all(one.stated for one in observed))
+            known = [one.noise for one in observed if name not in SINGLE_VALUES or one.noise.any()]
+            typical[position] = np.median([np.median(noise) for noise in known]) if known else 0.0
+        shape = len(histories), max(sum(one.frames.size for one in row.values()) for row in rows)
+        (index, frames), (present, leading) = np.zeros((2, *shape), np.int64), np.zeros((2, *shape), bool)
+        values, (times, relative_noise) = np.zeros(shape), np.ones((2, *shape))
+        for k, row in enumerate(rows):
+            start = 0
+            for rank, (name, one) in enumerate(row.items()):
+                place, position = (k, slice(start, start + one.frames.size)), outputs.index(name)
+                start += one.frames.size
+                index[place], frames[place], present[place] = position, one.frames, True
+                values[place], times[place] = one.values, one.times
+                leading[place] = rank == 0 and name != RUPTURE_OUTPUT
+                relative_noise[place] = one.relative_noise(typical[position], single=name in SINGLE_VALUES)
+        return cls(
             outputs,
-            transforms,
-            np.zeros(shape, np.int64),
-            np.zeros(shape, np.int64),
-            np.zeros(shape, bool),
-            np.zeros(shape, bool),
-            np.zeros(shape),
-            np.ones(shape),
-            noise,
-            np.ones(shape),
-            np.array([_states_noise([histories[k] for k in tests_by_output[name]], name) for name in outputs]),
-            followed_to_rupture,
-            followed_to_rupture & np.array([h.unruptured for h in histories]),
+            tuple(transforms),
+            index,
+            frames,
+            present,
+            leading,
+            values,
+            times,
+            typical,
+            relative_noise,
+            np.array(stated),
+            followed,
+            followed & np.array([h.unruptured for h in histories]),
             np.stack([_correlation_matrix(h, outputs) for h in histories]),
         )
-        for k, (history, row) in enumerate(zip(histories, rows, strict=True)):
-            observations._fill_test(k, history, row, noise_levels)
-        return observations
-
-    def _fill_test(
-        self, k: int, history: History, row: Sequence[tuple[str, Ints]], noise_levels: dict[tuple[int, str], Floats]
-    ) -> None:
-        start = 0
-        for rank, (name, frames) in enumerate(row):
-            columns, position = slice(start, start + frames.size), self.outputs.index(name)
-            self.output_index[k, columns], self.frame_index[k, columns], self.present[k, columns] = (
-                position,
-                frames,
-                True,
-            )
-            self.leading_output[k, columns] = rank == 0 and name != RUPTURE_OUTPUT
-            start += frames.size
-            if name == RUPTURE_OUTPUT:
-                self.values[k, columns] = self.times[k, columns] = history.rupture_time or history.times[-1]
-                continue
-            if name == MINIMUM_RATE_OUTPUT:
-                self.values[k, columns], self.times[k, columns] = history.minimum_rate, followed_duration(history)
-                typical_noise, own = self.noise[position], noise_levels[k, name]
-                self.relative_noise[k, columns] = own / typical_noise if typical_noise > 0 else 1.0
-                continue
-            self.values[k, columns], self.times[k, columns] = history.outputs[name][frames], history.times[frames]
-            noise = noise_levels[k, name][frames]
-            if not is_logarithmic(name) or name in history.standard_deviation:
-                typical_noise = self.noise[position]
-                self.relative_noise[k, columns] = (
-                    np.where(noise > 0, noise, typical_noise) / typical_noise if typical_noise > 0 else 1.0
-                )
 
     @cached_property
     def transformed_values(self) -> Floats:
@@ -252,6 +275,11 @@ class ObservationVector:
         }
         return replace(self, **rows)
 
+    def with_noise_of(self, other: ObservationVector) -> ObservationVector:
+        """The same with the transforms and the noise of other observations of these outputs."""
+        position = [other.outputs.index(name) for name in self.outputs]
+        return replace(self, transforms=tuple(other.transforms[k] for k in position), noise=other.noise[position])
+
     @cached_property
     def discrepancy_unit(self) -> Floats:
         """(tests, observations) -, what a model discrepancy of one is on the scale of the transformed output."""
@@ -260,11 +288,10 @@ class ObservationVector:
             if name in SINGLE_VALUES
             else RELATIVE_DISCREPANCY_UNIT
             if is_logarithmic(name)
-            else max(float(noise), SMALLEST_NOISE * transform.floor) / transform.scale  # type: ignore[attr-defined]
+            else max(float(noise), SMALLEST_NOISE * transform.floor) / transform.scale  # type: ignore[union-attr]
             for name, noise, transform in zip(self.outputs, self.noise, self.transforms, strict=True)
         ]
-        logarithmic = self.per_observation([float(is_logarithmic(name)) for name in self.outputs]) > 0
-        return self.per_observation(units) * np.where(logarithmic, 1.0, self.relative_noise)
+        return self.per_observation(units) * np.where(self.logarithmic_mask, 1.0, self.relative_noise)
 
     @cached_property
     def shared_noise(self) -> SharedNoise | None:
@@ -280,24 +307,22 @@ class ObservationVector:
     def correlation_coordinate(self) -> Floats:
         """(tests, observations) -, ln t where the transform is logarithmic, else 5 t / last time."""
         last_times = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)
-        logarithmic = (
-            self.per_observation([float(name in SINGLE_VALUES or is_logarithmic(name)) for name in self.outputs]) > 0
-        )
+        logarithmic = self.logarithmic_mask | self._mask_of(*SINGLE_VALUES)
         return np.where(
             logarithmic, self.log_times, LINEAR_COORDINATE_LENGTH * self.times / np.maximum(last_times, 1e-300)
         )
 
     def forward(self, y: Floats) -> Floats:
         """(..., tests, observations) - transformed outputs y (..., tests, observations)."""
-        return self._transformed(y, lambda scale: scale.forward)
+        return self._transformed(y, "forward")
 
     def inverse(self, g: Floats) -> Floats:
         """(..., tests, observations) outputs of transformed g (..., tests, observations)."""
-        return self._transformed(g, lambda scale: scale.inverse)
+        return self._transformed(g, "inverse")
 
     def derivative(self, y: Floats) -> Floats:
         """(..., tests, observations) 1 / unit, derivative of the transform at outputs y (..., tests, observations)."""
-        return self._transformed(y, lambda scale: scale.derivative)
+        return self._transformed(y, "derivative")
 
     def per_observation(self, values: Sequence[float] | Floats) -> Floats:
         """(tests, observations) numbers of the output of each observation, from values (outputs,)."""
@@ -306,15 +331,25 @@ class ObservationVector:
     @property
     def rupture_mask(self) -> Bools:
         """(tests, observations) which are rupture times, or times without rupture."""
-        return self._mask_of(RUPTURE_OUTPUT)
+        return self.present & self._mask_of(RUPTURE_OUTPUT)
 
     @property
     def single_value_mask(self) -> Bools:
         """(tests, observations) which are the only value of their output: rupture times and minimum rates."""
-        return self._mask_of(*SINGLE_VALUES)
+        return self.present & self._mask_of(*SINGLE_VALUES)
+
+    @property
+    def followed_frames(self) -> Bools:
+        """(tests, observations) which are frames of tests that are compared up to rupture."""
+        return np.asarray(self.followed_to_rupture[:, None] & self.present & ~self.single_value_mask)
+
+    @property
+    def logarithmic_mask(self) -> Bools:
+        """(tests, observations) which are of outputs with a logarithmic transform, padding included."""
+        return self._mask_of(*filter(is_logarithmic, self.outputs))
 
     def _mask_of(self, *outputs: str) -> Bools:
-        return np.asarray(self.present & (self.per_observation([float(n in outputs) for n in self.outputs]) > 0))
+        return np.array([name in outputs for name in self.outputs])[self.output_index]
 
     def select_outputs(self, array: Floats, prediction: Prediction) -> Floats:
         """(candidates, tests, observations, ...) of an array (candidates, tests, times, outputs, ...).
@@ -336,11 +371,11 @@ class ObservationVector:
         """(candidates, tests, observations, ...) of an array (candidates, tests, times, ...) without outputs."""
         return np.asarray(array[:, np.arange(len(self.frame_index))[:, None], self.frame_index])
 
-    def _transformed(self, y: Floats, method: Callable[[OutputTransform], Callable[[Floats], Floats]]) -> Floats:
+    def _transformed(self, y: Floats, method: str) -> Floats:
         out = np.empty_like(y)
         for position, transform in enumerate(self.transforms):
             mask = self.output_index == position
-            out[..., mask] = method(transform)(y[..., mask])
+            out[..., mask] = getattr(transform, method)(y[..., mask])
         return out
 
 
@@ -348,17 +383,6 @@ def _correlation_matrix(history: History, outputs: Sequence[str]) -> Floats:
     """(outputs, outputs) correlation of the noise of a frame."""
     fitted = {pair: rho for pair, rho in history.noise_correlation.items() if set(pair) <= set(outputs)}
     return correlation_matrix(fitted, outputs)
-
-
-def _states_noise(histories: Sequence[History], name: str) -> bool:
-    """Whether all of them state a standard deviation of this output."""
-    if name == MINIMUM_RATE_OUTPUT:
-        return all(h.minimum_rate_sd is not None for h in histories)
-    stated = [np.asarray(h.standard_deviation.get(name, np.nan)) for h in histories]
-    return name != RUPTURE_OUTPUT and all(
-        sd.shape == h.times.shape and (np.isfinite(sd) & (sd > 0))[usable_frames(h, name)].all()
-        for h, sd in zip(histories, stated, strict=True)
-    )
 
 
 def _observed_outputs(history: History, predictor: Predictor, *, followed: bool) -> tuple[str, ...]:
@@ -370,15 +394,3 @@ def _observed_outputs(history: History, predictor: Predictor, *, followed: bool)
             f"history '{history.name}' has no output that is predicted; it has {', '.join(history.outputs) or 'none'}"
         )
     return (*names, *([RUPTURE_OUTPUT] if followed else []))
-
-
-def _observed_frames(history: History, name: str) -> Ints:
-    return np.zeros(1, np.int64) if name in SINGLE_VALUES else np.flatnonzero(usable_frames(history, name))
-
-
-def _noise_at_frames(full: History, thinned: History, name: str) -> Floats:
-    """(frames of `thinned`,) noise as the full history shows it, in the output's unit; of a minimum rate as stated."""
-    if name == MINIMUM_RATE_OUTPUT:
-        return np.array([full.minimum_rate_sd or 0.0])
-    noise = noise_standard_deviation(full, name)
-    return noise[np.searchsorted(full.times, thinned.times)]

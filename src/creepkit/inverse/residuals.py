@@ -2,26 +2,25 @@
 
 After a predicted rupture the transformed output grows on with ln of time over rupture time, so that residuals are
 finite and their derivatives lead back to values at which the specimen lasts.
+
+Of tests that were followed to rupture residuals are orthogonal: near rupture strain grows without limit within almost
+no time, and an error in strain has no meaning. What counts is the distance of a measured point from the predicted
+curve, in strain and in the logarithm of time, in units of both errors.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats, Ints
+from creepkit.arrays import Bools, Floats
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, ObservationVector
-from creepkit.inverse.orthogonal_residual import (
-    OrthogonalResiduals,
-    offset_time_derivative,
-    orthogonal_residuals,
-    time_jacobian,
-)
 from creepkit.inverse.output_transforms import LinearTransform
-from creepkit.records import Prediction
+from creepkit.records import Prediction, TimesToStrain
 
 SLOPE_AFTER_RUPTURE = 3.0
 """Growth of the transformed output per unit of ln(t / t_rupture) after a predicted rupture."""
@@ -29,6 +28,44 @@ SLOPE_AFTER_RUPTURE = 3.0
 
 SMALLEST_INCREASE = 0.01
 """Of a transformed output since the first frame: smaller increases say nothing about the creep rate."""
+
+
+SMALLEST_DISTANCE = 1e-7
+"""Below this distance the ratio of the errors is the slope of the curve."""
+
+
+@dataclass(frozen=True, eq=False)
+class OrthogonalDistance:
+    """The orthogonal distance of points from a curve, in units of their errors.
+
+    values : (...,) -, the distance r, with its sign.
+    strain_derivative, time_derivative : (...,) -, its derivatives to the error in strain and to that in ln time.
+    informative : (...,), false for the end of a test that was stopped before its predicted rupture.
+    """
+
+    values: Floats
+    strain_derivative: Floats
+    time_derivative: Floats
+    informative: Bools | bool = True
+
+
+def orthogonal_distance(strain_residual: Floats, time_residual: Floats, curve_slope: Floats) -> OrthogonalDistance:
+    """The distance of points from a curve, given their errors, of which one may be infinite but not both.
+
+    strain_residual, time_residual : (...,) -, errors in transformed strain and in ln time.
+    curve_slope : (...,) -, d(transformed strain) / d(ln time) of the predicted curve, infinite at rupture.
+    """
+    a, b = np.abs(strain_residual), np.abs(time_residual)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        ratio = np.where(np.maximum(np.minimum(a, b), 0.0) > SMALLEST_DISTANCE, a / b, np.maximum(curve_slope, 0.0))
+        ratio = np.where(np.isinf(b), 0.0, np.where(np.isinf(a), np.inf, ratio))
+        strain_weight, time_weight = 1.0 / np.hypot(1.0, ratio), 1.0 / np.hypot(1.0, 1.0 / ratio)
+    sign = np.where(np.isinf(a), np.sign(time_residual), np.sign(strain_residual))
+    by_strain, by_time = (np.where(np.isinf(e), 0.0, e) * w for e, w in ((a, strain_weight), (b, time_weight)))
+    magnitude = np.where(strain_weight >= time_weight, by_strain, by_time)
+    return OrthogonalDistance(
+        np.sqrt(2.0) * sign * magnitude, np.sqrt(2.0) * strain_weight**3, np.sqrt(2.0) * time_weight**3
+    )
 
 
 def residuals_at_measured_values(observations: ObservationVector) -> Residuals:
@@ -52,9 +89,8 @@ def candidate_residuals(
 
     correction : (tests, observations) in the output's unit, what is added to predictions.
     """
-    predicted = _predicted_values(observations, prediction, correction)
-    values = _orthogonal_residuals(observations, predicted, prediction).values
-    return np.where(observations.present, values, 0.0)
+    distance = _distance(observations, _predicted_values(observations, prediction, correction), prediction)
+    return np.where(observations.present, distance.values, 0.0)
 
 
 def candidate_residuals_and_jacobian(
@@ -67,19 +103,9 @@ def candidate_residuals_and_jacobian(
     """
     assert prediction.jacobian is not None
     predicted = _predicted_values(observations, prediction, correction)
-    reached = np.isfinite(predicted)
-    derivatives = observations.derivative(np.where(reached, predicted, 1.0))
-    with np.errstate(invalid="ignore"):
-        jacobian = derivatives[..., None] * observations.select_outputs(prediction.jacobian, prediction)
-    jacobian = np.where(np.isfinite(jacobian), jacobian, np.nan)
-    filled = np.stack(
-        [
-            _jacobian_after_rupture(one, reached_rows, observations.output_index)
-            for one, reached_rows in zip(jacobian, reached & observations.present, strict=True)
-        ]
-    )
-    values = np.where(observations.present, _orthogonal_residuals(observations, predicted, prediction).values, 0.0)
-    return values, filled
+    jacobian = observations.select_outputs(prediction.jacobian, prediction)
+    values = np.where(observations.present, _distance(observations, predicted, prediction).values, 0.0)
+    return values, _transformed_jacobian(observations, predicted, jacobian)
 
 
 def residuals_of_prediction(
@@ -97,27 +123,26 @@ def residuals_of_prediction(
     """
     assert prediction.jacobian is not None
     predicted = _predicted_values(observations, prediction, correction)
-    orthogonal, reached = _orthogonal_residuals(observations, predicted, prediction), np.isfinite(predicted[0])
-    derivatives = observations.derivative(np.where(reached, predicted[0], 1.0))
-    jacobian = _transformed_jacobian(observations, prediction, nuisance_parameters, derivatives, reached)
-    jacobian = orthogonal.strain_derivative[0, ..., None] * jacobian
-    derivatives = orthogonal.strain_derivative[0] * np.where(reached, derivatives, 0.0)
-    times = prediction.times_to_strain
-    if times is not None:
-        jacobian += orthogonal.time_derivative[0, ..., None] * time_jacobian(observations, times)[0]
-        derivatives += orthogonal.time_derivative[0] * offset_time_derivative(observations, times)[0]
+    distance, reached = _distance(observations, predicted, prediction), np.isfinite(predicted[0])
+    jacobian = observations.select_outputs(prediction.jacobian, prediction)[0]
+    if nuisance_parameters.size:
+        by_kind = {
+            kind: observations.select_outputs(s, prediction)[0] for kind, s in prediction.nuisance_jacobian.items()
+        }
+        jacobian = np.concatenate([jacobian, nuisance_parameters.jacobian(by_kind)], axis=-1)
+    by_strain, by_time = distance.strain_derivative[0], distance.time_derivative[0]
+    jacobian = by_strain[..., None] * _transformed_jacobian(observations, predicted[0], jacobian)
+    offsets = by_strain * np.where(reached, observations.derivative(np.where(reached, predicted[0], 1.0)), 0.0)
+    if prediction.times_to_strain is not None:
+        time_jacobian, time_offsets = _time_derivatives(observations, prediction.times_to_strain)
+        jacobian += by_time[..., None] * time_jacobian
+        offsets += by_time * time_offsets
     if coefficients is None:
-        log_rate_sensitivity = _time_derivative(observations, predicted[0], orthogonal)
+        log_rate_sensitivity = by_strain * _time_derivative(observations, predicted[0]) + by_time
     else:
         log_rate_sensitivity = np.asarray(jacobian[..., list(coefficients)].sum(axis=-1))
-    return _masked_residuals(
-        observations,
-        orthogonal.values[0],
-        derivatives,
-        jacobian,
-        log_rate_sensitivity,
-        observations.present & orthogonal.informative[0],
-    )
+    informative = observations.present & np.broadcast_to(distance.informative, distance.values.shape)[0]
+    return _masked_residuals(observations, distance.values[0], offsets, jacobian, log_rate_sensitivity, informative)
 
 
 def median_log_rate_excess(observations: ObservationVector, residuals: Floats) -> Floats:
@@ -166,11 +191,38 @@ def _predicted_values(observations: ObservationVector, prediction: Prediction, c
     return np.where(observations.rupture_mask, observations.values, predicted)
 
 
-def _orthogonal_residuals(
-    observations: ObservationVector, predicted: Floats, prediction: Prediction
-) -> OrthogonalResiduals:
+def _distance(observations: ObservationVector, predicted: Floats, prediction: Prediction) -> OrthogonalDistance:
+    """Of the observations from the curves of candidates, predicted : (candidates, tests, observations).
+
+    Of tests that are not followed to rupture it is the residual in the transformed output alone; of a rupture ln of
+    measured over predicted time, and a stopped test counts where it lasted longer than that.
+    """
+    reached, times = np.isfinite(predicted), prediction.times_to_strain
     vertical = _extended_after_rupture(observations, predicted, prediction.end_times) - observations.transformed_values
-    return orthogonal_residuals(observations, vertical, np.isfinite(predicted), prediction)
+    if times is None:
+        return OrthogonalDistance(vertical, np.ones_like(vertical), np.zeros_like(vertical))
+    frames, ends = observations.followed_frames, observations.rupture_mask
+    log_time_ratio = observations.log_times - _log_times(observations.select_frames(times.times))
+    not_converged = ~reached & np.isneginf(log_time_ratio)  # neither reached nor ruptured: no convergence
+    curve_slope = observations.derivative(np.where(frames, observations.values, 1.0)) * observations.select_frames(
+        times.log_time_derivatives
+    )
+    orthogonal = orthogonal_distance(
+        np.where(reached | not_converged, vertical, np.inf),
+        np.where(not_converged, -np.inf, log_time_ratio),
+        curve_slope,
+    )
+    ruptured = np.isfinite(times.rupture_times)
+    log_end_times = np.log(np.where(ruptured, times.rupture_times, times.horizon))
+    late = observations.log_times - log_end_times[..., None]
+    uninformative = ends & observations.censored[:, None] & (late <= 0.0)
+    at_end = np.where(ruptured[..., None] & ~uninformative, 1.0, 0.0)
+    return OrthogonalDistance(
+        np.where(ends, np.where(uninformative, 0.0, late), np.where(frames, orthogonal.values, vertical)),
+        np.where(ends, 0.0, np.where(frames, orthogonal.strain_derivative, 1.0)),
+        np.where(ends, at_end, np.where(frames, orthogonal.time_derivative, 0.0)),
+        ~uninformative,
+    )
 
 
 def _extended_after_rupture(observations: ObservationVector, predicted: Floats, end_times: Floats) -> Floats:
@@ -185,35 +237,56 @@ def _extended_after_rupture(observations: ObservationVector, predicted: Floats, 
     return transformed
 
 
-def _transformed_jacobian(
-    observations: ObservationVector,
-    prediction: Prediction,
-    nuisance_parameters: NuisanceParameters,
-    derivatives: Floats,
-    reached: Bools,
-) -> Floats:
-    """(tests, observations, unknowns) derivatives of transformed outputs to internal and nuisance parameters."""
-    assert prediction.jacobian is not None
-    jacobian = observations.select_outputs(prediction.jacobian, prediction)[0]
-    if nuisance_parameters.size:
-        by_kind = {
-            kind: observations.select_outputs(s, prediction)[0] for kind, s in prediction.nuisance_jacobian.items()
-        }
-        jacobian = np.concatenate([jacobian, nuisance_parameters.jacobian(by_kind)], axis=-1)
+def _transformed_jacobian(observations: ObservationVector, predicted: Floats, jacobian: Floats) -> Floats:
+    """Derivatives (..., tests, observations, unknowns) of transformed outputs from those of outputs.
+
+    At frames after a rupture they are those of the last frame of the output that the prediction reaches.
+    """
+    reached, output = np.isfinite(predicted), observations.output_index
     with np.errstate(invalid="ignore"):
-        jacobian = derivatives[..., None] * jacobian
-    jacobian = np.where(np.isfinite(jacobian), jacobian, np.nan)
-    return _jacobian_after_rupture(jacobian, reached & observations.present, observations.output_index)
+        jacobian = observations.derivative(np.where(reached, predicted, 1.0))[..., None] * jacobian
+    reached = reached & observations.present
+    if not reached.all():
+        frames = np.broadcast_to(np.arange(reached.shape[-1]), reached.shape)
+        index = np.array(frames)
+        for position in np.unique(output):
+            mask = reached & (output == position)
+            last = np.maximum.accumulate(np.where(mask, frames, -1), axis=-1)
+            first = np.where(mask.any(axis=-1), mask.argmax(axis=-1), 0)[..., None]
+            index = np.where(output == position, np.where(last >= 0, last, first), index)
+        jacobian = np.take_along_axis(jacobian, index[..., None], axis=-2)
+    return np.where(np.isfinite(jacobian), jacobian, 0.0)
 
 
-def _time_derivative(observations: ObservationVector, predicted: Floats, orthogonal: OrthogonalResiduals) -> Floats:
-    """(tests, observations) derivative of the residual to ln t.
+def _time_derivatives(observations: ObservationVector, times: TimesToStrain) -> tuple[Floats, Floats]:
+    """Derivatives of -ln of the times to strain and to rupture, of the first candidate; zero where neither is reached.
+
+    To internal parameters (tests, observations, parameters) and to an added offset (tests, observations), 1 / unit.
+    """
+    assert times.time_jacobian is not None
+    assert times.rupture_jacobian is not None
+    ends = observations.rupture_mask
+    jacobian = -np.where(
+        ends[..., None], times.rupture_jacobian[:, :, None], observations.select_frames(times.time_jacobian)
+    )
+    slope = observations.select_frames(times.log_time_derivatives)
+    slope = np.where(np.isfinite(slope) & (slope > 0), slope, np.inf)
+    return np.where(np.isfinite(jacobian), jacobian, 0.0)[0], np.where(ends, 0.0, 1.0 / slope)[0]
+
+
+def _log_times(times: Floats) -> Floats:
+    """ln of times; infinity for a time that is never reached."""
+    with np.errstate(divide="ignore"):
+        return np.where(np.isnan(times), np.inf, np.log(np.where(np.isnan(times), 1.0, times)))
+
+
+def _time_derivative(observations: ObservationVector, predicted: Floats) -> Floats:
+    """(tests, observations) derivative of the transformed output to ln t.
 
     For a law without explicit time at constant stress it is that to ln of a factor on all rates: the strain depends on
     factor x time alone.
     """
-    reached = np.isfinite(predicted)
-    transformed = observations.forward(np.where(reached, predicted, observations.values))
+    transformed = observations.forward(np.where(np.isfinite(predicted), predicted, observations.values))
     sensitivity = np.zeros_like(transformed)
     for k, present in enumerate(observations.present):
         for position in np.unique(observations.output_index[k, present]):
@@ -222,7 +295,7 @@ def _time_derivative(observations: ObservationVector, predicted: Floats, orthogo
                 sensitivity[k, row] = 1.0
             elif row.sum() > 1:
                 sensitivity[k, row] = np.gradient(transformed[k, row], observations.log_times[k, row])
-    return np.asarray(orthogonal.strain_derivative[0] * sensitivity + orthogonal.time_derivative[0])
+    return sensitivity
 
 
 def _masked_residuals(
@@ -233,31 +306,17 @@ def _masked_residuals(
     log_rate_sensitivity: Floats,
     mask: Bools,
 ) -> Residuals:
-    return Residuals(
-        values=np.where(mask, values, 0.0),
-        offset_sensitivity=np.where(mask, derivatives, 0.0),
+    residuals = Residuals(
+        values=values,
+        offset_sensitivity=derivatives,
         present=mask,
         correlation_coordinate=observations.correlation_coordinate,
-        jacobian=None if jacobian is None else np.where(mask[..., None], jacobian, 0.0),
-        log_rate_sensitivity=np.where(mask, log_rate_sensitivity, 0.0),
+        jacobian=jacobian,
+        log_rate_sensitivity=log_rate_sensitivity,
         output_index=observations.output_index,
         relative_noise=observations.relative_noise,
-        discrepancy_unit=np.where(mask, observations.discrepancy_unit, 0.0),
+        discrepancy_unit=observations.discrepancy_unit,
         shared_noise=observations.shared_noise,
         test_weights=np.ones(len(mask)),
     )
-
-
-def _jacobian_after_rupture(jacobian: Floats, reached: Bools, output: Ints) -> Floats:
-    """Derivatives at frames after a rupture: those of the last frame of the output that the prediction reaches."""
-    if reached.all():
-        return np.where(np.isfinite(jacobian), jacobian, 0.0)
-    frames = np.broadcast_to(np.arange(reached.shape[1]), reached.shape)
-    index = np.array(frames)
-    for position in np.unique(output):
-        mask = reached & (output == position)
-        last_alive = np.maximum.accumulate(np.where(mask, frames, -1), axis=1)
-        first_alive = np.where(mask.any(axis=1), mask.argmax(axis=1), 0)
-        index = np.where(output == position, np.where(last_alive >= 0, last_alive, first_alive[:, None]), index)
-    filled = np.take_along_axis(jacobian, index[..., None], axis=1)
-    return np.where(np.isfinite(filled), filled, 0.0)
+    return residuals.where(mask)

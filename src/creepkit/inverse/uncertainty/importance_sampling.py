@@ -4,11 +4,13 @@ A Gaussian about a value at its bound puts half of its mass where no value may b
 other side. Samples are drawn from a Student's t about it, weighted with the posterior (see uncertainty.posterior) over
 their density, and the proposal is moved to the weighted samples in a few rounds: population Monte Carlo (Cappe et al.
 (2004), J. Comput. Graph. Stat. 13, 907). The posterior is that of the problem through a cheaper predictor, corrected at
-the optimum by what it differs from the predictor there (see inverse.defect_correction).
+the optimum by what it differs from the predictor there (see inverse.defect_correction), and with residuals that are
+quadratic functions of u where these prove right (see uncertainty.quadratic_residuals).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +22,7 @@ from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import lies_at_bound
 from creepkit.inverse.uncertainty.posterior import Posterior
+from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals, quadratic_terms
 from creepkit.records import Predictor
 
 ROUNDS, MOST_ROUNDS = 4, 12
@@ -67,7 +70,11 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     cheaper = cheaper or reduced_order_model_of(problem.predictor)
     if cheaper is not None:
         problem = with_cheaper_predictor(problem, fit.x, search_predictor_of(cheaper))
-    samples = posterior_samples(replace(fit, problem=problem))
+    posterior = Posterior.from_identification(replace(fit, problem=problem))
+    centre, seed = np.array(fit.u), fit.settings.seed
+    shape = shortened_covariance(posterior, centre, fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance)))
+    samples = _samples_by_quadratic_residuals(posterior, centre, shape, seed)
+    samples = posterior_samples(posterior, centre, shape, seed) if samples is None else samples
     if samples is None:
         note = (
             "values lie at their bounds or are not determined, and their posterior could not be sampled: intervals of "
@@ -76,12 +83,62 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     return replace(fit, samples=samples)
 
 
-def posterior_samples(fit: Identification, seed: int | None = None) -> Floats | None:
-    """(samples, parameters) conditioned coordinates of equal weight; None where too few of the draws count."""
-    posterior, size = Posterior.from_identification(fit), fit.u.size
-    seed = fit.settings.seed if seed is None else seed
-    centre = np.array(fit.u)
-    shape = _shortened(posterior, centre, fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance)))
+def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape: Floats, seed: int) -> Floats | None:
+    """Samples of the posterior with residuals as quadratic functions of u, where it is what predictions say; else None.
+
+    Fitted to draws about the optimum, and judged at draws of what it says itself, which improve it where it fails.
+    """
+    count = max(LEAST_POINTS, 2 * quadratic_terms(centre.size))
+    drawn = _drawn(centre, shape, seed)
+    u = drawn[posterior.inside(drawn)][:count]
+    if len(u) < count:
+        return None
+    residuals, rate_effect = posterior.residuals(u)
+    log_density = posterior.log_density(residuals, rate_effect)
+    for k in range(FITS):
+        usable = np.isfinite(log_density) & np.isfinite(residuals).all(axis=(1, 2))
+        if usable.sum() < 1.5 * quadratic_terms(centre.size):
+            return None
+        weights = np.exp(0.5 * np.maximum(log_density[usable] - log_density.max(), LEAST_LOG_WEIGHT))
+        surface = QuadraticResiduals.fitted(u[usable], residuals[usable], weights, centre, shape)
+        quadratic = replace(posterior, quadratic=surface)
+        samples = posterior_samples(quadratic, centre, shape, seed + k)
+        if samples is None:
+            return None
+        judged = samples[:: len(samples) // LEAST_POINTS][:LEAST_POINTS]
+        further, further_effect = posterior.residuals(judged)
+        exact = posterior.log_density(further, further_effect)
+        error = float(np.std(exact - quadratic(judged)))
+        if error < LARGEST_ERROR:
+            return samples
+        u, residuals = np.concatenate([u, judged]), np.concatenate([residuals, further])
+        log_density = np.concatenate([log_density, exact])
+    return None
+
+
+LEAST_POINTS = 32
+"""Simulated points that quadratic residuals are fitted to at least, and at which they are judged."""
+
+
+FITS = 3
+"""Of quadratic residuals, before the posterior is sampled by predictions alone."""
+
+
+LEAST_LOG_WEIGHT = -20.0
+"""ln of the posterior over its largest, below which points weigh the same."""
+
+
+LARGEST_ERROR = 0.2
+"""Standard deviation of the error of ln p by quadratic residuals: weights of samples then are right to 20 %."""
+
+
+def posterior_samples(density: Callable[[Floats], Floats], centre: Floats, shape: Floats, seed: int) -> Floats | None:
+    """(samples, parameters) conditioned coordinates of equal weight; None where too few of the draws count.
+
+    density : ln p (candidates,), but for a constant, of u (candidates, parameters). centre, shape : of the first
+    proposal.
+    """
+    size = centre.size
     least = 1e-6 * np.diag(np.diag(shape))
     points, log_density = np.zeros((0, size)), np.zeros(0)
     proposals: list[tuple[Floats, Floats]] = []
@@ -90,7 +147,7 @@ def posterior_samples(fit: Identification, seed: int | None = None) -> Floats | 
         proposals.append((centre, shape))
         drawn = _drawn(centre, shape, seed + k)
         points = np.concatenate([points, drawn])
-        log_density = np.concatenate([log_density, posterior(drawn)])
+        log_density = np.concatenate([log_density, density(drawn)])
         log_proposal = np.stack([multivariate_t.logpdf(points, m, s, df=PROPOSAL_FREEDOM) for m, s in proposals])
         mixture = np.logaddexp.reduce(log_proposal, axis=0) - np.log(len(proposals))
         log_weight = log_density - mixture
@@ -109,7 +166,7 @@ def posterior_samples(fit: Identification, seed: int | None = None) -> Floats | 
     return np.asarray(points[np.searchsorted(np.cumsum(weights), positions).clip(max=len(points) - 1)])
 
 
-def _shortened(posterior: Posterior, centre: Floats, covariance: Floats) -> Floats:
+def shortened_covariance(density: Callable[[Floats], Floats], centre: Floats, covariance: Floats) -> Floats:
     """The covariance with principal axes as short as the posterior falls along them.
 
     Where tests do not tell parameters apart, as two transients that are alike, the derivatives at the optimum vanish
@@ -118,13 +175,16 @@ def _shortened(posterior: Posterior, centre: Floats, covariance: Floats) -> Floa
     sd = np.sqrt(np.diag(covariance))
     variances, axes = np.linalg.eigh(covariance / np.outer(sd, sd))
     axes = axes * np.sqrt(np.maximum(variances, 1e-12))
-    lengths = 2.0 ** -np.arange(AXIS_HALVINGS + 1.0)
-    steps = np.concatenate([lengths, -lengths])
-    points = centre + sd * (steps[:, None, None] * axes.T).reshape(-1, centre.size)
-    log_density = posterior(np.concatenate([centre[None], points]))
-    inside = (log_density[1:] >= log_density[0] - LARGEST_FALL).reshape(2, lengths.size, centre.size).any(axis=0)
-    longest = np.where(inside.any(axis=0), lengths[inside.argmax(axis=0)], lengths[-1])
-    kept = axes * longest
+    least = float(density(centre[None])[0]) - LARGEST_FALL
+    lengths, longer = np.ones(centre.size), np.arange(centre.size)
+    for _ in range(AXIS_HALVINGS):
+        steps = (lengths[longer] * axes[:, longer]).T
+        log_density = density(centre + sd * np.concatenate([steps, -steps])).reshape(2, -1)
+        longer = longer[~(log_density >= least).any(axis=0)]
+        if not longer.size:
+            break
+        lengths[longer] *= 0.5
+    kept = axes * lengths
     return np.asarray(np.outer(sd, sd) * (kept @ kept.T))
 
 

@@ -36,6 +36,7 @@ from creepkit.inverse.noise_model import MINIMUM_TESTS, NoiseModel
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
 from creepkit.inverse.uncertainty.mixture_distribution import INTERVAL_PROBABILITIES
+from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, local_exponent, log_rate, quantity_of
 from creepkit.presentation import Presentable, present
 from creepkit.records import Predictor
@@ -75,6 +76,7 @@ class Posterior:
     internal parameters.
     nuisance_basis : (data + nuisances, nuisances) Q. prior_residuals : (nuisances,) - of the priors, at the estimates.
     degrees_of_freedom : nu; least_chi_square : at the optimum.
+    quadratic : residuals as functions of u, in the place of predictions.
     """
 
     problem: LeastSquaresProblem
@@ -87,6 +89,7 @@ class Posterior:
     prior_residuals: Floats
     degrees_of_freedom: float
     least_chi_square: float
+    quadratic: QuadraticResiduals | None = None
 
     @classmethod
     def from_identification(cls, fit: Identification) -> Posterior:
@@ -128,35 +131,38 @@ class Posterior:
         """(candidates,) ln p of u (candidates, parameters), in one prediction; -inf outside the bounds."""
         log_density, is_inside = np.full(len(u), -np.inf), self.inside(u)
         if is_inside.any():
-            rise = np.maximum(self.chi_square(u[is_inside]) - self.least_chi_square, -0.5 * self.degrees_of_freedom)
-            log_density[is_inside] = (
-                -0.5 * (self.degrees_of_freedom + u.shape[1]) * np.log1p(rise / self.degrees_of_freedom)
-            )
+            log_density[is_inside] = self.log_density(*self.residuals(u[is_inside]))
+        return log_density
+
+    def log_density(self, residuals: Floats, rate_effect: Floats) -> Floats:
+        """(candidates,) ln p of candidates within the bounds; residuals, rate_effect : as residuals() gives them."""
+        chi_square, count = self._chi_square(residuals, rate_effect), self.problem.parameter_count
+        rise = np.maximum(chi_square - self.least_chi_square, -0.5 * self.degrees_of_freedom)
+        log_density = -0.5 * (self.degrees_of_freedom + count) * np.log1p(rise / self.degrees_of_freedom)
         return np.where(np.isfinite(log_density), log_density, -np.inf)
 
-    def chi_square(self, u: Floats) -> Floats:
-        """(candidates,) least sum of squares that any values of the nuisances leave; u : (candidates, parameters)."""
-        residuals, rate_effect = self._residuals(u)
+    def _chi_square(self, residuals: Floats, rate_effect: Floats) -> Floats:
+        """(candidates,) least sum of squares that any values of the nuisances leave."""
         whitened = _whitened(self.covariance_factor, rate_effect, residuals)[:, self.problem.observations.present]
-        rows = np.concatenate(
-            [whitened, np.broadcast_to(self.prior_residuals, (len(u), self.prior_residuals.size))], axis=1
-        )
+        prior = np.broadcast_to(self.prior_residuals, (len(residuals), self.prior_residuals.size))
+        rows = np.concatenate([whitened, prior], axis=1)
         return np.asarray((rows**2).sum(axis=1) - ((rows @ self.nuisance_basis) ** 2).sum(axis=1))
 
-    def _residuals(self, u: Floats) -> tuple[Floats, Floats]:
+    def residuals(self, u: Floats) -> tuple[Floats, Floats]:
         """Residuals (candidates, tests, observations), and what a test's own rate does half way to each candidate.
 
         A factor on all rates moves every coefficient, each of which is a coordinate's own. Where a term has none, and
         for tests compared over their whole life, whose derivatives are expensive, that effect is taken at the optimum.
         """
         problem, law = self.problem, self.problem.law
+        predicted = self.quadratic or problem
         coefficients = list(problem.coordinates.coefficients)
         is_separable = (
             len(coefficients) == len(law.terms) + len(law.states) and not problem.observations.followed_to_rupture.any()
         )
         if not (is_separable and self.rate_sd > 0):
-            return problem.candidate_residuals(u), self.rate_effect
-        residuals, jacobian = problem.candidate_jacobian(u)
+            return predicted.candidate_residuals(u), self.rate_effect
+        residuals, jacobian = predicted.candidate_jacobian(u)
         rate_scatter = self.rate_sd / np.sqrt(self.test_weights)[:, None]
         return residuals, 0.5 * (self.rate_effect + jacobian[..., coefficients].sum(axis=-1) * rate_scatter)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from creepkit.inverse.orthogonal_residual import orthogonal_distance
+from creepkit.inverse.residuals import orthogonal_distance
 
 
 @pytest.mark.parametrize("slope", [0.1, 1.0, 30.0])
