@@ -73,7 +73,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
 )
 from creepkit.inverse.uncertainty.of_estimation import uncertainty_of
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.unmodelled_effect import unmodelled_note
+from creepkit.inverse.unmodelled_effect import UnmodelledEffect, unmodelled_note
 from creepkit.inverse.unmodelled_effects import unmodelled_effects
 from creepkit.inverse.working_noise import WorkingNoiseEstimator
 from creepkit.language import CreepLaw
@@ -219,7 +219,7 @@ def identify_values(
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
-        fit = _result(histories, best, search_outcome, numerical_error)
+        fit = _result(histories, best, search_outcome, numerical_error, approximately)
     return replace(fit, notes=(*compared.notes, *fit.notes))
 
 
@@ -324,6 +324,7 @@ def _result(
     best: EstimationResult,
     search_outcome: SearchOutcome,
     numerical_error: NumericalError | None,
+    approximately: bool,
 ) -> Identification:
     """Noise model, intervals and goodness of fit at the optimum."""
     problem, residuals, x = best.problem, best.residuals, best.minimum.x
@@ -333,7 +334,9 @@ def _result(
     noise_model, covariance, freedom = uncertainty_of(best, working_estimator, len(histories))
     linear = best.linearised or linearised(problem, x, residuals)
     working_noise = None if best.linearised is not None else best.working_noise
-    unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories, working_noise)
+    unmodelled: tuple[UnmodelledEffect, ...] = ()
+    if not approximately:
+        unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories, working_noise)
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     scatter = rate_scatter(problem, x, residuals, noise_model, lengths)
     prediction = predict(
