@@ -71,6 +71,7 @@ BENCHMARKS = {
     "rupture_strength_coverage": Benchmark(5, (("--sets", "40"),)),
     "forecast_coverage": Benchmark(50),
     "forecast_measured": Benchmark(12, needs=DATA),
+    "causes": Benchmark(5, (("--campaigns", "20"),)),
     "weights": Benchmark(8),
     "noise_correlation": Benchmark(4),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),

@@ -26,7 +26,7 @@ from creepkit.exporters.javascript import law_expression
 from creepkit.exporters.latex import latex_unit
 from creepkit.exporters.mathml import expression_mathml, law_equations
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.measured_minimum_rates import measured_minimum_rate
+from creepkit.inverse.minimum_rates import measured_minimum_rate
 from creepkit.inverse.uncertainty.correlation import correlation
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import LatexLawPrinter, latex_equations

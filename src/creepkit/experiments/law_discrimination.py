@@ -337,7 +337,7 @@ def _refit_in_full(
     """
     measured = law.measured
     histories = (*measured.histories, *further)
-    observations = _observations(measured, histories)
+    observations = ObservationVector.from_histories(histories, measured.predictor).with_noise_of(measured.observations)
     nuisances = nuisances_of_planned(law, further, of_made=True)
     problem = replace(
         measured, histories=histories, observations=observations, evaluations=EvaluationCache()
@@ -366,14 +366,6 @@ def _refit_in_full(
         minimum = under.minimise(x, tolerances=REFIT_TOLERANCES)
         found.append((FittedLaw(under, minimum.x), 2.0 * float(minimum.cost)))
     return min(found, key=lambda pair: pair[1])
-
-
-def _observations(measured: LeastSquaresProblem, histories: Sequence[History]) -> ObservationVector:
-    """The observations of histories with the transforms and the noise of the tests that were made."""
-    base = measured.observations
-    observations = ObservationVector.from_histories(histories, measured.predictor)
-    position = [base.outputs.index(name) for name in observations.outputs]
-    return replace(observations, transforms=tuple(base.transforms[k] for k in position), noise=base.noise[position])
 
 
 def _test_weights(law: KnownLaw, further: int) -> Floats:

@@ -156,14 +156,8 @@ class PlannedOutcomes:
             sd = {n: np.full(history.times.size, max(v, 1e-300)) for n, v in noise.items()}
             zero = {n: np.zeros(history.times.size) for n in noise}
             planned.append(history.replace(outputs=zero, standard_deviation=sd, rupture_time=None, unruptured=False))
-        observations = ObservationVector.from_histories(planned, predictor)
-        position = [base.outputs.index(name) for name in observations.outputs]
-        return replace(
-            observations,
-            transforms=tuple(base.transforms[k] for k in position),
-            noise=base.noise[position],
-            relative_noise=np.ones_like(observations.relative_noise),
-        )
+        observations = ObservationVector.from_histories(planned, predictor).with_noise_of(base)
+        return replace(observations, relative_noise=np.ones_like(observations.relative_noise))
 
     def _covariance(self, predicted: _Chunk, observations: ObservationVector) -> CovarianceFactor:
         """Noise, offset and rate of each planned test, and its own nuisance parameters, as a law predicts it."""

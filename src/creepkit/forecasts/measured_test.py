@@ -206,7 +206,7 @@ class LinearForecast:
         joint = mean + covariance_root(covariance_of_joint) @ sources[:size]
         own_factor, dimensions = float(np.sqrt(variance) * sources[size]), sources[size + 1 :]
         coefficients = list(self.fit.coordinates.coefficients)
-        if len(coefficients) < len(self.fit.law.terms) + len(self.fit.law.states):
+        if not self.fit.coordinates.every_rate_has_coefficient:
             return self.values + self.by_joint @ joint + own_factor * self.rate + self.tolerance @ dimensions
         x = np.concatenate([self.fit.u + joint[:count], [d.mean for d in self.dimensions]])
         x[coefficients] += own_factor + joint[[*test.known.values()]].sum()

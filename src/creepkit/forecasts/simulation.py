@@ -21,7 +21,7 @@ from creepkit.inverse.composite_predictor import (
 )
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.rate_nuisances import law_with_rate_factors
-from creepkit.inverse.rupture_prediction import EXTRAPOLATION_FACTOR
+from creepkit.inverse.single_values import EXTRAPOLATION_FACTOR
 from creepkit.records import History, Prediction, Predictor, Status
 
 FOLLOWED_TIMES, ADDED_TIMES = 300, 20
@@ -117,8 +117,7 @@ def curves(
 
 def _coefficients_of_rates(fit: Identification) -> list[int]:
     """Positions of the coefficients of all rates of the law; none where one of them has no coefficient of its own."""
-    coefficients = list(fit.coordinates.coefficients)
-    return coefficients if len(coefficients) == len(fit.law.terms) + len(fit.law.states) else []
+    return list(fit.coordinates.coefficients) if fit.coordinates.every_rate_has_coefficient else []
 
 
 @dataclass(frozen=True, eq=False)

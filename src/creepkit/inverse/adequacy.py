@@ -7,16 +7,20 @@ from typing import Literal
 
 import numpy as np
 
-from creepkit.inverse.contradicting_values import ContradictingValues
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
+from creepkit.inverse.single_values import ContradictingValues
 from creepkit.inverse.variance_components import SMALLEST_RATE_SCATTER
 from creepkit.records import output_unit
 
 IMPLAUSIBLE_CHI_SQUARE = 0.05
 """Reduced chi-square below which the noise that was stated is questioned: 4.5 times what the frames show."""
+
+
+SHAPE_MISFIT = 5.0
+"""Noises that a law leaves of an output, from which on it misses the shape of curves, and its rates are doubtful."""
 
 
 UNDETECTED_SCATTER = 1.5 * SMALLEST_RATE_SCATTER
@@ -80,7 +84,7 @@ class Adequacy:
     smallest_p_value : of all outputs together and of each, before it is multiplied by their number.
     not_judged : the outputs, where nothing can be judged, and few_frames : the tests, each with how
         many frames it has, where these are too few to show the noise.
-    unpredicted : tests of which nothing is predicted, of which no law is judged that does not contradict the others.
+    unpredicted : tests of which nothing, or not every reading, is predicted: a law is never judged to explain them.
     contradicting : minimum rates and rupture times that contradict one another by the law, beyond their own scatter.
     """
 
@@ -122,13 +126,19 @@ class Adequacy:
         return replace(self, verdict="leaves a discrepancy", explanations=explanations) if explanations else self
 
     def with_unpredicted(self, tests: tuple[str, ...]) -> Adequacy:
-        """The same; not judged to explain tests of which it predicts nothing."""
-        return replace(self, verdict="cannot be judged", unpredicted=tests) if tests and self.explains else self
+        """The same; not judged to explain tests that it does not predict."""
+        verdict = "cannot be judged" if tests and self.explains else self.verdict
+        return replace(self, verdict=verdict, unpredicted=tests)
 
     @property
     def lies_in_tests(self) -> bool:
         """Whether what is left is explained by one test or by two groups of tests, and not by another law."""
-        return bool(self.explanations) and not self.explanations[0].is_of_law
+        return self.is_explained and not self.explanations[0].is_of_law
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether rates of tests are what the law misses, and not the shape of their curves."""
+        return bool(self.explanations) and not self.discrepancy_in_noises > SHAPE_MISFIT
 
     @property
     def explanation_text(self) -> str:
@@ -222,9 +232,9 @@ class Adequacy:
 
     def __str__(self) -> str:
         """One sentence, to follow "the law": the verdict, with what is left and where."""
-        if self.unpredicted:
+        if self.unpredicted and self.verdict == "cannot be judged":
             more = f" and {len(self.unpredicted) - 1} more" if len(self.unpredicted) > 1 else ""
-            return f"cannot be judged: nothing is predicted of test '{self.unpredicted[0]}'{more}"
+            return f"cannot be judged: it does not predict every reading of test '{self.unpredicted[0]}'{more}"
         if self.verdict == "cannot be judged":
             return f"cannot be judged: {how_to_state_noise(self.not_judged, self.few_frames)}"
         source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
@@ -255,7 +265,8 @@ class Adequacy:
         if self.explanations and not parts:
             return f"is contradicted by the rates of the tests: {self.explanation_text} {judged}"
         rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained {judged}{where}"
-        return f"{rest}; {self.explanation_text}" if self.explanations else rest
+        beside = "" if self.is_explained else "of its rates, "
+        return f"{rest}; {beside}{self.explanation_text}" if self.explanations else rest
 
 
 def p_value_text(p: float) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, LawError
-from creepkit.inverse.duration import duration_known, needs_durations, rests_on_durations
+from creepkit.inverse.compared_tests import testable_laws
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.language import CreepLaw
 from creepkit.quality.curve_shapes import shows_primary_creep, shows_tertiary_creep
@@ -53,9 +53,7 @@ def candidates(histories: Sequence[History]) -> list[CreepLaw]:
     else:
         names = ["norton", "strain-hardening", "time-hardening", *steady[1:]]
     laws = [law for name in names if (law := _law(name)) is not None]
-    judged = all(map(duration_known, tests))
-    testable = [law for law in laws if (judged or not needs_durations(law)) and not rests_on_durations(law, tests)]
-    return testable or laws[:1]
+    return testable_laws(laws, tests) or laws[:1]
 
 
 def _several_stresses(tests: Sequence[History]) -> bool:

@@ -166,6 +166,11 @@ class Coordinates:
         """Positions of the coordinates that are log rates of terms and of internal variables."""
         return self.term_rates + self.state_rates
 
+    @property
+    def every_rate_has_coefficient(self) -> bool:
+        """Whether each term and internal variable has a coordinate that is ln of its rate."""
+        return len(self.coefficients) == len(self.law.terms) + len(self.law.states)
+
     def theta(self, u: Floats) -> Floats:
         """(..., parameters) internal parameters of conditioned coordinates u (..., parameters)."""
         theta = np.array(u, float)

@@ -22,20 +22,13 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs, predict_to_rupture
 from creepkit.inverse.frame_noise import usable_frames
-from creepkit.inverse.goodness_of_fit import (
-    OutputErrors,
-    RateComparison,
-    RuptureComparison,
-    errors_of_output,
-    relative_squared_error,
-)
+from creepkit.inverse.goodness_of_fit import OutputErrors, errors_of_output, relative_squared_error
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
-from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
-from creepkit.inverse.rupture_prediction import compare_rupture_times
 from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.inverse.single_values import LawAtTests, SingleValue
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction, Predictor, Status, predict_with
@@ -73,15 +66,14 @@ class Fold:
         }
 
     @cached_property
-    def single_values(self) -> list[dict[str, RuptureComparison | RateComparison]]:
+    def single_values(self) -> list[dict[str, SingleValue]]:
         """Rupture time and minimum rate of each of its tests, predicted as those of a new test; none by time."""
         fit = self.fit
         if any(m.name == h.name for m in fit.tests for h in self.held_out):
             return [{} for _ in self.held_out]
         assert fit.predictor is not None
-        known = fit.coordinates, fit.u, fit.scatter_of_rates, fit.noise_model, self.held_out, fit.predictor
-        pairs = zip(compare_rupture_times(*known), compare_minimum_rates(*known), strict=True)
-        named = ({"rupture time": end, "minimum rate": rate} for end, rate in pairs)
+        law = LawAtTests(fit.coordinates, fit.u, fit.scatter_of_rates, fit.noise_model, fit.predictor)
+        named = ({"rupture time": end, "minimum rate": rate} for end, rate in law.compared(self.held_out))
         return [{what: one for what, one in of_test.items() if one is not None} for of_test in named]
 
 
@@ -99,7 +91,7 @@ class CrossValidation(Presentable, text="reports.confirmation_text:cross_validat
         return {h.name: fold.errors(k) for fold in self.folds for k, h in enumerate(fold.held_out)}
 
     @property
-    def single_values(self) -> dict[str, dict[str, RuptureComparison | RateComparison]]:
+    def single_values(self) -> dict[str, dict[str, SingleValue]]:
         """{test: {"rupture time" or "minimum rate": comparison}} of the held-out tests, with intervals of new tests."""
         return {
             h.name: values for fold in self.folds for h, values in zip(fold.held_out, fold.single_values, strict=True)
@@ -216,11 +208,6 @@ def _deviance(residuals: Residuals, noise_model: NoiseModel) -> float:
     """r' C^-1 r + ln|C|."""
     factor = CovarianceFactor.of_residuals(residuals, noise_model)
     return float((factor.whiten(residuals.values) ** 2).sum() + factor.log_determinant)
-
-
-def prediction_errors(fit: Identification, history: History) -> dict[str, OutputErrors]:
-    """{output: errors} of one history that the fit predicts as a new test: prior means of nuisances, and no offset."""
-    return Fold((history,), fit).errors(0)
 
 
 def _joined(strain: float, comparisons: Sequence[TimeComparison]) -> TimeComparison:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creepkit.inverse.adequacy import SHAPE_MISFIT
 from creepkit.records import is_logarithmic
 
 if TYPE_CHECKING:
@@ -72,10 +73,11 @@ def headline(fit: Identification) -> str:
         truth = "whether it is the true law cannot be judged"
     elif adequacy.explains:
         truth = "the tests do not contradict it"
-    elif adequacy.explanations:
+    elif adequacy.is_explained:
         truth = f"but {adequacy.explanations[0].headline}"
     else:
-        truth = "yet it is not the true law: it misses more than noise"
+        shape = adequacy.discrepancy_in_noises > SHAPE_MISFIT
+        truth = f"yet it is not the true law: it misses {'the shape of the curves' if shape else 'more than noise'}"
     return f"{fit.law.name} {useful}; {truth}"
 
 

@@ -15,6 +15,7 @@ from creepkit.inverse.composite_predictor import compared_outputs
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.single_values import SingleValue
 from creepkit.records import History, Prediction, is_logarithmic
 
 
@@ -111,48 +112,6 @@ class OutputFit:
 
 
 @dataclass(frozen=True)
-class RuptureComparison:
-    """The end of one test.
-
-    measured : s, when it ruptured, or how long it lasted where it was stopped before (`censored`).
-    predicted : s, by the law alone; infinite where the law predicts no rupture.
-    low, high : 95 % interval for a single test, from the parameters and the scatter between tests.
-    used : whether the law was compared with it; else it stands beside a law that was identified without it.
-    """
-
-    measured: float
-    censored: bool
-    predicted: float
-    low: float
-    high: float
-    used: bool = True
-
-    @property
-    def ratio(self) -> float:
-        """Predicted over measured."""
-        return self.predicted / self.measured
-
-
-@dataclass(frozen=True)
-class RateComparison:
-    """The minimum creep rate of one test without frames.
-
-    measured, predicted : 1/s; predicted by the law alone, NaN where it gives none.
-    low, high : 95 % interval for a single test, from the parameters and the scatter between tests, 1/s.
-    """
-
-    measured: float
-    predicted: float
-    low: float
-    high: float
-
-    @property
-    def ratio(self) -> float:
-        """Predicted over measured."""
-        return self.predicted / self.measured
-
-
-@dataclass(frozen=True)
 class TestFit:
     """One test in the fit.
 
@@ -174,8 +133,8 @@ class TestFit:
     rate_factor: float = 1.0
     weight: float = 1.0
     outputs: tuple[OutputFit, ...] = ()
-    rupture: RuptureComparison | None = None
-    minimum_rate: RateComparison | None = None
+    rupture: SingleValue | None = None
+    minimum_rate: SingleValue | None = None
 
     def __getitem__(self, output: str) -> OutputFit:
         for one in self.outputs:
@@ -183,6 +142,11 @@ class TestFit:
                 return one
         known = ", ".join(o.output for o in self.outputs) or "no frames"
         raise FitError(f"test '{self.name}' has no output '{output}'; it has {known}")
+
+    @property
+    def misses_readings(self) -> bool:
+        """Whether the misfit of an output is no number: not every reading of it was predicted."""
+        return any(one.errors.frames > 0 and np.isnan(one.errors.mean_squared_error) for one in self.outputs)
 
     @property
     def offset(self) -> float:
@@ -196,7 +160,7 @@ def test_fits(
     random_effects: tuple[Floats, Floats],
     histories: Sequence[History],
     prediction: Prediction,
-    single_values: Sequence[tuple[RuptureComparison | None, RateComparison | None]],
+    single_values: Sequence[tuple[SingleValue | None, SingleValue | None]],
 ) -> tuple[TestFit, ...]:
     """One TestFit for each test.
 

@@ -27,6 +27,7 @@ from creepkit.inverse.predictor_documents import PredictorDocument, missing_pred
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.single_values import LawAtTests, constant_stress_tests
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, delta_method, interval_quantile
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.inverse.unmodelled_effect import UnmodelledEffect
@@ -250,8 +251,6 @@ class Identification(Presentable, text="reports.identification_text:identificati
         Infinite where nothing breaks within some thousand times the longest test. A stress or temperature outside
         `ranges` gives a FitWarning, a temperature that seems to be in Celsius a FitError, but for warn=False.
         """
-        from creepkit.inverse.rupture_prediction import constant_stress_tests
-
         T = self.reference.temperature if temperature is None else temperature
         tests, shape = constant_stress_tests(stress, T, self.ranges["time"][1], control)
         if warn:
@@ -264,11 +263,10 @@ class Identification(Presentable, text="reports.identification_text:identificati
         self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
     ) -> tuple[Floats, Floats, Floats]:
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
-        from creepkit.inverse.rupture_prediction import predict_rupture_times
-
         predictor = self._predictor_or(using)
         tests, noise_model = list(histories or self.histories), self.noise_model if test_scatter else None
-        return predict_rupture_times(self.coordinates, self.u, self.scatter_of_rates, noise_model, tests, predictor)
+        law = LawAtTests(self.coordinates, self.u, self.scatter_of_rates, noise_model, predictor)
+        return law.rupture_times(tests)
 
     @checked
     def predict(
@@ -338,7 +336,7 @@ class Identification(Presentable, text="reports.identification_text:identificati
             predictor = using
         else:
             raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
-        return cast(Identification, present("inverse.attached_histories:with_attached", self, tests, predictor))
+        return cast(Identification, present("inverse.identification_notes:with_attached", self, tests, predictor))
 
     def _predictor_or(self, using: Predictor | None) -> Predictor:
         """The predictor given, or the identification's own; FitError where a file does not give it."""

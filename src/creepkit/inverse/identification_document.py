@@ -14,10 +14,9 @@ from creepkit.files.json_documents import DocumentFormat, check_heading, read_js
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError, ValueCodec
 from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
-from creepkit.inverse.contradicting_values import ContradictingValues
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.explanation import Explanation, LeftOut
-from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, RateComparison, RuptureComparison, TestFit
+from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
@@ -26,6 +25,7 @@ from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.inverse.predictor_documents import predictor_documents, predictor_from_documents
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.single_values import ContradictingValues, SingleValue
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.inverse.uncertainty.stored_rate_scatter import problem_with
@@ -120,8 +120,7 @@ CODEC = RecordCodec(
             "chi_square": NOT_NEGATIVE_OR_NAN,
         },
         OutputFit: {"noise": NOT_NEGATIVE},
-        RuptureComparison: {"measured": POSITIVE, **dict.fromkeys(("predicted", "low", "high"), INFINITY_ALLOWED)},
-        RateComparison: {"measured": POSITIVE, **dict.fromkeys(("predicted", "low", "high"), NOT_NEGATIVE_OR_NAN)},
+        SingleValue: {"measured": POSITIVE, **dict.fromkeys(("predicted", "low", "high"), NOT_NEGATIVE_OR_NAN)},
         TestFit: {
             "frames": NOT_NEGATIVE,
             "log_strain_rms": NAN_ALLOWED,

@@ -1,18 +1,26 @@
-"""Provenance and notes of an identification: versions and fingerprints, ranges of the tests, and its limitations."""
+"""Provenance and notes of an identification: versions and fingerprints, ranges of the tests, and its limitations.
+
+Histories that are attached to one that was loaded are compared with those that it was made from.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit import registry
-from creepkit.inverse.duration import UNTESTABLE, followed_duration, rests_on_durations
+from creepkit.errors import FitWarning
+from creepkit.inverse.compared_tests import UNTESTABLE, compared_tests, followed_duration, rests_on_durations
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.goodness_of_fit import TestFit
+from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.iterative_estimation import EstimationResult
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS
 from creepkit.inverse.nuisance_correlation import nuisance_correlation_notes
@@ -22,8 +30,11 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses
 from creepkit.inverse.uncertainty.rate_scatter import unstated_member_notes
 from creepkit.language import temperature
-from creepkit.records import History, Prediction, Status
+from creepkit.records import History, Prediction, Predictor, Status
 from creepkit.records.units import celsius_text
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
 
 LOW_TEST_WEIGHT = 0.5
 """Weight below which a test is named."""
@@ -184,3 +195,33 @@ def _test_notes(
         if min(n.value - low, high - n.value) < 1e-4 * (high - low):
             sentences.append(f"the {n.key} of '{n.owner}' lies at its bound, {n.value:.4g}")
     return sentences
+
+
+def with_attached(fit: Identification, tests: Sequence[History], predictor: Predictor) -> Identification:
+    """The identification with its tests and what predicts them, copies and suspect frames left out as they were.
+
+    FitWarning where the tests are not those that it was made from: other frames, values, weights or nuisances.
+    """
+    tests, _ = compared_tests(fit.law, tests, fit.settings)
+    attached = replace(fit, histories=tuple(tests), predictor=predictor, problem=None)
+    known = fit.provenance.get("data")
+    sound = tuple(sound_tests(tests, fit.settings)[0])
+    if known is None or _digest(attached) == known:
+        return attached
+    without_suspect = replace(attached, histories=sound)
+    if _digest(without_suspect) == known:
+        return without_suspect
+    warnings.warn(
+        f"the tests given differ from those that {fit.law.name} was identified from, although they have the same "
+        "names: identify it again, or give the same files",
+        FitWarning,
+        stacklevel=5,
+    )
+    return attached
+
+
+def _digest(fit: Identification) -> str:
+    assert fit.predictor is not None
+    return data_digest(
+        LeastSquaresProblem.from_histories(fit.law, fit.histories, fit.predictor, fit.settings, fit.reference)
+    )

@@ -12,6 +12,7 @@ from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.bound_penalties import check_bounds
 from creepkit.inverse.chi_square_test import adequacy_with_remedies
+from creepkit.inverse.compared_tests import compared_tests, compares_rupture_times
 from creepkit.inverse.composite_predictor import (
     predict,
     prediction_errors_of,
@@ -20,7 +21,6 @@ from creepkit.inverse.composite_predictor import (
     refined_of,
     through_for_law,
 )
-from creepkit.inverse.contradicting_values import contradicting_values
 from creepkit.inverse.defect_correction import (
     NumericalError,
     correct_defect,
@@ -50,19 +50,17 @@ from creepkit.inverse.iterative_estimation import (
 )
 from creepkit.inverse.judged_residuals import at_own_rates
 from creepkit.inverse.kept_fits import kept_where_asked
-from creepkit.inverse.minimum_rate_comparison import compare_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
-from creepkit.inverse.rupture_prediction import compare_rupture_times
-from creepkit.inverse.rupture_use import compared_tests, compares_rupture_times
 from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import MultiStart
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.single_values import LawAtTests, contradicting_values
 from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.inverse.uncertainty.laplace_approximation import (
@@ -77,7 +75,7 @@ from creepkit.inverse.unmodelled_effect import UnmodelledEffect, unmodelled_note
 from creepkit.inverse.unmodelled_effects import unmodelled_effects
 from creepkit.inverse.working_noise import WorkingNoiseEstimator
 from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor, is_length_nuisance, is_logarithmic
+from creepkit.records import History, Predictor, Status, is_length_nuisance, is_logarithmic
 
 MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
@@ -167,7 +165,7 @@ def _beside_the_others(fit: Identification, without: Identification, test: int, 
     others = at(0.0)
     if all(map(is_logarithmic, problem.observations.outputs)):
         size = float(others.rates.median_log_factors[test])
-    elif problem.every_rate_has_coefficient:
+    elif problem.coordinates.every_rate_has_coefficient:
         for _ in range(NEWTON_STEPS):
             step = float(at(size).rates.own_log_factors[test])
             size += step
@@ -195,8 +193,7 @@ def identify_values(
     """
     settings = settings or IdentificationSettings()
     known, through, notes = predictors_for_law(law, using, through)
-    compared = compared_tests(law, histories, settings)
-    histories = compared.histories
+    histories, left_out = compared_tests(law, histories, settings)
     if notes:
         how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
         fit = identify_values(law, histories, known, through=through, approximately=approximately, **how)
@@ -220,7 +217,7 @@ def identify_values(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
         fit = _result(histories, best, search_outcome, numerical_error, approximately)
-    return replace(fit, notes=(*compared.notes, *fit.notes))
+    return replace(fit, notes=(*left_out, *fit.notes))
 
 
 def _gradient(best: EstimationResult) -> Floats:
@@ -350,10 +347,9 @@ def _result(
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
     law_covariance = positive_semidefinite(covariance[:count, :count])
-    known = coordinates, u, scatter, noise_model, histories, problem.predictor
+    values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)
-    ends = compare_rupture_times(*known, without_curves=used)
-    single_values = [*zip(ends, compare_minimum_rates(*known), strict=True)]
+    single_values = values_of_tests.compared(histories, without_curves=used)
     random_effects = predicted_random_effects(residuals, noise_model)
     tests = test_fits(problem, residuals, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
@@ -361,6 +357,7 @@ def _result(
     )
     implausible = implausible_nuisances(problem, random_effects, nuisance_estimates)
     failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]
+    failed |= (prediction.status[0] != Status.RUPTURED) & [test.misses_readings for test in tests]
     unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
     rates = RateExplanations(problem, x, linear, noise_model)
     judged = at_own_rates(problem, x, linear, noise_model)

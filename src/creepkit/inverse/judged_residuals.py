@@ -20,9 +20,8 @@ from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
-from creepkit.inverse.observation_vector import ObservationVector
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.scatter_of_lives import with_scatter_of_lives
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
 
 
@@ -66,7 +65,7 @@ def judged_residuals(
     predictor_errors : {output: standard deviation} of what the predictor is wrong by, in the output's unit.
     """
     observations = problem.observations
-    linear = with_scatter_of_lives(linear, observations, noise_model)
+    linear = _with_scatter_of_lives(linear, observations, noise_model)
     known = known.where(linear.residuals.offset_sensitivity > 0)
     if not known.judged.any():
         return None
@@ -84,6 +83,38 @@ def judged_residuals(
     )
 
 
+def life_sensitivity(residuals: Residuals, observations: ObservationVector) -> Floats:
+    """(tests, observations) -, derivative of the residuals of frames to ln of the rupture life; 0 of other tests.
+
+    Specimens of one alloy that creep alike still break at different times, and the last part of their curves moves with
+    the life. Along a curve whose creep ends in a damage that grows at a rate of its own, such as
+
+        e = A t_r lambda [1 - (1 - t / t_r)^(1 / lambda)]
+
+    a life longer by a factor exp(b) moves the time at which a strain is reached by (1 - 1/s) b in ln t, with
+    s = d ln e / d ln t: not at all in steady creep, where s = 1, and by all of b at rupture, where s is infinite. A
+    rate that scatters moves the whole curve by one amount in ln t, and the orthogonal residual of the frame by
+    L = sqrt(2) s / sqrt(1 + s^2); with that, a life moves it by L - sqrt(2 - L^2).
+    """
+    shift = np.clip(residuals.log_rate_sensitivity, 0.0, np.sqrt(2.0))
+    effect = np.maximum(shift - np.sqrt(np.maximum(2.0 - shift**2, 0.0)), 0.0)
+    return np.where(observations.followed_frames & residuals.present, effect, 0.0)
+
+
+def _with_scatter_of_lives(
+    linear: LinearisedProblem, observations: ObservationVector, noise_model: NoiseModel
+) -> LinearisedProblem:
+    """The linear problem with the scatter of lives, as estimated of rupture times, as a random effect of each test."""
+    scatter = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
+    effect = scatter * life_sensitivity(linear.residuals, observations)
+    if not effect.any():
+        return linear
+    known = linear.residuals.random_effect_sensitivities
+    columns = [*([] if known is None else [known]), effect[..., None]]
+    residuals = replace(linear.residuals, random_effect_sensitivities=np.concatenate(columns, axis=-1))
+    return replace(linear, residuals=residuals)
+
+
 NOTEWORTHY_FACTOR = 0.03
 """Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
 
@@ -93,7 +124,7 @@ def at_own_rates(
 ) -> LinearisedProblem:
     """The problem made linear at x (unknowns,) and where the rate of each test is its own, by which a law is judged."""
     log_factors = predicted_random_effects(linear.residuals, noise_model)[1]
-    if np.abs(log_factors).max() < NOTEWORTHY_FACTOR or not problem.every_rate_has_coefficient:
+    if np.abs(log_factors).max() < NOTEWORTHY_FACTOR or not problem.coordinates.every_rate_has_coefficient:
         return linear
     there = problem.residuals_at_rates(x, log_factors)
     values = there.values - log_factors[:, None] * there.log_rate_sensitivity
@@ -117,18 +148,8 @@ def judged_residuals_of(fit: Identification) -> JudgedResiduals | None:
 
 def _of_judged(residuals: Residuals, known: KnownNoise) -> Residuals:
     """The residuals of observations that are judged, tests of equal weight; the others are not there."""
-    assert residuals.jacobian is not None
-    mask = known.judged & residuals.present
-    return replace(
-        residuals,
-        values=np.where(mask, residuals.values, 0.0),
-        jacobian=np.where(mask[..., None], residuals.jacobian, 0.0),
-        offset_sensitivity=np.where(mask, residuals.offset_sensitivity, 0.0),
-        log_rate_sensitivity=np.where(mask, residuals.log_rate_sensitivity, 0.0),
-        present=mask,
-        test_weights=np.ones(len(mask)),
-        relative_noise=known.sd,
-    )
+    judged = residuals.where(known.judged & residuals.present)
+    return replace(judged, test_weights=np.ones(len(known.sd)), relative_noise=known.sd)
 
 
 def _independent_noise(

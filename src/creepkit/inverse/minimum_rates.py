@@ -1,24 +1,40 @@
-"""Minimum creep rates of tests that have no frames, predicted as one more output, with sensitivities.
+"""Minimum creep rates: predicted as one more output, with sensitivities, and measured on curves.
 
 The rate is the slope of the predicted curve of the leading strain between neighbouring times; its minimum lies on the
 parabola through the logarithms of three slopes, over ln t. Of a curve with a primary and a tertiary stage it is within
 0.2 % of the exact minimum, of steady creep exact, and the derivatives are those of the parabola.
+
+The measured rate of a curve is the least slope of straight lines through neighbouring readings. Each line spans a tenth
+of the test at least, and as many readings more as its slope needs to be known to LARGEST_ERROR from their noise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
+from creepkit.inverse.compared_tests import compares_minimum_rate, duration_known, followed_duration, needs_durations
 from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for
-from creepkit.inverse.duration import compares_minimum_rate, duration_known, followed_duration, needs_durations
+from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import CreepLaw, strain, time
-from creepkit.records import History, NuisanceValues, Output, Prediction, Predictor, load_unit, outputs_of
+from creepkit.records import (
+    History,
+    NuisanceValues,
+    Output,
+    Prediction,
+    Predictor,
+    growing_output,
+    is_logarithmic,
+    load_unit,
+    outputs_of,
+)
 
 TIMES = np.concatenate([[0.0], np.geomspace(1e-6, 0.1, 48), np.linspace(0.1, 1.0, 25)[1:]])
 """Times between which rates are taken, over the duration of the test: early ones for predictions that break early."""
@@ -82,61 +98,71 @@ def with_minimum_rates(
     tests = [k for k, history in enumerate(histories) if compares_minimum_rate(history)]
     if not tests:
         return prediction
-    curves = [_curve(histories[k]) for k in tests]
     given = {key: values[:, tests] for key, values in (nuisances or {}).items()}
-    if sensitivities and len(theta) == 1:
-        predicted = predict_with_sensitivities(predictor, law, theta[0], curves, given)
-    else:
-        predicted = predict(predictor, law, theta, curves, nuisances=given, sensitivities=sensitivities)
-    columns = [predicted.outputs.index(str(_leading_output(predictor_for(predictor, h)))) for h in curves]
-    rates = _slopes(_of_outputs(predicted.values, columns), curves)
-    index, weights = _minima(rates, curves)
-    values = np.exp(_at_minimum(np.log(np.where(rates > 0, rates, np.nan)), index, weights))
+    compared = [histories[k] for k in tests]
+    rates, by_parameter, by_nuisance = minimum_rates(predictor, law, theta, compared, given, sensitivities)
 
-    def derivative(array: Floats) -> Floats:
-        """Of the minimum rates, (candidates, tests, ...), from that of the outputs, as Prediction.jacobian."""
-        relative = _slopes(_of_outputs(array, columns), curves) / np.where(rates > 0, rates, np.nan).reshape(
-            *rates.shape, *(1,) * (array.ndim - 4)
-        )
-        of_logarithm = _at_minimum(relative, index, weights)
-        return np.asarray(values.reshape(*values.shape, *(1,) * (array.ndim - 4)) * of_logarithm)
+    def extended(array: Floats, of_tests: Floats) -> Floats:
+        """Array (candidates, tests, times, outputs, ...) with one output more, of values (candidates, tests, ...)."""
+        further = np.full((*array.shape[:3], 1, *array.shape[4:]), np.nan)
+        further[:, tests, 0, 0] = of_tests
+        return np.concatenate([array, further], axis=3)
 
-    jacobian = predicted.jacobian
+    jacobian = prediction.jacobian
     return replace(
         prediction,
-        values=_with_output(prediction.values, tests, values),
+        values=extended(prediction.values, rates),
         outputs=(*prediction.outputs, MINIMUM_RATE_OUTPUT),
-        jacobian=None
-        if prediction.jacobian is None or jacobian is None
-        else _with_output(prediction.jacobian, tests, derivative(jacobian)),
-        nuisance_jacobian={
-            key: _with_output(array, tests, derivative(predicted.nuisance_jacobian[key]))
-            for key, array in prediction.nuisance_jacobian.items()
-        },
+        jacobian=None if jacobian is None or by_parameter is None else extended(jacobian, by_parameter),
+        nuisance_jacobian={key: extended(a, by_nuisance[key]) for key, a in prediction.nuisance_jacobian.items()},
     )
+
+
+def minimum_rates(
+    predictor: Predictor,
+    law: CreepLaw,
+    theta: Floats,
+    histories: Sequence[History],
+    nuisances: NuisanceValues,
+    sensitivities: bool,
+) -> tuple[Floats, Floats | None, dict[str, Floats]]:
+    """(candidates, tests) 1/s, with derivatives to internal parameters, (..., parameters) or None, and to nuisances.
+
+    Each test is followed from loading to its end, at TIMES. Arguments as of with_minimum_rates().
+    """
+    known: dict[str, Any] = {"includes_elastic": False, "minimum_rate": None, "minimum_rate_sd": None}
+    curves = [h.replace(times=followed_duration(h) * TIMES, outputs={}, **known) for h in histories]
+    if sensitivities and len(theta) == 1:
+        predicted = predict_with_sensitivities(predictor, law, theta[0], curves, nuisances)
+    else:
+        predicted = predict(predictor, law, theta, curves, nuisances=nuisances, sensitivities=sensitivities)
+    columns = [predicted.outputs.index(str(_leading_output(predictor_for(predictor, h)))) for h in curves]
+    intervals = np.stack([np.diff(h.times) for h in curves])
+
+    def slopes(array: Floats) -> Floats:
+        """(candidates, tests, times - 1, ...) 1/s, of the leading ones of (candidates, tests, times, outputs, ...)."""
+        strains = np.stack([array[:, k, :, column] for k, column in enumerate(columns)], axis=1)
+        with np.errstate(invalid="ignore"):
+            return np.diff(strains, axis=2) / intervals.reshape(*intervals.shape, *(1,) * (strains.ndim - 3))
+
+    rates = slopes(predicted.values)
+    positive = np.where(rates > 0, rates, np.nan)
+    index, weights = _minima(rates, curves)
+    minima = np.exp(_at_minimum(np.log(positive), index, weights))
+
+    def derivative(array: Floats) -> Floats:
+        """Of the minima, (candidates, tests, ...), from that of the outputs, as Prediction.jacobian."""
+        further = (1,) * (array.ndim - 4)
+        of_logarithm = _at_minimum(slopes(array) / positive.reshape(*rates.shape, *further), index, weights)
+        return np.asarray(minima.reshape(*minima.shape, *further) * of_logarithm)
+
+    by_parameter = None if predicted.jacobian is None else derivative(predicted.jacobian)
+    return minima, by_parameter, {key: derivative(array) for key, array in predicted.nuisance_jacobian.items()}
 
 
 def _leading_output(predictor: Predictor) -> Output | None:
     """The output of a predictor that grows with creep; None where it names none."""
     return next((output for output in outputs_of(predictor) if output.grows), None)
-
-
-def _curve(history: History) -> History:
-    """The test whose curve is predicted: from loading to its end, at TIMES."""
-    times = followed_duration(history) * TIMES
-    return history.replace(times=times, outputs={}, includes_elastic=False, minimum_rate=None, minimum_rate_sd=None)
-
-
-def _of_outputs(array: Floats, columns: Sequence[int]) -> Floats:
-    """(candidates, tests, times, ...) of one output of each test; array : (candidates, tests, times, outputs, ...)."""
-    return np.stack([array[:, k, :, column] for k, column in enumerate(columns)], axis=1)
-
-
-def _slopes(strains: Floats, curves: Sequence[History]) -> Floats:
-    """(candidates, tests, times - 1, ...) 1/s, slopes between times of strains (candidates, tests, times, ...)."""
-    intervals = np.stack([np.diff(h.times) for h in curves])
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.diff(strains, axis=2) / intervals.reshape(*intervals.shape, *(1,) * (strains.ndim - 3)))
 
 
 def _minima(rates: Floats, curves: Sequence[History]) -> tuple[Ints, Floats]:
@@ -183,8 +209,70 @@ def _at_minimum(array: Floats, index: Ints, weights: Floats) -> Floats:
     return np.asarray(np.where(share != 0.0, share * three, 0.0).sum(axis=2))
 
 
-def _with_output(array: Floats, tests: Sequence[int], values: Floats) -> Floats:
-    """Array (candidates, tests, times, outputs, ...) with one output more, of values (candidates, tests, ...)."""
-    further = np.full((*array.shape[:3], 1, *array.shape[4:]), np.nan)
-    further[:, tests, 0, 0] = values
-    return np.concatenate([array, further], axis=3)
+SHORTEST_SPAN = 0.1
+"""Of the duration of a test: over less, a slope is not taken."""
+
+
+FEWEST_READINGS = 5
+"""Readings from which a slope is taken."""
+
+
+LARGEST_ERROR = 0.05
+"""Relative standard deviation of a slope from the noise of a reading."""
+
+
+def measured_minimum_rate(history: History) -> float:
+    """The minimum creep rate that a test states or its strain shows, 1/s; NaN where it is not known.
+
+    Load and temperature have to be constant, and the leading output a strain.
+    """
+    loads, temperatures = history.loading.program().values, history.temperature_program().values
+    held = history.loading.quantity == "stress" and np.ptp(temperatures) <= ISOTHERMAL_RANGE
+    if not (held and np.ptp(loads) <= CONSTANT_LOAD * np.abs(loads).max()):
+        return float("nan")
+    if history.minimum_rate is not None:
+        return history.minimum_rate
+    output = growing_output(history) if history.outputs else ""
+    if not is_logarithmic(output):
+        return float("nan")
+    used = usable_frames(history, output)
+    noise = noise_standard_deviation(history, output)[used]
+    return least_slope(history.times[used], history.outputs[output][used], noise)
+
+
+def least_slope(times: Floats, strains: Floats, noise: Floats) -> float:
+    """The least slope of straight lines through neighbouring readings, 1/s; NaN where no slope is known well enough.
+
+    times, strains, noise : (readings,) s and -, noise the standard deviation of a reading.
+    """
+    least, span = float("nan"), SHORTEST_SPAN * float(times[-1]) if times.size else 0.0
+    for first in range(times.size - FEWEST_READINGS + 1):
+        start = max(first + FEWEST_READINGS, int(np.searchsorted(times, times[first] + span)) + 1)
+        for end in range(start, times.size + 1):
+            t = times[first:end] - times[first:end].mean()
+            squares = float((t**2).sum())
+            slope = float((t * strains[first:end]).sum()) / squares
+            error = float(np.sqrt((t**2 * noise[first:end] ** 2).sum())) / squares
+            if slope > 0.0 and error <= LARGEST_ERROR * slope:
+                least = slope if np.isnan(least) else min(least, slope)
+                break
+    return least
+
+
+def apparent_exponent(stresses: Floats, rates: Floats, temperatures: Floats) -> float:
+    """d ln rate / d ln stress by regression with a level of each temperature; NaN where the stresses do not differ.
+
+    stresses, rates, temperatures : (tests,) MPa, 1/s and K.
+    """
+    known = np.isfinite(rates) & (rates > 0)
+    x, y, levels = np.log(stresses[known]), np.log(rates[known]), np.round(temperatures[known] / ISOTHERMAL_RANGE)
+    for level in np.unique(levels):
+        same = levels == level
+        x[same] -= x[same].mean()
+        y[same] -= y[same].mean()
+    squares = float((x**2).sum())
+    return float((x * y).sum()) / squares if squares > LEAST_SPREAD * max(x.size, 1) else float("nan")
+
+
+LEAST_SPREAD = 0.03**2
+"""Mean square of ln stress about its means from which an exponent is taken."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -56,6 +57,22 @@ class Residuals:
     def with_test_weights(self, test_weights: Floats) -> Residuals:
         """The same with other weights of tests."""
         return replace(self, test_weights=test_weights)
+
+    def where(self, mask: Bools) -> Residuals:
+        """The same of some observations alone; mask : (tests, observations)."""
+
+        def kept(array: Floats | None) -> Any:
+            return None if array is None else np.where(mask if array.ndim == 2 else mask[..., None], array, 0.0)
+
+        return replace(
+            self,
+            values=kept(self.values),
+            offset_sensitivity=kept(self.offset_sensitivity),
+            present=mask,
+            jacobian=kept(self.jacobian),
+            log_rate_sensitivity=kept(self.log_rate_sensitivity),
+            discrepancy_unit=kept(self.discrepancy_unit),
+        )
 
     @cached_property
     def series(self) -> ObservationSeries:

@@ -14,8 +14,8 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
+from creepkit.inverse.compared_tests import compares_minimum_rate, followed_duration
 from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
-from creepkit.inverse.duration import compares_minimum_rate, followed_duration
 from creepkit.inverse.frame_noise import frame_noise, noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_series import SharedNoise
 from creepkit.inverse.output_transforms import (
@@ -274,6 +274,11 @@ class ObservationVector:
         }
         return replace(self, **rows)
 
+    def with_noise_of(self, other: ObservationVector) -> ObservationVector:
+        """The same with the transforms and the noise of other observations of these outputs."""
+        position = [other.outputs.index(name) for name in self.outputs]
+        return replace(self, transforms=tuple(other.transforms[k] for k in position), noise=other.noise[position])
+
     @cached_property
     def discrepancy_unit(self) -> Floats:
         """(tests, observations) -, what a model discrepancy of one is on the scale of the transformed output."""
@@ -282,7 +287,7 @@ class ObservationVector:
             if name in SINGLE_VALUES
             else RELATIVE_DISCREPANCY_UNIT
             if is_logarithmic(name)
-            else max(float(noise), SMALLEST_NOISE * transform.floor) / transform.scale  # type: ignore[attr-defined]
+            else max(float(noise), SMALLEST_NOISE * transform.floor) / transform.scale  # type: ignore[union-attr]
             for name, noise, transform in zip(self.outputs, self.noise, self.transforms, strict=True)
         ]
         return self.per_observation(units) * np.where(self.logarithmic_mask, 1.0, self.relative_noise)

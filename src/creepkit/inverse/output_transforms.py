@@ -1,39 +1,17 @@
-"""Output transforms: the quantities in which outputs are compared, logarithmic for strains and linear for others."""
+"""Output transforms: the quantities in which outputs are compared, logarithmic for strains and linear for others.
+
+A transform is a monotone map g from an output to the quantity in which it is compared; arrays keep their shape, (...,).
+floor : the size, in the output's unit, below which a difference is nothing. ceiling : the compared quantity from which
+a prediction is continued after rupture.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from creepkit.arrays import Floats
-
-
-class OutputTransform(Protocol):
-    """A monotone map g from an output to the quantity in which it is compared; arrays keep their shape, (...,)."""
-
-    @property
-    def floor(self) -> float:
-        """The size, in the output's unit, below which a difference is nothing."""
-        ...
-
-    @property
-    def ceiling(self) -> float:
-        """The compared quantity from which a prediction is continued after rupture."""
-        ...
-
-    def forward(self, y: Floats) -> Floats:
-        """The compared quantity (...,) of outputs y (...,)."""
-        ...
-
-    def inverse(self, g: Floats) -> Floats:
-        """The outputs (...,) whose compared quantity is g (...,)."""
-        ...
-
-    def derivative(self, y: Floats) -> Floats:
-        """dg/dy (...,) at outputs y (...,)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -140,3 +118,6 @@ class RateTransform:
 
 SMALLEST_RATE = 1e-200
 """1/s; a candidate that does not creep at all is compared as if it did at this rate."""
+
+
+OutputTransform = LogTransform | LinearTransform | NegativeLogTransform | RateTransform

@@ -21,6 +21,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.bound_penalties import BoundPenalties, constraint_points
 from creepkit.inverse.bounds import Bounds
+from creepkit.inverse.compared_tests import compares_rupture_times
 from creepkit.inverse.composite_predictor import (
     CompositePredictor,
     concatenated_tests,
@@ -44,7 +45,6 @@ from creepkit.inverse.residuals import (
     residuals_at_measured_values,
     residuals_of_prediction,
 )
-from creepkit.inverse.rupture_use import compares_rupture_times
 from creepkit.inverse.search.local_refinement import (
     AdditionalResiduals,
     Minimum,
@@ -263,7 +263,7 @@ class LeastSquaresProblem:
         Where some rate has no coefficient of its own, none has such a factor.
         """
         u, e = x[: self.parameter_count], x[self.parameter_count :]
-        if not self.every_rate_has_coefficient:
+        if not self.coordinates.every_rate_has_coefficient:
             return self.residuals(x)
         nuisances, groups = self.nuisance_parameters.predictor_values(e), []
         for k, history in enumerate(self.histories):
@@ -272,11 +272,6 @@ class LeastSquaresProblem:
             own = {key: values[:, [k]] for key, values in nuisances.items()}
             groups.append(([k], self._with_sensitivities(moved, own, [history])))
         return self._residuals_of(u, concatenated_tests(groups, self.histories))
-
-    @property
-    def every_rate_has_coefficient(self) -> bool:
-        """Whether each term and internal variable has a coordinate that is ln of its rate."""
-        return len(self.coordinates.coefficients) == len(self.law.terms) + len(self.law.states)
 
     def _evaluated(self, x: Floats) -> Residuals:
         u, e = x[: self.parameter_count], x[self.parameter_count :]
@@ -295,17 +290,17 @@ class LeastSquaresProblem:
         return with_minimum_rates(prediction, *tests, nuisances, sensitivities=True)
 
     def _residuals_of(self, u: Floats, prediction: Prediction) -> Residuals:
-        coefficients, every_rate_has_one = self.coordinates.coefficients, self.every_rate_has_coefficient
+        coordinates = self.coordinates
         residuals = residuals_of_prediction(
             self.observations,
             prediction,
             self.nuisance_parameters,
-            coefficients if every_rate_has_one else None,
+            coordinates.coefficients if coordinates.every_rate_has_coefficient else None,
             self.correction,
         )
         assert residuals.jacobian is not None
         internal, nuisance_jacobian = np.split(residuals.jacobian, [u.size], axis=-1)
-        jacobian = np.concatenate([internal @ self.coordinates.jacobian(u), nuisance_jacobian], axis=-1)
+        jacobian = np.concatenate([internal @ coordinates.jacobian(u), nuisance_jacobian], axis=-1)
         return replace(residuals, jacobian=jacobian)
 
     # ---- chi-square ------------------------------------------------------------------------------------------------

@@ -11,8 +11,8 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
+from creepkit.inverse.compared_tests import followed_duration
 from creepkit.inverse.composite_predictor import predictor_for
-from creepkit.inverse.duration import followed_duration
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
 from creepkit.records import ZERO_CELSIUS, History, Predictor, growing_output, is_logarithmic, specimen_of

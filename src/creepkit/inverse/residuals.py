@@ -306,16 +306,17 @@ def _masked_residuals(
     log_rate_sensitivity: Floats,
     mask: Bools,
 ) -> Residuals:
-    return Residuals(
-        values=np.where(mask, values, 0.0),
-        offset_sensitivity=np.where(mask, derivatives, 0.0),
+    residuals = Residuals(
+        values=values,
+        offset_sensitivity=derivatives,
         present=mask,
         correlation_coordinate=observations.correlation_coordinate,
-        jacobian=None if jacobian is None else np.where(mask[..., None], jacobian, 0.0),
-        log_rate_sensitivity=np.where(mask, log_rate_sensitivity, 0.0),
+        jacobian=jacobian,
+        log_rate_sensitivity=log_rate_sensitivity,
         output_index=observations.output_index,
         relative_noise=observations.relative_noise,
-        discrepancy_unit=np.where(mask, observations.discrepancy_unit, 0.0),
+        discrepancy_unit=observations.discrepancy_unit,
         shared_noise=observations.shared_noise,
         test_weights=np.ones(len(mask)),
     )
+    return residuals.where(mask)

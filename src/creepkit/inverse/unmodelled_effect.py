@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 
-DRIFT = "temperature drift"
+DRIFT, OFFSET = "temperature drift", "offset of "
 
 
 NOTEWORTHY_CHANGE = 0.01
@@ -105,8 +105,8 @@ class UnmodelledEffect:
             return (
                 f"independent linear drifts of the temperature, {kelvin}" if several else f"a linear drift of {kelvin}"
             )
-        if self.kind.startswith("offset of "):
-            output = self.kind.removeprefix("offset of ").replace("_", " ")
+        if self.kind.startswith(OFFSET):
+            output = self.kind.removeprefix(OFFSET).replace("_", " ")
             return f"{'independent offsets' if several else 'an offset'} of {size} in the {output} of {each}"
         return f"{'independent errors' if several else 'an error'} of {size} in the {self.kind} of {each}"
 

@@ -294,3 +294,19 @@ def with_random_effects(linear: LinearisedProblem, effects: Sequence[UnmodelledE
     present = linear.residuals.random_effect_sensitivities
     stacked = np.concatenate([*([present] if present is not None else []), *columns], axis=-1)
     return replace(linear, residuals=replace(linear.residuals, random_effect_sensitivities=stacked))
+
+
+def with_unknown_effects(linear: LinearisedProblem, changes: Floats) -> LinearisedProblem:
+    """The linear problem with further unknowns of prior mean zero and standard deviation one, after all others.
+
+    changes : (tests, observations, unknowns) -, of the residuals by each.
+    """
+    jacobian, more = linear.residuals.jacobian, changes.shape[-1]
+    assert jacobian is not None
+    return LinearisedProblem(
+        replace(linear.residuals, jacobian=np.concatenate([jacobian, changes], axis=-1)),
+        np.append(linear.precision, np.ones(more)),
+        np.append(linear.prior_residual, np.zeros(more)),
+        np.append(linear.free, np.ones(more, bool)),
+        np.concatenate([linear.step_bounds, np.outer([-np.inf, np.inf], np.ones(more))], axis=1),
+    )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
     from creepkit.inverse.cross_validation import CrossValidation
-    from creepkit.inverse.goodness_of_fit import RateComparison, RuptureComparison
+    from creepkit.inverse.single_values import SingleValue
 
 
 def confirmation_text(confirmation: Confirmation) -> str:
@@ -37,10 +37,10 @@ def cross_validation_text(validation: CrossValidation) -> str:
     return "\n".join(lines)
 
 
-def _held_out_text(one: RuptureComparison | RateComparison) -> str:
+def _held_out_text(one: SingleValue) -> str:
     """Predicted over measured, with the interval of a single test."""
     low, high = one.low / one.measured, one.high / one.measured
-    unbroken = " of the time it lasted unbroken" if getattr(one, "censored", False) else ""
+    unbroken = " of the time it lasted unbroken" if one.censored else ""
     return f"predicted over measured {one.ratio:.3g} [{low:.3g}, {high:.3g}]{unbroken}"
 
 

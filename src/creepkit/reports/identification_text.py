@@ -20,9 +20,9 @@ from creepkit.reports.judged_readings import LAW_RATE_MEANING, LAW_RATE_MISFIT, 
 from creepkit.reports.stress_exponents import reference_sentences
 
 if TYPE_CHECKING:
-    from creepkit.inverse.goodness_of_fit import RuptureComparison
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.nuisance_parameters import NuisanceEstimate
+    from creepkit.inverse.single_values import SingleValue
 
 
 LISTED_TESTS = 15
@@ -196,7 +196,7 @@ def _if_the_law_holds(fit: Identification) -> str:
     return ", which they do not have: the tests contradict the law" if rejected else ", if the law holds"
 
 
-def _rupture_table(ruptures: Sequence[tuple[str, str, RuptureComparison]]) -> list[str]:
+def _rupture_table(ruptures: Sequence[tuple[str, str, SingleValue]]) -> list[str]:
     width, condition_width = (
         max(len(name) for name, _, _ in ruptures),
         max(len(condition) for _, condition, _ in ruptures),
@@ -334,6 +334,6 @@ MOST_TEMPERATURES_NAMED = 12
 """Temperatures whose stresses an exported text states."""
 
 
-def rupture_rows(fit: Identification) -> list[tuple[str, str, RuptureComparison]]:
+def rupture_rows(fit: Identification) -> list[tuple[str, str, SingleValue]]:
     """(test, condition, rupture) of the tests whose end is known and was compared with the law."""
     return [(m.name, m.condition, m.rupture) for m in fit.tests if m.rupture is not None and m.rupture.used]

@@ -40,7 +40,7 @@ def ranked_candidates(
     options : further ones of both verbs, such as `through`.
     """
     import creepkit as ck
-    from creepkit.inverse.rupture_use import common_rupture_times
+    from creepkit.inverse.compared_tests import common_rupture_times
 
     if by_likelihood(asked, changes) and (len(laws) > 1 or compared):
         return ck.select(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from creepkit.inverse.duration import duration_known
+from creepkit.inverse.compared_tests import duration_known
 from creepkit.inverse.held_levels import held_temperatures
 from creepkit.quality.curve_shapes import shows_tertiary_creep
 from creepkit.records import History, load_unit

@@ -75,7 +75,7 @@ def codec_of(histories: Sequence[History], predictor: Predictor | None = None) -
     histories : the tests of the study, which are stored by name; others, such as planned ones, are stored whole.
     predictor : of identifications whose file does not give one, such as a surrogate.
     """
-    from creepkit.inverse.selection.challenges import Challenge
+    from creepkit.inverse.selection.perturbation_trials import Challenge
 
     by_name = {history.name: history for history in histories}
     digests = {name: history_digest(history) for name, history in by_name.items()}

@@ -14,7 +14,7 @@ from typing import Any
 
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.candidates import candidates
-from creepkit.inverse.duration import followed_duration
+from creepkit.inverse.compared_tests import followed_duration
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit

@@ -5,8 +5,8 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
+from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, followed_duration
 from creepkit.inverse.cross_validation import cross_validate
-from creepkit.inverse.duration import STRAIN_OF_UNKNOWN_DURATION, followed_duration
 from creepkit.inverse.minimum_rates import with_minimum_rates
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.problem import LeastSquaresProblem

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.duration import UNTESTABLE, rests_on_durations
+from creepkit.inverse.compared_tests import UNTESTABLE, rests_on_durations
 from helpers.rupture_tests import BAR
 
 

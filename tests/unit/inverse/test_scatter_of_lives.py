@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from creepkit.inverse.judged_residuals import life_sensitivity
 from creepkit.inverse.residuals import orthogonal_distance
-from creepkit.inverse.scatter_of_lives import life_sensitivity
 
 
 @pytest.mark.parametrize("share", [0.05, 0.5, 0.8, 0.95, 0.99])
@@ -30,7 +30,7 @@ def test_a_longer_life_moves_the_residual_of_a_frame_as_stated(share):
     by_life = -moved(np.log(strain(share, np.exp(step)) / e), np.log(share) - log_time(e, np.exp(step)))
     by_rate = moved(slope * step, step)
     residuals = SimpleNamespace(present=np.ones((1, 1), bool), log_rate_sensitivity=np.full((1, 1), by_rate))
-    observations = SimpleNamespace(followed_to_rupture=np.ones(1, bool), single_value_mask=np.zeros((1, 1), bool))
+    observations = SimpleNamespace(followed_frames=np.ones((1, 1), bool))
     assert life_sensitivity(residuals, observations)[0, 0] == pytest.approx(abs(by_life), rel=2e-3, abs=1e-3)
-    observations.followed_to_rupture = np.zeros(1, bool)
+    observations.followed_frames = np.zeros((1, 1), bool)
     assert life_sensitivity(residuals, observations)[0, 0] == 0.0

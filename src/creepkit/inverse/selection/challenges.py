@@ -10,7 +10,7 @@ are therefore asked before an answer is called decisive:
 2. May there be a threshold? The stress s in the terms of the best law is replaced by s - s_0, with s_0 THRESHOLD of
    the reference stress, and judged likewise.
 3. Does the answer rest on something nobody measured? The laws are ranked again with each unmodelled effect (see
-   inverse.unmodelled_effects) as a random effect of every test.
+   selection.perturbation_trials).
 """
 
 from __future__ import annotations
@@ -31,13 +31,10 @@ from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.composite_predictor import reduced_order_model_of
 from creepkit.inverse.defect_correction import difference_of_predictors
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import DECISIVE_WEIGHT, bic_penalty, criterion_weights
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.search.local_refinement import Tolerances
-from creepkit.inverse.selection.discrimination import under_common_covariance
-from creepkit.inverse.unmodelled_effect import UnmodelledEffect
-from creepkit.inverse.unmodelled_effects import with_random_effects
+from creepkit.inverse.selection.perturbation_trials import Challenge, decisive_effects
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Param, stress
 
@@ -70,23 +67,6 @@ LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6)
 
 SAME_FUNCTION = 0.05
 """Range of ln of the ratio of two rates over all conditions, within which they are one function."""
-
-
-@dataclass(frozen=True)
-class Challenge:
-    """Something that the tests allow, so that the law of most weight is not proved.
-
-    kind : "sum" of the best law with another, a "threshold" stress of it, or an "unmodelled effect". subject : the name
-        of the law that is allowed, or the effect.
-    sentence : for people, to follow "but".
-    """
-
-    kind: Literal["sum", "threshold", "unmodelled effect"]
-    subject: str
-    sentence: str
-
-    def __str__(self) -> str:
-        return self.sentence
 
 
 def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
@@ -365,36 +345,3 @@ def _chi_square(problem: LeastSquaresProblem, x: Floats) -> float:
     nuisances = problem.nuisance_parameters
     deviation = (x[problem.parameter_count :] - nuisances.mean[: nuisances.size]) ** 2 * nuisances.precision
     return float((whitened**2).sum() + deviation.sum())
-
-
-# ---- unmodelled effects ----------------------------------------------------------------------------------------------
-
-
-def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
-    """The unmodelled effects, one by one, with which the first law no longer has nearly all the weight."""
-    if any(fit.linearised is None for fit in fits):  # they were not made by likelihood
-        return ()
-    independent = [{e.kind: e for e in fit.unmodelled if not e.common and e.residual_change.size} for fit in fits]
-    challenges = []
-    for kind, example in independent[0].items():
-        effects = [one[kind] for one in independent if kind in one]
-        weights = _weights_with(fits, effects) if len(effects) == len(fits) else np.ones(1)
-        if weights[0] > DECISIVE_WEIGHT:
-            continue
-        rival = fits[int(np.argmax(np.where(np.arange(len(fits)) == 0, -1.0, weights)))].law.name
-        left = f"would leave it a weight of {weights[0]:.2f} ({rival}: {weights[1:].max():.2f})"
-        sentence = f"{example.description}, which was not modelled, {left}"
-        challenges.append(Challenge("unmodelled effect", kind, sentence))
-    return tuple(challenges)
-
-
-def _weights_with(fits: Sequence[Identification], effects: Sequence[UnmodelledEffect]) -> Floats:
-    """(laws,) weights by BIC with an effect as a random effect of every test."""
-    disturbed = [
-        replace(fit, linearised=with_random_effects(fit.linearised, [effect]))
-        for fit, effect in zip(fits, effects, strict=True)
-        if fit.linearised is not None
-    ]
-    common = under_common_covariance(disturbed)
-    penalties = [bic_penalty(len(fit.u), common.independent_frames) for fit in fits]
-    return criterion_weights(common.chi_square + common.log_determinant + penalties)[1]

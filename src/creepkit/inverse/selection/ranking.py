@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.inverse.adequacy import Adequacy
-    from creepkit.inverse.selection.challenges import Challenge
     from creepkit.inverse.selection.discrimination import EquivalentLaws
+    from creepkit.inverse.selection.perturbation_trials import Challenge
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.records import History, LawWithValues
 
@@ -169,33 +169,35 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
     """Why a ranking of several laws is not decisive."""
     best, count, adequacy = ranking.best.law.name, len(ranking.laws), ranking.adequacy
     weight = f"weight {ranking.laws[0].weight:.2f} of the laws tried"
+    named = "; and ".join(challenge.sentence for challenge in ranking.challenges or ())
     if adequacy is not None and adequacy.rejects:
         if adequacy.lies_in_tests:
             first = adequacy.explanations[0].headline
             return f"of {count} laws tried {best} is best ({weight}), but {first}: {adequacy.explanation_text}"
         others = "" if len(names) == 1 else f", not told apart from {' and '.join(names[1:])}"
         remedied = [r.fit for r in ranking.laws if r.fit.adequacy is not None and r.fit.adequacy.remedies]
-        if remedied and not adequacy.remedies:
+        if named:
+            others += f"; {named}"
+        elif remedied and not adequacy.remedies:
             effect = " or ".join(remedied[0].adequacy.remedies) if remedied[0].adequacy is not None else ""
             others += f"; with {effect}, which nobody modelled, {remedied[0].law.name} would explain them"
         return f"none of {count} laws tried explains the tests; the best, {best} ({weight}{others}), {adequacy}"
-    if best in ranking.further:
+    if best in ranking.further and adequacy is not None and adequacy.explains:
         asked, more = count - len(ranking.further), len(ranking.further)
         found = f"of {more} more that were tried, {best} is not contradicted by them ({weight})"
         none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
         return f"{none} the tests; {found}: plan tests that can refute it"
     if len(names) > 1:
-        found = f"the best is {best}: {adequacy_text}"
+        found = f"{f'{named}; ' if named else ''}the best is {best}: {adequacy_text}"
         return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; {found}"
     if ranking.challenges is None:
         unexamined = "what else the tests allow was not examined"
         return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}; {unexamined}"
     if ranking.challenges:
         only = "" if adequacy is None else adequacy.qualification
-        but = "; and ".join(challenge.sentence for challenge in ranking.challenges)
         return (
             f"of {count} laws tried {best} has nearly all the weight ({weight}) and is not contradicted by the tests"
-            f"{only}; but {but}"
+            f"{only}; but {named}"
         )
     return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}"
 
@@ -239,13 +241,20 @@ def rank(
 
 
 def challenged(ranking: Ranking) -> Ranking:
-    """The ranking with its best law challenged, where that is singled out and its tests and predictor are at hand."""
+    """The ranking with its best law challenged, where its tests and predictor are at hand.
+
+    Where no law is singled out, what nobody modelled is tried alone (see selection.perturbation_trials).
+    """
     from creepkit.inverse.selection.challenges import challenges_of
+    from creepkit.inverse.selection.perturbation_trials import explaining_effects
 
     fits = [ranked.fit for ranked in ranking.laws]
-    if len(fits) < 2 or not ranking.singled_out or any(f.predictor is None or not f.histories for f in fits):
+    if len(fits) < 2 or any(f.predictor is None or not f.histories for f in fits):
         return ranking
-    return replace(ranking, challenges=challenges_of(fits))
+    if ranking.singled_out:
+        return replace(ranking, challenges=challenges_of(fits))
+    named = explaining_effects(fits, np.array([ranked.weight for ranked in ranking.laws]))
+    return replace(ranking, challenges=named) if named else ranking
 
 
 def ranking_from_scores(
@@ -259,9 +268,11 @@ def ranking_from_scores(
 ) -> Ranking:
     """The ranking of identifications.
 
-    scores : (laws,) -2 ln of their evidence. chi_square : (laws,) of their residuals.
+    scores : (laws,) -2 ln of their evidence. chi_square : (laws,) of their residuals. Laws whose score is no number, or
+    that do not predict every test, come after the others and have no weight beside them.
     """
-    excess, weight = criterion_weights(scores)
+    predicted = np.isfinite(scores) & [fit.adequacy is None or not fit.adequacy.unpredicted for fit in fits]
+    excess, weight = criterion_weights(np.where(predicted, scores, np.inf) if predicted.any() else scores)
     chi_squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
     order = np.argsort(excess, kind="stable")
     laws = tuple(RankedLaw(fits[k], float(excess[k]), float(weight[k]), float(chi_squares[k])) for k in order)

@@ -14,13 +14,12 @@ import numpy as np
 
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.candidates import candidates
+from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
-from creepkit.inverse.duration import duration_known, needs_durations, rests_on_durations
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify, identify_values
 from creepkit.inverse.reference_conditions import with_arrhenius
-from creepkit.inverse.rupture_use import common_rupture_times
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, challenged, rank, ranking_from_scores
@@ -133,14 +132,7 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
     suited = [_with_temperature_of(laws, law, histories) for law in (candidates(histories) if histories else [])]
     sums = [laws[0] + other for other in laws[1:]]
     richer = _distinct_laws([*suited, *sums, *_registered_laws(laws, histories)])
-    judged = all(map(duration_known, histories))
-    return [
-        law
-        for law in richer
-        if law.fingerprint not in tried
-        and (judged or not needs_durations(law))
-        and not rests_on_durations(law, histories)
-    ]
+    return testable_laws([law for law in richer if law.fingerprint not in tried], histories)
 
 
 def _registered_laws(tried: Sequence[CreepLaw], histories: Sequence[History]) -> list[CreepLaw]:

@@ -248,11 +248,6 @@ class ScatterPosterior:
             return 0.0
         return float(self.weight @ self.sd[:, self.levels.index(level)] ** 2)
 
-    @property
-    def total_variance(self) -> Floats:
-        """(nodes,) variance of ln rate over all levels."""
-        return np.asarray((self.sd**2).sum(axis=1))
-
     def median(self, level: str) -> float:
         """Median standard deviation of a level."""
         values = self.sd[:, self.levels.index(level)]

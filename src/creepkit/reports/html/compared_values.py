@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.errors import CreepkitError
+from creepkit.inverse.compared_tests import compares_rupture_times
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.observation_vector import (
     FLOOR_NOISES,
@@ -21,7 +22,6 @@ from creepkit.inverse.observation_vector import (
     thinned_history,
 )
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
-from creepkit.inverse.rupture_use import compares_rupture_times
 from creepkit.records import output_unit
 from creepkit.reports.html.elements import number, plural, printable
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from creepkit.inverse.duration import duration_known
+from creepkit.inverse.compared_tests import duration_known
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.reports.html.compared_values import frame_counts, selection_sentence

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from creepkit.inverse.duration import UNTESTABLE, rests_on_durations
+from creepkit.inverse.compared_tests import UNTESTABLE, rests_on_durations
 from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
 from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
 from creepkit.reports.contents import ExportedFile

@@ -10,8 +10,9 @@ from creepkit.records import SECONDS_PER_HOUR
 from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable
 
 if TYPE_CHECKING:
-    from creepkit.inverse.goodness_of_fit import RateComparison, RuptureComparison, TestFit
+    from creepkit.inverse.goodness_of_fit import TestFit
     from creepkit.inverse.identification import Identification
+    from creepkit.inverse.single_values import SingleValue
 
 MOST_LISTED = 40
 """Tests in the table: with more, those whose values lie farthest from the law."""
@@ -53,14 +54,14 @@ def _table(tests: list[TestFit], count: int) -> Table:
     return Table(caption, tuple(columns), rows, numeric=tuple(range(2, len(columns))))
 
 
-def _rate_cells(rate: RateComparison | None) -> tuple[str, str, str]:
+def _rate_cells(rate: SingleValue | None) -> tuple[str, str, str]:
     if rate is None:
         return ("", "", "")
     predicted = "none" if not np.isfinite(rate.predicted) else number(rate.predicted, 3)
     return number(rate.measured, 3), predicted, _ratio(rate.ratio)
 
 
-def _end_cells(end: RuptureComparison | None) -> tuple[str, str, str]:
+def _end_cells(end: SingleValue | None) -> tuple[str, str, str]:
     if end is None:
         return ("", "", "")
     lasted = f"{'> ' if end.censored else ''}{number(end.measured / SECONDS_PER_HOUR)}"

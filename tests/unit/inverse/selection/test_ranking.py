@@ -10,7 +10,7 @@ import creepkit as ck
 from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
 from creepkit.inverse.identify import identify
 from creepkit.inverse.largest_deviation import LargestDeviation
-from creepkit.inverse.selection.challenges import Challenge
+from creepkit.inverse.selection.perturbation_trials import Challenge
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores, verdict_of
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
@@ -91,8 +91,32 @@ def test_scores_are_ordered_and_weighted():
     assert [r.fit.law.name for r in found.credible] == ["sinh", "norton", "theta"]
 
 
+@pytest.mark.parametrize("score", [8.0, NAN], ids=["test not predicted", "misfit is no number"])
+def test_a_law_that_does_not_predict_every_test_is_never_first(score):
+    """Of readings that it does not predict a law has no misfit: its criterion is no smaller for them."""
+    adequacy = EXPLAINS.with_unpredicted(("bar 1",) if score == score else ())
+    fits = [fit("norton", adequacy), fit("sinh"), fit("theta")]
+    found = ranking_from_scores(fits, np.array([score, 10.0, 12.0]), "bic", independent_frames=40.0)
+    assert [r.fit.law.name for r in found.laws] == ["sinh", "theta", "norton"]
+    assert [r.weight for r in found.laws] == pytest.approx([1 / (1 + np.exp(-1)), np.exp(-1) / (1 + np.exp(-1)), 0.0])
+    alone = ranking_from_scores(fits[:1], np.array([score]), "bic", independent_frames=40.0)
+    assert not alone.decisive
+
+
+def test_what_is_not_predicted_has_no_positive_verdict():
+    missing = EXPLAINS.with_unpredicted(("bar 1", "bar 2"))
+    for more in ({"weights": [0.99, 0.01]}, {"weights": [0.6, 0.4]}, {"weights": [0.99, 0.01], "further": ("norton",)}):
+        found = ranking(more.pop("weights"), [missing, missing], **more)
+        assert not found.singled_out
+        assert not found.decisive
+        assert "not contradicted" not in found.verdict
+        assert "it does not predict every reading of test 'bar 1' and 1 more" in found.verdict
+
+
 def test_only_a_law_that_is_singled_out_and_can_be_predicted_is_challenged(monkeypatch):
     monkeypatch.setattr("creepkit.inverse.selection.challenges.challenges_of", lambda fits: (SUM,))
+    trials = "creepkit.inverse.selection.perturbation_trials.explaining_effects"
+    monkeypatch.setattr(trials, lambda fits, weights: ())
     at_hand = {"predictor": object(), "histories": (object(),)}
     whole = Ranking(tuple(RankedLaw(fit(n, **at_hand), 0.0, w) for n, w in (("norton", 0.99), ("sinh", 0.01))))
     assert challenged(whole).challenges == (SUM,)

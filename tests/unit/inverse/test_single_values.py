@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, ttest_1samp
 
-from creepkit.inverse.contradicting_values import SIGNIFICANCE, contradicting_values
-from creepkit.inverse.goodness_of_fit import RateComparison, RuptureComparison
+from creepkit.inverse.single_values import SIGNIFICANCE, SingleValue, contradicting_values
 from creepkit.records import History, constant_stress
 
 
@@ -18,7 +17,7 @@ def bars_at(stresses, temperatures):
 
 def values(rate_ratios, time_ratios, **further):
     return [
-        (RuptureComparison(1.0, False, t, 0.1, 10.0, **further), RateComparison(1.0, r, 0.1, 10.0))
+        (SingleValue(1.0, t, 0.1, 10.0, **further), SingleValue(1.0, r, 0.1, 10.0))
         for r, t in zip(rate_ratios, time_ratios, strict=True)
     ]
 

@@ -5,7 +5,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.inverse.rupture_use import common_rupture_times, compared_tests, has_tertiary_creep
+from creepkit.inverse.compared_tests import common_rupture_times, compared_tests, has_tertiary_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, constant_stress
@@ -86,13 +86,13 @@ def test_laws_are_compared_from_the_same_values():
 def test_what_says_nothing_is_left_out_and_ends_alone_are_refused():
     settings, tests = IdentificationSettings(), damaged_table(0, 5.0, 4e5, 0.06, 0.9, 0.1)
     silent = [h.replace(rupture_time=None, unruptured=False) for h in tests]
-    compared = compared_tests(NORTON, silent, settings)
-    assert len(compared.histories) == 15
-    assert compared.notes[0].endswith("'T4', 'T9', 'T14'")
+    compared, notes = compared_tests(NORTON, silent, settings)
+    assert len(compared) == 15
+    assert notes[0].endswith("'T4', 'T9', 'T14'")
     ends = [h.replace(minimum_rate=None) for h in tests]
     with pytest.raises(FitError, match="breaks by loss of section alone, and these tests state nothing but their ends"):
         compared_tests(NORTON, ends, settings)
-    assert len(compared_tests(KACHANOV, ends, settings).histories) == len(ends)
+    assert len(compared_tests(KACHANOV, ends, settings)[0]) == len(ends)
     assert common_rupture_times([NORTON, KACHANOV], settings).rupture_times == "use"
     assert common_rupture_times([NORTON], settings) == settings
     with pytest.raises(FitError, match="rupture_times 'never' is not known"):

@@ -1,0 +1,192 @@
+"""Trials of perturbations: whether the choice of a law rests on something that nobody measured.
+
+Each unmodelled effect of the laws (see inverse.unmodelled_effects: a length known to its tolerance, an offset, a
+furnace that drifts) is put into the linear problems of all of them, with its usual size as prior standard deviation,
+and they are ranked again under one common covariance. In several tests it is tried twice: independently in each test, a
+random effect, and as one error of all tests; as unknowns with priors both are integrated out. No simulation is needed.
+
+An answer that singles a law out rests on the absence of an effect with which it no longer has nearly all the weight.
+Where no law is singled out, the law of most evidence with an effect is named if it then explains the tests, and without
+was not among the credible laws or did not explain them; with the size that the effect has in its linear problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, bic_penalty, criterion_weights
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel
+from creepkit.inverse.nuisance_parameters import prior_mean
+from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, under_common_covariance
+from creepkit.inverse.unmodelled_effect import DRIFT, OFFSET, UnmodelledEffect
+from creepkit.inverse.unmodelled_effects import with_unknown_effects
+from creepkit.inverse.variance_components import LinearisedProblem
+from creepkit.records import Nuisance, is_length_nuisance
+
+MOST_NAMED = 2
+"""Perturbations, and laws that explain the tests with them, that a sentence names."""
+
+
+@dataclass(frozen=True)
+class Challenge:
+    """Something that the tests allow, so that the law of most weight is not proved.
+
+    kind : "sum" of the best law with another, a "threshold" stress of it, or an "unmodelled effect". subject : the name
+        of the law that is allowed, or the effect.
+    sentence : for people, to follow "but".
+    """
+
+    kind: Literal["sum", "threshold", "unmodelled effect"]
+    subject: str
+    sentence: str
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+Scope = Literal["test", "all"]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """The laws with one perturbation. scope : whether it is independent in each test, or one of all tests.
+
+    effects : it, by each law. problems : of each law the linear problem with the perturbation as its last unknowns.
+    scores, weights : (laws,) -2 ln of the evidence by BIC, and the weights by it. noise_model : of the common
+    covariance.
+    """
+
+    scope: Scope
+    effects: tuple[UnmodelledEffect, ...]
+    problems: tuple[LinearisedProblem, ...]
+    scores: Floats
+    weights: Floats
+    noise_model: NoiseModel
+
+    @classmethod
+    def of(cls, fits: Sequence[Identification], effects: tuple[UnmodelledEffect, ...], scope: Scope) -> Trial:
+        """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
+        problems = tuple(_perturbed(*pair, scope) for pair in zip(fits, effects, strict=True))
+        common = under_common_covariance([replace(f, linearised=p) for f, p in zip(fits, problems, strict=True)])
+        noise_model = fits[common.reference_law].noise_model
+        factor = CovarianceFactor.of_residuals(problems[common.reference_law].residuals, noise_model)
+        penalties = [bic_penalty(len(fit.u), common.independent_frames) for fit in fits]
+        scores = factor.log_determinant + common.chi_square + common.log_determinant + penalties
+        return cls(scope, effects, problems, scores, criterion_weights(scores)[1], noise_model)
+
+    @property
+    def is_of_length(self) -> bool:
+        """Whether it is the error of a length of the test pieces."""
+        return is_length_nuisance(self.effects[0].kind) and not self.effects[0].kind.startswith(OFFSET)
+
+    def sizes(self, law: int) -> Floats:
+        """(1,) of all tests or (tests,) sizes of the perturbation by a law, in standard deviations."""
+        linear, count = self.problems[law], 1 if self.scope == "all" else len(self.effects[law].residual_change)
+        return linear.solve(CovarianceFactor.of_residuals(linear.residuals, self.noise_model)).step[-count:]
+
+    def description(self, fits: Sequence[Identification], law: int) -> str:
+        """The perturbation with the size that it has in the linear problem of a law, by its position."""
+        return _description(self, fits[law], law, self.sizes(law))
+
+
+def _perturbed(fit: Identification, effect: UnmodelledEffect, scope: Scope) -> LinearisedProblem:
+    """The linear problem of a law with a perturbation of all tests, or one of each test, as unknowns with priors."""
+    assert fit.linearised is not None
+    column = effect.residual_change[..., None]
+    return with_unknown_effects(fit.linearised, column if scope == "all" else column * np.eye(len(column))[:, None, :])
+
+
+def _description(trial: Trial, fit: Identification, law: int, sizes: Floats) -> str:
+    """What it takes, to follow "with"; sizes : (1,) of all tests, or (tests,), in standard deviations."""
+    effect, tests, differ = trial.effects[law], len(fit.tests), sizes.size > 1
+    size = float(np.abs(sizes).max()) if differ else float(sizes[0])
+    where = "the test" if tests == 1 else f"each of the {tests} tests"
+    if trial.is_of_length:
+        predictor = fit.least_squares_problem.predictor
+        nominal = float(np.median([prior_mean(Nuisance(effect.kind), h, predictor) for h in fit.histories]))
+        share = f"{abs(100 * size * effect.size / nominal):.2g} %"
+        if differ:
+            return f"independent errors of up to {share} in the {effect.kind} of {where}"
+        return f"a {effect.kind} {share} {'smaller' if size < 0 else 'larger'}{f' in {where}' if tests > 1 else ''}"
+    amount, unit = f"{size * effect.size:{'' if differ else '+'}.2g}", effect.unit.removesuffix(" over a test")
+    amount = f"{'up to ' if differ else ''}{amount} {unit}".strip()
+    if effect.kind == DRIFT:
+        return f"{'independent drifts' if differ else 'a drift'} of the temperature of {amount} over {where}"
+    output = effect.kind.removeprefix(OFFSET).replace("_", " ")
+    return f"{'independent offsets' if differ else 'an offset'} of {amount} in the {output} of {where}"
+
+
+def _trials(fits: Sequence[Identification]) -> Iterator[Trial]:
+    """Those of all perturbations that every law has, of which the first states its size; of laws by likelihood."""
+    if any(fit.linearised is None for fit in fits):
+        return
+    by_kind = [{e.kind: e for e in fit.unmodelled if not e.common and e.residual_change.size} for fit in fits]
+    for kind in by_kind[0]:
+        effects = tuple(one[kind] for one in by_kind if kind in one)
+        if len(effects) == len(fits):
+            yield Trial.of(fits, effects, "test")
+            if len(fits[0].tests) > 1:
+                yield Trial.of(fits, effects, "all")
+
+
+def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
+    """The perturbations, one by one, with which the first law no longer has nearly all the weight."""
+    challenges: dict[str, tuple[float, Challenge]] = {}
+    for trial in _trials(fits):
+        effect, weight = trial.effects[0], float(trial.weights[0])
+        if weight > DECISIVE_WEIGHT or weight >= challenges.get(effect.kind, (np.inf,))[0]:
+            continue
+        rival = 1 + int(np.argmax(trial.weights[1:]))
+        name, weight_of_rival = fits[rival].law.name, f"{trial.weights[rival]:.2f}"
+        sentence = (
+            f"with {trial.description(fits, rival)} {name} would explain them (weight {weight_of_rival})"
+            if _explains_with(fits[rival], trial.effects[rival])
+            else f"{effect.description}, which was not modelled, would leave it a weight of {weight:.2f} "
+            f"({name}: {weight_of_rival})"
+        )
+        challenges[effect.kind] = weight, Challenge("unmodelled effect", effect.kind, sentence)
+    return tuple(challenge for _, challenge in challenges.values())
+
+
+def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple[Challenge, ...]:
+    """The laws that a perturbation would put first, where no law is singled out; none where that is nothing new.
+
+    weights : (laws,) of the ranking, best first. A law is named that explains the tests with a perturbation and is
+    credible then, and was not both without. What the best law alone would need stands in its adequacy.
+    """
+    rejected = fits[0].adequacy is not None and fits[0].adequacy.rejects
+    raised = [
+        (float(trial.scores[law]), law, trial)
+        for trial in _trials(fits)
+        for law, fit in enumerate(fits)
+        if trial.weights[law] > CREDIBLE_WEIGHT
+        and (rejected or not weights[law] > CREDIBLE_WEIGHT)
+        and _explains_with(fit, trial.effects[law])
+    ]
+    if not raised:
+        return ()
+    score, _, best = min(raised, key=lambda one: one[0])
+    laws = sorted((law for _, law, trial in raised if trial is best), key=lambda law: len(fits[law].u))
+    if laws == [0]:
+        return ()
+    trials = {best.effects[0].kind: best}
+    for other_score, law, trial in sorted(raised, key=lambda one: one[0]):
+        if law == laws[0] and other_score < score + DISTINGUISHABLE_CHI_SQUARE:
+            trials.setdefault(trial.effects[0].kind, trial)
+    texts = [trial.description(fits, laws[0]) for trial in trials.values()]
+    names = " or ".join(fits[law].law.name for law in laws[:MOST_NAMED])
+    sentence = f"with {' or with '.join(texts[:MOST_NAMED])} {names} would explain them"
+    return (Challenge("unmodelled effect", best.effects[0].kind, sentence),)
+
+
+def _explains_with(fit: Identification, effect: UnmodelledEffect) -> bool:
+    """Whether a law explains the tests, with that perturbation where it does not without."""
+    adequacy = fit.adequacy
+    return adequacy is not None and (adequacy.explains or effect.description in adequacy.remedies)
