@@ -40,7 +40,7 @@ STAGES = {
     "challenges": ("challenges_of",),
     "profile": ("profile_likelihood", "profile"),
     "correction of the defect": ("correct_defect",),
-    "unmodelled effects": ("unmodelled_effects",),
+    "unmodelled effects": ("perturbations",),
     "adequacy and scatter of rates": ("RateExplanations", "at_own_rates", "adequacy_with_remedies", "rate_scatter"),
     "test table": ("_result",),
     "refinement": ("estimate_iteratively",),

@@ -20,7 +20,7 @@ from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
-from creepkit.inverse.unmodelled_effect import UnmodelledEffect
+from creepkit.inverse.perturbation import Perturbation
 from helpers.paths import ROOT
 
 FORMATS = ROOT / "tests" / "data" / "formats" / ck.__version__
@@ -46,9 +46,9 @@ def whole_identification() -> ck.Identification:
         critical_chi_square=1.5, smallest_p_value=5e-5,
     )  # fmt: skip
     effects = (
-        UnmodelledEffect("thickness", 0.01, "mm", 0.08),
-        UnmodelledEffect("temperature drift", 5.0, "K over a test", 0.05, -3.1, 0.93),
-        UnmodelledEffect("temperature", 3.0, "K", -0.14, common=True, tests=2, activation_energy=4e5, assumed=True),
+        Perturbation("thickness", 0.01, "mm", 0.08),
+        Perturbation("temperature drift", 5.0, "K over a test", 0.05, -3.1, 0.93),
+        Perturbation("temperature", 3.0, "K", -0.14, common=True, tests=2, activation_energy=4e5, assumed=True),
     )
     return replace(
         fit,

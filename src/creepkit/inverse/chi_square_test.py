@@ -27,9 +27,9 @@ from creepkit.inverse.judged_residuals import judged_residuals
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.largest_deviation import largest_deviation
 from creepkit.inverse.noise_model import NoiseModel
+from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.perturbations import with_random_effects
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.unmodelled_effect import UnmodelledEffect
-from creepkit.inverse.unmodelled_effects import with_random_effects
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.records import History, is_logarithmic
 
@@ -104,15 +104,14 @@ def adequacy_with_remedies(
     noise_model: NoiseModel,
     predictor_errors: Mapping[str, float],
     histories: Sequence[History],
-    effects: Sequence[UnmodelledEffect],
+    effects: Sequence[Perturbation],
     explanations: tuple[Explanation, ...],
 ) -> Adequacy:
     """The same, rejected where rates of tests are explained otherwise, with effects that would explain the tests."""
     known = KnownNoise.of_histories(problem.observations, histories)
     adequacy = adequacy_of(problem, linear, noise_model, predictor_errors, histories, known)
-    adequacy = adequacy.with_explanations(explanations)
     if not adequacy.rejects:
-        return adequacy
+        return adequacy.with_explanations(explanations)
     remedies = [
         effect.description
         for effect in effects
@@ -121,7 +120,7 @@ def adequacy_with_remedies(
             problem, with_random_effects(linear, [effect]), noise_model, predictor_errors, histories, known
         ).explains
     ]
-    return replace(adequacy, remedies=tuple(remedies))
+    return replace(adequacy, remedies=tuple(remedies)).with_explanations(explanations)
 
 
 def _correlation(noise_model: NoiseModel) -> float:

@@ -311,9 +311,14 @@ def predict_with_sensitivities(
     on = np.isfinite(theta)  # a coefficient that is off stays off, and has a derivative of zero
     steps = RELATIVE_STEP * np.maximum(np.abs(np.where(on, theta, 0.0)), 1.0) if numeric else np.zeros(0)
     nuisance_steps = [_nuisance_step(key, nuisances[key]) for key in kinds]
-    points, shifted_nuisances = _difference_points(theta, steps, nuisances, kinds, nuisance_steps)
-    batch = predict(predictor, law, points, histories, nuisances=shifted_nuisances)
-    count = len(points) // 2
+    count = steps.size + len(kinds)
+    moved = np.zeros((count, theta.size))  # one step in each parameter, then in each nuisance of all tests at once
+    moved[: steps.size, : steps.size] = np.diag(steps)
+    shifted = {key: np.tile(values, (2 * count, 1)) for key, values in nuisances.items()}
+    for k, (kind, step) in enumerate(zip(kinds, nuisance_steps, strict=True), steps.size):
+        shifted[kind][k] += step
+        shifted[kind][count + k] -= step
+    batch = predict(predictor, law, np.concatenate([theta + moved, theta - moved]), histories, nuisances=shifted)
     with np.errstate(invalid="ignore"):  # of values that are not finite, whose derivatives are NaN
         differences = batch.values[:count] - batch.values[count:]
     jacobian = np.moveaxis(differences[: steps.size], 0, -1) / (2 * steps) if numeric else None
@@ -331,22 +336,6 @@ def _nuisance_step(key: str, values: Floats) -> float:
     """The step of central differences in a nuisance; values : (1, tests), of a length in mm."""
     kind = kind_and_start(key)[0]
     return LENGTH_STEP * float(np.max(np.abs(values))) if is_length_nuisance(kind) else NUISANCE_STEPS[kind]
-
-
-def _difference_points(
-    theta: Floats, steps: Floats, nuisances: NuisanceValues, kinds: Sequence[str], nuisance_steps: Sequence[float]
-) -> tuple[Floats, dict[str, Floats]]:
-    """Candidates one step up, then one step down, in each parameter and then in each nuisance of all tests at once."""
-    count = steps.size + len(kinds)
-    points = np.tile(theta, (2 * count, 1))
-    for sign, offset in ((1.0, 0), (-1.0, count)):
-        moved = sign * np.eye(steps.size, theta.size) * steps[:, None]
-        points[offset : offset + steps.size] += np.where(np.isfinite(theta), moved, 0.0)
-    shifted_nuisances = {kind: np.tile(values, (2 * count, 1)) for kind, values in nuisances.items()}
-    for k, kind in enumerate(kinds):
-        shifted_nuisances[kind][steps.size + k] += nuisance_steps[k]
-        shifted_nuisances[kind][count + steps.size + k] -= nuisance_steps[k]
-    return points, shifted_nuisances
 
 
 def predict_to_rupture(

@@ -23,6 +23,7 @@ from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, has_nuisance, owner_of, prior_mean
+from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.predictor_documents import PredictorDocument, missing_predictor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
@@ -30,7 +31,6 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import LawAtTests, constant_stress_tests
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, delta_method, interval_quantile
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
-from creepkit.inverse.unmodelled_effect import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import History, LawWithValues, Nuisance, Prediction, Predictor
@@ -96,7 +96,7 @@ class Identification(Presentable, text="reports.identification_text:identificati
     nuisances: tuple[NuisanceEstimate, ...] = ()
     adequacy: Adequacy | None = None
     numerical_error: NumericalError | None = None
-    unmodelled: tuple[UnmodelledEffect, ...] = ()
+    unmodelled: tuple[Perturbation, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     rate_scatter: RateScatter | None = None
     samples: Floats | None = None
@@ -263,10 +263,8 @@ class Identification(Presentable, text="reports.identification_text:identificati
         self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
     ) -> tuple[Floats, Floats, Floats]:
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
-        predictor = self._predictor_or(using)
-        tests, noise_model = list(histories or self.histories), self.noise_model if test_scatter else None
-        law = LawAtTests(self.coordinates, self.u, self.scatter_of_rates, noise_model, predictor)
-        return law.rupture_times(tests)
+        law = LawAtTests.of_fit(self, self._predictor_or(using), test_scatter=test_scatter)
+        return law.rupture_times(list(histories or self.histories))
 
     @checked
     def predict(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError
+from creepkit.errors import FitError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError, ValueCodec
@@ -22,14 +23,13 @@ from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
+from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.predictor_documents import predictor_documents, predictor_from_documents
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import ContradictingValues, SingleValue
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity
-from creepkit.inverse.uncertainty.rate_scatter import RateScatter
-from creepkit.inverse.uncertainty.stored_rate_scatter import problem_with
-from creepkit.inverse.unmodelled_effect import UnmodelledEffect
+from creepkit.inverse.uncertainty.rate_scatter import LEVELS, RateScatter
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.records import Nuisance
@@ -71,7 +71,7 @@ CODEC = RecordCodec(
     omitted={
         Identification: ("histories", "predictor", "search_trace", "linearised", "problem"),
         Sparsity: ("path",),
-        UnmodelledEffect: ("residual_change",),
+        Perturbation: ("residual_change",),
     },
     ranges={
         Identification: {"rms": NOT_NEGATIVE_OR_NAN, "effective_frames": POSITIVE, "freedom": POSITIVE},
@@ -103,7 +103,7 @@ CODEC = RecordCodec(
         ImplausibleNuisance: {"standard_deviations": NOT_NEGATIVE, "size": POSITIVE, "share": NOT_NEGATIVE_OR_NAN},
         LargestDeviation: {"rms": NOT_NEGATIVE},
         NumericalError: {"noises": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},
-        UnmodelledEffect: {
+        Perturbation: {
             "size": NOT_NEGATIVE,
             "rate_change": NAN_ALLOWED,
             "tests": NOT_NEGATIVE,
@@ -197,7 +197,7 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
     if fit.rate_scatter is not None:
         unknowns, tests = size + len(fit.nuisances), [m.name for m in fit.tests]
         fit = replace(fit, rate_scatter=_with_shapes(fit.rate_scatter, len(tests), unknowns))
-        problem = problem_with(fit.rate_scatter, tests, unknowns)  # type: ignore[arg-type]
+        problem = _problem_with(fit.rate_scatter, tests, unknowns)  # type: ignore[arg-type]
         if problem:
             raise FitError(f"{source}: rate_scatter: {problem}; the file is damaged")
     if not {"stress", "temperature", "strain", "time"} <= {*fit.ranges} or any(a > b for a, b in fit.ranges.values()):
@@ -217,3 +217,50 @@ def _with_shapes(scatter: RateScatter, tests: int, unknowns: int) -> RateScatter
         for name, shape in shapes.items()
     )
     return replace(scatter, design=design, precision=precision)
+
+
+LARGEST_NUMBER = 1e12
+"""Of a stored record: larger ones are damage."""
+
+
+def _problem_with(scatter: RateScatter, tests: Sequence[str], unknowns: int) -> str:
+    """What is wrong with a record that was read from a file, in one clause; "" for one that fits an identification.
+
+    tests : names of the fitted tests. unknowns : how many the identification has.
+    """
+    count = len(tests)
+    shapes = {
+        "log_factor": (count,),
+        "variance": (count,),
+        "weight": (count,),
+        "design": (count, unknowns),
+        "precision": (unknowns, unknowns),
+        "gradient": (unknowns,),
+    }
+    if scatter.tests != tuple(tests):
+        return "its tests are not those of the identification"
+    for name, shape in shapes.items():
+        array = np.asarray(getattr(scatter, name))
+        if array.shape != shape and not array.size == 0 == np.prod(shape):
+            return f"{name} has the shape {array.shape}, not {shape}"
+        if not (np.abs(array) < LARGEST_NUMBER**2).all():
+            return f"{name} holds numbers that are too large"
+    if not ((scatter.variance >= 0).all() and (scatter.weight > 0).all()):
+        return "a variance is negative, or a weight not above zero"
+    if not (scatter.weight < LARGEST_NUMBER).all():
+        return "weight holds numbers that are too large"
+    for level, names in scatter.members.items():
+        if level not in LEVELS[:-1] or len(names) != count:
+            return f"members of '{quoted(level, 20)}' are not one for each test, of a heat or laboratory"
+    if not {*scatter.common} <= {*LEVELS[:-1]}:
+        return "common names levels that are no heat or laboratory"
+    if scatter.known is not None and not 0 <= scatter.known < LARGEST_NUMBER:
+        return f"known is {scatter.known:g}, which is no standard deviation"
+    for name in ("output_scales", "output_floors"):
+        if not all(0 < value < LARGEST_NUMBER for value in getattr(scatter, name).values()):
+            return f"{name} must be above zero"
+    scale = np.sqrt(np.maximum(np.diag(scatter.precision), 1e-300))
+    scaled = scatter.precision / np.outer(scale, scale)
+    if unknowns and (not np.allclose(scaled, scaled.T, atol=1e-8) or np.linalg.eigvalsh(scaled)[0] < -1e-6):
+        return "precision is not symmetric and positive semi-definite"
+    return ""

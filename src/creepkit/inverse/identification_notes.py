@@ -23,8 +23,8 @@ from creepkit.inverse.goodness_of_fit import TestFit
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.iterative_estimation import EstimationResult
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS
-from creepkit.inverse.nuisance_correlation import nuisance_correlation_notes
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
+from creepkit.inverse.nuisance_plausibility import nuisance_correlation_notes
 from creepkit.inverse.prediction_failures import tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses

@@ -48,11 +48,13 @@ from creepkit.inverse.iterative_estimation import (
     linearised,
     starting_point,
 )
-from creepkit.inverse.judged_residuals import at_own_rates
+from creepkit.inverse.judged_residuals import at_own_rates, at_rates
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
+from creepkit.inverse.perturbation import Perturbation, unmodelled_note
+from creepkit.inverse.perturbations import perturbations
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
@@ -71,8 +73,6 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
 )
 from creepkit.inverse.uncertainty.of_estimation import uncertainty_of
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.unmodelled_effect import UnmodelledEffect, unmodelled_note
-from creepkit.inverse.unmodelled_effects import unmodelled_effects
 from creepkit.inverse.working_noise import WorkingNoiseEstimator
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor, Status, is_length_nuisance, is_logarithmic
@@ -83,10 +83,6 @@ MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 
 CHANGE_OF_DEFECT = 200.0
 """Relative change of a defect over that of what is predicted, at most: 10 to 50 were found in dimples."""
-
-
-NEWTON_STEPS = 8
-"""Of the factor on the rate of one test."""
 
 
 REFIT_ROUNDS = 2
@@ -123,7 +119,7 @@ def identify(
 
 
 def _without_one_test(fit: Identification) -> Identification:
-    """Where one test explains the scatter of rates, what the others say without it, by a refit to them."""
+    """Where single tests explain the scatter of rates, what the others say without them, by a refit to them."""
     adequacy = fit.adequacy
     if adequacy is None or not adequacy.explanations or adequacy.explanations[0].kind != "one test":
         return fit
@@ -139,39 +135,26 @@ def _without_one_test(fit: Identification) -> Identification:
         )
     except CreepkitError:
         return fit
-    position = [h.name for h in fit.histories].index(first.tests[0])
-    again = _beside_the_others(fit, without, position, first.odds)
     values = {e.name: (e.value, e.low, e.high) for e in without.estimates}
-    explanations = (replace(again, without=values), *rest)
+    if len(first.tests) == 1:
+        position = [h.name for h in fit.histories].index(first.tests[0])
+        again = _beside_the_others(fit, without, position, first)
+        first = replace(again, factors=(float(np.exp(again.size)),), near=first.near)
+    explanations = (replace(first, without=values), *rest)
     return replace(fit, adequacy=replace(adequacy, explanations=explanations))
 
 
-def _beside_the_others(fit: Identification, without: Identification, test: int, odds: float) -> Explanation:
-    """One test, by its position, beside the law of the others, with its factor on their rate.
-
-    Of outputs that are compared by their logarithm that factor is the median of what its readings show; of others it is
-    found by Newton's method.
-    """
-    problem, x, size = fit.least_squares_problem, fit.x.copy(), 0.0
-    count, coefficients = len(without.u), list(problem.coordinates.coefficients)
-    x[:count] = without.u
-
-    def at(log_factor: float) -> RateExplanations:
-        moved = x.copy()
-        moved[coefficients] += log_factor
-        linear = linearised(problem, moved, problem.residuals(moved))
-        return RateExplanations(problem, moved, linear, without.noise_model)
-
-    others = at(0.0)
-    if all(map(is_logarithmic, problem.observations.outputs)):
-        size = float(others.rates.median_log_factors[test])
-    elif problem.coordinates.every_rate_has_coefficient:
-        for _ in range(NEWTON_STEPS):
-            step = float(at(size).rates.own_log_factors[test])
-            size += step
-            if abs(step) < 1e-3:
-                break
-    return others.one_test(test, odds, size if np.isfinite(size) and size else None)
+def _beside_the_others(fit: Identification, without: Identification, test: int, found: Explanation) -> Explanation:
+    """One test, by its position, beside the law of the others: the problem is made linear there and at its own rate."""
+    problem, x, log_factors = fit.least_squares_problem, fit.x.copy(), np.zeros(len(fit.histories))
+    x[: len(without.u)] = without.u
+    log_factors[test] = found.size
+    linear = at_rates(problem, x, linearised(problem, x, problem.residuals(x)), log_factors)
+    others = RateExplanations(problem, x, linear, without.noise_model)
+    logarithmic = all(map(is_logarithmic, problem.observations.outputs))
+    sizes = others.rates.median_log_factors if logarithmic else others.rates.own_log_factors
+    size = float(sizes[test])
+    return others.one_test(test, found.odds, size if np.isfinite(size) else found.size)
 
 
 @kept_where_asked
@@ -331,9 +314,9 @@ def _result(
     noise_model, covariance, freedom = uncertainty_of(best, working_estimator, len(histories))
     linear = best.linearised or linearised(problem, x, residuals)
     working_noise = None if best.linearised is not None else best.working_noise
-    unmodelled: tuple[UnmodelledEffect, ...] = ()
+    unmodelled: tuple[Perturbation, ...] = ()
     if not approximately:
-        unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories, working_noise)
+        unmodelled = perturbations(problem, x, linear, noise_model, histories, working_noise)
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     scatter = rate_scatter(problem, x, residuals, noise_model, lengths)
     prediction = predict(
@@ -359,8 +342,8 @@ def _result(
     failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]
     failed |= (prediction.status[0] != Status.RUPTURED) & [test.misses_readings for test in tests]
     unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
-    rates = RateExplanations(problem, x, linear, noise_model)
     judged = at_own_rates(problem, x, linear, noise_model)
+    rates = RateExplanations(problem, x, judged, noise_model)
     adequacy = adequacy_with_remedies(
         problem, judged, noise_model, working_estimator.predictor_errors, histories, unmodelled, rates.found
     ).with_unpredicted(unpredicted)

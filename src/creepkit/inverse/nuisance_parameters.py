@@ -24,30 +24,35 @@ from creepkit.records import (
     Predictor,
     dimension_named,
     drift_duration,
+    is_length_nuisance,
     nuisance_key,
 )
 
-INITIAL_PRIOR_SD = {
-    **{"modulus": 0.05, "temperature": 5.0},
-    **{"temperature step": 10.0, "temperature drift": 5.0, "rate step": 0.3, "rate drift": 0.3, "load step": 0.05},
+
+@dataclass(frozen=True)
+class UsualSize:
+    """Of a kind of nuisance: unit, where the estimate of a prior standard deviation begins, limits."""
+
+    unit: str
+    prior_sd: float
+    low: float
+    high: float
+
+
+USUAL = {
+    "modulus": UsualSize("relative", 0.05, -0.7, 2.0),
+    "temperature": UsualSize("K", 5.0, -150.0, 150.0),
+    "temperature step": UsualSize("K", 10.0, -150.0, 150.0),
+    "temperature drift": UsualSize("K", 5.0, -150.0, 150.0),
+    "rate step": UsualSize("in ln", 0.3, -5.0, 5.0),
+    "rate drift": UsualSize("in ln", 0.3, -5.0, 5.0),
+    "load step": UsualSize("relative", 0.05, -0.7, 2.0),
 }
-"""Where the estimate of a prior standard deviation begins: relative, K, K, K, ln, ln, relative."""
+"""Of the kinds that are no lengths."""
 
 
-INITIAL_PRIOR_SD_OF_LENGTH = 0.06
-"""The same of a length, relative to its mean."""
-
-
-LIMITS = {
-    **{"modulus": (-0.7, 2.0), "temperature": (-150.0, 150.0)},
-    **{"temperature step": (-150.0, 150.0), "temperature drift": (-150.0, 150.0), "load step": (-0.7, 2.0)},
-    **{"rate step": (-5.0, 5.0), "rate drift": (-5.0, 5.0)},
-}
-"""Limits of nuisance parameters."""
-
-
-LIMITS_OF_LENGTH = (0.3, 3.0)
-"""Limits of lengths, as multiples of their mean."""
+USUAL_LENGTH = UsualSize("mm", 0.06, 0.3, 3.0)
+"""Of lengths, as multiples of their mean."""
 
 
 SMALLEST_PRIOR_SD = 1e-3
@@ -90,34 +95,32 @@ class NuisanceParameters:
                     f"nuisance '{nuisance.key}' means nothing to the predictor of these histories; leave it out, or "
                     f"take another: {nearest(nuisance.kind, sorted(allowed))}"
                 )
-            owners_of_tests = [owner_of(nuisance, h) for h in histories]
-            distinct_owners = list(dict.fromkeys(m for m, k in zip(owners_of_tests, offered, strict=True) if k))
-            first = len(parameters)
             index = test_index.setdefault(nuisance.key, np.full(len(histories), -1, np.int64))
+            first, owners = len(parameters), list[str]()
             for test in map(int, np.flatnonzero(offered)):
                 if index[test] >= 0:
                     raise FitError(
                         f"test '{histories[test].name}' has the nuisance '{nuisance.key}' twice; let tests= of one of "
                         "them leave it out"
                     )
-                index[test] = first + distinct_owners.index(owners_of_tests[test])
-            if named and nuisance.sd is None and len(distinct_owners) < 2:
+                owner = owner_of(nuisance, histories[test])
+                owners += [owner] if owner not in owners else []
+                index[test] = first + owners.index(owner)
+            if named and nuisance.sd is None and len(owners) < 2:
                 raise FitError(
                     f"nuisance '{nuisance.key}': a standard deviation cannot be estimated from a single value; "
                     "give its sd="
                 )
-            parameters += [(nuisance, member) for member in distinct_owners]
-        nuisance_of_parameter, by_name = [n for n, _ in parameters], {h.name: h for h in histories}
-        means = [prior_mean(n, by_name.get(member), predictor) for n, member in parameters]
-        limits = [_bounds_of(n, mean) for n, mean in zip(nuisance_of_parameter, means, strict=True)]
+            parameters += [(nuisance, owner) for owner in owners]
+        by_name = {h.name: h for h in histories}
+        means = [prior_mean(n, by_name.get(owner), predictor) for n, owner in parameters]
+        priors = [
+            (mean, initial_prior_sd(n, mean), *_bounds_of(n, mean))
+            for (n, _), mean in zip(parameters, means, strict=True)
+        ]
+        mean, sd, low, high = np.array(priors, float).reshape(-1, 4).T
         return cls(
-            tuple(nuisance_of_parameter),
-            tuple(m for _, m in parameters),
-            test_index,
-            np.array(means, float),
-            np.array([initial_prior_sd(n, mean) for n, mean in zip(nuisance_of_parameter, means, strict=True)], float),
-            np.array([low for low, _ in limits], float),
-            np.array([high for _, high in limits], float),
+            tuple(n for n, _ in parameters), tuple(owner for _, owner in parameters), test_index, mean, sd, low, high
         )
 
     @property
@@ -249,15 +252,19 @@ def initial_prior_sd(nuisance: Nuisance, mean: float) -> float:
     """The prior standard deviation of a nuisance parameter, or where its estimate begins; mean : of the prior."""
     if nuisance.sd is not None:
         return nuisance.sd
-    return INITIAL_PRIOR_SD_OF_LENGTH * abs(mean) if nuisance.is_length else INITIAL_PRIOR_SD[nuisance.kind]
+    return USUAL_LENGTH.prior_sd * abs(mean) if nuisance.is_length else USUAL[nuisance.kind].prior_sd
+
+
+def nuisance_unit(kind: str) -> str:
+    """The unit of a kind; "" of an offset, whose output has one."""
+    if is_length_nuisance(kind):
+        return USUAL_LENGTH.unit
+    return USUAL[kind].unit if kind in USUAL else "in ln" if kind == "rate" else ""
 
 
 def _bounds_of(nuisance: Nuisance, mean: float) -> tuple[float, float]:
-    if nuisance.is_length:
-        low, high = (factor * mean for factor in LIMITS_OF_LENGTH)
-    else:
-        low, high = LIMITS[nuisance.kind]
-    return max(low, nuisance.bounds[0]), min(high, nuisance.bounds[1])
+    usual, unit = (USUAL_LENGTH, mean) if nuisance.is_length else (USUAL[nuisance.kind], 1.0)
+    return max(usual.low * unit, nuisance.bounds[0]), min(usual.high * unit, nuisance.bounds[1])
 
 
 @dataclass(frozen=True)
@@ -288,15 +295,9 @@ def nuisance_estimates_of(
     nuisance_parameters: NuisanceParameters, e: Floats, sd: Floats
 ) -> tuple[NuisanceEstimate, ...]:
     """The estimates of nuisance parameters from e (nuisances,) and their standard deviations sd (nuisances,)."""
+    known = nuisance_parameters
+    numbers = np.stack([e, sd, known.mean, known.sd], axis=-1).astype(float).tolist()
     return tuple(
-        NuisanceEstimate(n.kind, n.scope, member, float(value), float(s), float(mean), float(prior_sd), n.start)
-        for n, member, value, s, mean, prior_sd in zip(
-            nuisance_parameters.nuisances,
-            nuisance_parameters.owners,
-            e,
-            sd,
-            nuisance_parameters.mean,
-            nuisance_parameters.sd,
-            strict=True,
-        )
+        NuisanceEstimate(n.kind, n.scope, owner, value, deviation, mean, prior_sd, n.start)
+        for n, owner, (value, deviation, mean, prior_sd) in zip(known.nuisances, known.owners, numbers, strict=True)
     )

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.inverse.common_errors import (
+from creepkit.inverse.identify import identify
+from creepkit.inverse.iterative_estimation import linearised
+from creepkit.inverse.perturbations import (
     COMMON_LOAD_ERROR,
     COMMON_TEMPERATURE_ERROR,
     USUAL_ACTIVATION_ENERGY,
     common_errors,
 )
-from creepkit.inverse.identify import identify
-from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import arrhenius

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.imposed_motion_errors import COMMON_MODULUS_ERROR, COMMON_MOTION_ERROR
+from creepkit.inverse.perturbations import COMMON_MODULUS_ERROR, COMMON_MOTION_ERROR
 
 E, A, N = 150e3, 2e-8 / 200.0**6, 6.0
 

@@ -11,6 +11,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.prediction_failures import tests_without_prediction as missing_tests
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
+from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import Status
 from helpers.steady_rate_predictor import Steady, planted
@@ -87,3 +88,35 @@ def test_the_start_alone_is_no_prediction() -> None:
     values[..., 0, :] = 0.0
     prediction = replace(Steady().predict(NORTON, np.array([[-30.0, 4.0]]), [history]), values=values)
     assert missing_tests(prediction, [history]).tolist() == [[True]]
+
+
+SINH = planted(
+    ck.law("hyperbolic-sine"), {"A": 1e-7, "n": 3.0, "B": 60.0}, [(s, 1000.0) for s in (55.0, 60.0, 65.0)], seed=1,
+    noise=2e-4, frames=12,
+)  # fmt: skip
+
+
+class Partial(Steady):
+    """Says nothing of one reading of the last test by the hyperbolic sine, and that it was simulated to its end."""
+
+    def predict(self, law, theta, histories, *, sensitivities=False):
+        found = super().predict(law, theta, histories, sensitivities=sensitivities)
+        values = found.values.copy()
+        if law.name == "hyperbolic-sine":
+            values[:, [h.name == SINH[-1].name for h in histories], 5] = np.nan
+        return replace(found, values=values)
+
+
+def test_a_law_whose_misfit_is_no_number_has_no_positive_verdict() -> None:
+    """The truth, of which a reading is not predicted; Norton's law predicts them all and comes first."""
+    tests = [h.replace(standard_deviation={"strain": np.full(12, 2e-4)}) for h in SINH]
+    settings = replace(SETTINGS, weights="likelihood", nuisances=())
+    fits = [identify(ck.law(name), tests, Partial(), settings=settings) for name in ("hyperbolic-sine", "norton")]
+    assert np.isnan(fits[0].errors["strain"].mean_squared_error)
+    assert fits[0].adequacy.unpredicted == (tests[-1].name,)
+    expected = f"cannot be judged: it does not predict every reading of test '{tests[-1].name}'"
+    assert str(fits[0].adequacy) == expected
+    found = rank(fits)
+    assert [(r.fit.law.name, r.weight) for r in found.laws] == [("norton", 1.0), ("hyperbolic-sine", 0.0)]
+    alone = rank(fits[:1])
+    assert alone.verdict.endswith(expected)

@@ -14,10 +14,10 @@ import creepkit as ck
 from creepkit.exporters.latex import equations_in_latex
 from creepkit.exporters.mathml import law_equations
 from creepkit.inverse.identify import identify
+from creepkit.inverse.perturbation import Perturbation, combined_change_text
 from creepkit.inverse.selection.discrimination import chi_square_by_test
 from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.unmodelled_effect import UnmodelledEffect, combined_change_text
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.reports.html.elements import number
@@ -80,7 +80,7 @@ def test_ends_of_an_interval_differ_from_its_value_as_printed(value: float, half
 
 
 def test_what_an_interval_does_not_include_adds_in_quadrature() -> None:
-    effects = [UnmodelledEffect("load", 1.0, "%", -0.04, common=True), UnmodelledEffect("thickness", 0.01, "mm", 0.03)]
+    effects = [Perturbation("load", 1.0, "%", -0.04, common=True), Perturbation("thickness", 0.01, "mm", 0.03)]
     assert combined_change_text(effects) == "5 %"
     assert combined_change_text([replace(effects[0], rate_change=0.7)]) == "a factor of 2"
     assert combined_change_text([]) == ""

@@ -1,6 +1,6 @@
 """Trials of perturbations: whether the choice of a law rests on something that nobody measured.
 
-Each unmodelled effect of the laws (see inverse.unmodelled_effects: a length known to its tolerance, an offset, a
+Each unmodelled effect of the laws (see inverse.perturbations: a length known to its tolerance, an offset, a
 furnace that drifts) is put into the linear problems of all of them, with its usual size as prior standard deviation,
 and they are ranked again under one common covariance. In several tests it is tried twice: independently in each test, a
 random effect, and as one error of all tests; as unknowns with priors both are integrated out. No simulation is needed.
@@ -24,9 +24,9 @@ from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIG
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
+from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
+from creepkit.inverse.perturbations import with_unknown_effects
 from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, under_common_covariance
-from creepkit.inverse.unmodelled_effect import DRIFT, OFFSET, UnmodelledEffect
-from creepkit.inverse.unmodelled_effects import with_unknown_effects
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.records import Nuisance, is_length_nuisance
 
@@ -64,14 +64,14 @@ class Trial:
     """
 
     scope: Scope
-    effects: tuple[UnmodelledEffect, ...]
+    effects: tuple[Perturbation, ...]
     problems: tuple[LinearisedProblem, ...]
     scores: Floats
     weights: Floats
     noise_model: NoiseModel
 
     @classmethod
-    def of(cls, fits: Sequence[Identification], effects: tuple[UnmodelledEffect, ...], scope: Scope) -> Trial:
+    def of(cls, fits: Sequence[Identification], effects: tuple[Perturbation, ...], scope: Scope) -> Trial:
         """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
         problems = tuple(_perturbed(*pair, scope) for pair in zip(fits, effects, strict=True))
         common = under_common_covariance([replace(f, linearised=p) for f, p in zip(fits, problems, strict=True)])
@@ -96,7 +96,7 @@ class Trial:
         return _description(self, fits[law], law, self.sizes(law))
 
 
-def _perturbed(fit: Identification, effect: UnmodelledEffect, scope: Scope) -> LinearisedProblem:
+def _perturbed(fit: Identification, effect: Perturbation, scope: Scope) -> LinearisedProblem:
     """The linear problem of a law with a perturbation of all tests, or one of each test, as unknowns with priors."""
     assert fit.linearised is not None
     column = effect.residual_change[..., None]
@@ -186,7 +186,7 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
     return (Challenge("unmodelled effect", best.effects[0].kind, sentence),)
 
 
-def _explains_with(fit: Identification, effect: UnmodelledEffect) -> bool:
+def _explains_with(fit: Identification, effect: Perturbation) -> bool:
     """Whether a law explains the tests, with that perturbation where it does not without."""
     adequacy = fit.adequacy
     return adequacy is not None and (adequacy.explains or effect.description in adequacy.remedies)

@@ -176,12 +176,11 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
             return f"of {count} laws tried {best} is best ({weight}), but {first}: {adequacy.explanation_text}"
         others = "" if len(names) == 1 else f", not told apart from {' and '.join(names[1:])}"
         remedied = [r.fit for r in ranking.laws if r.fit.adequacy is not None and r.fit.adequacy.remedies]
-        if named:
-            others += f"; {named}"
-        elif remedied and not adequacy.remedies:
+        if remedied and not named and not adequacy.remedies:
             effect = " or ".join(remedied[0].adequacy.remedies) if remedied[0].adequacy is not None else ""
             others += f"; with {effect}, which nobody modelled, {remedied[0].law.name} would explain them"
-        return f"none of {count} laws tried explains the tests; the best, {best} ({weight}{others}), {adequacy}"
+        stated = f" as they are stated; {named}" if named else ""
+        return f"none of {count} laws tried explains the tests{stated}; the best, {best} ({weight}{others}), {adequacy}"
     if best in ranking.further and adequacy is not None and adequacy.explains:
         asked, more = count - len(ranking.further), len(ranking.further)
         found = f"of {more} more that were tried, {best} is not contradicted by them ({weight})"

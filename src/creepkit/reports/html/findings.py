@@ -9,8 +9,8 @@ from markupsafe import Markup
 
 from creepkit.exporters.mathml import expression_mathml, law_equations
 from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration_known
+from creepkit.inverse.perturbation import NOT_INCLUDED
 from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
-from creepkit.inverse.unmodelled_effect import NOT_INCLUDED
 from creepkit.reports.html.elements import (
     Block,
     Formula,

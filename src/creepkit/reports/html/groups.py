@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.errors import CreepkitError
-from creepkit.inverse.nuisance_plausibility import nuisance_unit
+from creepkit.inverse.nuisance_parameters import nuisance_unit
 from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, chi_square_by_test
 from creepkit.records import output_unit
 from creepkit.reports.html.compared_values import compared_values

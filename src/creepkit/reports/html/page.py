@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from creepkit.inverse.unmodelled_effect import combined_change_text
+from creepkit.inverse.perturbation import combined_change_text
 from creepkit.reports.attachments import embed
 from creepkit.reports.html.closing import closing_sections
 from creepkit.reports.html.data_section import data_section

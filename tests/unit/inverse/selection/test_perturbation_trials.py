@@ -10,10 +10,10 @@ import creepkit as ck
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
+from creepkit.inverse.perturbations import with_random_effects, with_unknown_effects
 from creepkit.inverse.selection import rank
 from creepkit.inverse.selection.perturbation_trials import Trial, explaining_effects
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.unmodelled_effects import with_random_effects, with_unknown_effects
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from helpers.steady_rate_predictor import Steady, planted

@@ -162,6 +162,20 @@ def test_an_effect_with_which_a_law_would_explain_is_named():
     assert "; with thickness or temperature drift, which nobody modelled, sinh would explain them)" in other
 
 
+def test_what_would_explain_them_is_said_before_what_the_best_law_leaves():
+    thinner = Challenge("unmodelled effect", "thickness", "with a thickness 4.8 % smaller sinh would explain them")
+    rejected = verdict_of(ranking([0.99, 0.01], [LEAVES, LEAVES], challenges=(thinner,)))
+    assert rejected.startswith(
+        "not decisive: none of 2 laws tried explains the tests as they are stated; with a thickness 4.8 % smaller sinh "
+        "would explain them; the best, norton (weight 0.99 of the laws tried), leaves"
+    )
+    together = verdict_of(ranking([0.5, 0.45, 0.05], challenges=(thinner,)))
+    assert together.startswith(
+        "not decisive: of 3 laws tried these tests cannot tell apart norton and sinh; with a thickness 4.8 % smaller "
+        "sinh would explain them; the best is norton: it"
+    )
+
+
 def test_a_law_that_nobody_asked_for_is_a_proposal():
     found = verdict_of(ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton", "theta")))
     assert found == (

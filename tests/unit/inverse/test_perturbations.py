@@ -5,24 +5,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from creepkit.inverse.common_errors import USUAL_ACTIVATION_ENERGY
 from creepkit.inverse.composite_predictor import predict
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
-from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.unmodelled_effect import DRIFT, unmodelled_note
-from creepkit.inverse.unmodelled_effects import (
+from creepkit.inverse.perturbation import DRIFT, unmodelled_note
+from creepkit.inverse.perturbations import (
     OFFSET_IN_NOISES,
+    USUAL_ACTIVATION_ENERGY,
     USUAL_DRIFT,
     _likeness_of_hardening,
     _rate_changes,
     _with_scatter_of,
-    unmodelled_effects,
+    perturbations,
     with_random_effects,
 )
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -67,7 +67,7 @@ def at_the_truth(law, tests, predictor=BAR, settings=SETTINGS):
 def effects_of(law, tests, predictor=BAR, settings=SETTINGS):
     problem, x, linear = at_the_truth(law, tests, predictor, settings)
     noise = NoiseModel({name: OutputNoise(sd) for name, sd in zip(problem.observations.outputs, [NOISE], strict=True)})
-    effects = unmodelled_effects(problem, x, linear, noise, tests)
+    effects = perturbations(problem, x, linear, noise, tests)
     return {e.kind: e for e in effects if not e.common}, problem, linear
 
 
@@ -206,7 +206,7 @@ def test_the_effect_of_thickness_is_that_of_other_simulations():
     test = blank.replace(outputs={"amplitude": run.of(0)[:, run.outputs.index("amplitude")]}, standard_deviation=sd)
     problem, x, linear = at_the_truth(law, [test], dimple)
     noise = NoiseModel({"amplitude": OutputNoise(1.5e-3)})
-    effects = {e.kind: e for e in unmodelled_effects(problem, x, linear, noise, [test]) if not e.common}
+    effects = {e.kind: e for e in perturbations(problem, x, linear, noise, [test]) if not e.common}
     nominal = dimple.geometry.apex_thickness
     up, down = (
         dimple.replace(apex_thickness=nominal * factor).predict(law, theta(law)[None], [test])

@@ -1,4 +1,4 @@
-"""One unmodelled effect: something that an identification has no nuisance parameter for, its size, and sentences."""
+"""One perturbation of the tests: what they may hide, its size, what it does to the rate, and sentences."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DRIFT, OFFSET = "temperature drift", "offset of "
 
 
 NOTEWORTHY_CHANGE = 0.01
-"""Of the rate, from which on an effect is named."""
+"""Of the rate, from which on a perturbation is named."""
 
 
 LARGEST_PER_CENT = 0.4
@@ -21,7 +21,7 @@ LARGEST_PER_CENT = 0.4
 
 
 NOT_INCLUDED = "the intervals do not include what no nuisance parameter models"
-"""How the note on unmodelled effects begins."""
+"""How the note on perturbations that are not modelled begins."""
 
 
 LARGEST_DRIFT = 30.0
@@ -33,11 +33,11 @@ LIKE_HARDENING = 0.8
 
 
 @dataclass(frozen=True, eq=False)
-class UnmodelledEffect:
-    """An effect for which an identification has no nuisance parameter.
+class Perturbation:
+    """Something that tests may hide, with the prior standard deviation that is usual for it.
 
-    kind : of the nuisance parameter that would stand for it. size : of one standard deviation of errors that the tests
-        have independently of one another, or of one error common to all tests, and its unit.
+    kind : of the nuisance parameter that would stand for it. size : one standard deviation, in its unit, of errors that
+        the tests have independently of one another, or of one error common to all tests.
     rate_change : of ln of the rate at the reference point: one standard deviation of it where the errors are
         independent; where one is common, what the rate changes by if its size is added to what the tests state.
     like_hardening : the size, in the same unit, that looks most like the hardening of the law itself, NaN where it has
@@ -51,7 +51,7 @@ class UnmodelledEffect:
     kind: str
     size: float
     unit: str
-    rate_change: float
+    rate_change: float = float("nan")
     like_hardening: float = float("nan")
     hardening_correlation: float = float("nan")
     residual_change: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
@@ -61,19 +61,21 @@ class UnmodelledEffect:
     assumed: bool = False
 
     @property
+    def amount(self) -> str:
+        """Its size with the unit."""
+        return f"{self.size:.2g} {self.unit}".strip()
+
+    @property
     def description(self) -> str:
         """What, and of which size, in one test."""
-        article = "an" if self.kind[0] in "aeiou" else "a"
-        return f"{article} {self.kind} of {self.size:.2g} {self.unit}".strip()
+        return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind} of {self.amount}"
 
     @property
     def change_text(self) -> str:
         """By how much it changes the rate at the reference point: in per cent, large ones as a factor."""
         if abs(self.rate_change) >= LARGEST_PER_CENT:
             return f"a factor of {float(np.exp(self.rate_change)):.2g}"
-        if self.common:
-            return f"{100 * float(np.expm1(self.rate_change)):+.2g} %"
-        return f"{100 * self.rate_change:.2g} %"
+        return f"{100 * float(np.expm1(self.rate_change)):+.2g} %" if self.common else f"{100 * self.rate_change:.2g} %"
 
     @property
     def sentence(self) -> str:
@@ -87,47 +89,38 @@ class UnmodelledEffect:
 
     @property
     def _cause(self) -> str:
-        size = f"{self.size:.2g} {self.unit}".strip()
+        one = self.tests == 1
         if self.common:
-            of_tests = "the test" if self.tests == 1 else f"all {self.tests} tests"
-            stated = {
-                "temperature": f"temperatures {size} above those stated, in {of_tests}",
-                "load": f"loads {size} above those stated, in {of_tests}",
-                "modulus": f"Young's moduli {size} above those stated, in {of_tests}",
-            }
-            if self.kind.startswith("imposed "):
-                return f"{self.kind} {size} above that stated, in {of_tests}"
-            return stated.get(self.kind, f"a {self.kind} {size} above that stated, in {of_tests}")
-        several = self.tests > 1
-        each = f"each of the {self.tests} tests" if several else "the test"
+            plural = {"temperature": "temperatures", "load": "loads", "modulus": "Young's moduli"}
+            what = self.kind if self.kind.startswith("imposed ") else plural.get(self.kind, f"a {self.kind}")
+            stated = "those stated" if self.kind in plural else "that stated"
+            return f"{what} {self.amount} above {stated}, in {'the test' if one else f'all {self.tests} tests'}"
+        each = "the test" if one else f"each of the {self.tests} tests"
         if self.kind == DRIFT:
-            kelvin = f"{self.size:.2g} K over {each}"
-            return (
-                f"independent linear drifts of the temperature, {kelvin}" if several else f"a linear drift of {kelvin}"
-            )
+            drift = "a linear drift of" if one else "independent linear drifts of the temperature,"
+            return f"{drift} {self.size:.2g} K over {each}"
         if self.kind.startswith(OFFSET):
             output = self.kind.removeprefix(OFFSET).replace("_", " ")
-            return f"{'independent offsets' if several else 'an offset'} of {size} in the {output} of {each}"
-        return f"{'independent errors' if several else 'an error'} of {size} in the {self.kind} of {each}"
+            return f"{'an offset' if one else 'independent offsets'} of {self.amount} in the {output} of {each}"
+        return f"{'an error' if one else 'independent errors'} of {self.amount} in the {self.kind} of {each}"
 
 
-def combined_change_text(effects: Sequence[UnmodelledEffect]) -> str:
+def combined_change_text(perturbations: Sequence[Perturbation]) -> str:
     """The root sum of squares of the changes of the rate by all of them; "" where there are none."""
-    if not effects:
+    if not perturbations:
         return ""
-    total = float(np.sqrt(sum(e.rate_change**2 for e in effects)))
+    total = float(np.sqrt(sum(p.rate_change**2 for p in perturbations)))
     return f"a factor of {np.exp(total):.2g}" if total >= LARGEST_PER_CENT else f"{100 * total:.2g} %"
 
 
-def unmodelled_note(effects: Sequence[UnmodelledEffect]) -> tuple[str, ...]:
+def unmodelled_note(perturbations: Sequence[Perturbation]) -> tuple[str, ...]:
     """One sentence on what intervals do not include, with what it would do to the rate; none where that is little."""
-    parts = [e.sentence for e in effects if abs(e.rate_change) > NOTEWORTHY_CHANGE]
+    parts = [p.sentence for p in perturbations if abs(p.rate_change) > NOTEWORTHY_CHANGE]
     sentences = [f"{NOT_INCLUDED}; the rate amid the tests would move: {'; '.join(parts)}"] if parts else []
-    for effect in effects:
-        plausible = abs(effect.like_hardening) < LARGEST_DRIFT
-        if plausible and effect.hardening_correlation > LIKE_HARDENING:
-            sentences.append(
-                f"no temperature was recorded: a drift of {effect.like_hardening:+.2g} K over a test would look like "
-                f"the hardening of this law (correlation {effect.hardening_correlation:.2f})"
-            )
+    sentences += [
+        f"no temperature was recorded: a drift of {p.like_hardening:+.2g} K over a test would look like the hardening "
+        f"of this law (correlation {p.hardening_correlation:.2f})"
+        for p in perturbations
+        if abs(p.like_hardening) < LARGEST_DRIFT and p.hardening_correlation > LIKE_HARDENING
+    ]
     return tuple(sentences)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.tested_region import outside_combinations
-from creepkit.inverse.uncertainty.state_at_strain import state_at_strain
+from creepkit.inverse.extrapolation import outside_combinations
+from creepkit.inverse.single_values import state_at_strain
 
 A, N, M = 1e-13, 4.0, -0.4
 TIMES = np.geomspace(360.0, 3.6e5, 30)

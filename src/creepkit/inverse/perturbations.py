@@ -1,0 +1,450 @@
+"""Perturbations of the tests of an identification: what its intervals do not include, and what it would change.
+
+A dimple may be thicker than its drawing, a camera may have moved, a furnace may drift; a thermocouple, a load cell or a
+micrometer may be off in every test. Where no nuisance parameter stands for it, an interval takes it as exactly known.
+Its effect on the residuals, s (one standard deviation of the usual size), moves the values by
+
+    du = -(J'C^-1 J + P)^-1 J'C^-1 s
+
+to first order, and with it the rate. C is the covariance under which values are found. Independent errors of tests add
+in quadrature; where the scatter of rates is estimated from the tests, they are found as such scatter: C then holds the
+scatter that they make, and each test weighs as much as any other, however small the scatter is without them. An error
+common to all tests makes no scatter, and tests repeated on one rig do not average it out: what it does to each adds up.
+
+A temperature or load that is off changes the creep rate of each test by its own factor. Of tests under an imposed
+strain or displacement the stress is E (strain - creep strain): a modulus or a strain that is off moves it from the
+first reading on, and is found as offsets of the tests.
+
+The same perturbations, as random effects in the covariance or as unknowns with priors, show what a law would explain
+with them (inverse.chi_square_test), and whether the choice of a law rests on their absence
+(selection.perturbation_trials).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import sympy
+
+from creepkit.arrays import Floats
+from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for, supports_nuisance
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
+from creepkit.inverse.nuisance_parameters import prior_mean
+from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
+from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
+from creepkit.inverse.working_noise import with_single_value_weight
+from creepkit.language import CreepLaw, strain, temperature, time
+from creepkit.language.symbols import GAS_CONSTANT
+from creepkit.records import (
+    Dimension,
+    History,
+    Nuisance,
+    Program,
+    RecordedLoading,
+    dimension_named,
+    dimensions_of,
+    output_unit,
+)
+
+OFFSET_IN_NOISES = 3.0
+"""Size of an offset that nobody models, in noises of a frame."""
+
+
+USUAL_DRIFT = 5.0
+"""K over a test: what furnaces drift where nobody looks."""
+
+
+COMMON_TEMPERATURE_ERROR = 3.0
+"""K, by which ISO 204 permits the temperature of a creep test to be off up to 600 °C; above, 4 or 5 K."""
+
+
+COMMON_LOAD_ERROR = 0.01
+"""Of the load, of a creep machine of class 1 by ISO 7500-2."""
+
+
+COMMON_MODULUS_ERROR = 0.02
+"""Of Young's modulus, by which values of one alloy by different methods usually differ."""
+
+
+COMMON_MOTION_ERROR = 0.01
+"""Of an imposed strain or displacement, of an extensometer of class 1 by ISO 9513."""
+
+
+LOADS, IMPOSED = ("stress", "pressure", "force"), ("strain", "displacement")
+"""Quantities of a loading that an instrument sets, and those under which the stress follows from the stiffness."""
+
+
+MOTION_STEP = 1e-3
+"""Relative, of central differences in what is imposed."""
+
+
+USUAL_ACTIVATION_ENERGY = 400e3
+"""J/mol, of the rate of a law that knows no temperature: of nickel alloys and austenitic steels, within 30 %."""
+
+
+LOWEST_USUAL_TEMPERATURE = 1000.0
+"""K, below which the rate of a law that knows no temperature is taken to change by as much per K as there."""
+
+
+def perturbations(
+    problem: LeastSquaresProblem,
+    x: Floats,
+    linear: LinearisedProblem,
+    noise_model: NoiseModel,
+    full_histories: Sequence[History],
+    working_noise: NoiseModel | None = None,
+) -> tuple[Perturbation, ...]:
+    """Those that no nuisance parameter of the problem stands for; x : (unknowns,) its optimum.
+
+    working_noise : under which the values were found where that is not `noise_model`, as of frames of equal weight.
+    """
+    fitting_noise = None if working_noise is None else with_single_value_weight(working_noise, problem.observations)
+    factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
+    reference = problem.coordinates.reference
+    slope = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature)
+    energy = slope * GAS_CONSTANT * reference.temperature**2
+    found, without_energy = [], not problem.law.uses(temperature)
+    for one in _all(problem, x, linear, full_histories):
+        change, noise = one.residual_change, fitting_noise or noise_model
+        if not one.common and fitting_noise is None:
+            noise = _with_scatter_of(change, problem, linear, noise_model)
+        if one.kind == "modulus" or one.kind.startswith("imposed "):
+            noise = _with_offset_of(change, problem, linear, noise)
+        by_test = _rate_changes(problem, x, linear, noise, change)
+        one = replace(one, rate_change=float(by_test.sum() if one.common else np.sqrt((by_test**2).sum())))
+        if one.kind == DRIFT:
+            ratio, correlation = _likeness_of_hardening(problem, x, linear, factor, change)
+            one = replace(one, like_hardening=one.size * ratio, hardening_correlation=correlation)
+        if one.kind in (DRIFT, "temperature"):
+            one = replace(one, activation_energy=energy, assumed=without_energy)
+        found.append(replace(one, residual_change=np.zeros((0, 0))) if one.common else one)
+    return tuple(found)
+
+
+def with_random_effects(linear: LinearisedProblem, effects: Sequence[Perturbation]) -> LinearisedProblem:
+    """The linear problem with these perturbations as random effects of each test in its covariance."""
+    columns = [effect.residual_change[..., None] for effect in effects]
+    present = linear.residuals.random_effect_sensitivities
+    stacked = np.concatenate([*([present] if present is not None else []), *columns], axis=-1)
+    return replace(linear, residuals=replace(linear.residuals, random_effect_sensitivities=stacked))
+
+
+def with_unknown_effects(linear: LinearisedProblem, changes: Floats) -> LinearisedProblem:
+    """The linear problem with further unknowns of prior mean zero and standard deviation one, after all others.
+
+    changes : (tests, observations, unknowns) -, of the residuals by each.
+    """
+    jacobian, more = linear.residuals.jacobian, changes.shape[-1]
+    assert jacobian is not None
+    return LinearisedProblem(
+        replace(linear.residuals, jacobian=np.concatenate([jacobian, changes], axis=-1)),
+        np.append(linear.precision, np.ones(more)),
+        np.append(linear.prior_residual, np.zeros(more)),
+        np.append(linear.free, np.ones(more, bool)),
+        np.concatenate([linear.step_bounds, np.outer([-np.inf, np.inf], np.ones(more))], axis=1),
+    )
+
+
+# ---- what each does to the residuals ---------------------------------------------------------------------------------
+
+
+def _all(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, full_histories: Sequence[History]
+) -> Iterator[Perturbation]:
+    """Errors that the tests have independently of one another: lengths, offsets, drifts; then those common to all."""
+    nuisances = problem.settings.nuisances
+    kinds, shared = {n.kind for n in nuisances}, {n.kind for n in nuisances if n.scope != "test"}
+    lengths = []
+    for dimension in tolerated_dimensions(problem):
+        if shared.isdisjoint(dimension.names):
+            found = _length(problem, x, linear, dimension.names[-1])
+            yield from found if kinds.isdisjoint(dimension.names) else ()
+            lengths += found
+    if "offset" not in kinds:
+        yield from _offsets(problem, linear)
+    recorded = any(isinstance(h.temperature, Program) for h in full_histories)
+    # A drift changes curves, and no single value.
+    if any(h.outputs for h in full_histories) and not recorded and kinds.isdisjoint({DRIFT, "rate drift"}):
+        yield _drift(problem, x, linear)
+    yield from common_errors(problem, x, linear)
+    yield from (replace(one, common=True) for one in lengths if one.tests > 1)
+
+
+def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> list[Perturbation]:
+    """Those of instruments that no nuisance parameter common to tests stands for; x : (unknowns,)."""
+    shared = {n.kind for n in problem.settings.nuisances if n.scope != "test"}
+    histories, tests = problem.histories, range(len(problem.histories))
+    loaded, moved = ([h.loading.quantity in quantities for h in histories] for quantities in (LOADS, IMPOSED))
+    errors = list[Perturbation]()
+
+    def add(kind: str, size: float, unit: str, change: Floats) -> None:
+        errors.append(Perturbation(kind, size, unit, residual_change=change, common=True, tests=len(histories)))
+
+    def of_rates(by_test: Sequence[float], size: float) -> Floats:
+        return np.asarray(size * np.array(by_test, float)[:, None] * linear.residuals.log_rate_sensitivity)
+
+    def of_outputs(slope: Floats, size: float) -> Floats:
+        slope = np.where(np.isfinite(slope) & np.array(moved)[:, None], slope, 0.0)
+        return np.asarray(linear.residuals.offset_sensitivity * slope * size)
+
+    if "temperature" not in shared:
+        slopes = [log_rate_per_kelvin(problem, x, *_conditions(problem, test)) for test in tests]
+        change = of_rates(slopes, COMMON_TEMPERATURE_ERROR)
+        add("temperature", COMMON_TEMPERATURE_ERROR, "K", change)
+    if any(loaded):
+        exponents = [_stress_exponent(problem, x, test) if known else 0.0 for test, known in enumerate(loaded)]
+        add("load", 100 * COMMON_LOAD_ERROR, "%", of_rates(exponents, COMMON_LOAD_ERROR))
+    if any(moved):
+        imposed = [h for h, counts in zip(histories, moved, strict=True) if counts]
+        known = all(supports_nuisance(predictor_for(problem.predictor, h), "modulus") for h in imposed)
+        if known and "modulus" not in shared:
+            change = of_outputs(_slope(problem, x, "modulus"), COMMON_MODULUS_ERROR)
+            add("modulus", 100 * COMMON_MODULUS_ERROR, "%", change)
+        kind = f"imposed {' and '.join(sorted({h.loading.quantity for h in imposed}))}"
+        add(kind, 100 * COMMON_MOTION_ERROR, "%", of_outputs(_motion_slope(problem, x), COMMON_MOTION_ERROR))
+    return errors
+
+
+def tolerated_dimensions(problem: LeastSquaresProblem) -> list[Dimension]:
+    """The lengths of the test pieces that their specimens know to a tolerance only, each once."""
+    predictors = [predictor_for(problem.predictor, h) for h in problem.histories]
+    return list({d.name: d for p in predictors for d in dimensions_of(p) if d.tolerance > 0.0}.values())
+
+
+def _length(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, kind: str) -> list[Perturbation]:
+    """A length that every test piece has, known to its tolerance only."""
+    predictors = [predictor_for(problem.predictor, h) for h in problem.histories]
+    lengths = [dimension_named(p, kind) if supports_nuisance(p, kind) else None for p in predictors]
+    tolerances = [0.0 if length is None else length.tolerance for length in lengths]
+    if not all(tolerances):
+        return []
+    nominal = np.array([prior_mean(Nuisance(kind), h, problem.predictor) for h in problem.histories])
+    slope, sizes = _slope(problem, x, kind, nominal), nominal * np.array(tolerances)
+    change = linear.residuals.offset_sensitivity * np.where(np.isfinite(slope), slope, 0.0) * sizes[:, None]
+    return [Perturbation(kind, float(np.median(sizes)), "mm", residual_change=change, tests=len(sizes))]
+
+
+def _offsets(problem: LeastSquaresProblem, linear: LinearisedProblem) -> Iterator[Perturbation]:
+    """An offset of each output that grows with creep."""
+    observations, slopes = problem.observations, linear.residuals.offset_sensitivity
+    leading = observations.present & observations.leading_output
+    for position in np.unique(observations.output_index[leading]):
+        size, name = OFFSET_IN_NOISES * float(observations.noise[position]), observations.outputs[position]
+        if size > 0:
+            change = np.where(leading & (observations.output_index == position), slopes * size, 0.0)
+            kind, unit, tests = f"{OFFSET}{name}", output_unit(name), len(problem.histories)
+            yield Perturbation(kind, size, unit, residual_change=change, tests=tests)
+
+
+def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> Perturbation:
+    """A furnace that drifts linearly over each test: the clock of the creep runs ahead.
+
+    A factor 1 + b g(t) on the rate moves the clock by the integral of b g, and an output by that times its slope, as
+    long as the load is constant; where it changes, the advance counts in the new, faster, clock.
+    """
+    observations, residuals = problem.observations, linear.residuals
+    predicted = observations.inverse(residuals.values + observations.transformed_values)
+    change, by_time = np.zeros_like(predicted), problem.law.uses(time)
+    for test, history in enumerate(problem.histories):
+        for position in np.unique(observations.output_index[test, observations.present[test]]):
+            index = np.flatnonzero(observations.present[test] & (observations.output_index[test] == position))
+            if index.size >= 3 and not observations.rupture_mask[test, index].any():
+                times = observations.times[test, index]
+                change[test, index] = _advance(history, times, predicted[test, index], explicit_time=by_time)
+    reference = problem.coordinates.reference
+    factor = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature) * USUAL_DRIFT
+    change = factor * change * residuals.offset_sensitivity
+    return Perturbation(DRIFT, USUAL_DRIFT, "K over a test", residual_change=change, tests=len(change))
+
+
+def _advance(history: History, times: Floats, values: Floats, *, explicit_time: bool = False) -> Floats:
+    """(frames,) change of an output by a clock that advances by t^2 / 2 t_end; values : (frames,) in its unit.
+
+    A law of explicit time has no clock of its own: each increment is multiplied by t / t_end.
+    """
+    levels = history.loading.program().at(times)
+    change, advance, last_slope, begin = np.zeros_like(values), 0.0, 0.0, 0
+    for end in [*(np.flatnonzero(np.abs(np.diff(levels)) > 1e-3 * np.abs(levels).max()) + 1), times.size]:
+        part, start = slice(begin, end), times[begin - 1] if begin else 0.0
+        if end - begin >= 2:
+            t, slope = times[part], np.gradient(values[part], times[part])
+            if explicit_time:
+                increments = np.diff(values[part]) * 0.5 * (t[1:] + t[:-1]) / times[-1]
+                first = float(change[begin - 1]) if begin else 0.5 * float(slope[0]) * times[0] ** 2 / times[-1]
+                change[part] = first + np.concatenate([[0.0], np.cumsum(increments)])
+            else:
+                advance *= last_slope / slope[0] if begin and slope[0] != 0.0 else 1.0
+                clock = advance + (t**2 - start**2) / (2.0 * times[-1])
+                change[part], advance, last_slope = slope * clock, float(clock[-1]), float(slope[-1])
+        begin = end
+    return change
+
+
+def _slope(problem: LeastSquaresProblem, x: Floats, kind: str, at: Floats | None = None) -> Floats:
+    """(tests, observations) derivative of the outputs to a nuisance.
+
+    at : (tests,) its values, by default those of the fit, or zero.
+    """
+    theta, nuisances = _values(problem, x)
+    values = nuisances.get(kind, np.zeros((1, len(problem.histories)))) if at is None else at[None]
+    nuisances = {**nuisances, kind: values}
+    prediction = predict_with_sensitivities(problem.predictor, problem.law, theta, problem.histories, nuisances)
+    return np.asarray(problem.observations.select_outputs(prediction.nuisance_jacobian[kind], prediction)[0])
+
+
+def _motion_slope(problem: LeastSquaresProblem, x: Floats) -> Floats:
+    """(tests, observations) derivative of the outputs to the relative change of what is imposed."""
+    theta, nuisances = _values(problem, x)
+
+    def outputs(change: float) -> Floats:
+        histories = [_moved(history, change) for history in problem.histories]
+        prediction = predict(problem.predictor, problem.law, theta[None], histories, nuisances=nuisances)
+        return np.asarray(problem.observations.select_outputs(prediction.values, prediction)[0])
+
+    with np.errstate(invalid="ignore"):  # of tests that end before
+        return np.asarray((outputs(MOTION_STEP) - outputs(-MOTION_STEP)) / (2.0 * MOTION_STEP))
+
+
+def _moved(history: History, change: float) -> History:
+    """The history with all that is imposed larger by that share."""
+    if history.loading.quantity not in IMPOSED:
+        return history
+    program = history.loading.program()
+    loading = RecordedLoading(Program(program.times, program.values * (1.0 + change)), history.loading.quantity)
+    return replace(history, loading=loading)
+
+
+def _values(problem: LeastSquaresProblem, x: Floats) -> tuple[Floats, dict[str, Floats]]:
+    """(parameters,) internal values and the explicit nuisances."""
+    count = problem.parameter_count
+    return problem.coordinates.theta(x[:count]), dict(problem.nuisance_parameters.predictor_values(x[count:]))
+
+
+def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, stress: float, T: float) -> float:
+    """d ln rate / dT, 1/K, of the law at MPa and K; of one that knows no temperature by the usual activation energy.
+
+    x : (unknowns,), or those of the law alone.
+    """
+    if not problem.law.uses(temperature):
+        return USUAL_ACTIVATION_ENERGY / (GAS_CONSTANT * max(T, LOWEST_USUAL_TEMPERATURE) ** 2)
+    u = x[: problem.parameter_count]
+    up, down = (float(log_rate(problem.coordinates, stress, T + step)(u)) for step in (1.0, -1.0))
+    return 0.5 * (up - down)
+
+
+def _stress_exponent(problem: LeastSquaresProblem, x: Floats, test: int) -> float:
+    return float(local_exponent(problem.coordinates, *_conditions(problem, test))(x[: problem.parameter_count]))
+
+
+def _conditions(problem: LeastSquaresProblem, test: int) -> tuple[float, float]:
+    """MPa and K, of a test by its position."""
+    history = problem.histories[test]
+    stresses = reference_stresses(history, problem.predictor)
+    positive = stresses[stresses > 0]
+    stress = float(np.median(positive)) if positive.size else problem.coordinates.reference.stress
+    return stress, float(np.mean(history.temperature_program().values))
+
+
+# ---- what each does to the values ------------------------------------------------------------------------------------
+
+
+def _rate_changes(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel, change: Floats
+) -> Floats:
+    """(tests,) changes of ln of the rate at the reference point by changes of the residuals of each test."""
+    solution = linear.solve(CovarianceFactor.of_residuals(linear.residuals, noise_model))
+    coordinates, count = problem.coordinates, problem.parameter_count
+    free_parameters = np.flatnonzero(linear.free[:count])
+    derivative = gradient(log_rate(coordinates, coordinates.reference.stress), x[:count], np.ones(count))
+    row = np.zeros(len(solution.covariance))
+    row[: free_parameters.size] = derivative[free_parameters]
+    return np.asarray(-np.einsum("tep,te->tp", solution.weighted_jacobian, change) @ solution.covariance @ row)
+
+
+def _with_scatter_of(
+    change: Floats, problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel
+) -> NoiseModel:
+    """The noise model with the scatter of rates that independent errors of tests would be estimated as.
+
+    change : (tests, observations) -, of the residuals by one standard deviation. Of each test its projection on a
+    change of ln of the rate counts.
+    """
+    fixed = components_fixed_by_priors(problem.settings.nuisances, list(noise_model.outputs))
+    if not noise_model.rate > 0 or ("", "rate") in fixed:
+        return noise_model
+    sensitivity = linear.residuals.log_rate_sensitivity
+    weighted = CovarianceFactor.of_residuals(linear.residuals, noise_model).inverse_times(sensitivity)
+    information = np.maximum((sensitivity * weighted).sum(axis=1), 1e-300)
+    like_rates = (change * weighted).sum(axis=1) / information
+    scatter = float(np.hypot(noise_model.rate, np.sqrt(np.mean(like_rates**2))))
+    return replace(noise_model, rate=min(scatter, LARGEST_RATE_SCATTER))
+
+
+def _with_offset_of(
+    change: Floats, problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel
+) -> NoiseModel:
+    """The noise model with the offsets of tests that an error common to them would be estimated as.
+
+    change : (tests, observations) -, of the residuals. Of each output the mean of a test, in its unit, counts.
+    """
+    fixed = components_fixed_by_priors(problem.settings.nuisances, list(noise_model.outputs))
+    observations, slopes = problem.observations, linear.residuals.offset_sensitivity
+    if not any(n.kind == "offset" for n in problem.settings.nuisances):
+        return noise_model
+    for position, name in enumerate(observations.outputs):
+        if (name, "offset") in fixed or name not in noise_model.outputs:
+            continue
+        mask = linear.residuals.present & (observations.output_index == position)
+        weights = np.where(mask, slopes**2, 0.0).sum(axis=1)
+        means = np.where(mask, change * slopes, 0.0).sum(axis=1) / np.maximum(weights, 1e-300)
+        offset = float(np.sqrt(np.mean(means[weights > 0] ** 2))) if (weights > 0).any() else 0.0
+        noise_model = noise_model.with_output(name, offset=float(np.hypot(noise_model[name].offset, offset)))
+    return noise_model
+
+
+def _likeness_of_hardening(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, factor: CovarianceFactor, change: Floats
+) -> tuple[float, float]:
+    """(ratio, correlation) of an effect to what the law's hardening does, beside all other unknowns.
+
+    Hardening is what disappears where an exponent of strain, of time or of an internal variable is zero.
+    """
+    law, jacobian = problem.law, linear.residuals.jacobian
+    assert jacobian is not None
+    theta = problem.coordinates.theta(x[: problem.parameter_count])
+    positions = [k for k in _hardening_exponents(law) if abs(theta[k]) > 0]
+    if not positions:
+        return float("nan"), float("nan")
+    hardening = np.einsum("tep,p->te", jacobian[..., positions], theta[positions])
+    others = [k for k in range(jacobian.shape[-1]) if k not in positions]
+    columns = np.concatenate([hardening[..., None], change[..., None], jacobian[..., others]], axis=-1)
+    whitened = factor.whiten(columns)[linear.residuals.present]
+    basis, _ = np.linalg.qr(whitened[:, 2:] / np.maximum(np.linalg.norm(whitened[:, 2:], axis=0), 1e-300))
+    own, effect = (whitened[:, k] - basis @ (basis.T @ whitened[:, k]) for k in (0, 1))
+    sizes = float(np.linalg.norm(own)), float(np.linalg.norm(effect))
+    if min(sizes) == 0.0:
+        return float("nan"), float("nan")
+    product = float(own @ effect)
+    return product / sizes[1] ** 2, abs(product) / (sizes[0] * sizes[1])
+
+
+def _hardening_exponents(law: CreepLaw) -> list[int]:
+    """Positions of the parameters without which a term no longer depends on strain, time or an internal variable."""
+    memory = {strain, time, *law.states}
+
+    def hardens(parameter: sympy.Symbol) -> bool:
+        return any(
+            memory & term.free_symbols - term.subs(parameter, 0).free_symbols
+            for term in law.terms.values()
+            if parameter in term.free_symbols
+        )
+
+    return [
+        k for k, (symbol, p) in enumerate(law.params.items()) if p.off == 0.0 and p.scale != "log" and hardens(symbol)
+    ]
