@@ -179,10 +179,14 @@ def _predict_transformed(
 def prediction_errors_of(predictor: Predictor) -> dict[str, float]:
     """{output: standard deviation} of what a predictor says that it is wrong by; the largest of several predictors."""
     largest: dict[str, float] = {}
-    for one in predictor.predictors.values() if isinstance(predictor, CompositePredictor) else (predictor,):
+    for one in _single(predictor):
         for name, standard_deviation in getattr(one, "error", {}).items():
             largest[name] = max(standard_deviation, largest.get(name, 0.0))
     return largest
+
+
+def _single(predictor: Predictor) -> Sequence[Predictor]:
+    return [*predictor.predictors.values()] if isinstance(predictor, CompositePredictor) else [predictor]
 
 
 def supports_nuisance(predictor: Predictor, key: str) -> bool:
@@ -209,27 +213,19 @@ def compared_outputs(predictor: Predictor, history: History) -> tuple[str, ...]:
 
 def underlying_specimen(predictor: Predictor) -> Predictor:
     """The specimen of a surrogate or a reduced-order model; anything else is taken for the specimen itself."""
-    if isinstance(predictor, CompositePredictor):
-        return CompositePredictor({name: underlying_specimen(p) for name, p in predictor.predictors.items()})
-    specimen: Predictor = getattr(predictor, "specimen", predictor)
-    return specimen
+    return _derived(predictor, lambda p: getattr(p, "specimen", p)) or predictor
 
 
 def outside_class(predictor: Predictor, law: CreepLaw) -> str:
     """Why a predictor does not know the class of a law, in a sentence; "" where it does, or knows every law."""
-    if isinstance(predictor, CompositePredictor):
-        return next(filter(None, (outside_class(p, law) for p in predictor.predictors.values())), "")
-    reason: str = predictor.outside_class(law) if hasattr(predictor, "outside_class") else ""
-    return reason
+    reasons = (p.outside_class(law) for p in _single(predictor) if hasattr(p, "outside_class"))
+    return next(filter(None, reasons), "")
 
 
 def predictor_for_law(predictor: Predictor, law: CreepLaw) -> Predictor:
     """The predictor itself, or its specimen where the law is outside the class of laws that it knows."""
-    if isinstance(predictor, CompositePredictor):
-        chosen = {name: predictor_for_law(p, law) for name, p in predictor.predictors.items()}
-        unchanged = all(chosen[name] is p for name, p in predictor.predictors.items())
-        return predictor if unchanged else CompositePredictor(chosen)
-    return underlying_specimen(predictor) if outside_class(predictor, law) else predictor
+    known = _derived(predictor, lambda p: underlying_specimen(p) if outside_class(p, law) else None)
+    return predictor if known is None else known
 
 
 def predictors_for_law(

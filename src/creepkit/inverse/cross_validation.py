@@ -114,16 +114,14 @@ class CrossValidation(Presentable, text="reports.confirmation_text:cross_validat
 
         full : the same tests with all frames, to read measured times from. Loading strains are taken off them.
         """
-        by_name = {h.name: h for h in full or ()}
-        comparisons = []
+        by_name, parts = {h.name: h for h in full or ()}, []
         for fold in self.folds:
-            tests = [by_name.get(h.name, h) for h in fold.held_out]
-            comparisons.append(
-                times_to_strain(
-                    fold.fit.law, fold.fit.values, tests, self._predictor, strain, offsets=loading_strains(tests)
-                )
-            )
-        return _joined(strain, comparisons)
+            tests, predictor = [by_name.get(h.name, h) for h in fold.held_out], fold.fit.predictor
+            assert predictor is not None
+            law, values = fold.fit.law, fold.fit.values
+            parts.append(times_to_strain(law, values, tests, predictor, strain, offsets=loading_strains(tests)))
+        measured, predicted = (np.concatenate([getattr(one, n) for one in parts]) for n in ("measured", "predicted"))
+        return TimeComparison(strain, tuple(name for one in parts for name in one.names), measured, predicted)
 
     def times_to_rupture(self) -> TimeComparison:
         """Measured and predicted rupture times of the held-out tests; of cross-validation by time none."""
@@ -142,11 +140,6 @@ class CrossValidation(Presentable, text="reports.confirmation_text:cross_validat
             residuals, present=residuals.present & is_early, values=np.where(is_early, residuals.values, 0.0)
         )
         return _deviance(residuals, noise_model) - _deviance(beginning, noise_model)
-
-    @property
-    def _predictor(self) -> Predictor:
-        assert self.fit.predictor is not None
-        return self.fit.predictor
 
 
 @checked
@@ -205,12 +198,6 @@ def _deviance(residuals: Residuals, noise_model: NoiseModel) -> float:
     """r' C^-1 r + ln|C|."""
     factor = CovarianceFactor.of_residuals(residuals, noise_model)
     return float((factor.whiten(residuals.values) ** 2).sum() + factor.log_determinant)
-
-
-def _joined(strain: float, comparisons: Sequence[TimeComparison]) -> TimeComparison:
-    names = tuple(name for one in comparisons for name in one.names)
-    measured = np.concatenate([one.measured for one in comparisons])
-    return TimeComparison(strain, names, measured, np.concatenate([one.predicted for one in comparisons]))
 
 
 @dataclass(frozen=True)
