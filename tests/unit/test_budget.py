@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33800
+TESTS = 33830
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
