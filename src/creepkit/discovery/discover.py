@@ -52,7 +52,6 @@ def discover(
     parameters: Sequence[str] | None = None,
     histories: Sequence[History] | None = None,
     using: Predictor | str | None = None,
-    settings: IdentificationSettings | None = None,
     joint_fit: Identification | None = None,
     progress: IterationCallback | None = None,
 ) -> TemperatureLaw:
@@ -68,8 +67,8 @@ def discover(
     prior : {parameter: {form: odds}} in the place of the default, which counts 1/T four times for the coefficient of a
         rate and shares equal odds among forms of equally many numbers; printed with the result.
     parameters : those that may depend on temperature; by default all.
-    histories : all tests; the forms are then put back into the law and refitted to them (see refit). using, settings :
-        the predictor and the settings of that; by default those of the first identification.
+    histories : all tests; the forms are then put back into the law and refitted to them (see refit), with the settings
+        of the first identification. using : the predictor of that; by default that of the first identification.
     joint_fit : an identification of the law times Arrhenius' factor from all tests, where the refits begin.
 
     A combination of forms that fails is recorded in the notes with its reason, and the others go on.
@@ -87,7 +86,7 @@ def discover(
     predictor = fits[0].predictor if using is None else resolve_predictor(using)
     if predictor is None:
         raise FitError("the identifications were loaded from files: give using=, the specimen they were made with")
-    settings = settings or fits[0].settings
+    settings = fits[0].settings
     tests, _ = sound_tests(list(histories), settings)
     return refit(temperature_law, tests, predictor, settings=settings, joint_fit=joint_fit, progress=progress)
 
@@ -228,7 +227,7 @@ def temperature_study(
         notes.append(str(error))
     else:
         temperature_law = discover(
-            isothermal_fits, histories=histories, using=predictor, settings=settings, joint_fit=joint_fit,
+            isothermal_fits, histories=histories, using=predictor, joint_fit=joint_fit,
             progress=progress, **form_options
         )  # fmt: skip
     return TemperatureStudy(

@@ -37,7 +37,7 @@ def alone(tests):
 
 @pytest.fixture(scope="module")
 def trend(alone, tests):
-    return discover(alone, forms=FEW, histories=tests, settings=QUICK)
+    return discover(alone, forms=FEW, histories=tests)
 
 
 def inside(trend):
@@ -182,7 +182,7 @@ def test_a_dimple_at_three_temperatures_through_the_surrogate():
         tests.append(run.replace(outputs=noisy, standard_deviation=known))
     settings = IdentificationSettings(starts=1, sobol_points=8, frames=12, nuisances=())
     fits = [identify(NORTON, [test], model, settings=settings) for test in tests]
-    trend = discover(fits, forms={"A": ("arrhenius",), "n": ("constant", "linear")}, histories=tests, settings=settings)
+    trend = discover(fits, forms={"A": ("arrhenius",), "n": ("constant", "linear")}, histories=tests)
     assert trend.forms == {"A": "arrhenius", "n": "constant"}
     Q = trend.estimate("Q")
     assert Q.low <= truth["Q"] <= Q.high
