@@ -85,7 +85,7 @@ def spread_of_repeats(histories):
 
 def cells(name, fit, histories, cross_validate):
     """One row of the table, without BIC."""
-    fitted = times_to_rupture(fit.law, fit.values, histories, fit.predictor)
+    fitted = times_to_rupture((m.name, m.rupture) for m in fit.tests)
     low, middle, high = np.percentile(fitted.predicted / fitted.measured, [2.5, 50, 97.5])
     undetermined = [e.name for e in fit.estimates if e.verdict != "determined"]
     return [

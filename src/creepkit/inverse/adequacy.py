@@ -145,10 +145,8 @@ class Adequacy:
         """The likeliest explanation of the rates of tests, those of other tests, and by how much it beats the next."""
         if not self.explanations:
             return ""
-        first, *others = self.explanations
-        same = [e for e in others if e.kind == first.kind == "one test"]
-        rivals = [e for e in others if e not in same]
-        sentence = "; ".join(e.sentence for e in (first, *same))
+        first, *rivals = self.explanations
+        sentence = first.sentence
         if not rivals:
             return sentence
         ahead = first.odds - rivals[0].odds
@@ -254,16 +252,17 @@ class Adequacy:
             for o in sorted(self.outputs, key=lambda o: -o.discrepancy_in_noises)
             if o.discrepancy > 0
         ]
-        if self.scatters_too_much:
+        if self.scatters_too_much and not self.explanations:
             parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
         if self.contradicting is not None:
             parts.append(str(self.contradicting))
         where = f"; most in {self.largest}" if self.largest is not None else ""
         if self.remedies and not self.explanations:
             where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
-        judged = f"({self._chi_square_text}, {self._p_value_text})"
         if self.explanations and not parts:
-            return f"is contradicted by the rates of the tests: {self.explanation_text} {judged}"
+            curves = f"; curves agree with the noise ({self._p_value_text})" if self.outputs else ""
+            return f"is contradicted by the rates of the tests: {self.explanation_text}{curves}"
+        judged = f"({self._chi_square_text}, {self._p_value_text})"
         rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained {judged}{where}"
         beside = "" if self.is_explained else "of its rates, "
         return f"{rest}; {beside}{self.explanation_text}" if self.explanations else rest

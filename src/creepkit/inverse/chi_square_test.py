@@ -110,9 +110,8 @@ def adequacy_with_remedies(
     """The same, rejected where rates of tests are explained otherwise, with effects that would explain the tests."""
     known = KnownNoise.of_histories(problem.observations, histories)
     adequacy = adequacy_of(problem, linear, noise_model, predictor_errors, histories, known)
-    adequacy = adequacy.with_explanations(explanations)
     if not adequacy.rejects:
-        return adequacy
+        return adequacy.with_explanations(explanations)
     remedies = [
         effect.description
         for effect in effects
@@ -121,7 +120,7 @@ def adequacy_with_remedies(
             problem, with_random_effects(linear, [effect]), noise_model, predictor_errors, histories, known
         ).explains
     ]
-    return replace(adequacy, remedies=tuple(remedies))
+    return replace(adequacy, remedies=tuple(remedies)).with_explanations(explanations)
 
 
 def _correlation(noise_model: NoiseModel) -> float:

@@ -179,10 +179,14 @@ def _predict_transformed(
 def prediction_errors_of(predictor: Predictor) -> dict[str, float]:
     """{output: standard deviation} of what a predictor says that it is wrong by; the largest of several predictors."""
     largest: dict[str, float] = {}
-    for one in predictor.predictors.values() if isinstance(predictor, CompositePredictor) else (predictor,):
+    for one in _single(predictor):
         for name, standard_deviation in getattr(one, "error", {}).items():
             largest[name] = max(standard_deviation, largest.get(name, 0.0))
     return largest
+
+
+def _single(predictor: Predictor) -> Sequence[Predictor]:
+    return [*predictor.predictors.values()] if isinstance(predictor, CompositePredictor) else [predictor]
 
 
 def supports_nuisance(predictor: Predictor, key: str) -> bool:
@@ -209,27 +213,19 @@ def compared_outputs(predictor: Predictor, history: History) -> tuple[str, ...]:
 
 def underlying_specimen(predictor: Predictor) -> Predictor:
     """The specimen of a surrogate or a reduced-order model; anything else is taken for the specimen itself."""
-    if isinstance(predictor, CompositePredictor):
-        return CompositePredictor({name: underlying_specimen(p) for name, p in predictor.predictors.items()})
-    specimen: Predictor = getattr(predictor, "specimen", predictor)
-    return specimen
+    return _derived(predictor, lambda p: getattr(p, "specimen", p)) or predictor
 
 
 def outside_class(predictor: Predictor, law: CreepLaw) -> str:
     """Why a predictor does not know the class of a law, in a sentence; "" where it does, or knows every law."""
-    if isinstance(predictor, CompositePredictor):
-        return next(filter(None, (outside_class(p, law) for p in predictor.predictors.values())), "")
-    reason: str = predictor.outside_class(law) if hasattr(predictor, "outside_class") else ""
-    return reason
+    reasons = (p.outside_class(law) for p in _single(predictor) if hasattr(p, "outside_class"))
+    return next(filter(None, reasons), "")
 
 
 def predictor_for_law(predictor: Predictor, law: CreepLaw) -> Predictor:
     """The predictor itself, or its specimen where the law is outside the class of laws that it knows."""
-    if isinstance(predictor, CompositePredictor):
-        chosen = {name: predictor_for_law(p, law) for name, p in predictor.predictors.items()}
-        unchanged = all(chosen[name] is p for name, p in predictor.predictors.items())
-        return predictor if unchanged else CompositePredictor(chosen)
-    return underlying_specimen(predictor) if outside_class(predictor, law) else predictor
+    known = _derived(predictor, lambda p: underlying_specimen(p) if outside_class(p, law) else None)
+    return predictor if known is None else known
 
 
 def predictors_for_law(
@@ -311,9 +307,14 @@ def predict_with_sensitivities(
     on = np.isfinite(theta)  # a coefficient that is off stays off, and has a derivative of zero
     steps = RELATIVE_STEP * np.maximum(np.abs(np.where(on, theta, 0.0)), 1.0) if numeric else np.zeros(0)
     nuisance_steps = [_nuisance_step(key, nuisances[key]) for key in kinds]
-    points, shifted_nuisances = _difference_points(theta, steps, nuisances, kinds, nuisance_steps)
-    batch = predict(predictor, law, points, histories, nuisances=shifted_nuisances)
-    count = len(points) // 2
+    count = steps.size + len(kinds)
+    moved = np.zeros((count, theta.size))  # one step in each parameter, then in each nuisance of all tests at once
+    moved[: steps.size, : steps.size] = np.diag(steps)
+    shifted = {key: np.tile(values, (2 * count, 1)) for key, values in nuisances.items()}
+    for k, (kind, step) in enumerate(zip(kinds, nuisance_steps, strict=True), steps.size):
+        shifted[kind][k] += step
+        shifted[kind][count + k] -= step
+    batch = predict(predictor, law, np.concatenate([theta + moved, theta - moved]), histories, nuisances=shifted)
     with np.errstate(invalid="ignore"):  # of values that are not finite, whose derivatives are NaN
         differences = batch.values[:count] - batch.values[count:]
     jacobian = np.moveaxis(differences[: steps.size], 0, -1) / (2 * steps) if numeric else None
@@ -331,22 +332,6 @@ def _nuisance_step(key: str, values: Floats) -> float:
     """The step of central differences in a nuisance; values : (1, tests), of a length in mm."""
     kind = kind_and_start(key)[0]
     return LENGTH_STEP * float(np.max(np.abs(values))) if is_length_nuisance(kind) else NUISANCE_STEPS[kind]
-
-
-def _difference_points(
-    theta: Floats, steps: Floats, nuisances: NuisanceValues, kinds: Sequence[str], nuisance_steps: Sequence[float]
-) -> tuple[Floats, dict[str, Floats]]:
-    """Candidates one step up, then one step down, in each parameter and then in each nuisance of all tests at once."""
-    count = steps.size + len(kinds)
-    points = np.tile(theta, (2 * count, 1))
-    for sign, offset in ((1.0, 0), (-1.0, count)):
-        moved = sign * np.eye(steps.size, theta.size) * steps[:, None]
-        points[offset : offset + steps.size] += np.where(np.isfinite(theta), moved, 0.0)
-    shifted_nuisances = {kind: np.tile(values, (2 * count, 1)) for kind, values in nuisances.items()}
-    for k, kind in enumerate(kinds):
-        shifted_nuisances[kind][steps.size + k] += nuisance_steps[k]
-        shifted_nuisances[kind][count + steps.size + k] -= nuisance_steps[k]
-    return points, shifted_nuisances
 
 
 def predict_to_rupture(

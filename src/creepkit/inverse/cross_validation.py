@@ -10,7 +10,7 @@ but for a constant, r the residuals at the values that the beginning alone gave.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -20,7 +20,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import compared_outputs, predict_to_rupture
+from creepkit.inverse.composite_predictor import compared_outputs
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.goodness_of_fit import OutputErrors, errors_of_output, relative_squared_error
 from creepkit.inverse.identification import Identification
@@ -72,8 +72,8 @@ class Fold:
         if any(m.name == h.name for m in fit.tests for h in self.held_out):
             return [{} for _ in self.held_out]
         assert fit.predictor is not None
-        law = LawAtTests(fit.coordinates, fit.u, fit.scatter_of_rates, fit.noise_model, fit.predictor)
-        named = ({"rupture time": end, "minimum rate": rate} for end, rate in law.compared(self.held_out))
+        compared = LawAtTests.of_fit(fit, fit.predictor).compared(self.held_out)
+        named = ({"rupture time": end, "minimum rate": rate} for end, rate in compared)
         return [{what: one for what, one in of_test.items() if one is not None} for of_test in named]
 
 
@@ -114,23 +114,18 @@ class CrossValidation(Presentable, text="reports.confirmation_text:cross_validat
 
         full : the same tests with all frames, to read measured times from. Loading strains are taken off them.
         """
-        by_name = {h.name: h for h in full or ()}
-        comparisons = []
+        by_name, parts = {h.name: h for h in full or ()}, []
         for fold in self.folds:
-            tests = [by_name.get(h.name, h) for h in fold.held_out]
-            comparisons.append(
-                times_to_strain(
-                    fold.fit.law, fold.fit.values, tests, self._predictor, strain, offsets=loading_strains(tests)
-                )
-            )
-        return _joined(strain, comparisons)
+            tests, predictor = [by_name.get(h.name, h) for h in fold.held_out], fold.fit.predictor
+            assert predictor is not None
+            law, values = fold.fit.law, fold.fit.values
+            parts.append(times_to_strain(law, values, tests, predictor, strain, offsets=loading_strains(tests)))
+        measured, predicted = (np.concatenate([getattr(one, n) for one in parts]) for n in ("measured", "predicted"))
+        return TimeComparison(strain, tuple(name for one in parts for name in one.names), measured, predicted)
 
     def times_to_rupture(self) -> TimeComparison:
-        """Measured and predicted rupture times of the held-out tests."""
-        comparisons = [
-            times_to_rupture(fold.fit.law, fold.fit.values, fold.held_out, self._predictor) for fold in self.folds
-        ]
-        return _joined(float("nan"), comparisons)
+        """Measured and predicted rupture times of the held-out tests; of cross-validation by time none."""
+        return times_to_rupture((name, one.get("rupture time")) for name, one in self.single_values.items())
 
     def predictive_deviance(self, noise_model: NoiseModel, fitted_fraction: float = FITTED_FRACTION) -> float:
         """-2 ln of the predictive likelihood of what comes after the fitted part; of cross-validation by time."""
@@ -145,11 +140,6 @@ class CrossValidation(Presentable, text="reports.confirmation_text:cross_validat
             residuals, present=residuals.present & is_early, values=np.where(is_early, residuals.values, 0.0)
         )
         return _deviance(residuals, noise_model) - _deviance(beginning, noise_model)
-
-    @property
-    def _predictor(self) -> Predictor:
-        assert self.fit.predictor is not None
-        return self.fit.predictor
 
 
 @checked
@@ -208,12 +198,6 @@ def _deviance(residuals: Residuals, noise_model: NoiseModel) -> float:
     """r' C^-1 r + ln|C|."""
     factor = CovarianceFactor.of_residuals(residuals, noise_model)
     return float((factor.whiten(residuals.values) ** 2).sum() + factor.log_determinant)
-
-
-def _joined(strain: float, comparisons: Sequence[TimeComparison]) -> TimeComparison:
-    names = tuple(name for one in comparisons for name in one.names)
-    measured = np.concatenate([one.measured for one in comparisons])
-    return TimeComparison(strain, names, measured, np.concatenate([one.predicted for one in comparisons]))
 
 
 @dataclass(frozen=True)
@@ -297,18 +281,11 @@ def times_to_strain(
     )
 
 
-def times_to_rupture(
-    law: CreepLaw, values: Mapping[str, float], histories: Sequence[History], predictor: Predictor
-) -> TimeComparison:
-    """Compare the rupture times of every history that ruptured."""
-    ruptured = [h for h in histories if h.rupture_time is not None]
-    measured = np.array([h.rupture_time for h in ruptured], float)
-    if not ruptured:
-        return TimeComparison(float("nan"), (), measured, measured)
-    life_prediction = predict_to_rupture(predictor, law, law.to_internal(values), ruptured).times_to_strain
-    assert life_prediction is not None
-    predicted = np.where(np.isfinite(life_prediction.rupture_times[0]), life_prediction.rupture_times[0], np.inf)
-    return TimeComparison(float("nan"), tuple(h.name for h in ruptured), measured, predicted)
+def times_to_rupture(ends: Iterable[tuple[str, SingleValue | None]]) -> TimeComparison:
+    """Compare the rupture times of every test that ruptured; ends : names of tests, and their ends."""
+    ruptured = [(name, end) for name, end in ends if end is not None and not end.censored]
+    times = np.array([(end.measured, end.predicted) for _, end in ruptured]).reshape(-1, 2)
+    return TimeComparison(float("nan"), tuple(name for name, _ in ruptured), *times.T)
 
 
 def _crossing_time(strain: Floats, times: Floats, target: float, prediction: Prediction, test: int) -> float:

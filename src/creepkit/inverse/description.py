@@ -21,41 +21,56 @@ LARGEST_PER_CENT = 0.5
 """Of ln, from which on a spread is given as a factor."""
 
 
+WELL_PREDICTED = 0.5
+"""Of ln rate, standard deviation of what the others say of a test: where it is larger they say nothing."""
+
+
 @dataclass(frozen=True)
 class Description:
     """Root mean squares of predicted over measured, of ln; NaN of what was not measured.
 
-    rates : of tests left out in turn. outputs : {output: of its values}, of strains ln, of other outputs relative to
-    their root mean square; with the offset of each test, and without a rate of its own. ruptures, minimum_rates : of
-    the tests that state them.
+    rates : of tests left out in turn, of those that the others predict. outputs : {output: of its values}, of strains
+    ln, of other outputs relative to their root mean square; with the offset of each test, and without a rate of its
+    own. ruptures, minimum_rates : of the tests that state them and of which one is predicted; unpredicted : ruptures of
+    which none is.
     """
 
     rates: float
     outputs: dict[str, float]
     ruptures: float
     minimum_rates: float
+    unpredicted: int = 0
 
     @classmethod
     def of(cls, fit: Identification) -> Description:
         """That of an identification, also of one from a file."""
         ends = [m.rupture.ratio for m in fit.tests if m.rupture is not None and not m.rupture.censored]
-        rates = [m.minimum_rate.ratio for m in fit.tests if m.minimum_rate is not None]
+        minima = [m.minimum_rate.ratio for m in fit.tests if m.minimum_rate is not None]
         outputs = {
             name: fit.rms if is_logarithmic(name) else errors.relative_rms_error for name, errors in fit.errors.items()
         }
-        return cls(_rms([one.log_factor for one in fit.left_out]), outputs, _spread(ends), _spread(rates))
+        rates = [one.log_factor for one in fit.left_out if one.sd < WELL_PREDICTED]
+        predicted = [ratio for ratio in ends if 0.0 < ratio < np.inf]
+        unpredicted = len(ends) - len(predicted)
+        return cls(_rms(rates), outputs, _spread(predicted), _spread(minima), unpredicted)
 
     @property
     def sentence(self) -> str:
         """What it describes within how much, the most telling first, without a full stop; "" of nothing."""
-        parts = [
-            ("rupture times", self.ruptures),
+        lost = f" ({self.unpredicted} not predicted)" if self.unpredicted else ""
+        logarithmic = [
+            (f"rupture times{lost}", self.ruptures),
             ("minimum creep rates", self.minimum_rates),
             ("rates of single tests" if self.outputs else "rates", self.rates),
-            *((_plural(name.replace("_", " ")), value) for name, value in self.outputs.items()),
+            *((_plural(name), value) for name, value in self.outputs.items() if is_logarithmic(name)),
         ]
-        texts = [f"{name} within {spread_text(value)}" for name, value in parts if np.isfinite(value)]
-        return ", ".join(texts[:3])
+        texts = [f"{name} to {spread_text(value)}" for name, value in logarithmic if np.isfinite(value)]
+        texts += [
+            f"{_plural(name)} to {100 * value:.2g} %"
+            for name, value in self.outputs.items()
+            if np.isfinite(value) and not is_logarithmic(name)
+        ]
+        return f"{', '.join(texts[:3])} (rms)" if texts else ""
 
 
 def spread_text(spread: float) -> str:
@@ -75,13 +90,16 @@ def headline(fit: Identification) -> str:
         truth = "the tests do not contradict it"
     elif adequacy.is_explained:
         truth = f"but {adequacy.explanations[0].headline}"
+    elif adequacy.contradicting is not None:
+        truth = "yet minimum rates and rupture times contradict one another by it"
     else:
         shape = adequacy.discrepancy_in_noises > SHAPE_MISFIT
         truth = f"yet it is not the true law: it misses {'the shape of the curves' if shape else 'more than noise'}"
     return f"{fit.law.name} {useful}; {truth}"
 
 
-def _plural(word: str) -> str:
+def _plural(name: str) -> str:
+    word = name.replace("_", " ")
     return f"{word}es" if word.endswith("s") else f"{word}s"
 
 

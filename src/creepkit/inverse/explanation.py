@@ -17,9 +17,13 @@ LARGEST_KELVIN, LARGEST_LOAD = 40.0, 1.3
 """By which a temperature and a load are mistaken; beyond it is another error."""
 
 
-ROUND_FACTORS = (10.0, 100.0, 1000.0, 3600.0, 60.0, 6.895, 9.81, 25.4)
-"""Between units that are taken for one another: percent and per mille, percent and one, GPa and MPa, h and s, min and
-s, ksi and MPa, kgf and N, inches and mm."""
+UNIT_FACTORS = {
+    "strain": (10.0, 100.0, 1000.0, 25.4),
+    "load": (6.895, 9.807, 10.0, 1000.0),
+    "time": (24.0, 60.0, 3600.0),
+}
+"""Between units that are taken for one another: percent, per mille and one, inches and mm; ksi, kgf/mm2, bar and GPa
+beside MPa; days, hours, minutes and seconds."""
 
 
 ROUND_TOLERANCE = 0.2
@@ -41,6 +45,7 @@ class Explanation:
         temperature; at : these stresses, MPa, or temperatures, K.
     errors : of one test, errors of what is stated of it, any one of which would make it: {"load", "strain", "time":
         true value over that stated, "temperature": true less stated, K}.
+    factors : on the rates of the single tests. near : others that explain nearly as much as the last of them.
     condition, temperature : of the one test, in words and in K. label : by which groups differ, such as "heat B".
     without : {parameter: (value, low, high)}, 95 % intervals in the law's units of the tests without the one.
     """
@@ -53,6 +58,8 @@ class Explanation:
     ends: tuple[float, float] = (0.0, 0.0)
     at: tuple[float, float] = (0.0, 0.0)
     errors: Mapping[str, float] = field(default_factory=dict)
+    factors: tuple[float, ...] = ()
+    near: tuple[str, ...] = ()
     condition: str = ""
     temperature: float = 0.0
     label: str = ""
@@ -67,7 +74,8 @@ class Explanation:
     def headline(self) -> str:
         """In a few words."""
         if self.kind == "one test":
-            return f"test '{self.tests[0]}' does not agree with the others"
+            verb = "do" if len(self.tests) > 1 else "does"
+            return f"{self._named_tests} {verb} not agree with the others"
         if self.kind == "two groups":
             return "the tests are of two groups"
         return f"the {self.kind} {self._change}"
@@ -76,18 +84,26 @@ class Explanation:
     def sentence(self) -> str:
         """What it is, for people, without a full stop."""
         if self.is_of_law:
-            return f"{self.headline} over the tests, and by this law it does not"
+            return f"{self.headline} over the tests, more than this law lets it"
         speed = f"{np.exp(self.size):.3g} times as fast"
         if self.kind == "two groups":
             named = ", ".join(self.tests[:MOST_NAMED])
             more = f" and {len(self.tests) - MOST_NAMED} more" if len(self.tests) > MOST_NAMED else ""
-            whose = f"tests of {self.label}" if self.label else "tests"
-            return f"{whose} ({named}{more}) creep {speed} as the others at equal conditions: are they of one material?"
+            whose, question = (f"tests of {self.label}", "") if self.label else ("tests", ": are they of one material?")
+            return f"{whose} ({named}{more}) creep {speed} as the others at equal conditions{question}"
+        if len(self.tests) > 1:
+            factors = " and ".join(f"{factor:.3g}" for factor in self.factors)
+            return f"{self._named_tests} creep {factors} times as fast as the others say{self._values_without}"
         errors = self._errors_text
         cause = f"; it would agree with them {errors}" if errors else ""
-        return (
-            f"test '{self.tests[0]}' ({self.condition}) creeps {speed} as the others say{cause}{self._values_without}"
-        )
+        near = f" (or '{self.near[0]}' is to blame)" if self.near else ""
+        found = f"{self._named_tests} ({self.condition}) creeps {speed} as the others say{near}"
+        return f"{found}{cause}{self._values_without}"
+
+    @property
+    def _named_tests(self) -> str:
+        names = " and ".join(f"'{name}'" for name in self.tests)
+        return f"tests {names}" if len(self.tests) > 1 else f"test {names}"
 
     @property
     def _change(self) -> str:
@@ -100,24 +116,23 @@ class Explanation:
 
     @property
     def _errors_text(self) -> str:
-        """With which errors of what is stated the test would agree, the likelier first."""
+        """With which errors of what is stated the test would agree, units first."""
         kelvin, load = self.errors.get("temperature", np.inf), self.errors.get("load", np.inf)
-        texts = []
-        if abs(kelvin) <= LARGEST_KELVIN:
-            actual = celsius_text(self.temperature + kelvin, self.temperature + kelvin)
-            texts.append(f"at {actual}, {abs(kelvin):.2g} K {'less' if kelvin < 0 else 'more'} than stated")
-        if 1.0 / LARGEST_LOAD <= load <= LARGEST_LOAD:
-            texts.append(f"at a load {abs(100 * (load - 1)):.2g} % {'lower' if load < 1 else 'higher'}")
-        if texts:
-            return " or ".join(texts)
-        for quantity in ("strain", "load", "time"):
+        units, others = list[str](), list[str]()
+        for quantity, known in UNIT_FACTORS.items():
             ratio = self.errors.get(quantity, 0.0)
             factor = max(ratio, 1.0 / ratio) if ratio > 0 else 1.0
-            near = [f"{known:g}" for known in ROUND_FACTORS if abs(np.log(factor / known)) < ROUND_TOLERANCE]
-            said = f" (nearly {' or '.join(near)}: a unit?)" if near else ""
-            if factor > 1.0:
-                texts.append(f"if its {quantity} were {factor:.3g} times {'smaller' if ratio < 1 else 'larger'}{said}")
-        return ", or ".join(sorted(texts, key=lambda text: "unit" not in text))
+            text = f"if its {quantity} were {factor:.3g} times {'smaller' if ratio < 1 else 'larger'}"
+            near = [f"{one:g}" for one in known if abs(np.log(factor / one)) < ROUND_TOLERANCE]
+            units += [f"{text} (nearly {near[0]}: a unit?)"] if near else []
+            others += [text] if factor > LARGEST_LOAD and not near else []
+        likely = list[str]()
+        if abs(kelvin) <= LARGEST_KELVIN:
+            actual = celsius_text(self.temperature + kelvin, self.temperature + kelvin)
+            likely.append(f"at {actual}, {abs(kelvin):.2g} K {'less' if kelvin < 0 else 'more'} than stated")
+        if 1.0 / LARGEST_LOAD <= load <= LARGEST_LOAD:
+            likely.append(f"at a load {abs(100 * (load - 1)):.2g} % {'lower' if load < 1 else 'higher'}")
+        return " or ".join([*units, *likely] or others)
 
     @property
     def _values_without(self) -> str:

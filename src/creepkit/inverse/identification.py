@@ -263,10 +263,8 @@ class Identification(Presentable, text="reports.identification_text:identificati
         self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
     ) -> tuple[Floats, Floats, Floats]:
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
-        predictor = self._predictor_or(using)
-        tests, noise_model = list(histories or self.histories), self.noise_model if test_scatter else None
-        law = LawAtTests(self.coordinates, self.u, self.scatter_of_rates, noise_model, predictor)
-        return law.rupture_times(tests)
+        law = LawAtTests.of_fit(self, self._predictor_or(using), test_scatter=test_scatter)
+        return law.rupture_times(list(histories or self.histories))
 
     @checked
     def predict(

@@ -48,12 +48,12 @@ from creepkit.inverse.iterative_estimation import (
     linearised,
     starting_point,
 )
-from creepkit.inverse.judged_residuals import at_own_rates
+from creepkit.inverse.judged_residuals import at_own_rates, at_rates
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
-from creepkit.inverse.perturbation import unmodelled_note
+from creepkit.inverse.perturbation import Perturbation, unmodelled_note
 from creepkit.inverse.perturbations import perturbations
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -81,8 +81,8 @@ MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
 
 
-NEWTON_STEPS = 8
-"""Of the factor on the rate of one test."""
+CHANGE_OF_DEFECT = 200.0
+"""Relative change of a defect over that of what is predicted, at most: 10 to 50 were found in dimples."""
 
 
 REFIT_ROUNDS = 2
@@ -119,7 +119,7 @@ def identify(
 
 
 def _without_one_test(fit: Identification) -> Identification:
-    """Where one test explains the scatter of rates, what the others say without it, by a refit to them."""
+    """Where single tests explain the scatter of rates, what the others say without them, by a refit to them."""
     adequacy = fit.adequacy
     if adequacy is None or not adequacy.explanations or adequacy.explanations[0].kind != "one test":
         return fit
@@ -135,39 +135,26 @@ def _without_one_test(fit: Identification) -> Identification:
         )
     except CreepkitError:
         return fit
-    position = [h.name for h in fit.histories].index(first.tests[0])
-    again = _beside_the_others(fit, without, position, first.odds)
     values = {e.name: (e.value, e.low, e.high) for e in without.estimates}
-    explanations = (replace(again, without=values), *rest)
+    if len(first.tests) == 1:
+        position = [h.name for h in fit.histories].index(first.tests[0])
+        again = _beside_the_others(fit, without, position, first)
+        first = replace(again, factors=(float(np.exp(again.size)),), near=first.near)
+    explanations = (replace(first, without=values), *rest)
     return replace(fit, adequacy=replace(adequacy, explanations=explanations))
 
 
-def _beside_the_others(fit: Identification, without: Identification, test: int, odds: float) -> Explanation:
-    """One test, by its position, beside the law of the others, with its factor on their rate.
-
-    Of outputs that are compared by their logarithm that factor is the median of what its readings show; of others it is
-    found by Newton's method.
-    """
-    problem, x, size = fit.least_squares_problem, fit.x.copy(), 0.0
-    count, coefficients = len(without.u), list(problem.coordinates.coefficients)
-    x[:count] = without.u
-
-    def at(log_factor: float) -> RateExplanations:
-        moved = x.copy()
-        moved[coefficients] += log_factor
-        linear = linearised(problem, moved, problem.residuals(moved))
-        return RateExplanations(problem, moved, linear, without.noise_model)
-
-    others = at(0.0)
-    if all(map(is_logarithmic, problem.observations.outputs)):
-        size = float(others.rates.median_log_factors[test])
-    elif problem.coordinates.every_rate_has_coefficient:
-        for _ in range(NEWTON_STEPS):
-            step = float(at(size).rates.own_log_factors[test])
-            size += step
-            if abs(step) < 1e-3:
-                break
-    return others.one_test(test, odds, size if np.isfinite(size) and size else None)
+def _beside_the_others(fit: Identification, without: Identification, test: int, found: Explanation) -> Explanation:
+    """One test, by its position, beside the law of the others: the problem is made linear there and at its own rate."""
+    problem, x, log_factors = fit.least_squares_problem, fit.x.copy(), np.zeros(len(fit.histories))
+    x[: len(without.u)] = without.u
+    log_factors[test] = found.size
+    linear = at_rates(problem, x, linearised(problem, x, problem.residuals(x)), log_factors)
+    others = RateExplanations(problem, x, linear, without.noise_model)
+    logarithmic = all(map(is_logarithmic, problem.observations.outputs))
+    sizes = others.rates.median_log_factors if logarithmic else others.rates.own_log_factors
+    size = float(sizes[test])
+    return others.one_test(test, found.odds, size if np.isfinite(size) else found.size)
 
 
 @kept_where_asked
@@ -181,14 +168,18 @@ def identify_values(
     through: Predictor | None = None,
     start: StartingEstimate | None = None,
     progress: IterationCallback | None = None,
+    approximately: bool = False,
 ) -> Identification:
-    """As identify(), without samples of the posterior where a value is at its bound."""
+    """As identify(), without samples of the posterior where a value is at its bound.
+
+    approximately : to be identified again from there: in few rounds, corrected once, by the specimen itself.
+    """
     settings = settings or IdentificationSettings()
     known, through, notes = predictors_for_law(law, using, through)
     histories, left_out = compared_tests(law, histories, settings)
     if notes:
         how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
-        fit = identify_values(law, histories, known, through=through, **how)
+        fit = identify_values(law, histories, known, through=through, approximately=approximately, **how)
         return replace(fit, notes=(*fit.notes, *notes))
     with single_threaded_blas():
         problem = LeastSquaresProblem.from_histories(
@@ -202,13 +193,13 @@ def identify_values(
         if search_outcome.dropped_terms:
             return _without_terms(problem, histories, search_outcome, progress)
         best, numerical_error = _best_estimate(
-            problem, search_outcome, through, start or StartingEstimate(None), progress
+            problem, search_outcome, through, start or StartingEstimate(None), progress, approximately
         )
         gradient = _gradient(best)[: len(law.params)]
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
-        fit = _result(histories, best, search_outcome, numerical_error)
+        fit = _result(histories, best, search_outcome, numerical_error, approximately)
     return replace(fit, notes=(*left_out, *fit.notes))
 
 
@@ -242,6 +233,7 @@ def _best_estimate(
     through: Predictor | None,
     start: StartingEstimate,
     progress: IterationCallback | None,
+    approximately: bool,
 ) -> tuple[EstimationResult, NumericalError | None]:
     """The best end of the starts, through the cheaper predictor first if there is one; its best end goes on.
 
@@ -251,7 +243,7 @@ def _best_estimate(
     known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in search_outcome.starts]
     problem = replace(problem, loss=problem.settings.loss)
-    limits, working_noise = IterationLimits(), None
+    limits, working_noise = APPROXIMATE_LIMITS if approximately else IterationLimits(), None
     if through is not None and start.u is None:
         cheaper = problem.with_predictor(through)
         results = [estimate_iteratively(cheaper, x, working_estimator, APPROXIMATE_LIMITS, progress) for x in starts]
@@ -272,8 +264,8 @@ def _best_estimate(
     else:
         x = starts[0]
     known: Floats | None = None
-    for _ in range(MOST_CORRECTIONS):
-        corrected, error = correct_defect(problem, x)
+    for _ in range(1 if approximately else MOST_CORRECTIONS):
+        corrected, error = correct_defect(problem, x, by_specimen=approximately)
         if (
             known is not None
             and corrected.correction is not None
@@ -282,14 +274,22 @@ def _best_estimate(
             break
         numerical_error = error
         estimator = _working_estimator(corrected, error)
-        best = estimate_iteratively(corrected, x, estimator, limits, progress, working_noise)
+        corrected_at, best = x, estimate_iteratively(corrected, x, estimator, limits, progress, working_noise)
         x, working_noise, known = best.minimum.x, best.working_noise, corrected.correction
         if error is None or known is None:
             break
         numerical_error = replace(error, shift=shift_of_values(best.problem, x, known))
-        if numerical_error.shift < SMALL_SHIFT:
+        if numerical_error.shift * min(1.0, CHANGE_OF_DEFECT * _relative_change(best, x - corrected_at)) < SMALL_SHIFT:
             break
     return best, numerical_error
+
+
+def _relative_change(best: EstimationResult, step: Floats) -> float:
+    """Of what is predicted, by a step (unknowns,) to the end of an estimate: the largest, over the largest value."""
+    residuals, observations = best.residuals, best.problem.observations
+    assert residuals.jacobian is not None
+    change = (residuals.jacobian @ step / residuals.offset_sensitivity)[observations.present]
+    return float(np.abs(change).max() / np.abs(observations.values[observations.present]).max())
 
 
 def _working_estimator(
@@ -304,6 +304,7 @@ def _result(
     best: EstimationResult,
     search_outcome: SearchOutcome,
     numerical_error: NumericalError | None,
+    approximately: bool,
 ) -> Identification:
     """Noise model, intervals and goodness of fit at the optimum."""
     problem, residuals, x = best.problem, best.residuals, best.minimum.x
@@ -313,7 +314,9 @@ def _result(
     noise_model, covariance, freedom = uncertainty_of(best, working_estimator, len(histories))
     linear = best.linearised or linearised(problem, x, residuals)
     working_noise = None if best.linearised is not None else best.working_noise
-    unmodelled = perturbations(problem, x, linear, noise_model, histories, working_noise)
+    unmodelled: tuple[Perturbation, ...] = ()
+    if not approximately:
+        unmodelled = perturbations(problem, x, linear, noise_model, histories, working_noise)
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     scatter = rate_scatter(problem, x, residuals, noise_model, lengths)
     prediction = predict(
@@ -339,8 +342,8 @@ def _result(
     failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]
     failed |= (prediction.status[0] != Status.RUPTURED) & [test.misses_readings for test in tests]
     unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
-    rates = RateExplanations(problem, x, linear, noise_model)
     judged = at_own_rates(problem, x, linear, noise_model)
+    rates = RateExplanations(problem, x, judged, noise_model)
     adequacy = adequacy_with_remedies(
         problem, judged, noise_model, working_estimator.predictor_errors, histories, unmodelled, rates.found
     ).with_unpredicted(unpredicted)

@@ -124,7 +124,17 @@ def at_own_rates(
 ) -> LinearisedProblem:
     """The problem made linear at x (unknowns,) and where the rate of each test is its own, by which a law is judged."""
     log_factors = predicted_random_effects(linear.residuals, noise_model)[1]
-    if np.abs(log_factors).max() < NOTEWORTHY_FACTOR or not problem.coordinates.every_rate_has_coefficient:
+    return linear if np.abs(log_factors).max() < NOTEWORTHY_FACTOR else at_rates(problem, x, linear, log_factors)
+
+
+def at_rates(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, log_factors: Floats
+) -> LinearisedProblem:
+    """The problem made linear at x (unknowns,) and where rates of tests have factors; log_factors : (tests,) their ln.
+
+    As `linear`, which is about the law's rates, where some rate has no coefficient or nothing is predicted there.
+    """
+    if not problem.coordinates.every_rate_has_coefficient:
         return linear
     there = problem.residuals_at_rates(x, log_factors)
     values = there.values - log_factors[:, None] * there.log_rate_sensitivity

@@ -1,7 +1,9 @@
 """Observation vector: the measured values of all tests, usable and thinned frames, and the noise of a frame.
 
-Each test is one row: the frames of all its outputs, then its rupture time where that is known, padded to the longest
-test.
+An observation is a functional of the trajectory of a test with a noise of its own: the values of an output at frames,
+the times at which strains are reached (of tests that are followed to rupture, see inverse.residuals), the minimum creep
+rate, or the end. Each test is one row: the frames of all its outputs, then its minimum rate or its end where that is
+known, padded to the longest test.
 """
 
 from __future__ import annotations
@@ -229,13 +231,12 @@ class ObservationVector:
         for k, row in enumerate(rows):
             start = 0
             for rank, (name, one) in enumerate(row.items()):
-                columns, position = slice(start, start + one.frames.size), outputs.index(name)
+                place, position = (k, slice(start, start + one.frames.size)), outputs.index(name)
                 start += one.frames.size
-                index[k, columns], frames[k, columns] = position, one.frames
-                present[k, columns], leading[k, columns] = True, rank == 0 and name != RUPTURE_OUTPUT
-                values[k, columns], times[k, columns] = one.values, one.times
-                noise = one.relative_noise(typical[position], single=name in SINGLE_VALUES)
-                relative_noise[k, columns] = noise
+                index[place], frames[place], present[place] = position, one.frames, True
+                values[place], times[place] = one.values, one.times
+                leading[place] = rank == 0 and name != RUPTURE_OUTPUT
+                relative_noise[place] = one.relative_noise(typical[position], single=name in SINGLE_VALUES)
         return cls(
             outputs,
             tuple(transforms),

@@ -8,9 +8,9 @@ derivatives to the unknowns and d those to ln rate, the evidence
 
     p(r | w) = mean over s of  int N(r + J dx + (w c) d; 0, C0 + s^2 d d') p(dx) p(c) dx dc
 
-is a mean over a logarithmic grid of s, for the few tests of a campaign do not show their scatter. C0, the noise and
-offsets of each test, is whitened once; what is left are small matrices of each test, so that all explanations of twelve
-tests cost a few hundredths of a second and no simulation.
+is a mean over a logarithmic grid of s, for the few tests of a campaign do not show their scatter. C0, the noise,
+offsets and misfit of each test as they were estimated, is whitened once; what is left are small matrices of each test,
+so that all explanations of twelve tests cost a few hundredths of a second and no simulation.
 
 Occam's factor is in the evidence: a wide prior that the tests do not need costs. What an explanation was chosen from is
 counted too: one of n tests by ln n, a split into two groups by the ln of how many splits there are.
@@ -23,23 +23,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import logsumexp
 
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.explanation import Explanation, Kind, LeftOut
-from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.rate_perturbations import SMALLEST_FACTOR, Evidence, RatePerturbations
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
-from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
+from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import temperature
 from creepkit.language.symbols import GAS_CONSTANT
-
-SCATTERS = np.geomspace(1e-3, LARGEST_RATE_SCATTER, 25)
-"""Of ln rate between tests, over which evidence is averaged."""
-
 
 FACTOR_SD = 1.5
 """Prior standard deviation of ln of a factor on the rate of one test or of a group."""
@@ -50,7 +45,7 @@ EXPONENT_CHANGE, ENERGY_CHANGE = 5.0, 200e3
 
 
 DECISIVE_ODDS = float(np.log(6.0))
-"""ln of the odds against the law as it is, from which on an explanation is stated: false in one campaign of fifty."""
+"""ln of the odds against the law as it is, from which on an explanation is stated."""
 
 
 ENERGY_ODDS = float(np.log(0.3))
@@ -61,83 +56,16 @@ STEP = 0.01
 """Of ln of strain and time, for derivatives of the rate."""
 
 
-SMALLEST_FACTOR = 0.1
-"""Of ln rate: a smaller deviation of a test is no finding, however exact the tests are."""
-
-
 SMALLEST_CHANGE = {"stress exponent": 0.5, "activation energy": 30e3}
 """Over the tests: less is no finding."""
 
 
-FEWEST_TESTS = 4
+FEWEST_TESTS, FEWEST_CONTRASTS = 4, 2
+"""Tests, and combinations of their rates that the law does not move: with one alone any test could be to blame."""
 
 
 MOST_TESTS = 3
 """That may be named one after the other."""
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """ln of the evidence; mean and sd of the coefficients (columns,); step of all unknowns, (unknowns,)."""
-
-    log: float
-    mean: Floats
-    sd: Floats
-    step: Floats
-
-
-class RatePerturbations:
-    """The problem made linear, reduced to one small matrix a test, for perturbations of the rates of tests.
-
-    own_log_factors, median_log_factors : (tests,) of ln of the factor on the rate that each test alone shows beside the
-    law as it is, by least squares, and the median of those of its readings.
-    """
-
-    def __init__(self, linear: LinearisedProblem, noise_model: NoiseModel, *, scatter_known: bool) -> None:
-        """scatter_known : whether the scatter of rates is what the noise model says and no grid is averaged."""
-        residuals = linear.residuals
-        assert residuals.jacobian is not None
-        columns = np.concatenate(
-            [residuals.values[..., None], residuals.jacobian, residuals.log_rate_sensitivity[..., None]], axis=-1
-        )
-        factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
-        whitened = np.where(residuals.present[..., None], factor.whiten(columns), 0.0)
-        gram = np.einsum("tem,ten->tmn", whitened, whitened)
-        scatters = np.array([noise_model.rate]) if scatter_known else SCATTERS
-        own = scatters[:, None] ** 2 / (1.0 + scatters[:, None] ** 2 * gram[None, :, -1, -1])
-        row = gram[:, :, -1]
-        self.gram = gram[None] - own[..., None, None] * (row[:, :, None] * row[:, None, :])[None]
-        self.own_log_factors = -gram[:, -1, 0] / np.maximum(gram[:, -1, -1], 1e-300)
-        sensitive = residuals.present & (residuals.log_rate_sensitivity > 0.5)
-        ratios = [
-            -r[k] / d[k] for r, d, k in zip(residuals.values, residuals.log_rate_sensitivity, sensitive, strict=True)
-        ]
-        self.median_log_factors = np.array([np.median(r) if r.size else np.nan for r in ratios])
-        self.log_determinant = np.log1p(scatters[:, None] ** 2 * gram[None, :, -1, -1]).sum(axis=1)
-        self.precision, self.prior_residual = linear.precision, linear.prior_residual
-
-    def evidence(self, weights: Floats, prior_sd: Floats) -> Evidence:
-        """Of ln rates moved by weights (tests, columns) times coefficients of these prior deviations (columns,)."""
-        unknowns = self.precision.size
-        total = self.gram.sum(axis=1)
-        rows = np.einsum("tq,stm->sqm", weights, self.gram[..., -1])
-        of_rates = np.einsum("tq,tp,st->sqp", weights, weights, self.gram[..., -1, -1]) + np.diag(1.0 / prior_sd**2)
-        across, own = rows[:, :, 1:-1], total[:, 1:-1, 1:-1] + np.diag(self.precision)
-        normal = np.block([[own, np.swapaxes(across, 1, 2)], [across, of_rates]])
-        side = np.concatenate([total[:, 1:-1, 0] + self.precision * self.prior_residual, rows[:, :, 0]], axis=1)
-        scale = np.sqrt(np.diagonal(normal, axis1=1, axis2=2))
-        scaled = normal / scale[:, :, None] / scale[:, None, :]
-        inverse = np.linalg.inv(scaled) / scale[:, :, None] / scale[:, None, :]
-        step = -np.einsum("spq,sq->sp", inverse, side)
-        chi_square = total[:, 0, 0] + (self.precision * self.prior_residual**2).sum() + (side * step).sum(axis=1)
-        determinant = np.linalg.slogdet(scaled)[1] + 2 * np.log(scale).sum(axis=1)
-        logs = -0.5 * (self.log_determinant + determinant + 2 * np.log(prior_sd).sum() + chi_square)
-        share = np.exp(logs - logsumexp(logs))
-        mean = share @ step
-        variance = share @ (np.diagonal(inverse, axis1=1, axis2=2) + (step - mean) ** 2)
-        return Evidence(
-            float(logsumexp(logs) - np.log(len(logs))), mean[unknowns:], np.sqrt(variance[unknowns:]), mean[:unknowns]
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,8 +78,9 @@ class RateConditions:
     @classmethod
     def of_problem(cls, problem: LeastSquaresProblem) -> RateConditions:
         """Medians over each test."""
-        stresses = [float(np.median(reference_stresses(h, problem.predictor))) for h in problem.histories]
-        return cls(np.maximum(stresses, 1e-6), np.array([h.mean_temperature for h in problem.histories]))
+        every = [reference_stresses(h, problem.predictor) for h in problem.histories]
+        stresses = [float(np.median(one[one > 0])) if (one > 0).any() else 1e-6 for one in every]
+        return cls(np.array(stresses), np.array([h.mean_temperature for h in problem.histories]))
 
     @cached_property
     def log_stress(self) -> Floats:
@@ -175,11 +104,12 @@ class RateExplanations:
         self.rates = RatePerturbations(linear, noise, scatter_known=fixed or not noise.rate > 0)
         self.conditions = RateConditions.of_problem(problem)
         self.possible = len(problem.histories) >= FEWEST_TESTS and bool(linear.residuals.log_rate_sensitivity.any())
+        self.redundant = self.possible and self.rates.contrasts >= FEWEST_CONTRASTS
 
     @cached_property
     def found(self) -> tuple[Explanation, ...]:
         """What explains the rates better than scatter, the likeliest first; none that is not six times likelier."""
-        if not self.possible:
+        if not self.redundant:
             return ()
         found = [*self._of_law(), *self._of_tests(), *self._of_groups()]
         return tuple(sorted((e for e in found if e.odds > DECISIVE_ODDS), key=lambda e: -e.odds))
@@ -195,10 +125,9 @@ class RateExplanations:
             out.append(LeftOut(history.name, float(evidence.mean[0]), float(evidence.sd[0]), exponent))
         return tuple(out)
 
-    def one_test(self, test: int, odds: float, size: float | None = None) -> Explanation:
-        """That of one test by its position, as it is here; size : of ln of its factor, where that is known better."""
-        evidence = self._alone[test]
-        return self._one_test(test, evidence if size is None else replace(evidence, mean=np.array([size])), odds)
+    def one_test(self, test: int, odds: float, size: float) -> Explanation:
+        """That of one test by its position; size : of ln of its factor."""
+        return self._one_test(test, replace(self._alone[test], mean=np.array([size])), odds)
 
     def _evidence(self, columns: Sequence[Floats], prior_sd: Sequence[float]) -> Evidence:
         weights = np.stack(columns, axis=1) if columns else np.zeros((len(self.problem.histories), 0))
@@ -232,34 +161,34 @@ class RateExplanations:
         The exponential of ln stress is the stress: the exponent of a law whose power law breaks down grows with it.
         """
         scaled = over / np.ptp(over)
-        tried = []
-        for slope, primitive in ((scaled, 0.5 * scaled * over), (np.exp(over), np.exp(over) - over)):
-            span = float(np.ptp(slope))
-            tried.append((self._evidence([primitive], [prior_sd / span]), slope - slope.mean(), span))
-            if kind != "stress exponent":
-                break
-        evidence, slope, span = max(tried, key=lambda one: one[0].log)
-        change = float(evidence.mean[0]) * span
-        if abs(change) < SMALLEST_CHANGE[kind]:
-            return
+        forms = [(scaled, 0.5 * scaled * over)]
+        forms += [(np.exp(over) - 1.0, np.exp(over) - over)] if kind == "stress exponent" else []
+        tried = [(self._evidence([w], [prior_sd / float(np.ptp(slope))]), slope) for slope, w in forms]
+        evidence, slope = max(tried, key=lambda one: one[0].log)
+        span = float(np.ptp(slope))
         u, coordinates, middle = self._moved(evidence), self.problem.coordinates, self.problem.coordinates.reference
-        if kind == "stress exponent":
-            mean, values = float(local_exponent(coordinates, middle.stress)(u)), self.conditions.stresses
-        else:
-            mean, values = self._energy(u, middle.stress, middle.temperature), self.conditions.temperatures
         first, last = int(over.argmin()), int(over.argmax())
-        ends = tuple(mean + float(evidence.mean[0] * slope[k]) for k in (first, last))
+        if kind == "stress exponent":
+            at = float(self.conditions.stresses[first]), float(self.conditions.stresses[last])
+            own = [float(local_exponent(coordinates, stress)(u)) for stress in at]
+        else:
+            at = float(self.conditions.temperatures[first]), float(self.conditions.temperatures[last])
+            own = [self._energy(u, middle.stress, T) for T in at]
+        low, high = (value + float(evidence.mean[0] * slope[k]) for value, k in zip(own, (first, last), strict=True))
+        if abs(high - low) < SMALLEST_CHANGE[kind] or abs(evidence.mean[0]) * span < SMALLEST_CHANGE[kind]:
+            return
         before = ENERGY_ODDS if kind == "activation energy" else 0.0
         odds = evidence.log - self._as_it_is - float(np.log(len(tried))) + before
-        at = float(values[first]), float(values[last])
-        yield Explanation(kind, (), change, float(evidence.sd[0]) * span, odds, (ends[0], ends[1]), at)
+        change, sd = float(evidence.mean[0]) * span, float(evidence.sd[0]) * span
+        yield Explanation(kind, (), change, sd, odds, (low, high), at)
 
     # ---- single tests ------------------------------------------------------------------------------------------------
 
     def _of_tests(self) -> Iterable[Explanation]:
-        """One test whose rate is its own; then another beside it, while that is likelier by as much again."""
-        count, base, kept = len(self.problem.histories), self._as_it_is, list[int]()
-        for _ in range(min(MOST_TESTS, (count - 1) // 3)):
+        """One test whose rate is its own; and others beside it, while each of them is likelier by as much again."""
+        count, base, kept, total = len(self.problem.histories), self._as_it_is, list[int](), 0.0
+        best: tuple[Evidence, tuple[str, ...]] | None = None
+        for _ in range(min(MOST_TESTS, (count - 1) // 3, self.rates.contrasts - 1)):
             tried = [
                 (self._evidence([self._only(j) for j in (*kept, k)], [FACTOR_SD] * (len(kept) + 1)), k)
                 for k in range(count)
@@ -268,10 +197,20 @@ class RateExplanations:
             evidence, test = max(tried, key=lambda one: one[0].log)
             odds = evidence.log - base - float(np.log(len(tried)))
             if odds < DECISIVE_ODDS or abs(evidence.mean[-1]) < SMALLEST_FACTOR:
-                return
+                break
+            near = [k for e, k in tried if k != test and e.log > evidence.log - DECISIVE_ODDS]
             kept.append(test)
-            base = evidence.log
-            yield self._one_test(test, evidence, odds)
+            base, total = evidence.log, total + odds
+            best = evidence, tuple(self.problem.histories[k].name for k in near)
+        if best is not None:
+            yield self._explanation_of(kept, best[0], total, best[1])
+
+    def _explanation_of(
+        self, tests: Sequence[int], evidence: Evidence, odds: float, near: tuple[str, ...]
+    ) -> Explanation:
+        first = self._one_test(tests[0], replace(evidence, mean=evidence.mean[:1], sd=evidence.sd[:1]), odds)
+        names = tuple(self.problem.histories[k].name for k in tests)
+        return replace(first, tests=names, factors=tuple(map(float, np.exp(evidence.mean))), near=near)
 
     def _one_test(self, test: int, evidence: Evidence, odds: float) -> Explanation:
         history, u = self.problem.histories[test], self._moved(evidence)
@@ -326,14 +265,15 @@ class RateExplanations:
         starts = [np.isin(np.arange(count), order[:size]) for size in range(2, count - 1)]
         if starts:
             evidence, group = self._exchanged(max(starts, key=lambda one: self._of_split(one).log))
-            tried.append((evidence, group, "", (count - 1) * float(np.log(2.0))))
+            splits = 2.0 ** (count - 1) - count - 1.0
+            tried.append((evidence, group, "", float(np.log(max(splits, 1.0)))))
         if not tried:
             return
         _, group, label, choice = max(tried, key=lambda one: one[0].log - one[3])
         smaller = group if label or group.sum() <= count / 2 else ~group
         evidence = self._of_split(smaller)
-        odds = evidence.log - self._as_it_is - choice
-        if abs(evidence.mean[0]) > SMALLEST_FACTOR:
+        odds = evidence.log - self._as_it_is - choice - float(np.log(2.0))  # of a factor alone and of more
+        if abs(evidence.mean[0]) > SMALLEST_FACTOR or evidence.mean.size > 1:
             names = tuple(self.problem.histories[k].name for k in np.flatnonzero(smaller))
             yield Explanation("two groups", names, float(evidence.mean[0]), float(evidence.sd[0]), odds, label=label)
 

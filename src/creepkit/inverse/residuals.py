@@ -202,7 +202,10 @@ def _distance(observations: ObservationVector, predicted: Floats, prediction: Pr
     if times is None:
         return OrthogonalDistance(vertical, np.ones_like(vertical), np.zeros_like(vertical))
     frames, ends = observations.followed_frames, observations.rupture_mask
-    log_time_ratio = observations.log_times - _log_times(observations.select_frames(times.times))
+    strain_times = observations.select_frames(times.times)
+    never = np.isnan(strain_times)
+    with np.errstate(divide="ignore"):
+        log_time_ratio = observations.log_times - np.where(never, np.inf, np.log(np.where(never, 1.0, strain_times)))
     not_converged = ~reached & np.isneginf(log_time_ratio)  # neither reached nor ruptured: no convergence
     curve_slope = observations.derivative(np.where(frames, observations.values, 1.0)) * observations.select_frames(
         times.log_time_derivatives
@@ -272,12 +275,6 @@ def _time_derivatives(observations: ObservationVector, times: TimesToStrain) -> 
     slope = observations.select_frames(times.log_time_derivatives)
     slope = np.where(np.isfinite(slope) & (slope > 0), slope, np.inf)
     return np.where(np.isfinite(jacobian), jacobian, 0.0)[0], np.where(ends, 0.0, 1.0 / slope)[0]
-
-
-def _log_times(times: Floats) -> Floats:
-    """ln of times; infinity for a time that is never reached."""
-    with np.errstate(divide="ignore"):
-        return np.where(np.isnan(times), np.inf, np.log(np.where(np.isnan(times), 1.0, times)))
 
 
 def _time_derivative(observations: ObservationVector, predicted: Floats) -> Floats:

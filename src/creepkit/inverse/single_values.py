@@ -104,6 +104,16 @@ class LawAtTests:
     noise_model: NoiseModel | None
     predictor: Predictor
 
+    @classmethod
+    def of_fit(
+        cls, fit: Identification, predictor: Predictor | None = None, *, test_scatter: bool = True
+    ) -> LawAtTests:
+        """Of an identification, with another predictor or its own."""
+        known = predictor or fit.predictor
+        assert known is not None
+        noise_model = fit.noise_model if test_scatter else None
+        return cls(fit.coordinates, fit.u, fit.scatter_of_rates, noise_model, known)
+
     def compared(
         self, histories: Sequence[History], *, without_curves: bool = True
     ) -> list[tuple[SingleValue | None, SingleValue | None]]:
@@ -205,7 +215,7 @@ def minimum_rates_of(fit: Identification) -> list[MinimumRate]:
     measured = {k: rate for k, h in enumerate(fit.histories) if np.isfinite(rate := measured_minimum_rate(h))}
     if not measured or fit.predictor is None:
         return []
-    law = LawAtTests(fit.coordinates, fit.u, fit.scatter_of_rates, fit.noise_model, fit.predictor)
+    law = LawAtTests.of_fit(fit, fit.predictor)
     # as tests of which the minimum rate is known, over the same duration
     known: dict[str, Any] = {"outputs": {}, "minimum_rate_sd": None, "includes_elastic": False}
     whole = [fit.histories[k] for k in measured]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.rate_explanations import RatePerturbations
+from creepkit.inverse.rate_perturbations import SCATTERS, RatePerturbations
 from creepkit.language.symbols import GAS_CONSTANT
 
 HOUR, T_REF = 3600.0, 873.15
@@ -129,7 +129,6 @@ def test_the_evidence_is_that_of_the_dense_covariance():
 
     from creepkit.inverse.iterative_estimation import linearised
     from creepkit.inverse.noise_model import covariance
-    from creepkit.inverse.rate_explanations import SCATTERS
 
     fit = fitted(bars(power_law(5.0, 4e5), factor={2: 2.0})[:6])
     problem, x = fit.least_squares_problem, fit.x
