@@ -185,13 +185,14 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
     evidence, by more than chance does, to that of the best law as the tests are stated; and that was not credible
     before, or none explains the tests. What the best law alone would need stands in its adequacy.
     """
-    if any(fit.linearised is None for fit in fits):
+    trials = [*_trials(fits)]
+    if not trials:
         return ()
     rejected = fits[0].adequacy is not None and fits[0].adequacy.rejects
     as_stated, _ = _scores(fits, _problems(fits))
     raised = [
         (float(trial.scores[law]), law, trial)
-        for trial in _trials(fits)
+        for trial in trials
         for law, fit in enumerate(fits)
         if trial.scores[law] < as_stated[law] - DISTINGUISHABLE_CHI_SQUARE
         and trial.scores[law] < as_stated.min() + DISTINGUISHABLE_CHI_SQUARE
@@ -204,11 +205,11 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
     laws = sorted((law for _, law, trial in raised if trial is best), key=lambda law: len(fits[law].u))
     if laws == [0]:
         return ()
-    trials = {best.effects[0].kind: best}
+    by_kind = {best.effects[0].kind: best}
     for other_score, law, trial in sorted(raised, key=lambda one: one[0]):
         if law == laws[0] and other_score < score + DISTINGUISHABLE_CHI_SQUARE:
-            trials.setdefault(trial.effects[0].kind, trial)
-    texts = [trial.description(fits, laws[0]) for trial in trials.values()]
+            by_kind.setdefault(trial.effects[0].kind, trial)
+    texts = [trial.description(fits, laws[0]) for trial in by_kind.values()]
     names = " or ".join(fits[law].law.name for law in laws[:MOST_NAMED])
     sentence = f"with {' or with '.join(texts[:MOST_NAMED])} {names} would explain them"
     return (Challenge("unmodelled effect", best.effects[0].kind, sentence),)
