@@ -1,6 +1,6 @@
 """Inconel 625: do discovered temperature forms of n(t) predict better than plain Arrhenius?
 
-    python tests/benchmarks/inconel_temperature.py [FOLDER] [--through surrogate|bulge] [--max-forms 2] [--frames 16]
+    python tests/benchmarks/inconel_temperature.py [FOLDER] [--through surrogate|bulge] [--max-refits 8] [--frames 16]
                                                    [--no-finite-elements] [--write]
 
 FOLDER (../shared/data/dabi/in625) holds nine bulge tests between 716 and 811 C. The law is Eq. (1) with m = 0; the
@@ -117,7 +117,7 @@ def main() -> None:
     parser = arguments(__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=Path("../shared/data/dabi/in625"))
     parser.add_argument("--through", choices=("surrogate", "bulge"), default="surrogate")
-    parser.add_argument("--max-forms", type=int, default=2, help="forms of one parameter that are refitted")
+    parser.add_argument("--max-refits", type=int, default=8, help="combinations of forms that are refitted")
     parser.add_argument("--frames", type=int, default=16)
     parser.add_argument("--no-finite-elements", action="store_true")
     options = parser.parse_args()
@@ -129,7 +129,7 @@ def main() -> None:
     page = Page("inconel_temperature" if by_surrogate else "inconel_temperature_bulge", __doc__)
 
     settings = replace(ALL_TESTS, frames=options.frames)
-    refitting = {"max_forms": options.max_forms, "settings": settings}
+    refitting = {"max_refits": options.max_refits, "settings": settings}
     alone = identify_each(tests, using, replace(ONE_TEMPERATURE, frames=options.frames))
     result = discover(alone, forms=FORMS)
     result = refit(result, tests, using, progress=print_step, **refitting)

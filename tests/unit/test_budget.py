@@ -20,7 +20,7 @@ BUDGET = {
     "cli": 2300,
     "core": 100,
     "dataset": 820,
-    "discovery": 1240,
+    "discovery": 1490,
     "experiments": 1710,
     "exporters": 2690,
     "extraction": 1150,
@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1490,
     "instruments": 1400,
     "integration": 1100,
-    "inverse": 11890,
+    "inverse": 11995,
     "jobs": 260,
     "kernels": 1710,
     "language": 1590,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33610
+TESTS = 33830
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -12,9 +12,11 @@ fails is recorded with its reason, and the others go on.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +26,7 @@ from creepkit.discovery.regression import IsothermalEstimates, Regression, regre
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.information_criteria import criterion_weights
 from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.jobs.progress import duration_text
 from creepkit.language import CreepLaw
 
 MAX_EXHAUSTIVE = 150
@@ -75,14 +78,17 @@ class RankedCombinations:
     overdispersion : c, by which the covariances of the estimates are too small.
     plausible_forms : {parameter: forms that remain, best first}: those that have 95 % of the weight, and those
         equivalent to the best with no more numbers.
-    law : the law with the best forms. failed : {forms, in the order of the parameters: why nothing came of them}.
+    candidates : {parameter: the forms it may take}. law : the law with the best forms.
+    failed : {forms, in the order of the parameters: why nothing came of them}.
     """
 
     combinations: tuple[WeightedCombination, ...]
     overdispersion: float
     plausible_forms: Mapping[str, tuple[FormWeight, ...]]
+    candidates: Mapping[str, Sequence[CandidateForm]]
     law: CreepLaw
     failed: Mapping[tuple[str, ...], str]
+    optimizer: Any = None
 
     @property
     def best(self) -> Regression:
@@ -98,11 +104,15 @@ def rank_combinations(
     points: IsothermalEstimates,
     candidates: Mapping[str, Sequence[CandidateForm]],
     progress: IterationCallback | None = None,
+    optimizer: Any = None,
 ) -> RankedCombinations:
-    """Fit combinations of one library for each parameter, and weigh them."""
+    """Fit combinations of one library for each parameter, and weigh them; optimizer : see regress()."""
     names, combination_count = list(candidates), int(np.prod([len(forms) for forms in candidates.values()]))
     cache = _RegressionCache(
-        points, min(combination_count, MAX_SWEEPS * sum(len(own) for own in candidates.values())), progress
+        points,
+        min(combination_count, MAX_SWEEPS * sum(len(own) for own in candidates.values())),
+        None if progress is None else progress_with_duration("combinations of forms", progress),
+        optimizer,
     )
     if combination_count <= MAX_EXHAUSTIVE:
         cache.total = combination_count
@@ -110,9 +120,10 @@ def rank_combinations(
             cache(forms_of_combination)
     else:
         _coordinate_search(cache, candidates)
+    distinct = {tuple(one.forms.values()): one for one in cache.regressions.values()}  # terms may have been dropped
     admissible = [
         regression
-        for regression in cache.regressions.values()
+        for regression in distinct.values()
         if regression.parameter_count < regression.rows - 1 and regression.within_bounds()
     ]
     while admissible:
@@ -132,14 +143,34 @@ def rank_combinations(
     excess, weights = criterion_weights(scores)
     combinations = [WeightedCombination(admissible[k], float(excess[k]), float(weights[k])) for k in order]
     plausible_forms = {name: _plausible_forms(name, combinations, points, overdispersion) for name in names}
-    return RankedCombinations(tuple(combinations), overdispersion, plausible_forms, law, cache.failed)
+    return RankedCombinations(
+        tuple(combinations), overdispersion, plausible_forms, candidates, law, cache.failed, optimizer
+    )
+
+
+def progress_with_duration(what: str, progress: IterationCallback) -> IterationCallback:
+    """Progress of work of many like parts, named with the time that all will take, measured on the first of them.
+
+    what : the parts, in the plural.
+    """
+    names: list[str] = []
+    start = time.monotonic()
+
+    def tick(part: str, done: int, total: int) -> None:
+        if not names:
+            names.append(f"{total} {what} at most, about {duration_text(total / done * (time.monotonic() - start))}")
+        progress(names[0], done, total)
+
+    return tick
 
 
 class _RegressionCache:
     """Regressions of combinations, each made once; total : how many there may be; failed : why of those that end."""
 
-    def __init__(self, points: IsothermalEstimates, total: int, progress: IterationCallback | None) -> None:
-        self.points, self.total, self.progress = points, total, progress
+    def __init__(
+        self, points: IsothermalEstimates, total: int, progress: IterationCallback | None, optimizer: Any
+    ) -> None:
+        self.points, self.total, self.progress, self.optimizer = points, total, progress, optimizer
         self.regressions: dict[tuple[str, ...], Regression] = {}
         self.failed: dict[tuple[str, ...], str] = {}
 
@@ -147,11 +178,11 @@ class _RegressionCache:
         key = tuple(form.name for form in forms)
         if key not in self.regressions and key not in self.failed:
             try:
-                self.regressions[key] = regress(self.points, forms)
+                self.regressions[key] = regress(self.points, forms, self.optimizer)
             except FAILURES as error:
                 self.failed[key] = str(error)
             if self.progress is not None:
-                self.progress("combination of forms", len(self.regressions) + len(self.failed), self.total)
+                self.progress("", len(self.regressions) + len(self.failed), self.total)
         return self.regressions.get(key)
 
     def score(self, forms: Sequence[CandidateForm]) -> float:

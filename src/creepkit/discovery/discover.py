@@ -34,8 +34,8 @@ from creepkit.records.units import celsius_text
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictor, resolve_predictors
 
-Forms = Sequence[str] | Mapping[str, Sequence[str]]
-"""Names of temperature forms, or {parameter: names}."""
+Forms = Any
+"""One or more temperature forms, or {parameter: one or more}; see discover()."""
 
 
 PriorOdds = Mapping[str, Mapping[str, float]]
@@ -47,26 +47,36 @@ def discover(
     fits: Sequence[Identification],
     *,
     forms: Forms | None = None,
+    optimizer: Any = None,
     prior: PriorOdds | None = None,
     parameters: Sequence[str] | None = None,
     histories: Sequence[History] | None = None,
     using: Predictor | str | None = None,
     settings: IdentificationSettings | None = None,
+    joint_fit: Identification | None = None,
     progress: IterationCallback | None = None,
 ) -> TemperatureLaw:
     """Find closed forms of the parameters against temperature, and compare them on the tests where those are given.
 
     fits : identifications of one law, each at one temperature; three temperatures or more.
-    forms : names of registered temperature forms, or {parameter: names}; by default all that suit a parameter.
+    forms : a list of temperature forms, or {parameter: list}; by default all registered ones that suit a parameter. A
+        form is a name; a sympy expression in ck.temperature, with the parameter's symbol or to be added to it; a
+        function of temperature; one that returns a TemperatureForm for a T_ref, as ck.linear; or a feature library of
+        pysindy, whose features of T/1000 K are forms each and all together.
+    optimizer : of pysindy, such as pysindy.STLSQ(threshold=2.0); it drops terms of a combination, whose coefficients it
+        sees in standard deviations of their whitened columns. By default every term stays and the forms are weighed.
     prior : {parameter: {form: odds}} in the place of the default, which counts 1/T four times for the coefficient of a
         rate and shares equal odds among forms of equally many numbers; printed with the result.
     parameters : those that may depend on temperature; by default all.
     histories : all tests; the forms are then put back into the law and refitted to them (see refit). using, settings :
         the predictor and the settings of that; by default those of the first identification.
+    joint_fit : an identification of the law times Arrhenius' factor from all tests, where the refits begin.
+
+    A combination of forms that fails is recorded in the notes with its reason, and the others go on.
     """
     estimates = IsothermalEstimates.from_identifications(fits)
     candidates = candidate_forms_of(estimates, forms, prior or {}, parameters)
-    combinations = rank_combinations(estimates, candidates, progress)
+    combinations = rank_combinations(estimates, candidates, progress, optimizer)
     odds = {
         name: {form.name: form.prior_odds for form in forms_of_parameter}
         for name, forms_of_parameter in candidates.items()
@@ -79,7 +89,7 @@ def discover(
         raise FitError("the identifications were loaded from files: give using=, the specimen they were made with")
     settings = settings or fits[0].settings
     tests, _ = sound_tests(list(histories), settings)
-    return refit(temperature_law, tests, predictor, settings=settings, progress=progress)
+    return refit(temperature_law, tests, predictor, settings=settings, joint_fit=joint_fit, progress=progress)
 
 
 def candidate_forms_of(
@@ -92,7 +102,7 @@ def candidate_forms_of(
     rate_coefficients = {law.names[k] for k in coordinates.coefficients}
     forms_by_parameter = {}
     for name in law.names:
-        form_names = forms.get(name) if isinstance(forms, Mapping) else forms
+        form_names = _listed(forms.get(name) if isinstance(forms, Mapping) else forms)
         if parameters is not None and name not in parameters:
             form_names = (CONSTANT,)
         forms_by_parameter[name] = candidate_forms(
@@ -112,11 +122,18 @@ def check_form_options(
     law: CreepLaw, forms: Forms | None = None, prior: PriorOdds | None = None, parameters: Sequence[str] | None = None
 ) -> None:
     """Raise an error, before any work, for names of parameters or temperature forms that there are not."""
-    by_parameter = forms if isinstance(forms, Mapping) else {}
+    by_parameter = {n: _listed(own) or () for n, own in forms.items()} if isinstance(forms, Mapping) else {}
     for name in (*(parameters or ()), *(prior or ()), *by_parameter):
         law.symbol(name)
-    listed = chain.from_iterable(by_parameter.values()) if by_parameter else forms or ()
-    check_form_names(chain(listed, *(prior or {}).values()))
+    listed = [*(chain.from_iterable(by_parameter.values()) if by_parameter else _listed(forms) or ())]
+    names = [one for one in listed if isinstance(one, str)]
+    registered_prior = () if len(names) < len(listed) else chain.from_iterable((prior or {}).values())
+    check_form_names(chain(names, registered_prior))
+
+
+def _listed(forms: Any) -> Sequence[Any] | None:
+    """Forms as a list, where one stands alone."""
+    return forms if forms is None or isinstance(forms, list | tuple) else [forms]
 
 
 @checked
@@ -211,8 +228,9 @@ def temperature_study(
         notes.append(str(error))
     else:
         temperature_law = discover(
-            isothermal_fits, histories=histories, using=predictor, settings=settings, progress=progress, **form_options
-        )
+            isothermal_fits, histories=histories, using=predictor, settings=settings, joint_fit=joint_fit,
+            progress=progress, **form_options
+        )  # fmt: skip
     return TemperatureStudy(
         tuple(histories), moduli_fit, joint_fit, tuple(isothermal_fits), temperature_law, tuple(notes)
     )

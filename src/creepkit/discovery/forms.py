@@ -7,7 +7,7 @@ a regression finds the coefficients, and the functions are named: {name: sympy t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -17,6 +17,7 @@ import sympy
 
 from creepkit import registry
 from creepkit.arrays import Floats
+from creepkit.discovery.given_forms import given_forms, symbol_names
 from creepkit.errors import FitError, LawError, nearest
 from creepkit.language import CreepLaw, Param, TemperatureFactor, TemperatureForm, temperature
 from creepkit.laws.temperature_forms import creepkit_temperature_forms
@@ -62,6 +63,27 @@ class CandidateForm:
         """Its numbers by name: coefficients, then what is inside exponentials."""
         return (*self.terms, *(s.name for s in self.nonlinear_parameters))
 
+    def without(self, dropped: Set[str]) -> CandidateForm:
+        """The form without some of its coefficients; a constant where no other number is left."""
+        gone = [name for name in self.terms if name in dropped]
+        form = self.form
+        if not gone or form is None:
+            return self
+        terms = {name: term for name, term in self.terms.items() if name not in dropped}
+        table = {name: param for name, param in self.table.items() if name not in dropped}
+        if len(terms) == 1 and self.offset == 0:
+            own = {self.parameter: self.table[self.parameter]}
+            return CandidateForm(CONSTANT, self.parameter, None, terms, own, prior_odds=self.prior_odds)
+
+        def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
+            expression, extra = form.build(symbol, param)
+            zero = {s: 0 for s in extra if s.name in dropped}
+            return expression.subs(zero), {s: p for s, p in extra.items() if s not in zero}
+
+        name = f"{self.name} without {', '.join(gone)}"
+        reduced = TemperatureForm(name, build, form.reference, form.T_ref)
+        return replace(self, name=name, form=reduced, terms=terms, table=table)
+
     @cached_property
     def functions(self) -> list[Callable[..., Any]]:
         """One function of (T, *inner) for each term, and one for the offset."""
@@ -100,37 +122,33 @@ def candidate_forms(
     is_rate_coefficient: bool,
     T_ref: float,
     temperatures: Floats,
-    forms: Sequence[str] | None = None,
+    forms: Sequence[Any] | None = None,
     prior: Mapping[str, float] | None = None,
 ) -> list[CandidateForm]:
     """The forms that a parameter may take, the constant first, each with its prior odds.
 
     is_rate_coefficient : whether the parameter is the coefficient of a rate, which Arrhenius' factor is for.
     temperatures : (temperatures,) K of the estimates; T_ref : K.
-    forms : names of those wanted; by default all that are registered. Two that span the same functions are one.
+    forms : those wanted, by name or as given_forms() takes them; by default all that are registered. Two that span the
+        same functions are one. Where none of those given by a user suits, the parameter is constant.
     prior : {form: odds}; the others have the default: forms of equally many numbers share equal odds, and for rates 1/T
         counts ARRHENIUS_ODDS times.
     """
-    param, registered = law.table[parameter], registry.default_registry().temperature_forms()
-    form_names = [CONSTANT, *registered] if forms is None else list(forms)
-    check_form_names(form_names)
+    param, wanted = law.table[parameter], _forms_by_name(law, parameter, T_ref, forms)
     forms_found = [CandidateForm(CONSTANT, parameter, None, {parameter: sympy.S.One}, {parameter: param})]
-    for name in sorted(form_names, key=lambda n: (n != ARRHENIUS, n not in creepkit_temperature_forms(), n)):
-        temperature_form = registered[name].value(T_ref) if name != CONSTANT else None
-        suitable = (
-            None
-            if temperature_form is None
-            else candidate_form(name, law, parameter, temperature_form, is_rate_coefficient)
-        )
+    for name in sorted(wanted, key=lambda n: (n != ARRHENIUS, n not in creepkit_temperature_forms(), n)):
+        suitable = candidate_form(name, law, parameter, wanted[name], is_rate_coefficient) if name != CONSTANT else None
         if (
             suitable is not None
             and suitable.parameter_count < len(temperatures)
             and not _is_duplicate(suitable, forms_found, temperatures)
         ):
             forms_found.append(suitable)
-    retained = [candidate for candidate in forms_found if candidate.name in form_names]
+    retained = [candidate for candidate in forms_found if candidate.name in wanted]
+    if not retained and any(not isinstance(form, str) for form in forms or ()):
+        retained = forms_found[:1]
     if not retained:
-        raise FitError(f"none of the forms {', '.join(form_names)} suits parameter '{parameter}' of law '{law.name}'")
+        raise FitError(f"none of the forms {', '.join(wanted)} suits parameter '{parameter}' of law '{law.name}'")
     for name in prior or {}:
         if name not in {one.name for one in retained}:
             suggestion = nearest(name, [one.name for one in retained])
@@ -138,6 +156,19 @@ def candidate_forms(
                 f"prior odds are given for '{name}', no form that parameter '{parameter}' may take: {suggestion}"
             )
     return _with_prior_odds(retained, is_rate_coefficient, prior or {})
+
+
+def _forms_by_name(law: CreepLaw, parameter: str, T_ref: float, forms: Sequence[Any] | None) -> dict[str, Any]:
+    """{name: form about T_ref} of those wanted of a parameter, without expressions that name another parameter."""
+    registered = registry.default_registry().temperature_forms()
+    wanted: dict[str, Any] = {}
+    for form in [CONSTANT, *registered] if forms is None else forms:
+        if isinstance(form, str):
+            check_form_names([form])
+            wanted[form] = None if form == CONSTANT else registered[form].value(T_ref)
+        elif not symbol_names(form) & {*law.names} - {parameter}:
+            wanted |= {one.name: one for one in given_forms(form, T_ref)}
+    return wanted
 
 
 def factor_as_form(factor: TemperatureFactor, keep_names: bool) -> TemperatureForm:

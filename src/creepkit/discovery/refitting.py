@@ -1,11 +1,11 @@
 """Forms put back into the law, refitted to the tests themselves, and weighed by BIC and prior odds.
 
-Regression on estimates inherits how badly single temperatures determine them; the tests together do not. Each
-combination of forms makes an ordinary law, which is identified from all tests at once, starting where the regression
-ended, and ranked by BIC under one covariance. Where more forms of a parameter are plausible than are to be tried, one
-represents those that the estimates cannot distinguish from it. One parameter's form is changed at a time with the
-others as they are best so far; then each is reset to the simplest one, to see whether it was needed; the best law is
-searched for again over the whole of its bounds.
+Regression on estimates inherits how badly single temperatures determine them; the tests together do not. The tests of
+each temperature are linearised again about the curves of the best combination, with one simulation of each test and its
+derivatives, which gives estimates that are near to one another where the first ones were at the ends of flat valleys.
+On them all combinations are ranked anew. The credible ones and the simplest one, Arrhenius with every other parameter
+constant, become ordinary laws that are identified from all tests, beginning where the regression ended, and ranked by
+BIC under one covariance; one represents those that the estimates cannot distinguish from it.
 """
 
 from __future__ import annotations
@@ -20,16 +20,28 @@ from creepkit.discovery.combinations import (
     CREDIBLE_MASS,
     FAILURES,
     FormWeight,
+    RankedCombinations,
+    progress_with_duration,
+    rank_combinations,
     squared_mahalanobis,
     weight_of_better_forms,
 )
-from creepkit.discovery.forms import ARRHENIUS, CandidateForm, law_with_forms
-from creepkit.discovery.regression import IsothermalEstimates, Regression, check_temperatures, regress
+from creepkit.discovery.forms import ARRHENIUS, CONSTANT, CandidateForm, evaluate_forms, law_with_forms
+from creepkit.discovery.regression import (
+    IsothermalEstimates,
+    Regression,
+    check_temperatures,
+    isothermal_groups,
+    regress,
+)
 from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw, averaged_estimates
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import identify
+from creepkit.inverse.identify import identify, identify_values
 from creepkit.inverse.information_criteria import criterion_weights
+from creepkit.inverse.iterative_estimation import linearised, starting_point
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
@@ -47,21 +59,18 @@ class RefittedCombination:
     fit: Identification
 
 
-def curve_distance(temperature_law: TemperatureLaw, first: Regression, second: Regression) -> float:
-    """chi^2 between the curves of two combinations, by the covariances of the points."""
-    return squared_mahalanobis(
-        first, second, temperature_law.isothermal_estimates, temperature_law.combinations.overdispersion
-    )
-
-
 def weigh_refits(
-    temperature_law: TemperatureLaw, refits: Sequence[RefittedCombination], failed: Mapping[tuple[str, ...], str]
+    temperature_law: TemperatureLaw,
+    refits: Sequence[RefittedCombination],
+    failed: Mapping[tuple[str, ...], str],
+    points: IsothermalEstimates,
 ) -> TemperatureLaw:
     """The temperature law with forms weighed by the tests.
 
-    failed : {forms: why they could not be refitted}, which become notes.
+    failed : {forms: why they could not be refitted}, which become notes. points : those that combinations were ranked
+        on last.
     """
-    ranking = rank([refit.fit for refit in refits])
+    ranking = rank([refit.fit for refit in refits], challenge=False)
     bic_differences = {id(entry.fit): entry.excess for entry in ranking.laws}
     odds = np.array([one.regression.prior_odds for one in refits])
     scores = np.array([bic_differences[id(one.fit)] for one in refits]) - 2.0 * np.log(odds)
@@ -76,7 +85,7 @@ def weigh_refits(
         estimates=averaged_estimates(best.fit.law, candidates),
         criterion_data="histories",
         plausible_forms={
-            name: _plausible_forms_of_refits(temperature_law, candidates, name)
+            name: _plausible_forms_of_refits(temperature_law.combinations, points, candidates, name)
             for name in temperature_law.isothermal_law.names
         },
         candidates=candidates,
@@ -101,31 +110,50 @@ def _candidate_law(refit: RefittedCombination, criterion_difference: float, weig
 
 
 def _plausible_forms_of_refits(
-    temperature_law: TemperatureLaw, candidates: Sequence[CandidateLaw], name: str
+    combinations: RankedCombinations, points: IsothermalEstimates, candidates: Sequence[CandidateLaw], name: str
 ) -> tuple[FormWeight, ...]:
     """Forms that have 95 % of the weight, then those not refitted whose nearest neighbour is among them."""
     weights: dict[str, float] = {}
     for candidate in candidates:
         weights[candidate.forms[name]] = weights.get(candidate.forms[name], 0.0) + candidate.weight
     retained = [form for form, weight in weight_of_better_forms(weights).items() if weight < CREDIBLE_MASS]
-    not_refitted = [form.name for form in temperature_law.plausible_forms[name] if form.name not in weights]
-    with_form = temperature_law.combinations.with_form
+    known = {combination.forms[name] for combination in combinations.combinations}
+    tried = [form for form in weights if form in known]
 
     def nearest(form: str) -> str:
-        return min(
-            weights, key=lambda tried: curve_distance(temperature_law, with_form(name, form), with_form(name, tried))
-        )
+        curve = combinations.with_form(name, form)
+        distances = [
+            squared_mahalanobis(curve, combinations.with_form(name, one), points, combinations.overdispersion)
+            for one in tried
+        ]
+        return tried[int(np.argmin(distances))]
 
-    represented = [form for form in not_refitted if nearest(form) in retained]
+    not_refitted = [form.name for form in combinations.plausible_forms[name] if form.name not in weights]
+    represented = [form for form in not_refitted if tried and nearest(form) in retained]
     return tuple(FormWeight(form, weights.get(form, 0.0), form in represented) for form in (*retained, *represented))
 
 
-MAX_FORMS = 6
-"""Forms of one parameter that are refitted."""
+MAX_REFITS = 6
+"""Combinations that are refitted to all tests."""
 
 
-SIMILAR_CHI_SQUARE = 0.5
-"""chi^2 between the curves of two forms below which other forms are tried first."""
+MAX_ROUNDS = 4
+"""How often the tests are linearised about the curves of the best forms, and combinations are ranked again."""
+
+
+REFITS_PER_ROUND = 2
+
+
+ENOUGH_CHI_SQUARE = 12.0
+"""Rise of chi^2 from the best combination up to which a simpler one is refitted."""
+
+
+NEAR_BIC = 6.0
+"""BIC less the best up to which a combination is refitted with simpler forms."""
+
+
+SIMILAR_CHI_SQUARE = 1.0
+"""chi^2 between the curves of two combinations below which the one of more numbers is not refitted beside the other."""
 
 
 def refit(
@@ -133,18 +161,18 @@ def refit(
     histories: Sequence[History],
     using: Predictor,
     *,
-    max_forms: int = MAX_FORMS,
+    max_refits: int = MAX_REFITS,
     settings: IdentificationSettings | None = None,
-    search_again: bool = True,
+    joint_fit: Identification | None = None,
     progress: IterationCallback | None = None,
 ) -> TemperatureLaw:
-    """Refit the forms that remain to the tests, and weigh them by how well they follow these.
+    """Refit the combinations that remain to the tests, and weigh them by how well they follow these.
 
     settings : where values are to come from frames of equal weight ("noise", the default) the likelihood takes its
         place: combinations must be compared under one covariance, with scatter between tests and autocorrelation in it.
-    max_forms : forms of one parameter that are tried; where an identification is expensive, 3 are enough. The simplest
-        law, Arrhenius with every other parameter constant, is always among the combinations.
-    search_again : whether the best law is searched for again over the whole of its bounds.
+    max_refits : combinations that are refitted at most; the simplest law, Arrhenius with every other parameter
+        constant, is always among them.
+    joint_fit : an identification of that law from all tests, where to begin.
     """
     check_temperatures([h.mean_temperature for h in histories])
     cache = _RefitCache(
@@ -152,30 +180,47 @@ def refit(
         list(histories),
         using,
         _likelihood_settings(settings or IdentificationSettings()),
-        progress,
+        None if progress is None else progress_with_duration("refits of forms", progress),
+        max_refits,
     )
-    forms_to_try = {
-        name: _forms_to_try(temperature_law, name, max_forms) for name in temperature_law.isothermal_law.names
-    }
-    current = {form.parameter: form for form in temperature_law.candidates[0].candidate_forms}
-    baseline = {name: _baseline_form(temperature_law, name) for name in temperature_law.isothermal_law.names}
-    cache.total = 2 + sum(len(forms) for forms in forms_to_try.values())
-    cache(list(baseline.values()))
-    cache(list(current.values()))
-    for name in sorted(forms_to_try, key=lambda n: -len(forms_to_try[n])):
-        current = cache.try_forms(current, name, forms_to_try[name])
-    for name in [n for n in current if current[n].name != baseline[n].name]:
-        current = cache.try_forms(current, name, [baseline[name]])
+    combinations, points, notes = temperature_law.combinations, temperature_law.isothermal_estimates, []
+    cache(combinations.best.candidate_forms, points, joint_fit)
+    cache(_baseline(combinations), points, joint_fit)
+    every, last = combinations.candidates, None
+    linear = {name: [one for one in own if not one.nonlinear_parameters] or own for name, own in every.items()}
+    try:
+        for _ in range(MAX_ROUNDS):
+            if not cache.fitted or cache.best is last:
+                break
+            last = cache.best
+            points = cache.linearised_about(last)
+            cache.refit_credible(rank_combinations(points, linear, optimizer=combinations.optimizer), points)
+        combinations = rank_combinations(points, every, optimizer=combinations.optimizer)
+        cache.refit_credible(combinations, points)
+        cache.refit_simpler(_baseline(combinations), points)
+    except FAILURES as error:
+        notes.append(f"the search of forms by all tests ended early: {error}")
     if not cache.fitted:
-        note = f"no form could be refitted to the tests: {next(iter(cache.failed.values()))}"
-        return replace(temperature_law, notes=(*temperature_law.notes, note))
-    if search_again:
-        cache.search_again()
-    return weigh_refits(temperature_law, list(cache.fitted.values()), cache.failed)
+        notes.append(f"no form could be refitted to the tests: {next(iter(cache.failed.values()))}")
+        return replace(temperature_law, notes=(*temperature_law.notes, *notes))
+    cache.finish()
+    return weigh_refits(
+        replace(temperature_law, combinations=combinations, notes=(*temperature_law.notes, *notes)),
+        list(cache.fitted.values()),
+        cache.failed,
+        points,
+    )
 
 
 def _likelihood_settings(settings: IdentificationSettings) -> IdentificationSettings:
     return replace(settings, weights="likelihood") if settings.weights == "noise" else settings
+
+
+def _baseline(combinations: RankedCombinations) -> list[CandidateForm]:
+    """Arrhenius of a rate, else the constant, else the best."""
+    best = {form.parameter: form for form in combinations.best.candidate_forms}
+    by_name = {name: {form.name: form for form in forms} for name, forms in combinations.candidates.items()}
+    return [own.get(ARRHENIUS) or own.get(CONSTANT) or best[name] for name, own in by_name.items()]
 
 
 @dataclass(eq=False)
@@ -187,114 +232,125 @@ class _RefitCache:
     predictor: Predictor
     settings: IdentificationSettings
     progress: IterationCallback | None
+    max_refits: int
     fitted: dict[tuple[str, ...], RefittedCombination] = field(default_factory=dict)
     failed: dict[tuple[str, ...], str] = field(default_factory=dict)
-    total: int = 0
 
-    def __call__(self, forms: Sequence[CandidateForm]) -> None:
+    @property
+    def count(self) -> int:
+        """Combinations that were refitted, or could not be."""
+        return len(self.fitted) + len(self.failed)
+
+    def __call__(
+        self, forms: Sequence[CandidateForm], points: IsothermalEstimates, joint_fit: Identification | None = None
+    ) -> None:
+        """Refit a combination, beginning at its regression on points, or at a fit of the same law."""
         key = tuple(form.name for form in forms)
         if key in self.fitted or key in self.failed:
             return
-        fits, failure = [], ""
         try:
-            regression = regress(self.estimates, forms)
+            regression = regress(points, forms)
             law = law_with_forms(self.estimates.law, forms)
-            starts = self._starts(law, regression)
+            fits = [self._identify(law, start) for start in self._starts(law, regression, joint_fit)]
         except FAILURES as error:
-            starts, failure = [], str(error)
-        for start_values in starts:
-            try:
-                fits.append(self._identify(law, start_values))
-            except FAILURES as error:
-                failure = str(error)
-        if fits:
+            self.failed[key] = str(error)
+        else:
             fit = max(fits, key=lambda end: end.log_likelihood)
             self.fitted[key] = RefittedCombination(tuple(forms), regression, fit)
-        else:
-            self.failed[key] = failure
         if self.progress is not None:
-            self.progress("form of temperature", min(len(self.fitted) + len(self.failed), self.total), self.total)
+            self.progress("", self.count, self.max_refits)
 
-    def try_forms(
-        self, current: Mapping[str, CandidateForm], name: str, forms: Sequence[CandidateForm]
-    ) -> dict[str, CandidateForm]:
-        """Other forms of one parameter put in the place of its form now; returns the best combination so far."""
-        for form in forms:
-            self(list({**current, name: form}.values()))
-        return {best_form.parameter: best_form for best_form in self.best.forms} if self.fitted else dict(current)
+    def refit_credible(self, combinations: RankedCombinations, points: IsothermalEstimates) -> None:
+        """Refit the combinations that have 95 % of the weight, but those that another represents."""
+        weight, before = 0.0, self.count
+        tried = [one.regression for one in combinations.combinations if tuple(one.forms.values()) in self.fitted]
+        for one in combinations.combinations:
+            represented = any(
+                other.parameter_count <= one.regression.parameter_count
+                and squared_mahalanobis(one.regression, other, points, 1.0) < SIMILAR_CHI_SQUARE
+                for other in tried
+            )
+            if weight > CREDIBLE_MASS or self.count >= min(self.max_refits, before + REFITS_PER_ROUND):
+                return
+            weight += one.weight
+            if not represented:
+                self(one.regression.candidate_forms, points)
+                tried.append(one.regression)
+
+    def refit_simpler(self, baseline: Sequence[CandidateForm], points: IsothermalEstimates) -> None:
+        """Refit what remains with one parameter at a time in its simplest form, where that may be enough.
+
+        Two parameters that both have a wrong form make up for each other, so that combinations near the best count too.
+        """
+        ranking = rank([refit.fit for refit in self.fitted.values()], challenge=False)
+        near = {id(one.fit) for one in ranking.laws if one.excess < NEAR_BIC}
+        for refit in [one for one in self.fitted.values() if id(one.fit) in near]:
+            forms = list(refit.forms)
+            enough = regress(points, forms).chi_square + ENOUGH_CHI_SQUARE
+            for k, simple in enumerate(baseline):
+                simpler = [*forms[:k], simple, *forms[k + 1 :]]
+                if simple.name != forms[k].name and regress(points, simpler).chi_square < enough:
+                    self(simpler, points)
+
+    def linearised_about(self, refit: RefittedCombination) -> IsothermalEstimates:
+        """Estimates at each temperature by one step of Gauss and Newton from the curves of a refit.
+
+        Each temperature keeps the noise that its identification found; that of the refit holds what its forms miss.
+        """
+        points, law = self.estimates, self.estimates.law
+        internal = dict(zip(refit.fit.law.names, refit.fit.coordinates.theta(refit.fit.u), strict=True))
+        curves = np.clip(evaluate_forms(refit.forms, internal, points.temperatures), *law.internal_bounds)
+        nuisances = {(n.key, n.owner): n.value for n in refit.fit.nuisances}
+        groups = isothermal_groups([h.mean_temperature for h in self.histories])
+        theta, covariance = [], []
+        for fit, curve in zip(points.fits, curves, strict=True):
+            T = fit.reference.temperature
+            tests = min(
+                ([self.histories[k] for k in group] for group in groups),
+                key=lambda own: abs(float(np.median([h.mean_temperature for h in own])) - T),
+            )
+            problem = LeastSquaresProblem.from_histories(law, tests, self.predictor, self.settings, points.reference)
+            u = problem.coordinates.u(curve)
+            x = starting_point(problem.nuisance_parameters, u, nuisances)
+            residuals = problem.residuals(x)
+            linear, factor = (
+                linearised(problem, x, residuals),
+                CovarianceFactor.of_residuals(residuals, fit.noise_model),
+            )
+            solution = replace(linear, free=np.ones_like(linear.free)).solve(factor)
+            to_theta = problem.coordinates.jacobian(u)
+            theta.append(curve + to_theta @ solution.step[: u.size])
+            covariance.append(to_theta @ solution.covariance[: u.size, : u.size] @ to_theta.T)
+        return replace(points, theta=np.stack(theta), covariance=np.stack(covariance))
+
+    def finish(self) -> None:
+        """The best law with all that an identification says."""
+        best = self.best
+        start = StartingEstimate.from_identification(best.fit)
+        fit = identify(best.fit.law, self.histories, self.predictor, settings=self.settings, start=start)
+        self.fitted[tuple(form.name for form in best.forms)] = replace(best, fit=fit)
 
     def _identify(self, law: CreepLaw, start: Floats | None) -> Identification:
         estimate = StartingEstimate(start, reference=self.estimates.reference)
-        return identify(law, self.histories, self.predictor, settings=self.settings, start=estimate)
+        return identify_values(law, self.histories, self.predictor, settings=self.settings, start=estimate)
 
-    def _starts(self, law: CreepLaw, regression: Regression) -> list[Floats | None]:
-        """Where the regression ended; where points leave parameters open also the best so far, with idle forms.
+    def _starts(self, law: CreepLaw, regression: Regression, joint_fit: Identification | None) -> list[Floats | None]:
+        """Where a fit of this law ended, or else the regression.
 
-        None stands for a search of the whole bounds: where the first law begins then, or where a start has no
-        conditioned coordinates.
+        None stands for a search of the whole bounds: where the first law begins without a fit of it and points leave
+        parameters open, or where a start has no conditioned coordinates.
         """
-        starts: list[Floats | None] = [_coordinates_within_bounds(law, regression.values, self.estimates)]
-        if self.estimates.has_undetermined_parameters() and not self.fitted:
-            starts.append(None)
-        elif self.estimates.has_undetermined_parameters():
-            fit = self.best.fit
-            best_values = dict(zip(fit.law.names, fit.coordinates.theta(fit.u), strict=True))
-            inactive_values = {
-                name: p.to_internal(p.center if p.off is None else p.off) for name, p in law.table.items()
-            }
-            starts.append(_coordinates_within_bounds(law, {**inactive_values, **best_values}, self.estimates))
-        return [start if start is not None and np.isfinite(start).all() else None for start in starts]
+        values, undetermined = regression.values, self.estimates.has_undetermined_parameters()
+        is_known = joint_fit is not None and set(joint_fit.law.names) == set(law.names)
+        if joint_fit is not None and is_known:
+            values = dict(zip(joint_fit.law.names, joint_fit.coordinates.theta(joint_fit.u), strict=True))
+        theta = np.clip([values[name] for name in law.names], *law.internal_bounds)
+        start = Coordinates(law, self.estimates.reference).u(theta)
+        starts = [start if np.isfinite(start).all() else None]
+        return [*starts, None] if undetermined and not is_known and not self.fitted else starts
 
     @property
     def best(self) -> RefittedCombination:
         """The combination of lowest BIC so far; odds of forms count at the end."""
-        ranking = rank([refit.fit for refit in self.fitted.values()])
+        ranking = rank([refit.fit for refit in self.fitted.values()], challenge=False)
         return next(one for one in self.fitted.values() if one.fit is ranking.best)
-
-    def search_again(self) -> None:
-        """Search the best law anew, and keep the better of the two results."""
-        best_refit = self.best
-        new_fit = self._identify(best_refit.fit.law, None)
-        if new_fit.log_likelihood > best_refit.fit.log_likelihood:
-            key = tuple(library.name for library in best_refit.forms)
-            self.fitted[key] = replace(best_refit, fit=new_fit)
-
-
-def _coordinates_within_bounds(law: CreepLaw, values: Mapping[str, float], estimates: IsothermalEstimates) -> Floats:
-    """Conditioned coordinates, (parameters,), of internal values, within the bounds."""
-    theta = np.clip([values[name] for name in law.names], *law.internal_bounds)
-    return Coordinates(law, estimates.reference).u(theta)
-
-
-def _forms_to_try(temperature_law: TemperatureLaw, name: str, max_forms: int) -> list[CandidateForm]:
-    """The forms of one parameter to try: first those that the estimates can distinguish, then their neighbours.
-
-    Where points leave parameters open, they do not rule out a form that the tests may well ask for.
-    """
-    chosen: list[Regression] = []
-    forms = [form.name for form in temperature_law.plausible_forms[name]]
-    if temperature_law.isothermal_estimates.has_undetermined_parameters():
-        forms += dict.fromkeys(
-            regression.forms[name]
-            for regression in temperature_law.combinations.combinations
-            if regression.forms[name] not in forms
-        )
-    regressions = [temperature_law.combinations.with_form(name, form) for form in forms]
-    for one in regressions:
-        if all(curve_distance(temperature_law, one, other) > SIMILAR_CHI_SQUARE for other in chosen):
-            chosen.append(one)
-    chosen += [one for one in regressions if one not in chosen]
-    return [_form_of(one, name) for one in chosen[:max_forms]]
-
-
-def _baseline_form(temperature_law: TemperatureLaw, name: str) -> CandidateForm:
-    """Arrhenius of a rate, else the constant, else the best."""
-    regressions = {one.forms[name]: one.regression for one in reversed(temperature_law.combinations.combinations)}
-    for form in (ARRHENIUS, "constant"):
-        if form in regressions:
-            return _form_of(regressions[form], name)
-    return next(one for one in temperature_law.candidates[0].candidate_forms if one.parameter == name)
-
-
-def _form_of(regression: Regression, name: str) -> CandidateForm:
-    return next(candidate for candidate in regression.candidate_forms if candidate.parameter == name)

@@ -3,24 +3,28 @@
 A coefficient and its exponent are correlated to -0.99999 at one temperature, so that estimates with separate error bars
 would mislead: all parameters of one temperature stay together, with their whole covariance. The rows of the generalised
 least squares are all parameters at all temperatures, multiplied by the inverse Cholesky factor of each temperature's
-covariance; the columns are the functions of the forms. pysindy solves it without threshold or ridge: over ten per cent
-of temperature the functions are collinear, and a threshold on one wide library keeps all of them with coefficients of
-+-1000. Parameters inside exponentials are found by variable projection (Golub and Pereyra (1973), SIAM J. Numer. Anal.
-10, 413): the coefficients are solved for at each trial of them.
+covariance; the columns are the functions of the forms. It is solved without threshold or ridge unless an optimizer of
+pysindy is given: over ten per cent of temperature the functions are collinear, and a threshold on one wide library
+keeps all of them with coefficients of +-1000. Parameters inside exponentials are found by variable projection (Golub
+and Pereyra (1973), SIAM J. Numer. Anal. 10, 413): the coefficients are solved for at each trial of them.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import sympy
+from scipy.linalg import block_diag
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Bools, Floats
 from creepkit.discovery.forms import CandidateForm, evaluate_forms
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
@@ -52,6 +56,7 @@ class IsothermalEstimates:
         where an identification has few degrees of freedom; wide where a bound holds the value.
     reference : the point where rates are compared.
     ranges : {"stress", "temperature", "strain", "time": (low, high)} that they cover together.
+    fits : the identifications that they come from, in the same order.
     """
 
     law: CreepLaw
@@ -60,6 +65,7 @@ class IsothermalEstimates:
     covariance: Floats
     reference: ReferencePoint
     ranges: dict[str, tuple[float, float]]
+    fits: tuple[Identification, ...] = ()
 
     @classmethod
     def from_identifications(cls, fits: Sequence[Identification]) -> IsothermalEstimates:
@@ -74,6 +80,7 @@ class IsothermalEstimates:
             np.stack([_theta_covariance(fit) for fit in ordered]),
             _central_reference([fit.reference for fit in ordered]),
             _joint_ranges([dict(fit.ranges) for fit in ordered]),
+            tuple(ordered),
         )
 
     @cached_property
@@ -221,26 +228,24 @@ class Regression:
 
 
 class _DesignMatrix:
-    """The columns of all parameters' libraries, over temperatures."""
+    """The columns of all parameters' libraries over temperatures; those without nonlinear parameters are made once."""
 
-    def __init__(self, forms: Sequence[CandidateForm]) -> None:
-        self.forms = tuple(forms)
+    def __init__(self, forms: Sequence[CandidateForm], T: Floats) -> None:
+        self.forms, self.T = tuple(forms), T
         self.parameter_of_column = np.concatenate(
             [np.full(len(form.terms), parameter_index) for parameter_index, form in enumerate(forms)]
         )
         self.nonlinear_parameters: dict[sympy.Symbol, Param] = {
             s: p for one in forms for s, p in one.nonlinear_parameters.items()
         }
+        self._basis = [None if one.nonlinear_parameters else one.basis_values(T, ()) for one in forms]
 
-    def unweighted(self, T: Floats, nonlinear_values: Sequence[float] | Floats) -> tuple[Floats, Floats]:
+    def unweighted(self, nonlinear_values: Sequence[float] | Floats) -> tuple[Floats, Floats]:
         """Functions (temperatures, terms) and offsets (temperatures, parameters)."""
         basis, start = [], 0
-        for form in self.forms:
-            basis.append(
-                form.basis_values(
-                    T, [float(v) for v in nonlinear_values[start : start + len(form.nonlinear_parameters)]]
-                )
-            )
+        for form, fixed in zip(self.forms, self._basis, strict=True):
+            values = [float(v) for v in nonlinear_values[start : start + len(form.nonlinear_parameters)]]
+            basis.append(form.basis_values(self.T, values) if fixed is None else fixed)
             start += len(form.nonlinear_parameters)
         return np.concatenate([p[:, :-1] for p in basis], axis=1), np.stack([p[:, -1] for p in basis], axis=1)
 
@@ -248,17 +253,61 @@ class _DesignMatrix:
         self, estimates: IsothermalEstimates, nonlinear_values: Sequence[float] | Floats
     ) -> tuple[Floats, Floats]:
         """Features (temperatures * parameters, terms) and target (rows,) after multiplication by the whiteners."""
-        functions, offsets = self.unweighted(estimates.temperatures, nonlinear_values)
+        functions, offsets = self.unweighted(nonlinear_values)
         features = np.concatenate(estimates.whitening[:, :, self.parameter_of_column] * functions[:, None, :])
         return features, np.concatenate(np.einsum("kij,kj->ki", estimates.whitening, estimates.theta - offsets))
 
 
-def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm]) -> Regression:
-    """The best numbers of one library for each parameter, with their covariance."""
-    design = _DesignMatrix(forms)
+@dataclass(frozen=True, eq=False)
+class WhitenedSystem:
+    """The linear system y = X c that regression on temperature solves, with residuals of variance 1.
+
+    X : (rows, terms) functions of temperature; y : (rows,). A row is a parameter at a temperature, after multiplication
+    by the inverse Cholesky factor of the covariance of that temperature. covariance : (rows, rows) of the estimates
+    before, in internal values. terms : what the columns are. rows : (parameter, temperature in K) each.
+    """
+
+    X: Floats
+    y: Floats
+    covariance: Floats
+    terms: tuple[str, ...]
+    rows: tuple[tuple[str, float], ...]
+
+
+def whitened_system(
+    estimates: IsothermalEstimates, candidates: Mapping[str, Sequence[CandidateForm]]
+) -> WhitenedSystem:
+    """The system of all functions of the candidates side by side, without those that have nonlinear parameters."""
+    columns, terms, names, T = [], [], estimates.law.names, estimates.temperatures
+    for k, name in enumerate(names):
+        basis = {name: np.ones_like(T)}
+        for form in candidates[name]:
+            if not form.nonlinear_parameters and form.offset == 0:
+                own = form.basis_values(T, ())[:, :-1].T
+                basis |= {f"{c} ({form.name})": v for c, v in zip(form.terms, own, strict=True) if c != name}
+        columns += [(estimates.whitening[:, :, k] * values[:, None]).ravel() for values in basis.values()]
+        terms += list(basis)
+    target = np.einsum("kij,kj->ki", estimates.whitening, estimates.theta).ravel()
+    rows = tuple((name, float(one)) for one in T for name in names)
+    return WhitenedSystem(np.stack(columns, axis=1), target, block_diag(*estimates.covariance), tuple(terms), rows)
+
+
+def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm], optimizer: Any = None) -> Regression:
+    """The best numbers of one library for each parameter, with their covariance.
+
+    optimizer : of pysindy, which drops terms first; the parameters' values at T_ref stay.
+    """
+    design = _DesignMatrix(forms, estimates.temperatures)
     nonlinear_values = _variable_projection(design, estimates) if design.nonlinear_parameters else np.zeros(0)
     features, target = design.whitened(estimates, nonlinear_values)
-    coefficients = solve_with_pysindy(features, target)
+    if optimizer is not None:
+        names = [name for form in forms for name in form.terms]
+        is_value = [name == form.parameter for form in forms for name in form.terms]
+        kept = _kept_terms(features, target, is_value, optimizer)
+        dropped = {name for name, is_kept in zip(names, kept, strict=True) if not is_kept}
+        if dropped:
+            return regress(estimates, [form.without(dropped) for form in forms])
+    coefficients = solve_least_squares(features, target)
     sensitivities = np.concatenate(
         [features, _nonlinear_sensitivities(design, estimates, nonlinear_values, coefficients)], axis=1
     )
@@ -274,15 +323,27 @@ def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm]) -> R
     )
 
 
-def solve_with_pysindy(features: Floats, target: Floats) -> Floats:
-    """Coefficients (terms,) of target (rows,) on features (rows, terms), by pysindy; no term is dropped."""
-    import pysindy
-
+def solve_least_squares(features: Floats, target: Floats) -> Floats:
+    """Coefficients (terms,) of target (rows,) on features (rows, terms) in units of their norms; no term is dropped."""
     column_norms = np.linalg.norm(features, axis=0)
     column_norms = np.where(column_norms > 0, column_norms, 1.0)
-    model = pysindy.SINDy(optimizer=pysindy.STLSQ(threshold=0.0, alpha=0.0), feature_library=pysindy.IdentityLibrary())
-    model.fit(features / column_norms, t=np.arange(len(target), dtype=float), x_dot=target[:, None])
-    return np.asarray(model.coefficients()[0] / column_norms, float)
+    return np.asarray(np.linalg.lstsq(features / column_norms, target, rcond=None)[0] / column_norms, float)
+
+
+def _kept_terms(features: Floats, target: Floats, always: Sequence[bool], optimizer: Any) -> Bools:
+    """(terms,) which an optimizer of pysindy keeps, on columns of norm 1 without what those kept always can say."""
+    fixed, free = features[:, np.array(always)], features[:, ~np.array(always)]
+    kept = np.array(always)
+    if free.shape[1]:
+        basis = np.linalg.qr(fixed / np.linalg.norm(fixed, axis=0))[0]
+        columns, values = (array - basis @ (basis.T @ array) for array in (free, target))
+        norms = np.linalg.norm(columns, axis=0)
+        solver = deepcopy(optimizer)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # that every term was dropped, which is an answer
+            solver.fit(columns / np.where(norms > 0, norms, 1.0), values[:, None])
+        kept[~kept] = np.abs(np.ravel(solver.coef_)) > 0
+    return kept
 
 
 def _variable_projection(design: _DesignMatrix, estimates: IsothermalEstimates) -> Floats:
@@ -292,12 +353,11 @@ def _variable_projection(design: _DesignMatrix, estimates: IsothermalEstimates) 
 
     def residual(unit: Floats) -> Floats:
         white, target = design.whitened(estimates, low + unit * scale)
-        scaled = white / np.linalg.norm(white, axis=0)
-        return np.asarray(target - scaled @ np.linalg.lstsq(scaled, target, rcond=None)[0])
+        return np.asarray(target - white @ solve_least_squares(white, target))
 
     trials = qmc.Sobol(low.size, seed=0).random(SOBOL_STARTS)
     start = min(trials, key=lambda unit: float((residual(unit) ** 2).sum()))
-    solution = least_squares(residual, start, bounds=(0.0, 1.0), diff_step=1e-6, x_scale=0.1)
+    solution = least_squares(residual, start, bounds=(0.0, 1.0), diff_step=1e-6, x_scale=0.1, ftol=1e-6, xtol=1e-5)
     return np.asarray(low + solution.x * scale)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.discovery.combinations import FormWeight, RankedCombinations
 from creepkit.discovery.forms import CandidateForm, evaluate_forms
-from creepkit.discovery.regression import INFINITE_FREEDOM, IsothermalEstimates
+from creepkit.discovery.regression import INFINITE_FREEDOM, IsothermalEstimates, WhitenedSystem, whitened_system
 from creepkit.errors import FitError, nearest
 from creepkit.files.json_documents import DocumentFormat, write_json
 from creepkit.files.reading import FileKind
@@ -160,6 +160,11 @@ class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_
     def values(self) -> dict[str, float]:
         """{parameter: value} of `law`, in the author's units."""
         return {e.name: e.value for e in self.estimates}
+
+    @property
+    def system(self) -> WhitenedSystem:
+        """The linear system of all candidate forms on the isothermal estimates, for regressions of one's own."""
+        return whitened_system(self.isothermal_estimates, self.combinations.candidates)
 
     @property
     def adequacy(self) -> Adequacy | None:

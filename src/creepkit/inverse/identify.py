@@ -53,7 +53,7 @@ from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
-from creepkit.inverse.perturbation import unmodelled_note
+from creepkit.inverse.perturbation import Perturbation, unmodelled_note
 from creepkit.inverse.perturbations import perturbations
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -79,6 +79,10 @@ from creepkit.records import History, Predictor, Status, is_length_nuisance, is_
 
 MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
+
+
+CHANGE_OF_DEFECT = 200.0
+"""Relative change of a defect over that of what is predicted, at most: 10 to 50 were found in dimples."""
 
 
 REFIT_ROUNDS = 2
@@ -164,14 +168,18 @@ def identify_values(
     through: Predictor | None = None,
     start: StartingEstimate | None = None,
     progress: IterationCallback | None = None,
+    approximately: bool = False,
 ) -> Identification:
-    """As identify(), without samples of the posterior where a value is at its bound."""
+    """As identify(), without samples of the posterior where a value is at its bound.
+
+    approximately : to be identified again from there: in few rounds, corrected once, by the specimen itself.
+    """
     settings = settings or IdentificationSettings()
     known, through, notes = predictors_for_law(law, using, through)
     histories, left_out = compared_tests(law, histories, settings)
     if notes:
         how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
-        fit = identify_values(law, histories, known, through=through, **how)
+        fit = identify_values(law, histories, known, through=through, approximately=approximately, **how)
         return replace(fit, notes=(*fit.notes, *notes))
     with single_threaded_blas():
         problem = LeastSquaresProblem.from_histories(
@@ -185,13 +193,13 @@ def identify_values(
         if search_outcome.dropped_terms:
             return _without_terms(problem, histories, search_outcome, progress)
         best, numerical_error = _best_estimate(
-            problem, search_outcome, through, start or StartingEstimate(None), progress
+            problem, search_outcome, through, start or StartingEstimate(None), progress, approximately
         )
         gradient = _gradient(best)[: len(law.params)]
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
-        fit = _result(histories, best, search_outcome, numerical_error)
+        fit = _result(histories, best, search_outcome, numerical_error, approximately)
     return replace(fit, notes=(*left_out, *fit.notes))
 
 
@@ -225,6 +233,7 @@ def _best_estimate(
     through: Predictor | None,
     start: StartingEstimate,
     progress: IterationCallback | None,
+    approximately: bool,
 ) -> tuple[EstimationResult, NumericalError | None]:
     """The best end of the starts, through the cheaper predictor first if there is one; its best end goes on.
 
@@ -234,7 +243,7 @@ def _best_estimate(
     known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in search_outcome.starts]
     problem = replace(problem, loss=problem.settings.loss)
-    limits, working_noise = IterationLimits(), None
+    limits, working_noise = APPROXIMATE_LIMITS if approximately else IterationLimits(), None
     if through is not None and start.u is None:
         cheaper = problem.with_predictor(through)
         results = [estimate_iteratively(cheaper, x, working_estimator, APPROXIMATE_LIMITS, progress) for x in starts]
@@ -255,8 +264,8 @@ def _best_estimate(
     else:
         x = starts[0]
     known: Floats | None = None
-    for _ in range(MOST_CORRECTIONS):
-        corrected, error = correct_defect(problem, x)
+    for _ in range(1 if approximately else MOST_CORRECTIONS):
+        corrected, error = correct_defect(problem, x, by_specimen=approximately)
         if (
             known is not None
             and corrected.correction is not None
@@ -265,14 +274,22 @@ def _best_estimate(
             break
         numerical_error = error
         estimator = _working_estimator(corrected, error)
-        best = estimate_iteratively(corrected, x, estimator, limits, progress, working_noise)
+        corrected_at, best = x, estimate_iteratively(corrected, x, estimator, limits, progress, working_noise)
         x, working_noise, known = best.minimum.x, best.working_noise, corrected.correction
         if error is None or known is None:
             break
         numerical_error = replace(error, shift=shift_of_values(best.problem, x, known))
-        if numerical_error.shift < SMALL_SHIFT:
+        if numerical_error.shift * min(1.0, CHANGE_OF_DEFECT * _relative_change(best, x - corrected_at)) < SMALL_SHIFT:
             break
     return best, numerical_error
+
+
+def _relative_change(best: EstimationResult, step: Floats) -> float:
+    """Of what is predicted, by a step (unknowns,) to the end of an estimate: the largest, over the largest value."""
+    residuals, observations = best.residuals, best.problem.observations
+    assert residuals.jacobian is not None
+    change = (residuals.jacobian @ step / residuals.offset_sensitivity)[observations.present]
+    return float(np.abs(change).max() / np.abs(observations.values[observations.present]).max())
 
 
 def _working_estimator(
@@ -287,6 +304,7 @@ def _result(
     best: EstimationResult,
     search_outcome: SearchOutcome,
     numerical_error: NumericalError | None,
+    approximately: bool,
 ) -> Identification:
     """Noise model, intervals and goodness of fit at the optimum."""
     problem, residuals, x = best.problem, best.residuals, best.minimum.x
@@ -296,7 +314,9 @@ def _result(
     noise_model, covariance, freedom = uncertainty_of(best, working_estimator, len(histories))
     linear = best.linearised or linearised(problem, x, residuals)
     working_noise = None if best.linearised is not None else best.working_noise
-    unmodelled = perturbations(problem, x, linear, noise_model, histories, working_noise)
+    unmodelled: tuple[Perturbation, ...] = ()
+    if not approximately:
+        unmodelled = perturbations(problem, x, linear, noise_model, histories, working_noise)
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     scatter = rate_scatter(problem, x, residuals, noise_model, lengths)
     prediction = predict(

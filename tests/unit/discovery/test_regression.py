@@ -6,7 +6,7 @@ import pytest
 from creepkit import registry
 from creepkit.discovery.combinations import CHI_SQUARE_95, rank_combinations, squared_mahalanobis
 from creepkit.discovery.forms import candidate_form, candidate_forms, evaluate_forms
-from creepkit.discovery.regression import regress, solve_with_pysindy
+from creepkit.discovery.regression import regress
 from creepkit.errors import FitError
 from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution
 from creepkit.language import TemperatureForm, arrhenius
@@ -50,16 +50,6 @@ def test_exact_points_give_back_what_was_planted():
     found = regress(points(PLANTED, conditioned(0.05, 0.1)), [library("A", "arrhenius"), library("n", "linear")])
     assert found.values == pytest.approx({"A": LN_A, "Q": Q, "n": N, "n_T": SLOPE}, rel=1e-7)
     assert found.chi_square < 1e-9
-
-
-def test_pysindy_solves_what_scipy_does_and_leaves_the_global_seed_alone():
-    rng = np.random.default_rng(5)
-    features, target = rng.normal(size=(18, 4)) * [1.0, 0.1, 10.0, 3.0], rng.normal(size=18)
-    np.random.seed(7)
-    before = np.random.get_state()[1].copy()
-    expected = np.linalg.lstsq(features, target, rcond=None)[0]
-    assert np.allclose(solve_with_pysindy(features, target), expected, rtol=1e-9)
-    assert (np.random.get_state()[1] == before).all()
 
 
 def test_correlation_tells_more_than_error_bars():

@@ -1,18 +1,20 @@
 """Local refinement: bounded least squares from one start, robust losses, and the records of a minimum and of a penalty.
 
-The trust region reflective method of scipy, with analytic Jacobians.
+Gauss-Newton steps with exact Jacobians, within a box that is the bounds and a trust region (Nocedal and Wright (2006),
+Numerical Optimization, 10.3). Only what a simulation gives is made linear; penalties of bounds, with their corners, are
+taken as they are, so that a value at its bound costs no more simulations than another.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Floats, Ints
 from creepkit.inverse.bounds import Bounds
 
 IterationCallback = Callable[[str, int, int], None]
@@ -69,8 +71,99 @@ class Tolerances:
     tolerance: float = 1e-5
 
 
+System = Callable[[Floats], tuple[Floats, Floats]]
+"""x (unknowns,) to residuals (rows,) and their derivatives (rows, unknowns)."""
+
+
+FIRST_RADIUS, LEAST_RADIUS = 3.0, 1e-7
+"""Of the trust region, in scales of a step: at first, and where no shorter step is tried."""
+
+
+NO_GAIN = 1e-3
+"""Of the tolerance: a step that promises less is not evaluated."""
+
+
+LINEARISATIONS, LINEAR_ENOUGH = 8, 1e-3
+"""How often residuals without simulation are made linear for one step, and the error of its gain that ends that."""
+
+
+class LeastSquaresPath:
+    """Bounded least squares from one start by Gauss-Newton steps in a trust region; see bounded_least_squares()."""
+
+    def __init__(
+        self,
+        start: Floats,
+        others: System,
+        bounds: Bounds,
+        scale: Floats,
+        fixed: Sequence[int] = (),
+        loss: str = "linear",
+    ) -> None:
+        """others : residuals without simulation, such as penalties, which no step makes linear for good."""
+        self.x, self.others, self.bounds, self.scale, self.loss = start.copy(), others, bounds, scale, loss
+        self.free = np.setdiff1d(np.arange(start.size), fixed)
+        self.radius, self.evaluations = FIRST_RADIUS, 0
+        self.converged = self.is_small = False
+        self.data_cost = self.other_cost = np.inf
+        self.residuals, self.jacobian = np.zeros(0), np.zeros((0, start.size))
+        self.expected = self.length = 0.0
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of squares, with the loss of the data."""
+        return self.data_cost + self.other_cost
+
+    def minimum(self) -> Minimum:
+        """Where it is."""
+        return Minimum(self.x, self.cost, self.converged, self.evaluations, self.residuals)
+
+    def trial(self, tolerance: float) -> Floats | None:
+        """(unknowns,) the next point to evaluate; None where it has converged.
+
+        A step that would gain less than this share of the cost, and does not, is the last: a solver is not smoother;
+        one that would gain less than NO_GAIN of that is none.
+        """
+        if self.converged:
+            return None
+        free, root_weight = self.free, np.sqrt(robust_weight(self.residuals**2, self.loss))
+        basis, triangle = np.linalg.qr(root_weight[:, None] * self.jacobian[:, free])
+        projected = basis.T @ (root_weight * self.residuals)
+        reach, x = self.radius * self.scale[free], self.x
+        low, high = (limit[free] - x[free] for limit in (self.bounds.lower, self.bounds.upper))
+        step = _bounded_step(
+            projected, triangle, self.others, x, free, (np.maximum(low, -reach), np.minimum(high, reach))
+        )
+        trial = x.copy()
+        trial[free] += step
+        trial = self.bounds.clip(trial)
+        gain = _cost(projected) - _cost(projected + triangle @ step)
+        self.expected = gain + self.other_cost - _cost(self.others(trial)[0])
+        self.length = float(np.abs(step / self.scale[free]).max(initial=0.0))
+        self.is_small = bool(self.expected <= tolerance * self.cost)
+        self.converged = bool(self.expected <= NO_GAIN * tolerance * self.cost or self.radius < LEAST_RADIUS)
+        return None if self.converged else trial
+
+    def evaluated(self, trial: Floats, residuals: Floats, jacobian: Floats) -> None:
+        """Go to a trial point whose cost is lower, and change the trust region by how well the gain was foreseen."""
+        self.evaluations += 1
+        finite = np.isfinite(residuals).all() and np.isfinite(jacobian).all()
+        data_cost = _cost(residuals, self.loss) if finite else np.inf
+        other_cost = _cost(self.others(trial)[0])
+        gain = self.cost - data_cost - other_cost if finite else -np.inf
+        self.converged = self.is_small and gain < 0.5 * self.expected
+        if np.isfinite(self.cost):
+            if gain < 0.25 * self.expected:
+                self.radius = 0.25 * self.length
+            elif gain > 0.75 * self.expected and self.length > 0.99 * self.radius:
+                self.radius *= 2.0
+        if gain > 0.0:
+            self.x, self.residuals, self.jacobian = trial, residuals, jacobian
+            self.data_cost, self.other_cost = data_cost, other_cost
+
+
 def bounded_least_squares(
-    system: Callable[[Floats], tuple[Floats, Floats]],
+    data: System,
+    others: System,
     start: Floats,
     bounds: Bounds,
     scale: Floats,
@@ -79,41 +172,61 @@ def bounded_least_squares(
     fixed: Mapping[int, float],
     loss: str,
 ) -> Minimum:
-    """Bounded least squares by the trust region reflective method of scipy.
+    """Bounded least squares by Gauss-Newton steps within a trust region; it ends where a step would gain nothing more.
 
-    system : x (unknowns,) to residuals (rows,) and their derivatives (rows, unknowns).
+    data, others : x (unknowns,) to residuals (rows,) and their derivatives (rows, unknowns): those that a simulation
+        gives, to which the loss is applied, and those without, such as penalties.
     start : (unknowns,) within the bounds; scale : (unknowns,) the scale of a step in each unknown.
     fixed : {position: value} of unknowns that keep their values.
     """
-    free = np.setdiff1d(np.arange(start.size), list(fixed))
-    cache: dict[bytes, tuple[Floats, Floats]] = {}
+    path = LeastSquaresPath(start, others, bounds, scale, list(fixed), loss)
+    path.evaluated(start, *data(start))
+    while (trial := path.trial(tolerances.tolerance)) is not None and path.evaluations < tolerances.max_steps:
+        path.evaluated(trial, *data(trial))
+    return path.minimum()
 
-    def at(free_values: Floats) -> Floats:
-        x = start.copy()
-        x[free] = free_values
-        return x
 
-    def evaluate(free_values: Floats) -> tuple[Floats, Floats]:
-        key = free_values.tobytes()
-        if key not in cache:
-            cache.clear()
-            values, jacobian = system(at(free_values))
-            cache[key] = values, jacobian[:, free]
-        return cache[key]
+def _cost(residuals: Floats, loss: str = "linear") -> float:
+    return 0.5 * float(robust_loss(residuals**2, loss).sum())
 
-    result = least_squares(
-        lambda part: evaluate(part)[0],
-        start[free],
-        jac=lambda part: evaluate(part)[1],
-        bounds=(bounds.lower[free], bounds.upper[free]),
-        x_scale=scale[free],
-        loss=loss,
-        max_nfev=tolerances.max_steps,
-        ftol=tolerances.tolerance,
-        xtol=10 * tolerances.tolerance,
-        gtol=tolerances.tolerance,
+
+def _bounded_step(
+    projected: Floats, triangle: Floats, others: System, x: Floats, free: Ints, box: tuple[Floats, Floats]
+) -> Floats:
+    """(free,) the step s of least |projected + triangle s|^2 + |others(x + s)|^2 within a box: (free,) low and high.
+
+    With `others` made linear in turn where the last step ended, by active sets; where that finds no end, as between two
+    corners, by the trust region reflective method. Neither costs a simulation.
+    """
+    low, high = box
+    high = np.maximum(high, low + 1e-12 * np.maximum(1.0, np.abs(low)))
+
+    def at(step: Floats) -> tuple[Floats, Floats]:
+        moved = x.copy()
+        moved[free] += step
+        values, slopes = others(moved)
+        return np.concatenate([projected + triangle @ step, values]), np.concatenate([triangle, slopes[:, free]])
+
+    step = best = np.zeros(free.size)
+    values, slopes = at(step)
+    least = start_cost = _cost(values)
+    for _ in range(LINEARISATIONS):
+        size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+        right = slopes @ step - values
+        step = np.linalg.lstsq(slopes / size, right, rcond=None)[0] / size
+        if not ((step >= low) & (step <= high)).all():
+            step = lsq_linear(slopes / size, right, bounds=(low * size, high * size), method="bvls").x / size
+        step = np.clip(step, low, high)
+        foreseen = _cost(slopes @ step - right)
+        values, slopes = at(step)
+        cost = _cost(values)
+        best, least = (step, cost) if cost < least else (best, least)
+        if abs(cost - foreseen) <= LINEAR_ENOUGH * max(start_cost - foreseen, 0.0):
+            return np.asarray(best)
+    found = least_squares(
+        lambda s: at(s)[0], np.clip(best, low, high), lambda s: at(s)[1], bounds=(low, high), x_scale=1.0 / size
     )
-    return Minimum(at(np.asarray(result.x)), float(result.cost), bool(result.status > 0), int(result.nfev), result.fun)
+    return np.asarray(found.x if found.cost < least else best)
 
 
 def robust_loss(squared: Floats, loss: str) -> Floats:

@@ -19,8 +19,8 @@ from creepkit.errors import FitError
 from creepkit.inverse.bounds import LOG_RATE_BOUNDS, Bounds
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import median_log_rate_excess, median_log_rupture_excess
+from creepkit.inverse.search.batched_least_squares import batched_least_squares
 from creepkit.inverse.search.global_search import SearchResult, SearchTrace
-from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 
 INTERNAL_RATE_RANGE = (-4.0, 0.0)
@@ -46,22 +46,32 @@ class MultiStart:
         ):
             if value is not None:
                 limits.check_number(f"multi-start: {name}", value, allowed, FitError)
-        starts, draws = self.starts or problem.settings.starts, self.draws or default_draws(problem)
+        starts, draws = self.starts or default_starts(problem), self.draws or default_draws(problem)
         screened = screened_starts(problem, starts=starts, draws=draws)
-        problem.check_predicted(np.array(screened))  # from where nothing is predicted, no direction leads away
+        problem.check_predicted(np.array(screened[:2]))  # from where nothing is predicted, no direction leads away
         initial_points = [*single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2), *screened]
         costs: list[Floats] = []
-        minima = batched_levenberg_marquardt(problem, initial_points, progress=progress, costs=costs)
+        minima = batched_least_squares(problem, initial_points, progress=progress, costs=costs)
         return SearchResult(tuple(minima), SearchTrace.from_costs("multi-start", costs) if costs else None)
 
 
+def default_starts(problem: LeastSquaresProblem) -> int:
+    """Those of the settings for three parameters beside rates, half of them for two, a quarter for one or none."""
+    return -(-problem.settings.starts // _fewer(problem))
+
+
 def default_draws(problem: LeastSquaresProblem) -> int:
-    """Those of the settings for three parameters beside rates, half of them for two, a quarter for one or none.
+    """Those of the settings for three parameters beside rates, a quarter for two, an eighth for one or none.
 
     Rates are not drawn: they are shifted to those of the data.
     """
+    fewer = _fewer(problem)
+    return max(problem.settings.sobol_points // (2 * fewer if fewer > 1 else 1), 1)
+
+
+def _fewer(problem: LeastSquaresProblem) -> int:
     shapes = problem.bounds.lower.size - len(problem.coordinates.term_rates)
-    return max(problem.settings.sobol_points // {0: 4, 1: 4, 2: 2}.get(shapes, 1), 1)
+    return {0: 4, 1: 4, 2: 2}.get(shapes, 1)
 
 
 def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
@@ -80,7 +90,7 @@ def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int)
             continue
         single = problem.with_law(single_law)
         positions = [law.names.index(name) for name in single_law.names]
-        minimum = batched_levenberg_marquardt(single, screened_starts(single, starts=starts, draws=draws))[0]
+        minimum = batched_least_squares(single, screened_starts(single, starts=starts, draws=draws))[0]
         problem.evaluations.count += single.evaluations.count
         u = bounds.centre
         u[positions] = minimum.x
@@ -92,7 +102,10 @@ def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int)
 
 
 def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
-    """The centre, and the best draws after a shift of all rates to that of the data: (parameters,) each."""
+    """The centre, and the best draws after a shift of all rates to that of the data: (parameters,) each.
+
+    The worse half of the draws is left out from shift to shift, down to twice as many as there are starts.
+    """
     observations, bounds, seed = problem.observations, problem.bounds, problem.settings.seed
     sobol = qmc.Sobol(bounds.lower.size, seed=seed).random(draws)
     points = bounds.lower + sobol * bounds.width
@@ -113,19 +126,25 @@ def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) ->
             + sobol[:, internal_rates] * (INTERNAL_RATE_RANGE[1] - INTERNAL_RATE_RANGE[0])
         )
         points[0, internal_rates] = log_internal_rate + 0.5 * sum(INTERNAL_RATE_RANGE)
-        for _ in range(3 + 2 * min(len(internal_rates), 1)):
+        for shift in range(3 + 2 * min(len(internal_rates), 1)):
             residuals = problem.candidate_residuals(bounds.clip(points))
             points[:, rates] -= np.clip(median_log_rate_excess(observations, residuals), -6, 6)[:, None]
             points[:, internal_rates] -= np.clip(median_log_rupture_excess(observations, residuals), -6, 6)[:, None]
+            if shift:  # once shifted they can be compared
+                best = np.argsort(_scores(problem, residuals)[1:])[: max(len(points) // 2, 2 * starts)]
+                points = points[[0, *np.sort(1 + best)]]
     points = bounds.clip(points)
-    residuals = problem.candidate_residuals(points)
-    score = np.array(
-        [np.mean(np.arcsinh(candidate_residuals[observations.present]) ** 2) for candidate_residuals in residuals]
-    )
+    score = _scores(problem, problem.candidate_residuals(points))
     if not np.isfinite(score).any():
         raise FitError(f"law '{problem.law.name}': no point within its bounds can be simulated; widen the bounds")
     order = [int(k) for k in np.argsort(score) if k != 0][: max(starts - 1, 0)]
     return [points[0], *(points[k] for k in order)]
+
+
+def _scores(problem: LeastSquaresProblem, residuals: Floats) -> Floats:
+    """(candidates,) - means of squared residuals (candidates, tests, observations), large ones by their logarithms."""
+    present = problem.observations.present
+    return np.array([np.mean(np.arcsinh(candidate_residuals[present]) ** 2) for candidate_residuals in residuals])
 
 
 def _with_sampled_exponents(problem: LeastSquaresProblem, points: Floats, sobol: Floats) -> Floats:
@@ -149,6 +168,10 @@ EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS = 1e-5, 5e-3
 reduced-order model is not better than the latter, and along a valley one start is enough for its predictor."""
 
 
+MUCH_WORSE = 3.0
+"""Times the cost of the best minimum, beyond which another is not refined."""
+
+
 SAME_COORDINATES = 0.02
 """Distance over the width of the bounds, in every coordinate, up to which two minima are one."""
 
@@ -165,10 +188,15 @@ def distinct(
     max_count: int = 2,
     tolerance: float = SAME_COORDINATES,
 ) -> list[Minimum]:
-    """The best minima that differ by more than 2 % of the bounds in some coordinate, and in what they predict."""
+    """The best minima that differ by more than 2 % of the bounds in some coordinate, and in what they predict.
+
+    One whose cost is MUCH_WORSE than the best is none that a likelihood would prefer.
+    """
     selected: list[Minimum] = []
     for minimum in minima:
-        if not any(_same(minimum, other, bounds, equal_predictions, tolerance) for other in selected):
+        if minimum.cost <= MUCH_WORSE * minima[0].cost and not any(
+            _same(minimum, other, bounds, equal_predictions, tolerance) for other in selected
+        ):
             selected.append(minimum)
     return selected[:max_count]
 

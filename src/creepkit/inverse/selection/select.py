@@ -177,19 +177,25 @@ def _identify_all(
         if progress is not None:
             progress(task, k, len(laws))
         first = through_for_law(through, law)
-        fit = _try_to_identify(law, histories, first or using, settings, failed, sampled=first is None)
+        fit = _try_to_identify(law, histories, first or using, settings, failed, approximately=first is not None)
         fits += [fit] if fit is not None else []
         if progress is not None:
             progress(task, k + 1, len(laws))
     if through is None or not fits:
         return fits
     competitive = {id(r.fit) for r in rank(fits, challenge=False).laws if r.excess < RULED_OUT_EXCESS}
-    refined = {
-        id(fit): _try_to_identify(fit.law, histories, using, settings, failed, fit)
-        for fit in fits
-        if id(fit) in competitive
-    }
-    return [refined.get(id(fit)) or _ruled_out(fit) for fit in fits if fit.law.name not in failed]
+    refined = []
+    for fit in fits:
+        cheaper = through_for_law(through, fit.law)
+        if cheaper is None:
+            refined.append(fit)
+        elif id(fit) in competitive:
+            better = _try_to_identify(fit.law, histories, using, settings, failed, fit)
+            refined += [] if better is None else [better]
+        else:
+            better = _try_to_identify(fit.law, histories, cheaper, settings, {}, fit, sampled=False)
+            refined.append(_ruled_out(better or fit))
+    return refined
 
 
 def _try_to_identify(
@@ -199,16 +205,20 @@ def _try_to_identify(
     settings: IdentificationSettings,
     failed: dict[str, str],
     previous_fit: Identification | None = None,
+    *,
+    approximately: bool = False,
     sampled: bool = True,
 ) -> Identification | None:
     """Identify one law, from where a cheaper predictor ended if it did; errors are recorded in `failed`.
 
-    sampled : whether its posterior is sampled where that is needed; not of what is identified again.
+    approximately : with the cheaper predictor, to be identified again. sampled : whether its posterior is sampled where
+        that is needed.
     """
     start = None if previous_fit is None else StartingEstimate.from_identification(previous_fit)
     try:
-        run = identify if sampled else identify_values
-        return run(law, histories, using, settings=settings, start=start)
+        if sampled and not approximately:
+            return identify(law, histories, using, settings=settings, start=start)
+        return identify_values(law, histories, using, settings=settings, start=start, approximately=approximately)
     except CreepkitError as error:
         failed[law.name] = str(error)
         return None

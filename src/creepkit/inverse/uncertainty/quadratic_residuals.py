@@ -53,8 +53,8 @@ class QuadraticResiduals:
         pairs = 1 + u.shape[1] + np.arange(len(first))
         slopes[:, pairs, first] += v[:, second]
         slopes[:, pairs, second] += v[:, first]
-        jacobian = np.einsum("ckp,kte,pq->cteq", slopes, self.coefficients, inverse)
-        return self.candidate_residuals(u), np.asarray(jacobian)
+        jacobian = np.tensordot(slopes @ inverse, self.coefficients, axes=(1, 0))
+        return self.candidate_residuals(u), np.asarray(np.moveaxis(jacobian, 1, -1))
 
     @property
     def _pairs(self) -> tuple[Ints, Ints]:
