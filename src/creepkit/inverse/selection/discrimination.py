@@ -60,7 +60,7 @@ def under_common_covariance(fits: Sequence[Identification]) -> CommonCovarianceF
     results = [
         _optimum_under(
             linear,
-            CovarianceFactor.of_residuals(_with_covariance_of(reference_residuals, linear.residuals), noise_model),
+            CovarianceFactor.of_residuals(with_covariance_of(reference_residuals, linear.residuals), noise_model),
             len(identification.u),
         )
         for linear, identification in zip(problems, fits, strict=True)
@@ -72,7 +72,7 @@ def under_common_covariance(fits: Sequence[Identification]) -> CommonCovarianceF
     )
 
 
-def _with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
+def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
     """A law's residuals, with the derivatives that make the covariance, and the weights of tests, of the best law."""
     offset_sensitivity, rate_effect = (
         np.where(reference.present, reference_values, own_values)

@@ -2,8 +2,8 @@
 
 Each unmodelled effect of the laws (see inverse.perturbations: a length known to its tolerance, an offset, a
 furnace that drifts) is put into the linear problems of all of them, with its usual size as prior standard deviation,
-and they are ranked again under one common covariance. In several tests it is tried twice: independently in each test, a
-random effect, and as one error of all tests; as unknowns with priors both are integrated out. No simulation is needed.
+and they are ranked again under one common covariance. In several tests it is tried twice: independently in each test,
+as a random effect of the covariance, and as one error of all tests, an unknown with a prior. No simulation is needed.
 
 An answer that singles a law out rests on the absence of an effect with which it no longer has nearly all the weight.
 Where no law is singled out, the law of most evidence with an effect is named if it then explains the tests, and without
@@ -21,12 +21,16 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, bic_penalty, criterion_weights
-from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
-from creepkit.inverse.perturbations import with_unknown_effects
-from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, under_common_covariance
+from creepkit.inverse.perturbations import with_random_effects, with_unknown_effects
+from creepkit.inverse.selection.discrimination import (
+    DISTINGUISHABLE_CHI_SQUARE,
+    under_common_covariance,
+    with_covariance_of,
+)
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.records import Nuisance, is_length_nuisance
 
@@ -58,14 +62,12 @@ Scope = Literal["test", "all"]
 class Trial:
     """The laws with one perturbation. scope : whether it is independent in each test, or one of all tests.
 
-    effects : it, by each law. problems : of each law the linear problem with the perturbation as its last unknowns.
-    scores, weights : (laws,) -2 ln of the evidence by BIC, and the weights by it. noise_model : of the common
-    covariance.
+    effects : it, by each law. scores, weights : (laws,) -2 ln of the evidence by BIC, and the weights by it.
+    noise_model : of the common covariance.
     """
 
     scope: Scope
     effects: tuple[Perturbation, ...]
-    problems: tuple[LinearisedProblem, ...]
     scores: Floats
     weights: Floats
     noise_model: NoiseModel
@@ -73,34 +75,55 @@ class Trial:
     @classmethod
     def of(cls, fits: Sequence[Identification], effects: tuple[Perturbation, ...], scope: Scope) -> Trial:
         """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
-        problems = tuple(_perturbed(*pair, scope) for pair in zip(fits, effects, strict=True))
-        common = under_common_covariance([replace(f, linearised=p) for f, p in zip(fits, problems, strict=True)])
-        noise_model = fits[common.reference_law].noise_model
-        factor = CovarianceFactor.of_residuals(problems[common.reference_law].residuals, noise_model)
-        penalties = [bic_penalty(len(fit.u), common.independent_frames) for fit in fits]
-        scores = factor.log_determinant + common.chi_square + common.log_determinant + penalties
-        return cls(scope, effects, problems, scores, criterion_weights(scores)[1], noise_model)
+        perturbed = [
+            with_random_effects(p, [e]) if scope == "test" else with_unknown_effects(p, _columns(e, scope))
+            for p, e in zip(_problems(fits), effects, strict=True)
+        ]
+        scores, noise_model = _scores(fits, perturbed)
+        return cls(scope, effects, scores, criterion_weights(scores)[1], noise_model)
 
     @property
     def is_of_length(self) -> bool:
         """Whether it is the error of a length of the test pieces."""
         return is_length_nuisance(self.effects[0].kind) and not self.effects[0].kind.startswith(OFFSET)
 
-    def sizes(self, law: int) -> Floats:
+    def sizes(self, fits: Sequence[Identification], law: int) -> Floats:
         """(1,) of all tests or (tests,) sizes of the perturbation by a law, in standard deviations."""
-        linear, count = self.problems[law], 1 if self.scope == "all" else len(self.effects[law].residual_change)
-        return linear.solve(CovarianceFactor.of_residuals(linear.residuals, self.noise_model)).step[-count:]
+        linear, columns = fits[law].linearised, _columns(self.effects[law], self.scope)
+        assert linear is not None
+        linear = with_unknown_effects(linear, columns)
+        factor = CovarianceFactor.of_residuals(linear.residuals, self.noise_model)
+        return linear.solve(factor).step[-columns.shape[-1] :]
 
     def description(self, fits: Sequence[Identification], law: int) -> str:
         """The perturbation with the size that it has in the linear problem of a law, by its position."""
-        return _description(self, fits[law], law, self.sizes(law))
+        return _description(self, fits[law], law, self.sizes(fits, law))
 
 
-def _perturbed(fit: Identification, effect: Perturbation, scope: Scope) -> LinearisedProblem:
-    """The linear problem of a law with a perturbation of all tests, or one of each test, as unknowns with priors."""
-    assert fit.linearised is not None
+def _problems(fits: Sequence[Identification]) -> list[LinearisedProblem]:
+    return [fit.linearised for fit in fits if fit.linearised is not None]
+
+
+def _scores(fits: Sequence[Identification], problems: Sequence[LinearisedProblem]) -> tuple[Floats, NoiseModel]:
+    """(laws,) -2 ln of the evidence by BIC of these linear problems of the laws, and the noise model it is under."""
+    common = under_common_covariance([replace(f, linearised=p) for f, p in zip(fits, problems, strict=True)])
+    noise_model, unperturbed = fits[common.reference_law].noise_model, _problems(fits)
+    reference = unperturbed[common.reference_law].residuals
+
+    def log_determinant(linear: LinearisedProblem) -> float:
+        residuals = with_covariance_of(reference, linear.residuals)
+        return CovarianceFactor.of_residuals(residuals, noise_model).log_determinant
+
+    scores = log_determinant(unperturbed[common.reference_law]) + common.chi_square + common.log_determinant
+    scores += [log_determinant(new) - log_determinant(old) for new, old in zip(problems, unperturbed, strict=True)]
+    frames = effective_sample_size(reference, noise_model)
+    return scores + [bic_penalty(len(fit.u), frames) for fit in fits], noise_model
+
+
+def _columns(effect: Perturbation, scope: Scope) -> Floats:
+    """(tests, observations, unknowns) change of the residuals by a perturbation of all tests, or of each test."""
     column = effect.residual_change[..., None]
-    return with_unknown_effects(fit.linearised, column if scope == "all" else column * np.eye(len(column))[:, None, :])
+    return column if scope == "all" else column * np.eye(len(column))[:, None, :]
 
 
 def _description(trial: Trial, fit: Identification, law: int, sizes: Floats) -> str:
@@ -156,17 +179,23 @@ def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
 
 
 def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple[Challenge, ...]:
-    """The laws that a perturbation would put first, where no law is singled out; none where that is nothing new.
+    """The laws that a perturbation makes as likely as the best one, where no law is singled out.
 
-    weights : (laws,) of the ranking, best first. A law is named that explains the tests with a perturbation and is
-    credible then, and was not both without. What the best law alone would need stands in its adequacy.
+    weights : (laws,) of the ranking, best first. Named is what explains the tests with a perturbation that raises its
+    evidence, by more than chance does, to that of the best law as the tests are stated; and that was not credible
+    before, or none explains the tests. What the best law alone would need stands in its adequacy.
     """
+    trials = [*_trials(fits)]
+    if not trials:
+        return ()
     rejected = fits[0].adequacy is not None and fits[0].adequacy.rejects
+    as_stated, _ = _scores(fits, _problems(fits))
     raised = [
         (float(trial.scores[law]), law, trial)
-        for trial in _trials(fits)
+        for trial in trials
         for law, fit in enumerate(fits)
-        if trial.weights[law] > CREDIBLE_WEIGHT
+        if trial.scores[law] < as_stated[law] - DISTINGUISHABLE_CHI_SQUARE
+        and trial.scores[law] < as_stated.min() + DISTINGUISHABLE_CHI_SQUARE
         and (rejected or not weights[law] > CREDIBLE_WEIGHT)
         and _explains_with(fit, trial.effects[law])
     ]
@@ -176,11 +205,11 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
     laws = sorted((law for _, law, trial in raised if trial is best), key=lambda law: len(fits[law].u))
     if laws == [0]:
         return ()
-    trials = {best.effects[0].kind: best}
+    by_kind = {best.effects[0].kind: best}
     for other_score, law, trial in sorted(raised, key=lambda one: one[0]):
         if law == laws[0] and other_score < score + DISTINGUISHABLE_CHI_SQUARE:
-            trials.setdefault(trial.effects[0].kind, trial)
-    texts = [trial.description(fits, laws[0]) for trial in trials.values()]
+            by_kind.setdefault(trial.effects[0].kind, trial)
+    texts = [trial.description(fits, laws[0]) for trial in by_kind.values()]
     names = " or ".join(fits[law].law.name for law in laws[:MOST_NAMED])
     sentence = f"with {' or with '.join(texts[:MOST_NAMED])} {names} would explain them"
     return (Challenge("unmodelled effect", best.effects[0].kind, sentence),)
