@@ -32,7 +32,7 @@ from creepkit.presentation import Presentable
 from creepkit.records import History, Predictor
 from creepkit.records.units import celsius_text
 from creepkit.registry import resolve_law
-from creepkit.registry.arguments import resolve_predictor, resolve_predictors
+from creepkit.registry.arguments import resolve_predictors
 
 Forms = Any
 """One or more temperature forms, or {parameter: one or more}; see discover()."""
@@ -51,7 +51,6 @@ def discover(
     prior: PriorOdds | None = None,
     parameters: Sequence[str] | None = None,
     histories: Sequence[History] | None = None,
-    using: Predictor | str | None = None,
     joint_fit: Identification | None = None,
     progress: IterationCallback | None = None,
 ) -> TemperatureLaw:
@@ -68,7 +67,7 @@ def discover(
         rate and shares equal odds among forms of equally many numbers; printed with the result.
     parameters : those that may depend on temperature; by default all.
     histories : all tests; the forms are then put back into the law and refitted to them (see refit), with the settings
-        of the first identification. using : the predictor of that; by default that of the first identification.
+        and the predictor of the first identification.
     joint_fit : an identification of the law times Arrhenius' factor from all tests, where the refits begin.
 
     A combination of forms that fails is recorded in the notes with its reason, and the others go on.
@@ -83,9 +82,11 @@ def discover(
     temperature_law = temperature_law_from_combinations(estimates, combinations, odds)
     if histories is None:
         return temperature_law
-    predictor = fits[0].predictor if using is None else resolve_predictor(using)
+    predictor = fits[0].predictor
     if predictor is None:
-        raise FitError("the identifications were loaded from files: give using=, the specimen they were made with")
+        raise FitError(
+            "the identifications were loaded from files: attach tests and specimen with fit.with_histories(tests)"
+        )
     settings = fits[0].settings
     tests, _ = sound_tests(list(histories), settings)
     return refit(temperature_law, tests, predictor, settings=settings, joint_fit=joint_fit, progress=progress)
@@ -227,7 +228,7 @@ def temperature_study(
         notes.append(str(error))
     else:
         temperature_law = discover(
-            isothermal_fits, histories=histories, using=predictor, joint_fit=joint_fit,
+            isothermal_fits, histories=histories, joint_fit=joint_fit,
             progress=progress, **form_options
         )  # fmt: skip
     return TemperatureStudy(
