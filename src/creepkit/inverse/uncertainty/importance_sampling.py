@@ -101,19 +101,37 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
             return None
         weights = np.exp(0.5 * np.maximum(log_density[usable] - log_density.max(), LEAST_LOG_WEIGHT))
         surface = QuadraticResiduals.fitted(u[usable], residuals[usable], weights, centre, shape)
-        quadratic = replace(posterior, quadratic=surface)
-        samples = posterior_samples(quadratic, centre, shape, seed + k)
+        density = _corrected(replace(posterior, quadratic=surface), u[usable], log_density[usable], weights)
+        samples = posterior_samples(density, centre, shape, seed + k)
         if samples is None:
             return None
         judged = samples[:: len(samples) // LEAST_POINTS][:LEAST_POINTS]
         further, further_effect = posterior.residuals(judged)
         exact = posterior.log_density(further, further_effect)
-        error = float(np.std(exact - quadratic(judged)))
+        error = float(np.std(exact - density(judged)))
         if error < LARGEST_ERROR:
             return samples
         u, residuals = np.concatenate([u, judged]), np.concatenate([residuals, further])
         log_density = np.concatenate([log_density, exact])
     return None
+
+
+def _corrected(quadratic: Posterior, u: Floats, log_density: Floats, weights: Floats) -> Callable[[Floats], Floats]:
+    """ln p by quadratic residuals, and a quadratic function of u more where that is wrong at simulated points.
+
+    u : (points, parameters). log_density, weights : (points,) ln p there, and weights. No correction is larger than one
+    that was found.
+    """
+    assert quadratic.quadratic is not None
+    centre, root = quadratic.quadratic.centre, quadratic.quadratic.root
+    errors = log_density - quadratic(u)
+    surface = QuadraticResiduals.fitted(u, errors[:, None, None], weights, centre, root @ root.T)
+
+    def density(candidates: Floats) -> Floats:
+        correction = surface.candidate_residuals(candidates)[:, 0, 0]
+        return np.asarray(quadratic(candidates) + np.clip(correction, errors.min(), errors.max()))
+
+    return density
 
 
 LEAST_POINTS = 32
