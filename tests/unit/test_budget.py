@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1490,
     "instruments": 1400,
     "integration": 1100,
-    "inverse": 11995,
+    "inverse": 12015,
     "jobs": 260,
     "kernels": 1710,
     "language": 1590,

@@ -33,11 +33,12 @@ from creepkit.forecasts.variance_shares import (
     offset_draws,
     variance_shares,
 )
-from creepkit.inverse.extrapolation import HOUR, extrapolation_text, outside_combinations
+from creepkit.inverse.extrapolation import HOUR, extrapolation_text
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.tested_region import outside_combinations
 from creepkit.inverse.uncertainty.laplace_approximation import is_open
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, is_logarithmic, output_unit

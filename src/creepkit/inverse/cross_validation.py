@@ -28,7 +28,7 @@ from creepkit.inverse.identify import refit
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.search.local_refinement import IterationCallback
-from creepkit.inverse.single_values import LawAtTests, SingleValue
+from creepkit.inverse.single_values import SingleValue
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction, Predictor, Status, predict_with
@@ -72,7 +72,7 @@ class Fold:
         if any(m.name == h.name for m in fit.tests for h in self.held_out):
             return [{} for _ in self.held_out]
         assert fit.predictor is not None
-        compared = LawAtTests.of_fit(fit, fit.predictor).compared(self.held_out)
+        compared = fit.at_tests(fit.predictor).compared(self.held_out)
         named = ({"rupture time": end, "minimum rate": rate} for end, rate in compared)
         return [{what: one for what, one in of_test.items() if one is not None} for of_test in named]
 

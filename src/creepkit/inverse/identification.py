@@ -263,8 +263,13 @@ class Identification(Presentable, text="reports.identification_text:identificati
         self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
     ) -> tuple[Floats, Floats, Floats]:
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
-        law = LawAtTests.of_fit(self, self._predictor_or(using), test_scatter=test_scatter)
+        law = self.at_tests(self._predictor_or(using), test_scatter=test_scatter)
         return law.rupture_times(list(histories or self.histories))
+
+    def at_tests(self, predictor: Predictor, *, test_scatter: bool = True) -> LawAtTests:
+        """The law as it predicts single values of tests; test_scatter : whether the scatter of tests counts."""
+        noise_model = self.noise_model if test_scatter else None
+        return LawAtTests(self.coordinates, self.u, self.scatter_of_rates, noise_model, predictor)
 
     @checked
     def predict(

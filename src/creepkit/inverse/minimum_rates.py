@@ -128,7 +128,9 @@ def minimum_rates(
 ) -> tuple[Floats, Floats | None, dict[str, Floats]]:
     """(candidates, tests) 1/s, with derivatives to internal parameters, (..., parameters) or None, and to nuisances.
 
-    Each test is followed from loading to its end, at TIMES. Arguments as of with_minimum_rates().
+    Each test is followed from loading to its end, at TIMES.
+
+    theta : (candidates, parameters) internal values. sensitivities : as of with_minimum_rates().
     """
     known: dict[str, Any] = {"includes_elastic": False, "minimum_rate": None, "minimum_rate_sd": None}
     curves = [h.replace(times=followed_duration(h) * TIMES, outputs={}, **known) for h in histories]

@@ -117,7 +117,7 @@ LINEAR_COORDINATE_LENGTH = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Observation:
+class ObservedOutput:
     """What one test says of one output: its values at frames, its minimum rate, or its end.
 
     frames : (values,) their positions among the frames of the history; of a single value the first.
@@ -135,7 +135,7 @@ class Observation:
     stated: bool
 
     @classmethod
-    def of_history(cls, history: History, full: History, name: str) -> Observation:
+    def of_history(cls, history: History, full: History, name: str) -> ObservedOutput:
         """Of one output of a history; its noise is that of `full`, the same before frames were left out."""
         if name in SINGLE_VALUES:
             value, time, noise = history.minimum_rate or 0.0, followed_duration(history), full.minimum_rate_sd
@@ -212,7 +212,10 @@ class ObservationVector:
             [h.end_known and (rupture_times or bool(h.outputs)) and predicts_rupture(predictor, h) for h in histories]
         )
         rows = [
-            {name: Observation.of_history(h, whole, name) for name in _observed_outputs(h, predictor, followed=bool(f))}
+            {
+                name: ObservedOutput.of_history(h, whole, name)
+                for name in _observed_outputs(h, predictor, followed=bool(f))
+            }
             for h, whole, f in zip(histories, histories if full is None else full, followed, strict=True)
         ]
         distinct = dict.fromkeys(name for row in rows for name in row)

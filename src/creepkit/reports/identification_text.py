@@ -8,9 +8,9 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from creepkit.inverse.adequacy import UNDETECTED_SCATTER
-from creepkit.inverse.extrapolation import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.nuisance_parameters import nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
+from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import is_logarithmic, kind_and_start, output_unit

@@ -9,9 +9,9 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
+from creepkit.inverse.identified_values import MinimumRate, minimum_rates_of
 from creepkit.inverse.minimum_rates import apparent_exponent
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
-from creepkit.inverse.single_values import MinimumRate, minimum_rates_of
 from creepkit.language import strain, time
 from creepkit.records import ZERO_CELSIUS
 from creepkit.records.units import celsius_text

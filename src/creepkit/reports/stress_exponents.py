@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from creepkit.inverse.adequacy import UNDETECTED_SCATTER
-from creepkit.inverse.single_values import StateAtStrain, depends_on_history, state_at_strain
+from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.language import strain, time
 from creepkit.records.units import celsius_text
 from creepkit.reports.load_programs import SECONDS_PER_HOUR

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from creepkit.inverse.identified_values import minimum_rates_of
 from creepkit.inverse.identify import identify
 from creepkit.inverse.minimum_rates import apparent_exponent, least_slope, measured_minimum_rate
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.single_values import minimum_rates_of
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Program, constant_stress
 from helpers.steady_rate_predictor import Steady, planted

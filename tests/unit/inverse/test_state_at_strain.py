@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.extrapolation import outside_combinations
-from creepkit.inverse.single_values import state_at_strain
+from creepkit.inverse.identified_values import state_at_strain
+from creepkit.inverse.tested_region import outside_combinations
 
 A, N, M = 1e-13, 4.0, -0.4
 TIMES = np.geomspace(360.0, 3.6e5, 30)

@@ -182,8 +182,9 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
     """The laws that a perturbation makes as likely as the best one, where no law is singled out.
 
     weights : (laws,) of the ranking, best first. Named is what explains the tests with a perturbation that raises its
-    evidence, by more than chance does, to that of the best law as the tests are stated; and that was not credible
-    before, or none explains the tests. What the best law alone would need stands in its adequacy.
+    evidence, by more than chance does, to that of the best law as the tests are stated; that was not credible before,
+    or none explains the tests; and beside which no simpler law, credible or not, has more evidence with it. What the
+    best law alone would need stands in its adequacy.
     """
     trials = [*_trials(fits)]
     if not trials:
@@ -197,6 +198,7 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
         if trial.scores[law] < as_stated[law] - DISTINGUISHABLE_CHI_SQUARE
         and trial.scores[law] < as_stated.min() + DISTINGUISHABLE_CHI_SQUARE
         and (rejected or not weights[law] > CREDIBLE_WEIGHT)
+        and not any(trial.scores[k] < trial.scores[law] and len(f.u) <= len(fit.u) for k, f in enumerate(fits))
         and _explains_with(fit, trial.effects[law])
     ]
     if not raised:

@@ -1,0 +1,122 @@
+"""What an identified law says of minimum rates of its tests, and of bars that reach a strain under constant stress."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import CreepkitError
+from creepkit.inverse.composite_predictor import predict_to_rupture, predicts_rupture
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.minimum_rates import measured_minimum_rate
+from creepkit.inverse.single_values import SingleValue
+from creepkit.language import CreepLaw, strain, time
+from creepkit.records import History, constant_stress
+
+STRESS_RATIO = 1.05
+"""Ratio of the stresses between which the exponent of bars is taken, to each side."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MinimumRate(SingleValue):
+    """The minimum creep rate of one test, by its position; stress : MPa, that was held; temperature : K."""
+
+    test: int
+    stress: float
+    temperature: float
+
+
+def minimum_rates_of(fit: Identification) -> list[MinimumRate]:
+    """Measured and predicted minimum rates of the tests of an identification that show one.
+
+    fit : with its histories and predictor.
+    """
+    measured = {k: rate for k, h in enumerate(fit.histories) if np.isfinite(rate := measured_minimum_rate(h))}
+    if not measured or fit.predictor is None:
+        return []
+    law = fit.at_tests(fit.predictor)
+    # as tests of which the minimum rate is known, over the same duration
+    known: dict[str, Any] = {"outputs": {}, "minimum_rate_sd": None, "includes_elastic": False}
+    whole = [fit.histories[k] for k in measured]
+    tests = [
+        h.replace(times=h.times[-1:], minimum_rate=rate, **known)
+        for h, rate in zip(whole, measured.values(), strict=True)
+    ]
+    rates = []
+    for k, h, one in zip(measured, tests, law.minimum_rates(tests).values(), strict=True):
+        held: dict[str, Any] = {
+            "test": k,
+            "stress": float(h.loading.program().values[0]),
+            "temperature": h.mean_temperature,
+        }
+        rates.append(MinimumRate(one.measured, one.predicted, one.low, one.high, **held))
+    return rates
+
+
+@dataclass(frozen=True)
+class StateAtStrain:
+    """The state of a bar under constant true stress, at the reference stress and temperature, at the reference strain.
+
+    time : s, rate : 1/s, and exponent : d ln rate / d ln stress of bars at that strain, each with its 95 % interval,
+    (value, low, high).
+    """
+
+    time: tuple[float, float, float]
+    rate: tuple[float, float, float]
+    exponent: tuple[float, float, float]
+
+
+def depends_on_history(law: CreepLaw) -> bool:
+    """Whether the rate depends on more than stress and temperature: on time, strain or internal variables."""
+    return bool(law.states) or law.uses(time) or law.uses(strain)
+
+
+def state_at_strain(fit: Identification) -> StateAtStrain | None:
+    """At the reference point; None where the law never gets to that strain, or no predictor follows bars to it.
+
+    A derivative of the law's formula to stress holds time, strain and internal variables. Bars under different stresses
+    reach one strain at different times, so that the exponent which measured rates show is another one: with time
+    hardening, rate = A s^n t^m, the strain A s^n t^(1 + m) / (1 + m) is reached after a time ~ s^(-n / (1 + m)), at a
+    rate ~ s^(n / (1 + m)).
+    """
+    r, predictor = fit.reference, fit.predictor
+    if predictor is None:
+        return None
+    halves = np.array([0.5, 1.0])
+    bars = [
+        History(
+            f"bar {k}",
+            r.time * halves,
+            {"strain": r.strain * halves},
+            constant_stress(r.stress * STRESS_RATIO**k, "stress"),
+            r.temperature,
+            strain_measure="logarithmic",
+        )
+        for k in (-1, 0, 1)
+    ]
+
+    def function(u: Floats) -> Floats:
+        theta = fit.coordinates.theta(u)
+        flat = np.ascontiguousarray(theta.reshape(-1, theta.shape[-1]))
+        reached = predict_to_rupture(predictor, fit.law, flat, bars).times_to_strain
+        assert reached is not None
+        with np.errstate(divide="ignore", invalid="ignore"):
+            log_time = np.log(reached.times[..., 1])
+            log_rate = np.log(reached.log_time_derivatives[..., 1]) - log_time
+        exponent = (log_rate[:, 2] - log_rate[:, 0]) / (2 * np.log(STRESS_RATIO))
+        return np.stack([log_time[:, 1], log_rate[:, 1], exponent], axis=-1).reshape(*theta.shape[:-1], 3)
+
+    try:
+        if not all(predicts_rupture(predictor, bar) for bar in bars):
+            return None
+        ends = np.array(fit.interval_of(function))
+    except CreepkitError:
+        return None
+    if not np.isfinite(ends).all():
+        return None
+    time_, rate = ([math.exp(min(v, 700.0)) for v in column] for column in ends.T[:2])
+    return StateAtStrain(*map(tuple, (time_, rate, ends[:, 2].tolist())))
