@@ -64,7 +64,7 @@ class Page:
         print(*lines, sep="\n", flush=True)
 
 
-FOLDERS = ("--keep", "--data", "--jobs", "--python")
+FOLDERS = ("--keep", "--before", "--data", "--jobs", "--python")
 """Options with a value that change no result."""
 
 

@@ -1,6 +1,6 @@
 """Simulation counts: how many simulations an identification of one planted dimple costs, by stage.
 
-    python tests/benchmarks/simulation_counts.py [--dimples 0 1 2 3 4 5] [--json FILE] [--write]
+    python tests/benchmarks/simulation_counts.py [--dimples 0 1 2 3 4 5] [--before FOLDER] [--write]
 
 The tests are those of law_recovery.py: select() of the four single laws of Table 1 with the modulus free, and
 identify() of Garofalo's hyperbolic sine alone with its default settings; answers are printed, as a user would.
@@ -181,9 +181,12 @@ def values_of(fit):
     }
 
 
-def print_tables(page, dimples):
-    """Mean counts a dimple by stage, then the totals of each dimple."""
-    for name, title in (("select", "select() of four laws"), ("identify", "identify() of the hyperbolic sine")):
+TITLES = {"select": "select() of four laws", "identify": "identify() of the hyperbolic sine"}
+
+
+def print_tables(page, dimples, before):
+    """Mean counts a dimple by stage, then the totals of each dimple; before : those of an earlier version."""
+    for name, title in TITLES.items():
         page.heading(title)
         page.table("stage, mean of all dimples", *KINDS, "equivalents")
         for stage in (*STAGES, "other"):
@@ -191,10 +194,29 @@ def print_tables(page, dimples):
             if any(counts):
                 equivalents = np.mean([d[name]["equivalents"].get(stage, 0.0) for d in dimples])
                 page.row(stage, *(f"{count:.0f}" for count in counts), f"{equivalents:.0f}")
-        page.table("planted dimple", *KINDS, "equivalents", "CPU")
+        heads = (*KINDS, "equivalents", "CPU")
+        page.table("planted dimple", *heads, *(f"before: {head}" for head in heads if before))
         for d in dimples:
-            row = (*(simulations(d[name], kind) for kind in KINDS), sum(d[name]["equivalents"].values()))
-            page.row(f"{d['truth']} {d['k']}", *(f"{number:.0f}" for number in row), f"{d[name]['cpu']:.0f}")
+            row = totals(d[name]) + [total for b in before if b["k"] == d["k"] for total in totals(b[name])]
+            page.row(f"{d['truth']} {d['k']}", *(f"{number:.0f}" for number in row))
+        rows = [totals(d[name]) for d in dimples], [totals(b[name]) for b in before]
+        page.row("mean", *(f"{number:.0f}" for part in rows if part for number in np.mean(part, axis=0)))
+    if before:
+        page.heading("Answers")
+        page.table("planted dimple", "best law, before", "largest change of a weight", "of a value, in its sd: select",
+                   "identify")  # fmt: skip
+        for d, b in [(d, b) for d in dimples for b in before if b["k"] == d["k"]]:
+            new, old = d["select"]["answer"], b["select"]["answer"]
+            change = max(abs(new["weights"].get(law, 0.0) - weight) for law, weight in old["weights"].items())
+            moved = max(moved_values(new["fits"][law], old["fits"][law]) for law in old["fits"] if law in new["fits"])
+            alone = moved_values(d["identify"]["answer"], b["identify"]["answer"])
+            names = f"{new['best']}, {old['best']}"
+            page.row(f"{d['truth']} {d['k']}", names, f"{change:.4f}", f"{moved:.3f}", f"{alone:.3f}")
+
+
+def totals(measured):
+    """Simulations by kind, equivalents and CPU."""
+    return [*(simulations(measured, kind) for kind in KINDS), sum(measured["equivalents"].values()), measured["cpu"]]
 
 
 def simulations(measured, kind, stage=None):
@@ -202,16 +224,30 @@ def simulations(measured, kind, stage=None):
     return sum(count for own, of, count in measured["counts"] if of == kind and stage in (None, own))
 
 
+def moved_values(new, old):
+    """Largest difference of coordinates, in standard deviations."""
+    return float((np.abs(np.subtract(new["u"], old["u"])) / old["sd"]).max())
+
+
+def kept(folder, k):
+    """The file of a planted dimple in a folder."""
+    return Path(folder) / f"{k}.json"
+
+
 def main():
     parser = arguments(__doc__)
     parser.add_argument("--dimples", nargs="*", type=int, default=list(range(6)), help="numbers of planted dimples")
-    parser.add_argument("--json", type=Path, help="file for counts and answers")
+    parser.add_argument("--keep", default="build/simulation_counts", help="folder in which counts are kept")
+    parser.add_argument("--before", help="folder in which an earlier version kept them")
     options = parser.parse_args()
-    dimples = [measured_dimple(k) for k in options.dimples]
-    if options.json:
-        options.json.write_text(json.dumps(dimples, indent=1))
+    Path(options.keep).mkdir(parents=True, exist_ok=True)
+    for k in options.dimples:
+        if not kept(options.keep, k).exists():
+            kept(options.keep, k).write_text(json.dumps(measured_dimple(k)))
+    dimples = [json.loads(kept(options.keep, k).read_text()) for k in options.dimples]
+    earlier = [kept(options.before, k) for k in options.dimples] if options.before else []
     page = Page("simulation_counts", __doc__)
-    print_tables(page, dimples)
+    print_tables(page, dimples, [json.loads(file.read_text()) for file in earlier if file.exists()])
     if options.write:
         page.write()
 

@@ -136,12 +136,12 @@ class Posterior:
 
     def log_density(self, residuals: Floats, rate_effect: Floats) -> Floats:
         """(candidates,) ln p of candidates within the bounds; residuals, rate_effect : as residuals() gives them."""
-        chi_square, count = self._chi_square(residuals, rate_effect), self.problem.parameter_count
+        chi_square, count = self.chi_square(residuals, rate_effect), self.problem.parameter_count
         rise = np.maximum(chi_square - self.least_chi_square, -0.5 * self.degrees_of_freedom)
         log_density = -0.5 * (self.degrees_of_freedom + count) * np.log1p(rise / self.degrees_of_freedom)
         return np.where(np.isfinite(log_density), log_density, -np.inf)
 
-    def _chi_square(self, residuals: Floats, rate_effect: Floats) -> Floats:
+    def chi_square(self, residuals: Floats, rate_effect: Floats) -> Floats:
         """(candidates,) least sum of squares that any values of the nuisances leave."""
         whitened = _whitened(self.covariance_factor, rate_effect, residuals)[:, self.problem.observations.present]
         prior = np.broadcast_to(self.prior_residuals, (len(residuals), self.prior_residuals.size))

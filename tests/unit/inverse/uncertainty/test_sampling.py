@@ -113,7 +113,7 @@ def test_nuisances_are_integrated_out(tests):
     curvature = rows.T @ inverse @ rows
     step = np.array([0.03, 0.2])
     points = fit.u + np.array([step, -step, 0.0 * step])
-    up, down, middle = posterior.chi_square(points)
+    up, down, middle = posterior.chi_square(*posterior.residuals(points))
     assert up + down - 2 * middle == pytest.approx(2 * step @ curvature @ step, rel=1e-4)
     y = np.concatenate([h.outputs["amplitude"] - h.times / 1e5 for h in tests])
     left = [y - rows @ u for u in points]
