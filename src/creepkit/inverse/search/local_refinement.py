@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import least_squares, lsq_linear
+from scipy.optimize import lsq_linear
 
 from creepkit.arrays import Floats, Ints
 from creepkit.inverse.bounds import Bounds
@@ -195,8 +195,7 @@ def _bounded_step(
 ) -> Floats:
     """(free,) the step s of least |projected + triangle s|^2 + |others(x + s)|^2 within a box: (free,) low and high.
 
-    With `others` made linear in turn where the last step ended, by active sets; where that finds no end, as between two
-    corners, by the trust region reflective method. Neither costs a simulation.
+    With `others` made linear in turn where the last step ended, by active sets; that costs no simulation.
     """
     low, high = box
     high = np.maximum(high, low + 1e-12 * np.maximum(1.0, np.abs(low)))
@@ -222,11 +221,8 @@ def _bounded_step(
         cost = _cost(values)
         best, least = (step, cost) if cost < least else (best, least)
         if abs(cost - foreseen) <= LINEAR_ENOUGH * max(start_cost - foreseen, 0.0):
-            return np.asarray(best)
-    found = least_squares(
-        lambda s: at(s)[0], np.clip(best, low, high), lambda s: at(s)[1], bounds=(low, high), x_scale=1.0 / size
-    )
-    return np.asarray(found.x if found.cost < least else best)
+            break
+    return np.asarray(best)
 
 
 def robust_loss(squared: Floats, loss: str) -> Floats:
