@@ -61,12 +61,8 @@ def default_starts(problem: LeastSquaresProblem) -> int:
 
 
 def default_draws(problem: LeastSquaresProblem) -> int:
-    """Those of the settings for three parameters beside rates, a quarter for two, an eighth for one or none.
-
-    Rates are not drawn: they are shifted to those of the data.
-    """
-    fewer = _fewer(problem)
-    return max(problem.settings.sobol_points // (2 * fewer if fewer > 1 else 1), 1)
+    """Those of the settings, and as many fewer; rates are not drawn: they are shifted to those of the data."""
+    return max(problem.settings.sobol_points // _fewer(problem), 1)
 
 
 def _fewer(problem: LeastSquaresProblem) -> int:
