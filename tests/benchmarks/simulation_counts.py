@@ -35,7 +35,7 @@ SENSITIVITIES = 2.5
 KINDS = ("FE", "finer", "reduced", "coarse")
 STAGES = {
     "screening of starts": ("screened_starts", "check_predicted"),
-    "search": ("batched_least_squares", "initial_search"),
+    "search": ("batched_levenberg_marquardt", "initial_search"),
     "importance sampling": ("with_samples",),
     "challenges": ("challenges_of",),
     "profile": ("profile_likelihood", "profile"),

@@ -19,8 +19,8 @@ from creepkit.errors import FitError
 from creepkit.inverse.bounds import LOG_RATE_BOUNDS, Bounds
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import median_log_rate_excess, median_log_rupture_excess
-from creepkit.inverse.search.batched_least_squares import batched_least_squares
 from creepkit.inverse.search.global_search import SearchResult, SearchTrace
+from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 
 INTERNAL_RATE_RANGE = (-4.0, 0.0)
@@ -51,7 +51,7 @@ class MultiStart:
         problem.check_predicted(np.array(screened[:2]))  # from where nothing is predicted, no direction leads away
         initial_points = [*single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2), *screened]
         costs: list[Floats] = []
-        minima = batched_least_squares(problem, initial_points, progress=progress, costs=costs)
+        minima = batched_levenberg_marquardt(problem, initial_points, progress=progress, costs=costs)
         return SearchResult(tuple(minima), SearchTrace.from_costs("multi-start", costs) if costs else None)
 
 
@@ -86,7 +86,7 @@ def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int)
             continue
         single = problem.with_law(single_law)
         positions = [law.names.index(name) for name in single_law.names]
-        minimum = batched_least_squares(single, screened_starts(single, starts=starts, draws=draws))[0]
+        minimum = batched_levenberg_marquardt(single, screened_starts(single, starts=starts, draws=draws))[0]
         problem.evaluations.count += single.evaluations.count
         u = bounds.centre
         u[positions] = minimum.x

@@ -11,7 +11,7 @@ from creepkit.reports.html.elements import printable
 
 CITATIONS = {
     "sobol": "I. M. Sobol' (1967), USSR Comput. Math. Math. Phys. 7(4), 86-112",
-    "nocedal": "J. Nocedal and S. J. Wright (2006), Numerical Optimization, 2nd ed., chapters 4 and 10",
+    "levenberg": "K. Levenberg (1944), Q. Appl. Math. 2, 164-168; D. W. Marquardt (1963), J. SIAM 11, 431-441",
     "weighted least squares": "G. A. F. Seber, C. J. Wild (1989), Nonlinear Regression, Wiley, New York",
     "reml": "H. D. Patterson, R. Thompson (1971), Biometrika 58, 545-554",
     "satterthwaite": "F. E. Satterthwaite (1946), Biometrics Bull. 2, 110-114",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.noise_model import MINIMUM_TESTS
-from creepkit.inverse.nuisance_parameters import nuisance_unit
+from creepkit.inverse.nuisance_plausibility import nuisance_unit
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
 from creepkit.inverse.variance_components import NOISE_PRIOR_SD
 from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
@@ -81,12 +81,12 @@ def _estimation(found: GroupFindings, contents: ReportContents, references: Refe
 def _search(fit: Identification, contents: ReportContents, references: References) -> str:
     """How the optimum was sought, where that is known."""
     settings, how = fit.settings, _search_name(fit, contents)
-    end = f", and refined by least squares by Gauss-Newton steps within a trust region{references.cite('nocedal')}."
+    end = f", and refined by least squares with the Levenberg-Marquardt method{references.cite('levenberg')}."
     seed = f" (seed {settings.seed})"
     if how.startswith("multi-start"):
         return (
-            f"Parameters were sought within their bounds from at most {plural(settings.starts, 'start')}, picked out "
-            f"of at most {settings.sobol_points} points of a Sobol' sequence{references.cite('sobol')}{seed}{end}"
+            f"Parameters were sought within their bounds from {plural(settings.starts, 'start')}, picked out of at "
+            f"most {settings.sobol_points} points of a Sobol' sequence{references.cite('sobol')}{seed}{end}"
         )
     if "swarm" in how:
         return f"Parameters were sought within their bounds by a particle swarm{references.cite('swarm')}{seed}{end}"

@@ -30,7 +30,7 @@ CONTINUED = 4
 """Of the best minima, how many are refined further where they have not converged."""
 
 
-def batched_least_squares(
+def batched_levenberg_marquardt(
     problem: LeastSquaresProblem,
     starts: Sequence[Floats],
     *,

@@ -6,7 +6,7 @@ import pytest
 import creepkit as ck
 from creepkit.inverse.initial_search import search_problem
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.batched_least_squares import batched_least_squares
+from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
 from creepkit.inverse.search.local_refinement import robust_loss, robust_weight
 from creepkit.inverse.search.multistart import MultiStart, distinct, screened_starts
 from creepkit.inverse.settings import IdentificationSettings
@@ -34,7 +34,7 @@ def landscape(law, values, stresses=(60.0, 90.0, 130.0)):
 def test_planted_values_are_found_from_many_starts(name, values):
     law = ck.law(name)
     view = landscape(law, values)
-    ends = batched_least_squares(view, screened_starts(view, starts=6, draws=32))
+    ends = batched_levenberg_marquardt(view, screened_starts(view, starts=6, draws=32))
     found = view.coordinates.values(ends[0].x)
     assert {n: found[n] for n in values} == pytest.approx(values, rel=1e-3)
     assert sum(end.cost < ends[0].cost + 1e-4 for end in ends) >= 4
