@@ -14,7 +14,6 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.observation_vector import thinned_history
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.settings import IdentificationSettings
 from helpers.correlated_noise import BARS, LAW, NOISE, PAIR, least_squares, measured
 from helpers.steady_rate_predictor import Steady
@@ -35,7 +34,7 @@ def test_the_optimum_is_that_of_generalised_least_squares(rho: float) -> None:
     tests = measured(rho, seed=3)
     problem, _ = exactly_known(LeastSquaresProblem.from_histories(LAW, tests, TwoOutputs(), SETTINGS))
     start = problem.coordinates.u(LAW.to_internal({"A": 1e-15})[0])
-    minimum = problem.minimise(start, tolerances=Tolerances(tolerance=1e-10))
+    minimum = problem.minimise(start)
     factor, sd = least_squares(tests, rho)
     rate = float(np.exp(problem.coordinates.theta(minimum.x)[0])) / 1e-15
     assert rate == pytest.approx(factor, rel=1e-6)

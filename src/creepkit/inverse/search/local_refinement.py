@@ -79,7 +79,7 @@ FIRST_RADIUS, LEAST_RADIUS = 3.0, 1e-7
 """Of the trust region, in scales of a step: at first, and where no shorter step is tried."""
 
 
-NO_GAIN = 1e-3
+NO_GAIN = 1e-4
 """Of the tolerance: a step that promises less is not evaluated."""
 
 
