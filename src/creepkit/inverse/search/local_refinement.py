@@ -79,10 +79,6 @@ FIRST_RADIUS, LEAST_RADIUS = 3.0, 1e-7
 """Of the trust region, in scales of a step: at first, and where no shorter step is tried."""
 
 
-NO_GAIN = 1e-4
-"""Of the tolerance: a step that promises less is not evaluated."""
-
-
 LINEARISATIONS, LINEAR_ENOUGH = 8, 1e-3
 """How often residuals without simulation are made linear for one step, and the error of its gain that ends that."""
 
@@ -102,8 +98,7 @@ class LeastSquaresPath:
         """others : residuals without simulation, such as penalties, which no step makes linear for good."""
         self.x, self.others, self.bounds, self.scale, self.loss = start.copy(), others, bounds, scale, loss
         self.free = np.setdiff1d(np.arange(start.size), fixed)
-        self.radius, self.evaluations = FIRST_RADIUS, 0
-        self.converged = self.is_small = False
+        self.radius, self.evaluations, self.converged = FIRST_RADIUS, 0, False
         self.data_cost = self.other_cost = np.inf
         self.residuals, self.jacobian = np.zeros(0), np.zeros((0, start.size))
         self.expected = self.length = 0.0
@@ -118,13 +113,7 @@ class LeastSquaresPath:
         return Minimum(self.x, self.cost, self.converged, self.evaluations, self.residuals)
 
     def trial(self, tolerance: float) -> Floats | None:
-        """(unknowns,) the next point to evaluate; None where it has converged.
-
-        A step that would gain less than this share of the cost, and does not, is the last: a solver is not smoother;
-        one that would gain less than NO_GAIN of that is none.
-        """
-        if self.converged:
-            return None
+        """(unknowns,) the next point to evaluate; None where a step would gain less than this share of the cost."""
         free, root_weight = self.free, np.sqrt(robust_weight(self.residuals**2, self.loss))
         basis, triangle = np.linalg.qr(root_weight[:, None] * self.jacobian[:, free])
         projected = basis.T @ (root_weight * self.residuals)
@@ -139,8 +128,7 @@ class LeastSquaresPath:
         gain = _cost(projected) - _cost(projected + triangle @ step)
         self.expected = gain + self.other_cost - _cost(self.others(trial)[0])
         self.length = float(np.abs(step / self.scale[free]).max(initial=0.0))
-        self.is_small = bool(self.expected <= tolerance * self.cost)
-        self.converged = bool(self.expected <= NO_GAIN * tolerance * self.cost or self.radius < LEAST_RADIUS)
+        self.converged = bool(self.expected <= tolerance * self.cost or self.radius < LEAST_RADIUS)
         return None if self.converged else trial
 
     def evaluated(self, trial: Floats, residuals: Floats, jacobian: Floats) -> None:
@@ -150,7 +138,6 @@ class LeastSquaresPath:
         data_cost = _cost(residuals, self.loss) if finite else np.inf
         other_cost = _cost(self.others(trial)[0])
         gain = self.cost - data_cost - other_cost if finite else -np.inf
-        self.converged = self.is_small and gain < 0.5 * self.expected
         if np.isfinite(self.cost):
             if gain < 0.25 * self.expected:
                 self.radius = 0.25 * self.length
