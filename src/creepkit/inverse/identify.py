@@ -199,7 +199,7 @@ def identify_values(
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
-        fit = _result(histories, best, search_outcome, numerical_error, approximately)
+        fit = _result(histories, best, search_outcome, numerical_error)
     return replace(fit, notes=(*left_out, *fit.notes))
 
 
@@ -304,7 +304,6 @@ def _result(
     best: EstimationResult,
     search_outcome: SearchOutcome,
     numerical_error: NumericalError | None,
-    approximately: bool,
 ) -> Identification:
     """Noise model, intervals and goodness of fit at the optimum."""
     problem, residuals, x = best.problem, best.residuals, best.minimum.x
@@ -314,9 +313,7 @@ def _result(
     noise_model, covariance, freedom = uncertainty_of(best, working_estimator, len(histories))
     linear = best.linearised or linearised(problem, x, residuals)
     working_noise = None if best.linearised is not None else best.working_noise
-    unmodelled: tuple[Perturbation, ...] = ()
-    if not approximately:
-        unmodelled = perturbations(problem, x, linear, noise_model, histories, working_noise)
+    unmodelled = perturbations(problem, x, linear, noise_model, histories, working_noise)
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     scatter = rate_scatter(problem, x, residuals, noise_model, lengths)
     prediction = predict(

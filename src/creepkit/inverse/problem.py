@@ -358,7 +358,7 @@ class LeastSquaresProblem:
         inside[list(fixed)] = list(fixed.values())
 
         def others(x: Floats) -> tuple[Floats, Floats]:
-            return self.other_system(x, additional)
+            return self._other_system(x, additional)
 
         if not all(np.isfinite(part).all() for part in (*self._data_system(inside), *others(inside))):
             raise FitError(
@@ -380,7 +380,7 @@ class LeastSquaresProblem:
         data = self.whiten(np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1))
         return data[:, 0], data[:, 1:]
 
-    def other_system(self, x: Floats, additional: AdditionalResiduals | None = None) -> tuple[Floats, Floats]:
+    def _other_system(self, x: Floats, additional: AdditionalResiduals | None) -> tuple[Floats, Floats]:
         """Residuals without simulation at x, (rows,), and their derivatives, (rows, unknowns)."""
         prior_weight = PRIOR_STRENGTH / self.bounds.width
         values = [self.bound_penalties.residuals(x), prior_weight * (x - self.bounds.centre)]

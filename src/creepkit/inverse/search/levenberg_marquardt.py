@@ -1,24 +1,26 @@
-"""Least squares from several starts at once, all of which share each prediction, by paths of Gauss-Newton steps.
+"""Batched Levenberg-Marquardt: least squares from several starts, all of which share each prediction.
 
-A start that meets the path of a better one ends where that does (see search.local_refinement for the steps).
+A start that meets the path of a better one ends where that does; one whose next step would gain nothing has converged.
+Steps are projected on the bounds: a coordinate that stands at its bound and is pushed outwards is left out of the step
+(Kanzow, Yamashita & Fukushima (2004), J. Comput. Appl. Math. 172, 375); a step is accepted only if the cost falls.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from creepkit.arrays import Floats
-from creepkit.inverse.problem import FAILED_COST, LeastSquaresProblem
-from creepkit.inverse.search.local_refinement import IterationCallback, LeastSquaresPath, Minimum
+from creepkit.arrays import Floats, Ints
+from creepkit.inverse.problem import FAILED_COST, PRIOR_STRENGTH, LeastSquaresProblem
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, robust_loss, robust_weight
 
 MAX_STEPS = 40
 
 
 TOLERANCE = 1e-5
-"""Relative decrease of the cost that a step must promise; else a start has converged."""
+"""Relative decrease of the cost below which a start has converged, twice in turn."""
 
 
 MET = 0.02
@@ -28,6 +30,10 @@ MET = 0.02
 
 CONTINUED = 4
 """Of the best minima, how many are refined further where they have not converged."""
+
+
+DAMPING_RANGE = (1e-3, 1e8)
+"""First damping, relative to the diagonal of J'J over the bounds, and the one at which a start is given up."""
 
 
 def batched_levenberg_marquardt(
@@ -52,7 +58,9 @@ def batched_levenberg_marquardt(
             if progress is not None:
                 progress("start", k + 1, len(starts))
         return sorted(minima, key=lambda minimum: minimum.cost)
-    ends = _BatchedPaths(problem, np.array(starts, float)).run(max_steps, progress, [] if costs is None else costs)
+    ends = _BatchedLevenbergMarquardt(problem, np.array(starts, float)).run(
+        max_steps, progress, [] if costs is None else costs
+    )
     return sorted([*_continued(problem, ends[:CONTINUED]), *ends[CONTINUED:]], key=lambda minimum: minimum.cost)
 
 
@@ -71,61 +79,108 @@ def _continued(problem: LeastSquaresProblem, minima: Sequence[Minimum]) -> list[
     return finished
 
 
-class _BatchedPaths:
-    """The paths of all starts, whose trial points share each prediction."""
+class _BatchedLevenbergMarquardt:
+    """The state of all starts: positions, residuals, gradients and Hessians, and damping."""
 
     def __init__(self, problem: LeastSquaresProblem, starts: Floats) -> None:
-        self.problem, scale = problem, 0.1 * problem.bounds.width
-        self.paths = [
-            LeastSquaresPath(start, problem.other_system, problem.bounds, scale, loss=problem.loss)
-            for start in problem.bounds.clip(starts)
-        ]
-        self.follows = list(range(len(self.paths)))
-        self._evaluate({k: path.x for k, path in enumerate(self.paths)})
+        self.problem, self.bounds = problem, problem.bounds
+        self.bound_penalties = problem.bound_penalties
+        self.u = self.bounds.clip(starts)
+        count, size = self.u.shape
+        self.cost, self.whitened = np.full(count, np.inf), [np.zeros(0)] * count
+        self.gradient, self.hessian = np.zeros((count, size)), np.zeros((count, size, size))
+        self.damping, self.stalled_steps = np.full(count, DAMPING_RANGE[0]), np.zeros(count, int)
+        self.evaluations, self.follows = np.zeros(count, int), np.arange(count)
+        self._evaluate(np.arange(count), self.u)
 
     def run(self, max_steps: int, progress: IterationCallback | None, costs: list[Floats]) -> list[Minimum]:
         """Step until all have converged."""
-        active = [k for k, path in enumerate(self.paths) if np.isfinite(path.cost)]
         for _ in range(max_steps):
-            costs.append(np.array([min(path.cost, FAILED_COST) for path in self.paths]))
+            costs.append(self.cost.copy())
+            active = np.flatnonzero((self.stalled_steps < 2) & (self.damping < DAMPING_RANGE[1]))
             if progress is not None:
-                progress("start", len(self.paths) - len(active), len(self.paths))
-            trials = {k: self.paths[k].trial(TOLERANCE) for k in active if not self._has_met_another(k)}
-            going = {k: trial for k, trial in trials.items() if trial is not None}
-            active = list(going)
-            if not active:
-                break
-            self._evaluate(going)
-        ends = [self.paths[self._end_of(k)].minimum() for k in range(len(self.paths))]
+                progress("start", len(self.u) - active.size, len(self.u))
+            trials = {int(k): self._trial_point(int(k)) for k in active}
+            going = [k for k, trial in trials.items() if not self._ends(k, trial)]
+            if going:
+                self._evaluate(np.array(going), np.stack([trials[k] for k in going]))
+        ends = [self._end_of(k) for k in range(len(self.u))]
         minima = [
-            replace(end, evaluations=path.evaluations)
-            if np.isfinite(end.cost)
-            else replace(end, cost=FAILED_COST, whitened_residuals=None)
-            for end, path in zip(ends, self.paths, strict=True)
+            Minimum(self.u[end], float(self.cost[end]), bool(self.stalled_steps[end] >= 2), count, self.whitened[end])
+            for end, count in zip(ends, map(int, self.evaluations), strict=True)
         ]
         return sorted(minima, key=lambda minimum: minimum.cost)
 
-    def _has_met_another(self, k: int) -> bool:
-        """Whether a start has met the path of a better one, which it follows from there."""
-        own, width = self.paths[k], MET * self.problem.bounds.width
-        better = [
-            j
-            for j, other in enumerate(self.paths)
-            if other.cost < own.cost and (np.abs(other.x - own.x) <= width).all()
-        ]
-        if better:
-            self.follows[k] = min(better, key=lambda j: self.paths[j].cost)
-        return bool(better)
+    def _ends(self, k: int, trial: Floats) -> bool:
+        """Whether a start has converged, for its step would gain nothing, or has met the path of a better one."""
+        step = trial - self.u[k]
+        gain = -float(self.gradient[k] @ step + 0.5 * step @ self.hessian[k] @ step)
+        if np.isfinite(self.cost[k]) and self.cost[k] < FAILED_COST and gain <= TOLERANCE * self.cost[k]:
+            self.stalled_steps[k] = 2
+            return True
+        near = (np.abs(self.u - self.u[k]) <= MET * self.bounds.width).all(axis=1)
+        better = np.flatnonzero(near & (self.cost < self.cost[k]))
+        if better.size:
+            self.follows[k] = int(better[np.argmin(self.cost[better])])
+            self.stalled_steps[k] = 2
+        return bool(better.size)
 
     def _end_of(self, k: int) -> int:
         """The start whose path a start followed to its end."""
         while self.follows[k] != k:
-            k = self.follows[k]
+            k = int(self.follows[k])
         return k
 
-    def _evaluate(self, points: Mapping[int, Floats]) -> None:
-        """Evaluate points (parameters,), {position of the start: point}, in one prediction."""
-        residuals, jacobians = self.problem.candidate_jacobian(np.stack([*points.values()]))
-        for (k, u), residual, jacobian in zip(points.items(), residuals, jacobians, strict=True):
+    def _trial_point(self, k: int) -> Floats:
+        """(parameters,) the next trial point of a start."""
+        scale = self.bounds.width
+        gradient, hessian = self.gradient[k] * scale, self.hessian[k] * np.outer(scale, scale)
+        blocked = ((self.u[k] <= self.bounds.lower) & (gradient > 0)) | (
+            (self.u[k] >= self.bounds.upper) & (gradient < 0)
+        )
+        free = np.flatnonzero(~blocked)
+        if not free.size:
+            return np.asarray(self.u[k])
+        free_hessian = hessian[np.ix_(free, free)]
+        free_hessian = free_hessian + self.damping[k] * np.diag(
+            np.maximum(np.diag(free_hessian), 1e-12 * np.trace(free_hessian) + 1e-300)
+        )
+        step = np.zeros(scale.size)
+        step[free] = -np.linalg.solve(free_hessian, gradient[free])
+        return np.asarray(self.bounds.clip(self.u[k] + np.clip(step, -0.3, 0.3) * scale))
+
+    def _evaluate(self, indices: Ints, points: Floats) -> None:
+        """Evaluate points (starts, parameters), and move the starts whose cost decreases."""
+        residuals, jacobians = self.problem.candidate_jacobian(points)
+        for k, u, residual, jacobian in zip(indices, points, residuals, jacobians, strict=True):
+            self.evaluations[k] += 1
             whitened = self.problem.whiten(np.concatenate([residual[..., None], jacobian], axis=-1))
-            self.paths[k].evaluated(u, whitened[:, 0], whitened[:, 1:])
+            self._accept_or_reject(int(k), u, whitened[:, 0], whitened[:, 1:])
+
+    def _accept_or_reject(self, k: int, u: Floats, whitened: Floats, jacobian: Floats) -> None:
+        prior_weight = PRIOR_STRENGTH / self.bounds.width
+        penalty_residuals = np.concatenate([self.bound_penalties.residuals(u), prior_weight * (u - self.bounds.centre)])
+        cost = 0.5 * float(robust_loss(whitened**2, self.problem.loss).sum() + (penalty_residuals**2).sum())
+        penalty = self.problem.penalty
+        cost += 0.0 if penalty is None else float(penalty.values(u[None])[0])
+        finite = np.isfinite(cost) and np.isfinite(jacobian).all()
+        cost = cost if finite else FAILED_COST
+        if not cost < self.cost[k]:
+            self.damping[k] *= 8.0
+            self.stalled_steps[k] += int(cost <= self.cost[k] * (1.0 + TOLERANCE))
+            return
+        decrease = (self.cost[k] - cost) / max(cost, 1e-300)
+        self.stalled_steps[k] = self.stalled_steps[k] + 1 if decrease < TOLERANCE else 0
+        self.damping[k] = max(self.damping[k] * 0.1, 1e-12)
+        self.u[k], self.cost[k], self.whitened[k] = u, cost, whitened
+        if not finite:
+            return  # without a direction it stays where it is
+        weight = robust_weight(whitened**2, self.problem.loss)
+        penalty_jacobian = np.concatenate([self.bound_penalties.jacobian(u), np.diag(prior_weight)])
+        self.gradient[k] = jacobian.T @ (weight * whitened) + penalty_jacobian.T @ penalty_residuals
+        self.hessian[k] = (jacobian.T * weight) @ jacobian + penalty_jacobian.T @ penalty_jacobian
+        if penalty is not None:
+            local_penalty = penalty.frozen_weights_at(u)
+            local_jacobian = local_penalty.jacobian(u)
+            self.gradient[k] += local_jacobian.T @ local_penalty.residuals(u)
+            self.hessian[k] += local_jacobian.T @ local_jacobian

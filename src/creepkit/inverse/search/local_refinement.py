@@ -7,12 +7,12 @@ taken as they are, so that a value at its bound costs no more simulations than a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.optimize import least_squares, lsq_linear
 
 from creepkit.arrays import Floats, Ints
 from creepkit.inverse.bounds import Bounds
@@ -71,83 +71,6 @@ class Tolerances:
     tolerance: float = 1e-5
 
 
-System = Callable[[Floats], tuple[Floats, Floats]]
-"""x (unknowns,) to residuals (rows,) and their derivatives (rows, unknowns)."""
-
-
-FIRST_RADIUS, LEAST_RADIUS = 3.0, 1e-7
-"""Of the trust region, in scales of a step: at first, and where no shorter step is tried."""
-
-
-LINEARISATIONS, LINEAR_ENOUGH = 8, 1e-3
-"""How often residuals without simulation are made linear for one step, and the error of its gain that ends that."""
-
-
-class LeastSquaresPath:
-    """Bounded least squares from one start by Gauss-Newton steps in a trust region; see bounded_least_squares()."""
-
-    def __init__(
-        self,
-        start: Floats,
-        others: System,
-        bounds: Bounds,
-        scale: Floats,
-        fixed: Sequence[int] = (),
-        loss: str = "linear",
-    ) -> None:
-        """others : residuals without simulation, such as penalties, which no step makes linear for good."""
-        self.x, self.others, self.bounds, self.scale, self.loss = start.copy(), others, bounds, scale, loss
-        self.free = np.setdiff1d(np.arange(start.size), fixed)
-        self.radius, self.evaluations, self.converged = FIRST_RADIUS, 0, False
-        self.data_cost = self.other_cost = np.inf
-        self.residuals, self.jacobian = np.zeros(0), np.zeros((0, start.size))
-        self.expected = self.length = 0.0
-
-    @property
-    def cost(self) -> float:
-        """Half the sum of squares, with the loss of the data."""
-        return self.data_cost + self.other_cost
-
-    def minimum(self) -> Minimum:
-        """Where it is."""
-        return Minimum(self.x, self.cost, self.converged, self.evaluations, self.residuals)
-
-    def trial(self, tolerance: float) -> Floats | None:
-        """(unknowns,) the next point to evaluate; None where a step would gain less than this share of the cost."""
-        free, root_weight = self.free, np.sqrt(robust_weight(self.residuals**2, self.loss))
-        basis, triangle = np.linalg.qr(root_weight[:, None] * self.jacobian[:, free])
-        projected = basis.T @ (root_weight * self.residuals)
-        reach, x = self.radius * self.scale[free], self.x
-        low, high = (limit[free] - x[free] for limit in (self.bounds.lower, self.bounds.upper))
-        step = _bounded_step(
-            projected, triangle, self.others, x, free, (np.maximum(low, -reach), np.minimum(high, reach))
-        )
-        trial = x.copy()
-        trial[free] += step
-        trial = self.bounds.clip(trial)
-        gain = _cost(projected) - _cost(projected + triangle @ step)
-        self.expected = gain + self.other_cost - _cost(self.others(trial)[0])
-        self.length = float(np.abs(step / self.scale[free]).max(initial=0.0))
-        self.converged = bool(self.expected <= tolerance * self.cost or self.radius < LEAST_RADIUS)
-        return None if self.converged else trial
-
-    def evaluated(self, trial: Floats, residuals: Floats, jacobian: Floats) -> None:
-        """Go to a trial point whose cost is lower, and change the trust region by how well the gain was foreseen."""
-        self.evaluations += 1
-        finite = np.isfinite(residuals).all() and np.isfinite(jacobian).all()
-        data_cost = _cost(residuals, self.loss) if finite else np.inf
-        other_cost = _cost(self.others(trial)[0])
-        gain = self.cost - data_cost - other_cost if finite else -np.inf
-        if np.isfinite(self.cost):
-            if gain < 0.25 * self.expected:
-                self.radius = 0.25 * self.length
-            elif gain > 0.75 * self.expected and self.length > 0.99 * self.radius:
-                self.radius *= 2.0
-        if gain > 0.0:
-            self.x, self.residuals, self.jacobian = trial, residuals, jacobian
-            self.data_cost, self.other_cost = data_cost, other_cost
-
-
 def bounded_least_squares(
     data: System,
     others: System,
@@ -162,30 +85,62 @@ def bounded_least_squares(
     """Bounded least squares by Gauss-Newton steps within a trust region; it ends where a step would gain nothing more.
 
     data, others : x (unknowns,) to residuals (rows,) and their derivatives (rows, unknowns): those that a simulation
-        gives, to which the loss is applied, and those without, such as penalties.
+        gives, to whose squares the loss is applied, and those without, such as penalties, which no step linearises.
     start : (unknowns,) within the bounds; scale : (unknowns,) the scale of a step in each unknown.
     fixed : {position: value} of unknowns that keep their values.
     """
-    path = LeastSquaresPath(start, others, bounds, scale, list(fixed), loss)
-    path.evaluated(start, *data(start))
-    while (trial := path.trial(tolerances.tolerance)) is not None and path.evaluations < tolerances.max_steps:
-        path.evaluated(trial, *data(trial))
-    return path.minimum()
+    free = np.setdiff1d(np.arange(start.size), list(fixed))
+    radius, evaluations, x = FIRST_RADIUS, 1, start.copy()
+    residuals, jacobian = data(x)
+    data_cost, other_cost = _cost(residuals, loss), _cost(others(x)[0])
+    while True:
+        root_weight = np.sqrt(robust_weight(residuals**2, loss))
+        basis, triangle = np.linalg.qr(root_weight[:, None] * jacobian[:, free])
+        projected = basis.T @ (root_weight * residuals)
+        reach = radius * scale[free]
+        box = np.stack([np.maximum((bounds.lower - x)[free], -reach), np.minimum((bounds.upper - x)[free], reach)])
+        trial = x.copy()
+        step = _bounded_step(projected, triangle, others, x, free, box)
+        trial[free] += step
+        trial = bounds.clip(trial)
+        expected = _cost(projected) - _cost(projected + triangle @ step) + other_cost - _cost(others(trial)[0])
+        converged = expected <= tolerances.tolerance * (data_cost + other_cost) or radius < LEAST_RADIUS
+        if converged or evaluations >= tolerances.max_steps:
+            return Minimum(x, data_cost + other_cost, bool(converged), evaluations, residuals)
+        trial_residuals, trial_jacobian = data(trial)
+        evaluations += 1
+        finite = np.isfinite(trial_residuals).all() and np.isfinite(trial_jacobian).all()
+        costs = (_cost(trial_residuals, loss) if finite else np.inf), _cost(others(trial)[0])
+        gain, length = data_cost + other_cost - sum(costs), float(np.abs(step / scale[free]).max())
+        if gain < 0.25 * expected:
+            radius = 0.25 * length
+        elif gain > 0.75 * expected and length > 0.99 * radius:
+            radius *= 2.0
+        if gain > 0.0:
+            x, residuals, jacobian, (data_cost, other_cost) = trial, trial_residuals, trial_jacobian, costs
+
+
+System = Callable[[Floats], tuple[Floats, Floats]]
+"""x (unknowns,) to residuals (rows,) and their derivatives (rows, unknowns)."""
+
+
+FIRST_RADIUS, LEAST_RADIUS = 3.0, 1e-7
+"""Of the trust region, in scales of a step: at first, and where no shorter step is tried."""
+
+
+LINEAR_ENOUGH = 0.1
+"""Error of what a step gains, over that gain, up to which residuals without simulation are taken as linear."""
 
 
 def _cost(residuals: Floats, loss: str = "linear") -> float:
     return 0.5 * float(robust_loss(residuals**2, loss).sum())
 
 
-def _bounded_step(
-    projected: Floats, triangle: Floats, others: System, x: Floats, free: Ints, box: tuple[Floats, Floats]
-) -> Floats:
-    """(free,) the step s of least |projected + triangle s|^2 + |others(x + s)|^2 within a box: (free,) low and high.
+def _bounded_step(projected: Floats, triangle: Floats, others: System, x: Floats, free: Ints, box: Floats) -> Floats:
+    """(free,) the step s of least |projected + triangle s|^2 + |others(x + s)|^2 within a box (2, free).
 
-    With `others` made linear in turn where the last step ended, by active sets; that costs no simulation.
+    First with `others` linear, by active sets; where they are not, by a search that costs no simulation.
     """
-    low, high = box
-    high = np.maximum(high, low + 1e-12 * np.maximum(1.0, np.abs(low)))
 
     def at(step: Floats) -> tuple[Floats, Floats]:
         moved = x.copy()
@@ -193,23 +148,19 @@ def _bounded_step(
         values, slopes = others(moved)
         return np.concatenate([projected + triangle @ step, values]), np.concatenate([triangle, slopes[:, free]])
 
-    step = best = np.zeros(free.size)
-    values, slopes = at(step)
-    least = start_cost = _cost(values)
-    for _ in range(LINEARISATIONS):
-        size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
-        right = slopes @ step - values
-        step = np.linalg.lstsq(slopes / size, right, rcond=None)[0] / size
-        if not ((step >= low) & (step <= high)).all():
-            step = lsq_linear(slopes / size, right, bounds=(low * size, high * size), method="bvls").x / size
-        step = np.clip(step, low, high)
-        foreseen = _cost(slopes @ step - right)
-        values, slopes = at(step)
-        cost = _cost(values)
-        best, least = (step, cost) if cost < least else (best, least)
-        if abs(cost - foreseen) <= LINEAR_ENOUGH * max(start_cost - foreseen, 0.0):
-            break
-    return np.asarray(best)
+    values, slopes = at(np.zeros(free.size))
+    size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+    low, high = box[0], np.maximum(box[1], box[0] + 1e-12 * np.maximum(1.0, np.abs(box[0])))
+    step = np.linalg.lstsq(slopes / size, -values, rcond=None)[0] / size
+    if not ((step >= low) & (step <= high)).all():
+        step = lsq_linear(slopes / size, -values, bounds=(low * size, high * size), method="bvls").x / size
+    step = np.clip(step, low, high)
+    linear, exact = values + slopes @ step, at(step)[0]
+    if abs(_cost(exact) - _cost(linear)) <= LINEAR_ENOUGH * max(_cost(values) - _cost(linear), 0.0):
+        return np.asarray(step)
+    start = step if _cost(exact) < _cost(values) else np.zeros(free.size)
+    found = least_squares(lambda s: at(s)[0], start, lambda s: at(s)[1], bounds=(low, high), x_scale=1.0 / size)
+    return np.asarray(found.x)
 
 
 def robust_loss(squared: Floats, loss: str) -> Floats:

@@ -164,10 +164,6 @@ EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS = 1e-5, 5e-3
 reduced-order model is not better than the latter, and along a valley one start is enough for its predictor."""
 
 
-MUCH_WORSE = 3.0
-"""Times the cost of the best minimum, beyond which another is not refined."""
-
-
 SAME_COORDINATES = 0.02
 """Distance over the width of the bounds, in every coordinate, up to which two minima are one."""
 
@@ -184,15 +180,10 @@ def distinct(
     max_count: int = 2,
     tolerance: float = SAME_COORDINATES,
 ) -> list[Minimum]:
-    """The best minima that differ by more than 2 % of the bounds in some coordinate, and in what they predict.
-
-    One whose cost is MUCH_WORSE than the best is none that a likelihood would prefer.
-    """
+    """The best minima that differ by more than 2 % of the bounds in some coordinate, and in what they predict."""
     selected: list[Minimum] = []
     for minimum in minima:
-        if minimum.cost <= MUCH_WORSE * minima[0].cost and not any(
-            _same(minimum, other, bounds, equal_predictions, tolerance) for other in selected
-        ):
+        if not any(_same(minimum, other, bounds, equal_predictions, tolerance) for other in selected):
             selected.append(minimum)
     return selected[:max_count]
 

@@ -184,18 +184,12 @@ def _identify_all(
     if through is None or not fits:
         return fits
     competitive = {id(r.fit) for r in rank(fits, challenge=False).laws if r.excess < RULED_OUT_EXCESS}
-    refined = []
-    for fit in fits:
-        cheaper = through_for_law(through, fit.law)
-        if cheaper is None:
-            refined.append(fit)
-        elif id(fit) in competitive:
-            better = _try_to_identify(fit.law, histories, using, settings, failed, fit)
-            refined += [] if better is None else [better]
-        else:
-            better = _try_to_identify(fit.law, histories, cheaper, settings, {}, fit, sampled=False)
-            refined.append(_ruled_out(better or fit))
-    return refined
+    refined = {
+        id(fit): _try_to_identify(fit.law, histories, using, settings, failed, fit)
+        for fit in fits
+        if id(fit) in competitive
+    }
+    return [refined.get(id(fit)) or _ruled_out(fit) for fit in fits if fit.law.name not in failed]
 
 
 def _try_to_identify(
@@ -205,20 +199,17 @@ def _try_to_identify(
     settings: IdentificationSettings,
     failed: dict[str, str],
     previous_fit: Identification | None = None,
-    *,
     approximately: bool = False,
-    sampled: bool = True,
 ) -> Identification | None:
     """Identify one law, from where a cheaper predictor ended if it did; errors are recorded in `failed`.
 
-    approximately : with the cheaper predictor, to be identified again. sampled : whether its posterior is sampled where
-        that is needed.
+    approximately : with the cheaper predictor, to be identified again, so that its posterior is not sampled either.
     """
     start = None if previous_fit is None else StartingEstimate.from_identification(previous_fit)
     try:
-        if sampled and not approximately:
-            return identify(law, histories, using, settings=settings, start=start)
-        return identify_values(law, histories, using, settings=settings, start=start, approximately=approximately)
+        if approximately:
+            return identify_values(law, histories, using, settings=settings, start=start, approximately=True)
+        return identify(law, histories, using, settings=settings, start=start)
     except CreepkitError as error:
         failed[law.name] = str(error)
         return None
