@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.composite_predictor import predict, refined_of, underlying_specimen
+from creepkit.inverse.composite_predictor import predict, refined_of
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.records import History, Prediction, Predictor, Status, output_unit
@@ -61,16 +61,9 @@ class NumericalError:
         )
 
 
-def correct_defect(
-    problem: LeastSquaresProblem, x: Floats, *, by_specimen: bool = False
-) -> tuple[LeastSquaresProblem, NumericalError | None]:
-    """The problem with its predictor corrected at x (unknowns,) by the more exact one, if it has one.
-
-    by_specimen : of a surrogate or a reduced-order model, by the specimen as it is, not by its finer discretisation.
-    """
+def correct_defect(problem: LeastSquaresProblem, x: Floats) -> tuple[LeastSquaresProblem, NumericalError | None]:
+    """The problem with its predictor corrected at x (unknowns,) by the more exact one, if it has one."""
     refined = refined_of(problem.predictor)
-    if refined is not None and by_specimen:
-        refined = underlying_specimen(problem.predictor)
     if refined is None or problem.observations.followed_to_rupture.any():
         return problem, None
     observations, count = problem.observations, problem.parameter_count

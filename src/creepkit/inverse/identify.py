@@ -81,10 +81,6 @@ MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
 
 
-CHANGE_OF_DEFECT = 200.0
-"""Relative change of a defect over that of what is predicted, at most: 10 to 50 were found in dimples."""
-
-
 REFIT_ROUNDS = 2
 """Rounds of an estimate that begins near its end."""
 
@@ -168,18 +164,14 @@ def identify_values(
     through: Predictor | None = None,
     start: StartingEstimate | None = None,
     progress: IterationCallback | None = None,
-    approximately: bool = False,
 ) -> Identification:
-    """As identify(), without samples of the posterior where a value is at its bound.
-
-    approximately : to be identified again from there: in few rounds, corrected once, by the specimen itself.
-    """
+    """As identify(), without samples of the posterior where a value is at its bound."""
     settings = settings or IdentificationSettings()
     known, through, notes = predictors_for_law(law, using, through)
     histories, left_out = compared_tests(law, histories, settings)
     if notes:
         how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
-        fit = identify_values(law, histories, known, through=through, approximately=approximately, **how)
+        fit = identify_values(law, histories, known, through=through, **how)
         return replace(fit, notes=(*fit.notes, *notes))
     with single_threaded_blas():
         problem = LeastSquaresProblem.from_histories(
@@ -193,7 +185,7 @@ def identify_values(
         if search_outcome.dropped_terms:
             return _without_terms(problem, histories, search_outcome, progress)
         best, numerical_error = _best_estimate(
-            problem, search_outcome, through, start or StartingEstimate(None), progress, approximately
+            problem, search_outcome, through, start or StartingEstimate(None), progress
         )
         gradient = _gradient(best)[: len(law.params)]
         check_bounds(
@@ -233,7 +225,6 @@ def _best_estimate(
     through: Predictor | None,
     start: StartingEstimate,
     progress: IterationCallback | None,
-    approximately: bool,
 ) -> tuple[EstimationResult, NumericalError | None]:
     """The best end of the starts, through the cheaper predictor first if there is one; its best end goes on.
 
@@ -243,7 +234,7 @@ def _best_estimate(
     known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in search_outcome.starts]
     problem = replace(problem, loss=problem.settings.loss)
-    limits, working_noise = APPROXIMATE_LIMITS if approximately else IterationLimits(), None
+    limits, working_noise = IterationLimits(), None
     if through is not None and start.u is None:
         cheaper = problem.with_predictor(through)
         results = [estimate_iteratively(cheaper, x, working_estimator, APPROXIMATE_LIMITS, progress) for x in starts]
@@ -264,8 +255,8 @@ def _best_estimate(
     else:
         x = starts[0]
     known: Floats | None = None
-    for _ in range(1 if approximately else MOST_CORRECTIONS):
-        corrected, error = correct_defect(problem, x, by_specimen=approximately)
+    for _ in range(MOST_CORRECTIONS):
+        corrected, error = correct_defect(problem, x)
         if (
             known is not None
             and corrected.correction is not None
@@ -274,22 +265,14 @@ def _best_estimate(
             break
         numerical_error = error
         estimator = _working_estimator(corrected, error)
-        corrected_at, best = x, estimate_iteratively(corrected, x, estimator, limits, progress, working_noise)
+        best = estimate_iteratively(corrected, x, estimator, limits, progress, working_noise)
         x, working_noise, known = best.minimum.x, best.working_noise, corrected.correction
         if error is None or known is None:
             break
         numerical_error = replace(error, shift=shift_of_values(best.problem, x, known))
-        if numerical_error.shift * min(1.0, CHANGE_OF_DEFECT * _relative_change(best, x - corrected_at)) < SMALL_SHIFT:
+        if numerical_error.shift < SMALL_SHIFT:
             break
     return best, numerical_error
-
-
-def _relative_change(best: EstimationResult, step: Floats) -> float:
-    """Of what is predicted, by a step (unknowns,) to the end of an estimate: the largest, over the largest value."""
-    residuals, observations = best.residuals, best.problem.observations
-    assert residuals.jacobian is not None
-    change = (residuals.jacobian @ step / residuals.offset_sensitivity)[observations.present]
-    return float(np.abs(change).max() / np.abs(observations.values[observations.present]).max())
 
 
 def _working_estimator(

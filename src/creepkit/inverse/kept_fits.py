@@ -217,7 +217,6 @@ def _key(kind: str, law: Any, histories: Any, predictor: Predictor, how: Mapping
         "through": None if through is None else predictor_fingerprint(through),
         "settings": repr(how.get("settings")),
         "search": repr(how.get("search")),
-        "approximately": bool(how.get("approximately")),
         "start": None
         if start is None
         else [None if start.u is None else np.asarray(start.u).tolist(), repr(start.nuisances), repr(start.reference)],

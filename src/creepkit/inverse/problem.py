@@ -357,10 +357,10 @@ class LeastSquaresProblem:
         inside = np.clip(initial, self.bounds.lower + margin, self.bounds.upper - margin)
         inside[list(fixed)] = list(fixed.values())
 
-        def others(x: Floats) -> tuple[Floats, Floats]:
-            return self._other_system(x, additional)
+        def system(x: Floats) -> tuple[Floats, Floats]:
+            return self._system(x, additional)
 
-        if not all(np.isfinite(part).all() for part in (*self._data_system(inside), *others(inside))):
+        if not all(np.isfinite(part).all() for part in system(inside)):
             raise FitError(
                 f"law '{self.law.name}': its prediction is no number where a refinement begins; narrow the bounds of "
                 "its parameters, or give more starts"
@@ -368,23 +368,19 @@ class LeastSquaresProblem:
         scale, nuisances = 0.1 * self.bounds.width, self.nuisance_parameters
         if nuisances.size:
             scale[-nuisances.size :] = np.minimum(nuisances.sd, self.bounds.width[-nuisances.size :])
-        tolerances = tolerances or Tolerances()
-        return bounded_least_squares(
-            self._data_system, others, inside, self.bounds, scale, tolerances, fixed=fixed, loss=self.loss
+        minimum = bounded_least_squares(
+            system, inside, self.bounds, scale, tolerances or Tolerances(), fixed=fixed, loss=self.loss
         )
+        assert minimum.whitened_residuals is not None
+        return replace(minimum, whitened_residuals=minimum.whitened_residuals[: self.observations.count])
 
-    def _data_system(self, x: Floats) -> tuple[Floats, Floats]:
-        """Whitened residuals of the data at x, (data,), and their derivatives, (data, unknowns)."""
-        residuals = self.residuals(x)
+    def _system(self, x: Floats, additional: AdditionalResiduals | None) -> tuple[Floats, Floats]:
+        """All residuals at x, (rows,), and their derivatives, (rows, unknowns)."""
+        residuals, prior_weight = self.residuals(x), PRIOR_STRENGTH / self.bounds.width
         assert residuals.jacobian is not None
         data = self.whiten(np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1))
-        return data[:, 0], data[:, 1:]
-
-    def _other_system(self, x: Floats, additional: AdditionalResiduals | None) -> tuple[Floats, Floats]:
-        """Residuals without simulation at x, (rows,), and their derivatives, (rows, unknowns)."""
-        prior_weight = PRIOR_STRENGTH / self.bounds.width
-        values = [self.bound_penalties.residuals(x), prior_weight * (x - self.bounds.centre)]
-        jacobians = [self.bound_penalties.jacobian(x), np.diag(prior_weight)]
+        values = [data[:, 0], self.bound_penalties.residuals(x), prior_weight * (x - self.bounds.centre)]
+        jacobians = [data[:, 1:], self.bound_penalties.jacobian(x), np.diag(prior_weight)]
         for extra in (self.penalty, additional):
             if extra is not None:
                 values.append(extra.residuals(x))

@@ -30,7 +30,7 @@ OutputWeights = Weighting | Mapping[str, float]
 class IdentificationSettings(Options, title="settings of an identification", error=FitError):
     """What a run can be repeated from.
 
-    starts : of the multi-start search; sobol_points : that are screened for them, a power of two is best; half of both
+    starts : of the multi-start search; sobol_points : that are screened for them, a power of two is best; half of them
     where two parameters beside rates are sought, a quarter for one.
     frames : that are compared in each history, with all their outputs. seed : of random draws.
     loss : of frames, for values only; intervals and noise model are Gaussian, in which outliers are noise. An

@@ -1,6 +1,5 @@
 """Batched Levenberg-Marquardt: least squares from several starts, all of which share each prediction.
 
-A start that meets the path of a better one ends where that does; one whose next step would gain nothing has converged.
 Steps are projected on the bounds: a coordinate that stands at its bound and is pushed outwards is left out of the step
 (Kanzow, Yamashita & Fukushima (2004), J. Comput. Appl. Math. 172, 375); a step is accepted only if the cost falls.
 """
@@ -21,11 +20,6 @@ MAX_STEPS = 40
 
 TOLERANCE = 1e-5
 """Relative decrease of the cost below which a start has converged, twice in turn."""
-
-
-MET = 0.02
-"""Distance over the width of the bounds, in every coordinate, from which on the worse of two starts goes as the other.
-"""
 
 
 CONTINUED = 4
@@ -66,15 +60,15 @@ def batched_levenberg_marquardt(
 
 def _continued(problem: LeastSquaresProblem, minima: Sequence[Minimum]) -> list[Minimum]:
     """Minima that have not converged are refined one by one, in a trust region, which follows curved valleys better."""
-    finished: list[Minimum] = []
-    continued: dict[bytes, Minimum] = {}
+    finished = []
     for minimum in minima:
         if not minimum.converged:
-            key = minimum.x.tobytes()  # several starts may have gone one way
-            continued[key] = continued[key] if key in continued else problem.minimise(minimum.x)
-            lower = continued[key]
-            evaluations = lower.evaluations + minimum.evaluations
-            minimum = replace(lower, evaluations=evaluations) if lower.cost < minimum.cost else minimum
+            continued = problem.minimise(minimum.x)
+            minimum = (
+                replace(continued, evaluations=continued.evaluations + minimum.evaluations)
+                if continued.cost < minimum.cost
+                else minimum
+            )
         finished.append(minimum)
     return finished
 
@@ -90,7 +84,7 @@ class _BatchedLevenbergMarquardt:
         self.cost, self.whitened = np.full(count, np.inf), [np.zeros(0)] * count
         self.gradient, self.hessian = np.zeros((count, size)), np.zeros((count, size, size))
         self.damping, self.stalled_steps = np.full(count, DAMPING_RANGE[0]), np.zeros(count, int)
-        self.evaluations, self.follows = np.zeros(count, int), np.arange(count)
+        self.evaluations = np.zeros(count, int)
         self._evaluate(np.arange(count), self.u)
 
     def run(self, max_steps: int, progress: IterationCallback | None, costs: list[Floats]) -> list[Minimum]:
@@ -100,36 +94,20 @@ class _BatchedLevenbergMarquardt:
             active = np.flatnonzero((self.stalled_steps < 2) & (self.damping < DAMPING_RANGE[1]))
             if progress is not None:
                 progress("start", len(self.u) - active.size, len(self.u))
-            trials = {int(k): self._trial_point(int(k)) for k in active}
-            going = [k for k, trial in trials.items() if not self._ends(k, trial)]
-            if going:
-                self._evaluate(np.array(going), np.stack([trials[k] for k in going]))
-        ends = [self._end_of(k) for k in range(len(self.u))]
+            if not active.size:
+                break
+            self._evaluate(active, np.stack([self._trial_point(int(k)) for k in active]))
         minima = [
-            Minimum(self.u[end], float(self.cost[end]), bool(self.stalled_steps[end] >= 2), count, self.whitened[end])
-            for end, count in zip(ends, map(int, self.evaluations), strict=True)
+            Minimum(
+                self.u[k],
+                float(self.cost[k]),
+                bool(self.stalled_steps[k] >= 2),
+                int(self.evaluations[k]),
+                self.whitened[k],
+            )
+            for k in range(len(self.u))
         ]
         return sorted(minima, key=lambda minimum: minimum.cost)
-
-    def _ends(self, k: int, trial: Floats) -> bool:
-        """Whether a start has converged, for its step would gain nothing, or has met the path of a better one."""
-        step = trial - self.u[k]
-        gain = -float(self.gradient[k] @ step + 0.5 * step @ self.hessian[k] @ step)
-        if np.isfinite(self.cost[k]) and self.cost[k] < FAILED_COST and gain <= TOLERANCE * self.cost[k]:
-            self.stalled_steps[k] = 2
-            return True
-        near = (np.abs(self.u - self.u[k]) <= MET * self.bounds.width).all(axis=1)
-        better = np.flatnonzero(near & (self.cost < self.cost[k]))
-        if better.size:
-            self.follows[k] = int(better[np.argmin(self.cost[better])])
-            self.stalled_steps[k] = 2
-        return bool(better.size)
-
-    def _end_of(self, k: int) -> int:
-        """The start whose path a start followed to its end."""
-        while self.follows[k] != k:
-            k = int(self.follows[k])
-        return k
 
     def _trial_point(self, k: int) -> Floats:
         """(parameters,) the next trial point of a start."""

@@ -46,28 +46,22 @@ class MultiStart:
         ):
             if value is not None:
                 limits.check_number(f"multi-start: {name}", value, allowed, FitError)
-        starts, draws = self.starts or default_starts(problem), self.draws or default_draws(problem)
+        starts, draws = self.starts or problem.settings.starts, self.draws or default_draws(problem)
         screened = screened_starts(problem, starts=starts, draws=draws)
-        problem.check_predicted(np.array(screened[:2]))  # from where nothing is predicted, no direction leads away
+        problem.check_predicted(np.array(screened))  # from where nothing is predicted, no direction leads away
         initial_points = [*single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2), *screened]
         costs: list[Floats] = []
         minima = batched_levenberg_marquardt(problem, initial_points, progress=progress, costs=costs)
         return SearchResult(tuple(minima), SearchTrace.from_costs("multi-start", costs) if costs else None)
 
 
-def default_starts(problem: LeastSquaresProblem) -> int:
-    """Those of the settings for three parameters beside rates, half of them for two, a quarter for one or none."""
-    return -(-problem.settings.starts // _fewer(problem))
-
-
 def default_draws(problem: LeastSquaresProblem) -> int:
-    """Those of the settings, and as many fewer; rates are not drawn: they are shifted to those of the data."""
-    return max(problem.settings.sobol_points // _fewer(problem), 1)
+    """Those of the settings for three parameters beside rates, half of them for two, a quarter for one or none.
 
-
-def _fewer(problem: LeastSquaresProblem) -> int:
+    Rates are not drawn: they are shifted to those of the data.
+    """
     shapes = problem.bounds.lower.size - len(problem.coordinates.term_rates)
-    return {0: 4, 1: 4, 2: 2}.get(shapes, 1)
+    return max(problem.settings.sobol_points // {0: 4, 1: 4, 2: 2}.get(shapes, 1), 1)
 
 
 def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
@@ -98,10 +92,7 @@ def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int)
 
 
 def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
-    """The centre, and the best draws after a shift of all rates to that of the data: (parameters,) each.
-
-    The worse half of the draws is left out from shift to shift, down to twice as many as there are starts.
-    """
+    """The centre, and the best draws after a shift of all rates to that of the data: (parameters,) each."""
     observations, bounds, seed = problem.observations, problem.bounds, problem.settings.seed
     sobol = qmc.Sobol(bounds.lower.size, seed=seed).random(draws)
     points = bounds.lower + sobol * bounds.width
@@ -122,25 +113,19 @@ def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) ->
             + sobol[:, internal_rates] * (INTERNAL_RATE_RANGE[1] - INTERNAL_RATE_RANGE[0])
         )
         points[0, internal_rates] = log_internal_rate + 0.5 * sum(INTERNAL_RATE_RANGE)
-        for shift in range(3 + 2 * min(len(internal_rates), 1)):
+        for _ in range(3 + 2 * min(len(internal_rates), 1)):
             residuals = problem.candidate_residuals(bounds.clip(points))
             points[:, rates] -= np.clip(median_log_rate_excess(observations, residuals), -6, 6)[:, None]
             points[:, internal_rates] -= np.clip(median_log_rupture_excess(observations, residuals), -6, 6)[:, None]
-            if shift:  # once shifted they can be compared
-                best = np.argsort(_scores(problem, residuals)[1:])[: max(len(points) // 2, 2 * starts)]
-                points = points[[0, *np.sort(1 + best)]]
     points = bounds.clip(points)
-    score = _scores(problem, problem.candidate_residuals(points))
+    residuals = problem.candidate_residuals(points)
+    score = np.array(
+        [np.mean(np.arcsinh(candidate_residuals[observations.present]) ** 2) for candidate_residuals in residuals]
+    )
     if not np.isfinite(score).any():
         raise FitError(f"law '{problem.law.name}': no point within its bounds can be simulated; widen the bounds")
     order = [int(k) for k in np.argsort(score) if k != 0][: max(starts - 1, 0)]
     return [points[0], *(points[k] for k in order)]
-
-
-def _scores(problem: LeastSquaresProblem, residuals: Floats) -> Floats:
-    """(candidates,) - means of squared residuals (candidates, tests, observations), large ones by their logarithms."""
-    present = problem.observations.present
-    return np.array([np.mean(np.arcsinh(candidate_residuals[present]) ** 2) for candidate_residuals in residuals])
 
 
 def _with_sampled_exponents(problem: LeastSquaresProblem, points: Floats, sobol: Floats) -> Floats:

@@ -177,7 +177,7 @@ def _identify_all(
         if progress is not None:
             progress(task, k, len(laws))
         first = through_for_law(through, law)
-        fit = _try_to_identify(law, histories, first or using, settings, failed, approximately=first is not None)
+        fit = _try_to_identify(law, histories, first or using, settings, failed, sampled=first is None)
         fits += [fit] if fit is not None else []
         if progress is not None:
             progress(task, k + 1, len(laws))
@@ -199,17 +199,16 @@ def _try_to_identify(
     settings: IdentificationSettings,
     failed: dict[str, str],
     previous_fit: Identification | None = None,
-    approximately: bool = False,
+    sampled: bool = True,
 ) -> Identification | None:
     """Identify one law, from where a cheaper predictor ended if it did; errors are recorded in `failed`.
 
-    approximately : with the cheaper predictor, to be identified again, so that its posterior is not sampled either.
+    sampled : whether its posterior is sampled where that is needed; not of what is identified again.
     """
     start = None if previous_fit is None else StartingEstimate.from_identification(previous_fit)
     try:
-        if approximately:
-            return identify_values(law, histories, using, settings=settings, start=start, approximately=True)
-        return identify(law, histories, using, settings=settings, start=start)
+        run = identify if sampled else identify_values
+        return run(law, histories, using, settings=settings, start=start)
     except CreepkitError as error:
         failed[law.name] = str(error)
         return None

@@ -134,11 +134,9 @@ def test_values_by_equal_weights_are_judged_where_their_own_chi_square_is_least(
     fit = identify(
         NORTON, tests, Steady(), settings=replace(SETTINGS, weights="noise", nuisances=(ck.Nuisance("rate"),))
     )
-    elsewhere = replace(fit, u=fit.u + 0.05)
-    best = FittedLaw.at_least_chi_square(elsewhere)
+    best = FittedLaw.at_least_chi_square(fit)
     least = _chi_square(best.problem, best.x)
-    assert least < _chi_square(best.problem, elsewhere.x) - 1.0
-    assert least <= _chi_square(best.problem, fit.x) + 1e-3
+    assert least < _chi_square(best.problem, fit.x)
     assert _least_chi_square(best, best.problem, fit.x + 0.05)[0] == pytest.approx(least, abs=0.02)
 
 
