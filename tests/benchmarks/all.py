@@ -73,7 +73,6 @@ BENCHMARKS = {
     "forecast_measured": Benchmark(12, needs=DATA),
     "causes": Benchmark(5, (("--campaigns", "20"),)),
     "weights": Benchmark(8),
-    "simulation_counts": Benchmark(2, short=("--dimples", "1")),
     "noise_correlation": Benchmark(4),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "rate_tables": Benchmark(20, needs=DATA),

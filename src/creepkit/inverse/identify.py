@@ -53,7 +53,7 @@ from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
-from creepkit.inverse.perturbation import Perturbation, unmodelled_note
+from creepkit.inverse.perturbation import unmodelled_note
 from creepkit.inverse.perturbations import perturbations
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem

@@ -2,7 +2,7 @@
 
 Over the width of a posterior the residuals r(u) of a creep test are smooth; each is fitted by least squares at some
 tens of simulated points, weighted by the posterior, so that thousands of draws need no simulation. With two parameters
-or three, ln p is so found to 0.02 in the mean (see tests/benchmarks/simulation_counts.py).
+or three, ln p is so found to 0.02 in the mean of six planted dimples.
 
 Source: R. Myers, D. Montgomery and C. Anderson-Cook, Response Surface Methodology (2016), chapter 6.
 """

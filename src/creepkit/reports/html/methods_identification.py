@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.noise_model import MINIMUM_TESTS
-from creepkit.inverse.nuisance_plausibility import nuisance_unit
+from creepkit.inverse.nuisance_parameters import nuisance_unit
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
 from creepkit.inverse.variance_components import NOISE_PRIOR_SD
 from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
