@@ -70,7 +70,10 @@ MOST_TESTS = 3
 
 @dataclass(frozen=True, eq=False)
 class RateConditions:
-    """Of each test the stress, MPa, and temperature, K, and ln stress and -1/(R T), mol/J, less their means."""
+    """Stress and temperature of each test.
+
+    stresses : (tests,) MPa. temperatures : (tests,) K.
+    """
 
     stresses: Floats
     temperatures: Floats

@@ -22,7 +22,10 @@ SMALLEST_FACTOR = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """ln of the evidence; mean and sd of the coefficients (columns,); step of all unknowns, (unknowns,)."""
+    """ln of the evidence of an explanation.
+
+    mean, sd : (columns,) of the coefficients. step : (unknowns,) of all unknowns.
+    """
 
     log: float
     mean: Floats
@@ -65,7 +68,10 @@ class RatePerturbations:
         self.precision, self.prior_residual = linear.precision, linear.prior_residual
 
     def evidence(self, weights: Floats, prior_sd: Floats) -> Evidence:
-        """Of ln rates moved by weights (tests, columns) times coefficients of these prior deviations (columns,)."""
+        """Of ln rates moved by weights times coefficients.
+
+        weights : (tests, columns). prior_sd : (columns,) prior standard deviations of the coefficients.
+        """
         unknowns = self.precision.size
         total = self.gram.sum(axis=1)
         rows = np.einsum("tq,stm->sqm", weights, self.gram[..., -1])

@@ -153,8 +153,8 @@ LARGEST_ERROR = 0.2
 def posterior_samples(density: Callable[[Floats], Floats], centre: Floats, shape: Floats, seed: int) -> Floats | None:
     """(samples, parameters) conditioned coordinates of equal weight; None where too few of the draws count.
 
-    density : ln p (candidates,), but for a constant, of u (candidates, parameters). centre, shape : of the first
-    proposal.
+    density : ln p (candidates,), but for a constant, of u (candidates, parameters).
+    centre : (parameters,) of the first proposal. shape : (parameters, parameters) its covariance.
     """
     size = centre.size
     least = 1e-6 * np.diag(np.diag(shape))
@@ -185,7 +185,10 @@ def posterior_samples(density: Callable[[Floats], Floats], centre: Floats, shape
 
 
 def shortened_covariance(density: Callable[[Floats], Floats], centre: Floats, covariance: Floats) -> Floats:
-    """The covariance with principal axes as short as the posterior falls along them.
+    """The covariance (parameters, parameters) with principal axes as short as the posterior falls along them.
+
+    density : ln p (candidates,), but for a constant, of u (candidates, parameters). centre : (parameters,).
+    covariance : (parameters, parameters) by Laplace.
 
     Where tests do not tell parameters apart, as two transients that are alike, the derivatives at the optimum vanish
     along a line that the posterior leaves soon after: Laplace's axis is then longer by orders of magnitude.

@@ -135,14 +135,20 @@ class Posterior:
         return log_density
 
     def log_density(self, residuals: Floats, rate_effect: Floats) -> Floats:
-        """(candidates,) ln p of candidates within the bounds; residuals, rate_effect : as residuals() gives them."""
+        """(candidates,) ln p of candidates within the bounds, but for a constant.
+
+        residuals, rate_effect : (candidates, tests, observations) as residuals() gives them.
+        """
         chi_square, count = self.chi_square(residuals, rate_effect), self.problem.parameter_count
         rise = np.maximum(chi_square - self.least_chi_square, -0.5 * self.degrees_of_freedom)
         log_density = -0.5 * (self.degrees_of_freedom + count) * np.log1p(rise / self.degrees_of_freedom)
         return np.where(np.isfinite(log_density), log_density, -np.inf)
 
     def chi_square(self, residuals: Floats, rate_effect: Floats) -> Floats:
-        """(candidates,) least sum of squares that any values of the nuisances leave."""
+        """(candidates,) least sum of squares that any values of the nuisances leave.
+
+        residuals, rate_effect : (candidates, tests, observations) as residuals() gives them.
+        """
         whitened = _whitened(self.covariance_factor, rate_effect, residuals)[:, self.problem.observations.present]
         prior = np.broadcast_to(self.prior_residuals, (len(residuals), self.prior_residuals.size))
         rows = np.concatenate([whitened, prior], axis=1)
@@ -150,6 +156,8 @@ class Posterior:
 
     def residuals(self, u: Floats) -> tuple[Floats, Floats]:
         """Residuals (candidates, tests, observations), and what a test's own rate does half way to each candidate.
+
+        u : (candidates, parameters).
 
         A factor on all rates moves every coefficient, each of which is a coordinate's own. Where a term has none, and
         for tests compared over their whole life, whose derivatives are expensive, that effect is taken at the optimum.

@@ -32,7 +32,8 @@ class QuadraticResiduals:
     def fitted(cls, u: Floats, residuals: Floats, weights: Floats, centre: Floats, shape: Floats) -> QuadraticResiduals:
         """Through points u (points, parameters); residuals : (points, tests, observations); weights : (points,).
 
-        centre, shape : mean and covariance of the points, about which the functions are written.
+        centre : (parameters,) mean of the points, about which the functions are written. shape : (parameters,
+        parameters) their covariance.
         """
         result = cls(centre, np.asarray(np.linalg.cholesky(shape)), np.zeros(0))
         terms, root_weights = result._terms(u), np.sqrt(weights)[:, None]
@@ -45,7 +46,7 @@ class QuadraticResiduals:
         return np.asarray(np.tensordot(self._terms(u), self.coefficients, axes=1))
 
     def candidate_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
-        """The same, and their derivatives (candidates, tests, observations, parameters) to u."""
+        """The same of u (candidates, parameters), and derivatives (candidates, tests, observations, parameters)."""
         v, inverse = self._standardised(u), np.linalg.inv(self.root)
         first, second = self._pairs
         slopes = np.zeros((len(u), len(self.coefficients), u.shape[1]))  # of the terms, to v
