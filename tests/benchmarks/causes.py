@@ -2,14 +2,11 @@
 
     python tests/benchmarks/causes.py [--campaigns 20] [--write]
 
-Each campaign has 8 to 12 bars at three temperatures (575, 600 and 625 C) and four stresses, whose rates scatter by 3,
-8 or 15 % (one standard deviation). Strains have a closed form: rate = r (1 + 10 exp(-e / 0.002)), with primary creep,
-or r alone in every second campaign, with r = A s^n exp(-Q/R T), n from 4 to 7 and Q from 300 to 450 kJ/mol, and noise
-of 1e-5. One fault is planted: a temperature that was 8 to 20 K other than stated, a load 10 or 15 % other, a strain in
-another unit (a factor of 10, 25.4 or 100), two materials whose rates differ by a factor of 2 to 5, or an exponent that
-rises with stress as in sinh(s / 60 MPa)^4. "None" has no fault. The law that is fitted is the right one, of the rising
-exponent a power law with the same primary creep. "Named" counts campaigns whose likeliest explanation is of the
-planted kind and, of single tests, names the test; of two materials, most of them. "Others" name something else.
+8 to 12 bars at three temperatures, rates scattering by 3, 8 or 15 %, strains in closed form, every second campaign
+with primary creep: rate = r (1 + 10 exp(-e / 0.002)), r = A s^n exp(-Q/R T). Planted is one fault: a temperature 8 to
+20 K or a load 10 or 15 % other than stated, a strain in another unit (10, 25.4, 100), two materials (a factor of 2 to
+5), or r of sinh(s / 60 MPa)^4 fitted by a power law. "Named": the likeliest explanation is the planted one, with its
+test.
 """
 
 from __future__ import annotations
