@@ -166,8 +166,12 @@ class RateExplanations:
         scaled = over / np.ptp(over)
         forms = [(scaled, 0.5 * scaled * over)]
         forms += [(np.exp(over) - 1.0, np.exp(over) - over)] if kind == "stress exponent" else []
-        tried = [(self._evidence([w], [prior_sd / float(np.ptp(slope))]), slope) for slope, w in forms]
-        evidence, slope = max(tried, key=lambda one: one[0].log)
+        tried = [(self._evidence([w], [prior_sd / float(np.ptp(slope))]), slope, w) for slope, w in forms]
+        evidence, slope, primitive = max(tried, key=lambda one: one[0].log)
+        straight = np.stack([np.ones_like(over), over], axis=1)
+        bend = primitive - straight @ np.linalg.lstsq(straight, primitive, rcond=None)[0]
+        if np.ptp(bend) * abs(evidence.mean[0]) < SMALLEST_FACTOR:
+            return
         span = float(np.ptp(slope))
         u, coordinates, middle = self._moved(evidence), self.problem.coordinates, self.problem.coordinates.reference
         first, last = int(over.argmin()), int(over.argmax())

