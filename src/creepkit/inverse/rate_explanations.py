@@ -111,7 +111,7 @@ class RateExplanations:
 
     @cached_property
     def found(self) -> tuple[Explanation, ...]:
-        """What explains the rates better than scatter, the likeliest first; none that is not six times likelier, with its prior odds."""
+        """What explains the rates better than scatter, likeliest first; with prior odds six times likelier at least."""
         if not self.redundant:
             return ()
         found = [*self._of_law(), *self._of_tests(), *self._of_groups()]
