@@ -18,7 +18,7 @@ from creepkit.experiments.rig import Rig
 from creepkit.extraction.options import ExtractionOptions
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.search_options import SearchOptions
-from creepkit.inverse.settings import IdentificationSettings, OutputWeights
+from creepkit.inverse.settings import IdentificationSettings, OutputWeights, UsualErrors
 from creepkit.options import Options, table_of
 from creepkit.rupture_assessment.assessment import RuptureQuestion, RuptureSettings
 
@@ -86,11 +86,11 @@ def _label_values(value: Any) -> Any:
 
 
 def _output_weights(value: Any) -> Any:
-    """A word, or weights by output."""
+    """A word, or numbers by name."""
     numbers = isinstance(value, dict) and all(_is_number(one) for one in value.values())
     if isinstance(value, str) or (value and numbers):
         return value
-    raise PydanticCustomError("misfit", "must be a word such as noise, or numbers by output such as { strain = 1 }")
+    raise PydanticCustomError("misfit", "must be a word such as noise, or numbers by name such as { strain = 1 }")
 
 
 def _channels(value: Any) -> Any:
@@ -111,6 +111,7 @@ TYPES: dict[Any, Any] = {
     tuple[str, ...]: OneOrMore,
     tuple[tuple[float, ...], ...]: Annotated[list[Bounds], Field(max_length=MOST_ITEMS)],
     OutputWeights: Annotated[Any, BeforeValidator(_output_weights)],
+    UsualErrors: Annotated[Any, BeforeValidator(_output_weights)],
 }
 """{type of an option: that of its key}, where it is another one in TOML."""
 

@@ -20,7 +20,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.uncertainty.laplace_approximation import lies_at_bound
+from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile, lies_at_bound
 from creepkit.inverse.uncertainty.posterior import Posterior
 from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals, quadratic_terms
 from creepkit.records import Predictor
@@ -71,8 +71,8 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     if cheaper is not None:
         problem = with_cheaper_predictor(problem, fit.x, search_predictor_of(cheaper))
     posterior = Posterior.from_identification(replace(fit, problem=problem))
-    centre, seed = np.array(fit.u), fit.settings.seed
-    shape = shortened_covariance(posterior, centre, fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance)))
+    centre, seed, covariance = np.array(fit.u), fit.settings.seed, fit.by_tests_alone.covariance
+    shape = shortened_covariance(posterior, centre, covariance + 1e-12 * np.diag(np.diag(covariance)))
     samples = _samples_by_quadratic_residuals(posterior, centre, shape, seed)
     samples = posterior_samples(posterior, centre, shape, seed) if samples is None else samples
     if samples is None:
@@ -80,7 +80,25 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
             "values lie at their bounds or are not determined, and their posterior could not be sampled: intervals of "
         )
         return replace(fit, notes=(*fit.notes, f"{note}rates may be too narrow"))
-    return replace(fit, samples=samples)
+    return replace(fit, samples=_with_usual_errors(fit, samples))
+
+
+def _with_usual_errors(fit: Identification, samples: Floats) -> Floats:
+    """Samples moved by the errors that tests usually have and nobody modelled, within the bounds of the law."""
+    if fit.error_covariance is None:
+        return samples
+    scale = interval_quantile(fit.freedom) / interval_quantile(1e9)
+    root = covariance_root(fit.error_covariance) * scale
+    unit = np.random.default_rng(fit.settings.seed).standard_normal(samples.shape)
+    low, high = fit.law.internal_bounds
+    return fit.coordinates.u(np.clip(fit.coordinates.theta(samples + unit @ root.T), low, high))
+
+
+def covariance_root(covariance: Floats) -> Floats:
+    """A square root (unknowns, unknowns) of covariance (unknowns, unknowns)."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape: Floats, seed: int) -> Floats | None:
