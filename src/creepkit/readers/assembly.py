@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -15,13 +14,14 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError, quoted
 from creepkit.readers.column_names import KnownNames
+from creepkit.readers.condition_texts import with_weak_sources
 from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, StatedNumber, errors_located_at
 from creepkit.readers.ends_of_tests import STOPPED, UNCLEAR, ends_in_column
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
 from creepkit.readers.noise_correlation import read_noise_correlation
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
-from creepkit.readers.table_rows import NumberRows, cells_of, kept_alike
+from creepkit.readers.table_rows import NumberRows, cells_of
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, how_to_ignore, read_frames
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, outputs_of_test, specimen_of
@@ -48,6 +48,9 @@ def assemble_history(
     resemble no key are labels, as columns of an index are.
     """
     entries, table = in_standard_names(entries, table, vocabulary)
+    known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
+    entries, assumed = with_weak_sources(entries, table, known)
+    table = replace(table, assumptions=(*table.assumptions, *assumed))
     conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
@@ -93,7 +96,7 @@ def assemble_history(
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )
-    _check_operator(history, columns, conditions.location_of("operator"))
+    _check_operator(history, columns)
     return history
 
 
@@ -112,25 +115,12 @@ def _stated_fields(conditions: StatedConditions, name: str, elastic: Elastic | N
     }
 
 
-_OBSERVATION = re.compile(r"[a-z][a-z -]*\d")
-"""Beginning of an operator of observation: a form and a number."""
-
-
-def _check_operator(history: History, location: str, operator_location: str) -> None:
-    """HistoryError where the operator of a test does not give the outputs of its columns, or is who made the test."""
-    specimen, operator = specimen_of(history), history.operator
-    person = f"a person is a label: write 'label operator: {operator}'"
-    is_observation = _OBSERVATION.match(operator) is not None
-    if operator and not is_observation and getattr(specimen, "outputs_of_test", None) is None:
-        raise HistoryError(
-            f"{operator_location}: operator '{operator}' does not say how outputs were observed, as 'profile 0-7.5 mm' "
-            f"does; {person}"
-        )
+def _check_operator(history: History, location: str) -> None:
+    """HistoryError where the operator of a test does not give the outputs of its columns."""
     try:
-        outputs_of_test(specimen, replace(history, source=location))
+        outputs_of_test(specimen_of(history), replace(history, source=location))
     except SolveError as error:
-        hint = f"; {person}" if operator and not is_observation else ""
-        raise HistoryError(f"{error}{hint}") from error
+        raise HistoryError(str(error)) from error
 
 
 def assemble_without_frames(
@@ -175,7 +165,7 @@ def assemble_without_frames(
         )
         history = history.replace(specimen=named) if named else history
     if history.operator:
-        _check_operator(history, location, conditions.location_of("operator"))
+        _check_operator(history, location)
     return history
 
 
@@ -243,8 +233,7 @@ def _without_readings_before_steps(
     if not before:
         return table, set()
     dropped, lines = set(before), table.lines
-    kept = kept_alike(rows, (row for k, row in enumerate(rows) if k not in dropped))
-    return table.with_rows(kept), {int(lines[k + 1]) for k in before}
+    return table.with_rows([row for k, row in enumerate(rows) if k not in dropped]), {int(lines[k + 1]) for k in before}
 
 
 def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Elastic | None) -> float | None:

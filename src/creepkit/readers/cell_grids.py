@@ -12,7 +12,7 @@ from creepkit.readers.column_names import split_written_name
 from creepkit.readers.comment_lines import entry_of, is_comment
 from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.table_limits import refuse_many
-from creepkit.readers.table_rows import NumberRows, TableRow, TextRows, kept_alike, with_columns, without_empty
+from creepkit.readers.table_rows import NumberRows, TableRow, with_columns
 from creepkit.readers.text_tables import SourceText, TextTable, check_columns, location_in, some_of
 from creepkit.readers.vocabulary import plain_name
 
@@ -101,9 +101,8 @@ def without_ignored(grid: CellGrid, names_at: int, ignored: Collection[str]) -> 
     width = max(len(row.cells) for row in grid.rows)
     kept = [k for k in range(width) if k not in left_out]
     numbers = grid.numbers and replace(grid.numbers, numbers=grid.numbers.numbers[:, kept])
-    return replace(
-        grid, header=header, rows=without_empty(with_columns(grid.rows, kept)), numbers=numbers, positions=kept
-    )
+    rows = [row for row in with_columns(grid.rows, kept) if any(row.cells)]
+    return replace(grid, header=header, rows=rows, numbers=numbers, positions=kept)
 
 
 def _columns_called(name: str, cells: Sequence[str]) -> list[int]:
@@ -122,8 +121,8 @@ def table_of(grid: CellGrid) -> TextTable:
     columns = names.cells[:width]
     check_columns(grid.location(names.line), columns)
     body: Sequence[TableRow] = rows if grid.numbers is None else grid.numbers
-    if not (isinstance(body, NumberRows) or (isinstance(body, TextRows) and body.has_only == {width})):
-        body = kept_alike(rows, _cut_rows(grid, rows, width))
+    if not isinstance(body, NumberRows):
+        body = list(_cut_rows(grid, rows, width))
     if not body:
         place = grid.location(names.line)
         raise HistoryError(f"{place}: no rows below the line of columns; a table needs at least one")

@@ -193,7 +193,8 @@ def _strain_reached(written: str) -> float | None:
 def _unit_of_time(written: str) -> str:
     """The unit of a time in brackets, at the end, or among the words, as in `hours to 1 % strain`; "" for none."""
     for text in (*re.findall(r"[(\[]([^()\[\]]*)[)\]]", written), split_written_name(written)[1]):
-        if (suffix := unit_suffix(text)) in TIME.units:
+        suffix = unit_suffix(text)
+        if suffix is not None and suffix in TIME.units:
             return suffix
     words = words_of(written)
     return next((unit for unit, names in _UNIT_IN_NAME.items() if re.search(rf"\b(?:{names})\b", words)), "")

@@ -5,6 +5,7 @@ Nothing that a file states goes unread, and no key is guessed: an unknown one is
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -34,6 +35,10 @@ _ALLOWED_COMBINATIONS = (
 
 END_OF_TEST_TERMS = ("ruptured", "stopped")
 """How a test may have ended: by rupture, or before it."""
+
+
+_OBSERVATION = re.compile(r"[a-z][a-z -]*\d")
+"""Beginning of an operator of observation, a form and a number; any other operator is who made the test."""
 
 
 _T = TypeVar("_T")
@@ -166,7 +171,7 @@ class StatedConditions:
     def _classify(self, key: str, entry: SourceText) -> bool:
         """Put an entry where it belongs; False where nothing is known of its key."""
         name = self._vocabulary.synonyms.get(key, key)
-        kept_as_label = name in self._vocabulary.labels
+        kept_as_label = name in self._vocabulary.labels or (name == "operator" and not _OBSERVATION.match(entry.text))
         result = None if kept_as_label else split_unit(name, self._kinds)
         word, _, rest = name.strip().partition(" ")
         if kept_as_label:

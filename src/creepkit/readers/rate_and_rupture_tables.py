@@ -24,7 +24,17 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.column_names import split_written_name, unit_suffix, words_of
-from creepkit.readers.columns_of_tests import NAMES, QUANTITIES, TEXTS, TIME_TO_STRAIN, has_frames, key_of_column
+from creepkit.readers.columns_of_tests import (
+    NAMES,
+    QUANTITIES,
+    TEXTS,
+    TIME_TO_STRAIN,
+    has_frames,
+    key_of_column,
+    kind_of,
+    quantity_of,
+    unit_of,
+)
 from creepkit.readers.ends_of_rows import MOST_ASKED, RowEnd, assumed_of_empty, ends_of_rows, marked_time, with_end
 from creepkit.readers.ends_of_tests import LABEL, NO, STOPPED, YES, kind_of_column
 from creepkit.readers.questions import Question, collected, raise_all

@@ -10,7 +10,6 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_missing, is_number, parse_number, parse_numbers
 from creepkit.readers.column_names import NameTable, split_written_name
-from creepkit.readers.table_rows import NumberRows, TableRow, TextRows, cells_by_part
+from creepkit.readers.table_rows import NumberRows, TableRow, cells_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records.quantities import QuantityKind
 
@@ -61,7 +60,8 @@ class TextTable:
 
     sheet : of a spreadsheet, "" elsewhere. positions : the column of the file, from 0, in which each column stands,
     where errors must tell it. assumptions : what was assumed of the table, for the label "assumed". written : the
-    columns as they were written, where they were given creepkit's names.
+    columns as they were written, where they were given creepkit's names. sources : what titles and names of sheets and
+    files state of its test, which must agree with what else does.
     """
 
     path: Path
@@ -74,6 +74,7 @@ class TextTable:
     positions: Sequence[int] = ()
     assumptions: tuple[str, ...] = ()
     written: Sequence[str] = ()
+    sources: tuple[SourceText, ...] = ()
 
     def location(self, line_number: int, column: int | None = None) -> str:
         """Where a line stands, 'file:line', or 'file, sheet 'creep', row 3' in a spreadsheet; or a cell of it."""
@@ -96,19 +97,13 @@ class TextTable:
         k = self.column(name)
         if isinstance(self.rows, NumberRows):
             return self.rows.numbers[:, k]
-        found = list[Floats]()
-        for lines, cells in cells_by_part(self.rows, k):
-            place = partial(self._location_among, lines, k)
-            found.append(parse_numbers(cells, self.dialect, place, self.as_written(k)))
-        return np.concatenate(found) if found else np.zeros(0)
-
-    def _location_among(self, lines: Ints, column: int, row: int) -> str:
-        return self.location(int(lines[row]), column)
+        cells = list(cells_of(self.rows, k))
+        return parse_numbers(cells, self.dialect, lambda row: self.location(self.rows[row].line, k), self.as_written(k))
 
     @property
     def lines(self) -> Ints:
         """(rows,) The line of the file in which each row stands."""
-        if isinstance(self.rows, (NumberRows, TextRows)):
+        if isinstance(self.rows, NumberRows):
             return self.rows.lines
         return np.array([row.line for row in self.rows], dtype=int)
 
