@@ -17,7 +17,7 @@ BUDGET = {
     "api": 270,
     "app": 630,
     "cameras": 1170,
-    "cli": 2300,
+    "cli": 2380,
     "core": 100,
     "dataset": 820,
     "discovery": 1490,
@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 140,
     "modules": 780,
     "quality": 1470,
-    "readers": 5420,
+    "readers": 5510,
     "records": 1940,
     "registry": 620,
     "reports": 8250,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34010
+TESTS = 34120
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
