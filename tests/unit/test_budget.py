@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 140,
     "modules": 780,
     "quality": 1470,
-    "readers": 4370,
+    "readers": 5420,
     "records": 1940,
     "registry": 620,
     "reports": 8250,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34000
+TESTS = 34010
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.errors import HistoryError, SolveError
+from creepkit.errors import HistoryError, SolveError, quoted
 from creepkit.readers.column_names import KnownNames
 from creepkit.readers.condition_texts import with_weak_sources
 from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, StatedNumber, errors_located_at
+from creepkit.readers.ends_of_tests import STOPPED, UNCLEAR, ends_in_column
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
 from creepkit.readers.noise_correlation import read_noise_correlation
@@ -23,7 +24,6 @@ from creepkit.readers.plain_bar import as_plain_bar, modulus_of_ramp
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table_rows import NumberRows, cells_of
 from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, how_to_ignore, read_frames
-from creepkit.readers.unbroken_words import refuse_unbroken
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, outputs_of_test, specimen_of
 
@@ -182,7 +182,18 @@ def _check_end_without_frames(
     if ended == "stopped" and end is None:
         raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
     if time is not None and not ended:
-        refuse_unbroken(labels, time.key, time.location)
+        _refuse_unbroken(labels, time)
+
+
+def _refuse_unbroken(labels: Mapping[str, str], time: StatedNumber) -> None:
+    """HistoryError where a label says, or may say, that a test did not break that has a rupture time."""
+    for label, text in labels.items():
+        (end,) = ends_in_column(label, [text], {}, False).ends if label != "assumed" else ("",)
+        if end in (STOPPED, UNCLEAR):
+            raise HistoryError(
+                f"{time.location}: '{quoted(label)}' says '{quoted(text)}', and '{time.key}' makes it a test that "
+                "ruptured then; state which holds, as in '# ended: ruptured', or 'stopped' without that time"
+            )
 
 
 def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | None]:
@@ -348,7 +359,7 @@ def _end_of_test(conditions: StatedConditions, frames: TableFrames, used: Bools)
             f"{time.location}: the test was stopped, and '{time.key}' says when it ruptured; keep one of them"
         )
     if time is not None and not ended:
-        refuse_unbroken(conditions.labels, time.key, time.location)
+        _refuse_unbroken(conditions.labels, time)
     if time is not None or ended != "ruptured":
         return None if time is None else time.value, ended == "stopped"
     conditions.record_assumption("rupture at the last frame")

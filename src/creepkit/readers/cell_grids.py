@@ -25,7 +25,8 @@ class CellGrid:
     no comment and not empty. numbers : the rows below the last of `rows`, where they hold numbers alone.
     comments : line, key and entry of each `# key: value` below the first row. positions : the column of the file, from
     0, in which each cell of a row stands, where some were left out. remarks : what was left aside, or read though it
-    was hidden. cut : the last number of the file, where the file may have been cut in it.
+    was hidden. cut : the last number of the file, where the file may have been cut in it. merged : row and column, from
+    0, of cells that are merged with one above them.
     """
 
     path: Path
@@ -38,6 +39,7 @@ class CellGrid:
     positions: Sequence[int] = ()
     remarks: tuple[str, ...] = ()
     cut: CutNumber | None = None
+    merged: frozenset[tuple[int, int]] = frozenset()
 
     def location(self, line: int) -> str:
         """Where a row stands."""

@@ -102,13 +102,14 @@ class _SheetNotes:
     """What openpyxl does not say of a sheet that it reads row by row.
 
     hidden : numbers of rows. hidden_columns : whether there are some. uncomputed : the first cell with a formula and no
-    value, "" for none. merged : row, first and last column of each range of merged cells. comments : cell and text.
+    value, "" for none. merged : first row and column, last row and column of each range of merged cells, from 1.
+    comments : cell and text.
     """
 
     hidden: tuple[str, ...]
     hidden_columns: bool
     uncomputed: str
-    merged: tuple[tuple[int, int, int], ...]
+    merged: tuple[tuple[int, int, int, int], ...]
     comments: tuple[tuple[str, str], ...] = ()
 
     def remarks(self, sheet: str) -> tuple[str, ...]:
@@ -122,7 +123,7 @@ def _notes_of(archive: zipfile.ZipFile, sheet: Any) -> _SheetNotes:
     """The notes of a sheet; ValueError for a row that no spreadsheet has."""
     from openpyxl.utils import range_boundaries
 
-    hidden, merged, uncomputed, hidden_columns = list[str](), list[tuple[int, int, int]](), "", False
+    hidden, merged, uncomputed, hidden_columns = list[str](), list[tuple[int, int, int, int]](), "", False
     with archive.open(sheet._worksheet_path.lstrip("/")) as stream:
         for _, element in ElementTree.iterparse(stream):
             kind, is_hidden = element.tag.rpartition("}")[2], element.get("hidden") in ("1", "true")
@@ -138,8 +139,8 @@ def _notes_of(archive: zipfile.ZipFile, sheet: Any) -> _SheetNotes:
             elif kind == "col":
                 hidden_columns |= is_hidden
             elif kind == "mergeCell":
-                first, row, last, _ = range_boundaries(element.get("ref", ""))
-                merged.append((row, first, last))
+                first, row, last, below = range_boundaries(element.get("ref", ""))
+                merged.append((row, first, below, last))
     comments = tuple(_comments_of(archive, sheet._worksheet_path.lstrip("/")))
     return _SheetNotes(tuple(hidden), hidden_columns, uncomputed, tuple(merged), comments)
 
@@ -185,7 +186,8 @@ def _grid(path: Path, sheet: Any, notes: _SheetNotes) -> CellGrid | None:
     if not rows:
         return None
     rows = _with_points(rows, texts, place)
-    return grid_of_rows(path, str(sheet.title), _with_merged(rows, notes.merged))
+    grid = grid_of_rows(path, str(sheet.title), _with_merged(rows, notes.merged))
+    return replace(grid, merged=_cells_below(rows, notes.merged))
 
 
 def _is_text(cell: Any) -> bool:
@@ -234,10 +236,22 @@ def _with_points(rows: list[TableRow], texts: list[str], place: str) -> list[Tab
     ]
 
 
-def _with_merged(rows: list[TableRow], merged: Sequence[tuple[int, int, int]]) -> list[TableRow]:
+def _cells_below(rows: list[TableRow], merged: Sequence[tuple[int, int, int, int]]) -> frozenset[tuple[int, int]]:
+    """Row and column, from 0, of cells that are merged with one above them."""
+    lines, width = {row.line for row in rows}, max(len(row.cells) for row in rows)
+    ranges = [(top, first, min(bottom, max(lines)), min(last, width)) for top, first, bottom, last in merged]
+    return frozenset(
+        (line, column - 1)
+        for top, first, bottom, last in ranges
+        for line in range(top + 1, bottom + 1)
+        for column in range(first, last + 1)
+    )
+
+
+def _with_merged(rows: list[TableRow], merged: Sequence[tuple[int, int, int, int]]) -> list[TableRow]:
     """The rows with the text of each merged cell in all columns that it covers, in its first row."""
     by_line = {row.line: row for row in rows}
-    for line, first, last in merged:
+    for line, first, _, last in merged:
         row = by_line.get(line)
         if row is None or row.line > _FILLED_ROWS or last - first > 1000 or first > len(row.cells):
             continue

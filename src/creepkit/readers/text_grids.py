@@ -258,17 +258,30 @@ def read_table(path: Path, ignored: Collection[str] = ()) -> TextTable:
     return table_of(without_ignored(read_text_grid(path), 0, ignored))
 
 
-def peek_columns(path: Path, byte_limit: int = 65536) -> tuple[str, ...]:
+def peek_grid(path: Path) -> CellGrid | None:
+    """The beginning of a text as a grid; None where it is no table; never raises for what it holds."""
+    try:
+        text = decode_text(_beginning(path), path).replace("\r\n", "\n").replace("\r", "\n")
+        head, offset = _head_of(path, text)
+        return None if offset == len(text) else _grid_of_texts(path, text, head, offset)
+    except HistoryError:
+        return None
+
+
+def _beginning(path: Path, byte_limit: int = _LARGE_TEXT) -> bytes:
+    """The whole lines with which a file begins."""
+    content = read_bytes(path, TABLE_FILE, first=byte_limit)
+    if len(content) < byte_limit:
+        return content
+    end = content.rfind(b"\n") + 1  # not within a character: a line feed of UTF-16 has two bytes
+    return content[: end + end % 2] if content[:2] in (b"\xff\xfe", b"\xfe\xff") else content[:end]
+
+
+def peek_columns(path: Path) -> tuple[str, ...]:
     """The columns of a file as far as its beginning shows them, () when it has none; never raises for what it holds."""
     try:
-        content = read_bytes(path, TABLE_FILE, first=byte_limit)
-        is_cut = len(content) == byte_limit
-        if is_cut:  # not within a character: a line feed of UTF-16 has two bytes
-            end = content.rfind(b"\n") + 1
-            content = content[: end + end % 2] if content[:2] in (b"\xff\xfe", b"\xfe\xff") else content[:end]
-        lines = [line for line in text_lines(decode_text(content, path)) if line.strip() and not is_comment(line)]
-        if not lines:
-            return ()
-        return tuple(split_line(lines[0], detect_dialect(lines, decimal=".")))
+        lines = text_lines(decode_text(_beginning(path), path))
+        lines = [line for line in lines if line.strip() and not is_comment(line)]
+        return tuple(split_line(lines[0], detect_dialect(lines, decimal="."))) if lines else ()
     except HistoryError:
         return ()
