@@ -36,8 +36,8 @@ BUDGET = {
     "laws": 140,
     "modules": 780,
     "quality": 1470,
-    "readers": 5510,
-    "records": 1940,
+    "readers": 5760,
+    "records": 1950,
     "registry": 620,
     "reports": 8250,
     "rupture_assessment": 1880,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34120
+TESTS = 34320
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

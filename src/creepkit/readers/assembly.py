@@ -20,6 +20,7 @@ from creepkit.readers.ends_of_tests import LABEL, NO, RUPTURED, STOPPED, UNCLEAR
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
 from creepkit.readers.noise_correlation import read_noise_correlation
+from creepkit.readers.plain_bar import as_plain_bar, modulus_of_ramp
 from creepkit.readers.questions import Question
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table_rows import NumberRows, cells_of
@@ -69,7 +70,7 @@ def assemble_history(
         conditions.record_assumption(
             f"{count} left out that another one at the same time follows with other conditions"
         )
-    frames = read_frames(table, vocabulary, conditions.terms, skipped_columns)
+    frames = as_plain_bar(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
     columns = table.location(table.columns_line)
     loading = read_loading(conditions, frames, marked)
     specimen, outputs = _specimen_and_outputs(conditions, frames, loading.quantity, columns)
@@ -77,7 +78,7 @@ def assemble_history(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
     temperature = read_temperature(conditions, frames, marked)
-    used, elastic = _used_frames(conditions, frames), _elastic(conditions)
+    used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
     if "strain" in outputs:
         record = without_loading(
             conditions, frames.times, outputs["strain"], used, _elastic_strain(loading, temperature, elastic)
@@ -319,8 +320,22 @@ def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], l
         raise column_question(table, what, {table.as_written(column): UNUSED})
 
 
-def _elastic(conditions: StatedConditions) -> Elastic | None:
+def _elastic(
+    conditions: StatedConditions, frames: TableFrames | None = None, loading: Loading | None = None
+) -> Elastic | None:
+    """The elastic data that are stated; of a test with imposed strain else those of its loading ramp."""
     modulus = conditions.take_number("modulus")
+    if modulus is None and frames is not None and loading is not None and loading.quantity == "strain":
+        if not {"strain", "stress"} <= frames.values.keys():
+            return None
+        found = modulus_of_ramp(loading.program().at(frames.times), frames.values["stress"])
+        if found is None:
+            raise conditions.missing_error(
+                "Young's modulus, and no loading ramp that shows it",
+                "write modulus_GPa: the stress is E (strain - creep)",
+            )
+        modulus = StatedNumber(found[0], "modulus", conditions.location)
+        conditions.record_assumption(found[1])
     if modulus is None:
         return None
     # Here, not above: the record of elasticity brings sympy, which listing the readers must not wait for.

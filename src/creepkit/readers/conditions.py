@@ -34,6 +34,14 @@ _ALLOWED_COMBINATIONS = (
 )
 
 
+_HELD = {
+    "strain": re.compile(r"strain|dehnung|relax|extension|displacement|verschiebung|déformation|\bweg"),
+    "stress": re.compile(r"(?:true|wahre|vraie).*(?:stress|spannung|contrainte)"),
+    "load": re.compile(r"\bloads?\b.*\w\W|\W.*\bload\b|dead|\blast\b|kraft|gewicht|weight"),
+}
+"""{what was held: words by which laboratories say so}."""
+
+
 END_OF_TEST_TERMS = ("ruptured", "stopped")
 """How a test may have ended: by rupture, or before it."""
 
@@ -112,6 +120,19 @@ class StatedConditions:
         """Whether a number or text is given that nothing has taken yet."""
         return key in self._numbers or key in self._texts
 
+    def text_of(self, key: str) -> str:
+        """A text that nothing has taken yet, "" where it is not given."""
+        return self._texts[key].text if key in self._texts else ""
+
+    def states_load(self, quantity: str) -> bool:
+        """Whether a load is stated in any form: a number, levels, steps or a program."""
+        return any(self.states(f"{quantity}{form}") for form in ("", "_1", "_steps", "_program"))
+
+    def put_number(self, quantity: str, number: StatedNumber) -> None:
+        """Add a number that others give; its place is that of the one it was made of."""
+        self._numbers[quantity] = number
+        self._locations[quantity] = number.location
+
     def take_choice(self, key: str, allowed: Sequence[str], required: bool) -> str:
         """Take one of the allowed texts; '' when it was not given, or what the layout assumes when it is needed."""
         entry = self._texts.pop(key, None)
@@ -137,9 +158,9 @@ class StatedConditions:
             raise HistoryError(f"{entry.location}: {description}; they must start at 0 and never decrease")
         return pairs
 
-    def record_assumption(self, what: str) -> None:
-        """Record in the label "assumed" what the file leaves unsaid."""
-        self._assumptions.append(what)
+    def record_assumption(self, what: str, *, first: bool = False) -> None:
+        """Record in the label "assumed" what the file leaves unsaid; first : before all others."""
+        self._assumptions.insert(0 if first else len(self._assumptions), what)
 
     def location_of(self, *keys: str) -> str:
         """The place of the first of these numbers and texts that was given, else that of the test."""
@@ -187,6 +208,8 @@ class StatedConditions:
             self._put_marked(mark, result[1], entry, entry.key or key)
         elif name == "specimen":
             self._name_specimen(entry)
+        elif name == "control":
+            self._put_control(entry)
         elif name in self._text_keys:
             _put_once(self._texts, name, entry, entry.location)
             self._locations[name] = entry.location
@@ -229,6 +252,15 @@ class StatedConditions:
         if near:
             raise HistoryError(f"{entry.location}: there is no specimen '{entry.text}'; did you mean '{near[0]}'?")
         _put_once(self.labels, "specimen", entry.text, entry.location)
+
+    def _put_control(self, entry: SourceText) -> None:
+        """What was held, in a laboratory's words: `constant load`, `strain hold 0.15 %`."""
+        plain = entry.text.casefold()
+        held = next((held for held, pattern in _HELD.items() if pattern.search(plain)), entry.text)
+        if held != entry.text:
+            _put_once(self.labels, "control", entry.text, entry.location)
+        _put_once(self._texts, "control", replace(entry, text=held), entry.location)
+        self._locations["control"] = entry.location
 
     def _misspelt(self, key: str) -> str:
         """The key, the laboratory's own included, of which an unknown one is a misspelling; "" for none."""

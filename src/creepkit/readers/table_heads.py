@@ -269,6 +269,10 @@ def head_of_one_test(grid: CellGrid, head: Sequence[TableRow], known: KnownNames
                     f"{place}: the number {quoted(key)} stands above the names of the columns, and is that of a column "
                     "without a name, or has no key before it; name every column of the table, or the condition"
                 )
+            if "=" in key and conditions_in_text(key, place, known):
+                _add_title(result, key, row, grid, known)
+                cells = rest
+                continue
             measured = conditions_of_head(key, known)
             for quantity, text in measured:
                 put_entry(result.entries, quantity, text, place, grid, known)

@@ -49,6 +49,10 @@ _POINT_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
 """Beside decimal commas 1.234 may be 1234."""
 
 
+NOISE_OF_ZERO = 0.01
+"""Of the largest reading of a load: a reading that is less below zero is one of none."""
+
+
 def some_of(names: Sequence[str], count: int = 12) -> str:
     """Names as messages list them: the first ones, each not longer than 40, and how many there are."""
     shown = ", ".join(quoted(name, 40) for name in names[:count])
@@ -266,9 +270,11 @@ def _sensor(name: str, kinds: Mapping[str, QuantityKind]) -> str:
 
 def _converted_column(table: TextTable, name: str, kind: QuantityKind, suffix: str) -> Floats:
     """One column in creepkit's unit."""
-    k = table.column(name)
+    k, numbers = table.column(name), table.numbers(name)
     written = table.as_written(k)
-    return kind.convert_all(table.numbers(name), suffix, lambda row: table.location(int(table.lines[row]), k), written)
+    if kind.low == 0.0 and kind.name in ("stress", "pressure") and numbers.size:  # a reading of none may be below it
+        numbers = np.where((numbers < 0.0) & (numbers >= -NOISE_OF_ZERO * numbers.max()), 0.0, numbers)
+    return kind.convert_all(numbers, suffix, lambda row: table.location(int(table.lines[row]), k), written)
 
 
 def _check_marks(table: TextTable, k: int, marks: Floats) -> None:

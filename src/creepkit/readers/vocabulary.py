@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 
 from creepkit.records import TENSOR_COMPONENTS, dimensions_of, known_specimens, loads_of, outputs_of
 from creepkit.records.quantities import (
+    AREA,
     COUNT,
     FLAG,
     LENGTH,
@@ -77,6 +78,7 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
     "temperature": TEMPERATURE,
     **dict.fromkeys(("jump_time", "end_time", "ramp", "rupture", "loading_time"), TIME),
     "loading_strain": STRAIN,
+    "area": AREA,
     "modulus": MODULUS,
     "poisson": POISSON,
     "minimum_rate": RATE,
