@@ -16,18 +16,18 @@ from helpers.paths import ROOT
 BUDGET = {
     "api": 270,
     "app": 630,
-    "cameras": 1200,
-    "cli": 2300,
+    "cameras": 1170,
+    "cli": 2380,
     "core": 100,
     "dataset": 820,
     "discovery": 1490,
     "experiments": 1710,
     "exporters": 2690,
-    "extraction": 1150,
+    "extraction": 1145,
     "fem": 1900,
-    "files": 1310,
+    "files": 1315,
     "forecasts": 1490,
-    "instruments": 1400,
+    "instruments": 1370,
     "integration": 1100,
     "inverse": 12015,
     "jobs": 260,
@@ -36,8 +36,8 @@ BUDGET = {
     "laws": 140,
     "modules": 780,
     "quality": 1470,
-    "readers": 4150,
-    "records": 1940,
+    "readers": 5760,
+    "records": 1950,
     "registry": 620,
     "reports": 8250,
     "rupture_assessment": 1880,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33830
+TESTS = 34320
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from creepkit.errors import HistoryError, quoted
 from creepkit.readers.clock_times import with_elapsed_times
 from creepkit.readers.column_names import STATED_BY_NAME, KnownNames, split_written_name, unit_suffix, words_of
-from creepkit.readers.table_rows import NumberRows, TableRow, kept_alike
+from creepkit.readers.table_rows import NumberRows, TableRow
 from creepkit.readers.text_tables import SourceText, TextTable
 from creepkit.readers.vocabulary import HeaderVocabulary, plain_name, split_unit
 
@@ -105,7 +105,7 @@ def _without_per_cent_signs(table: TextTable, known: KnownNames) -> TextTable:
             place = table.location(table.columns_line, k)
             raise HistoryError(f"{place}: '{columns[k]}' is not in per cent, but its cells are; correct one of them")
         columns[k] = f"{name}_pct"
-    rows = kept_alike(table.rows, _rows_without_signs(replace(table, columns=columns), signed))
+    rows = list(_rows_without_signs(replace(table, columns=columns), signed))
     return replace(table, columns=columns, rows=rows, written=table.written or table.columns)
 
 
