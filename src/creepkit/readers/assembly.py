@@ -23,6 +23,7 @@ from creepkit.readers.noise_correlation import read_noise_correlation
 from creepkit.readers.plain_bar import as_plain_bar, modulus_of_ramp
 from creepkit.readers.questions import Question
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
+from creepkit.readers.steps_taken_off import without_steps
 from creepkit.readers.table_rows import NumberRows, cells_of
 from creepkit.readers.text_tables import (
     UNUSED,
@@ -86,6 +87,7 @@ def assemble_history(
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
     else:
         elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
+    outputs = without_steps(conditions, frames.times, outputs, used)
     rupture_time, unruptured = _end_of_test(conditions, frames, used, name)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
     history = History(

@@ -247,9 +247,10 @@ def is_number_like(cell: str, dialect: Dialect) -> bool:
 
 def only_text(row: TableRow, dialect: Dialect) -> str:
     """The one text of a row that holds nothing else, in one cell or merged ones; "" of any other row."""
-    filled = {cell for cell in row.cells if cell}
-    text = filled.pop() if len(filled) == 1 else ""
-    return "" if is_number_like(text, dialect) else text
+    filled = [cell for cell in row.cells if cell]
+    if len(set(filled)) != 1 or len(filled) not in (1, len(row.cells)):
+        return ""
+    return "" if is_number_like(filled[0], dialect) or unit_suffix(filled[0]) else filled[0]
 
 
 def head_of_tests(rows: Sequence[TableRow], dialect: Dialect, meant: Mapping[str, str]) -> TestTableHead | None:
@@ -282,7 +283,9 @@ def head_of_tests(rows: Sequence[TableRow], dialect: Dialect, meant: Mapping[str
 
 def _may_name(row: TableRow, dialect: Dialect) -> bool:
     filled = [cell for cell in row.cells if cell]
-    return len(set(filled)) > 1 and not any(is_number_like(cell, dialect) for cell in filled)
+    return (len(set(filled)) > 1 or bool(unit_suffix(filled[0]))) and not any(
+        is_number_like(cell, dialect) for cell in filled
+    )
 
 
 def _understood(names: Sequence[str], meant: Mapping[str, str]) -> int:
@@ -315,7 +318,9 @@ def _name_of(k: int, rows: Sequence[Sequence[str]], above: Sequence[Sequence[str
     wide = list(dict.fromkeys(filter(None, (*(cells[k] for cells in above), rows[-1][k]))))
     options = [" ".join(texts), *reversed(texts), " ".join(wide)]
     for text in options:
-        name = f"{text} ({units[0]})" if units and not split_written_name(text)[1] else text
+        own = unit_suffix(split_written_name(text)[1])
+        is_reached = own == "pct" and bool(units) and unit_suffix(units[0]) in TIME.units
+        name = f"{text} ({units[0]})" if units and (not own or is_reached) else text
         if text in meant or key_of_column(name)[0]:
             return name
     return f"{options[0]} ({units[0]})" if units else options[0]

@@ -100,6 +100,8 @@ def ends_of_rows(
             notes.append("stopped before rupture by its remark")
         is_asked = len(said) != 1 and UNCLEAR in (mark.said, *(one.ends[r] for one in found.values()))
         ends.append(RowEnd("".join(said) if len(said) == 1 else "", mark, tuple(notes), is_asked))
+    if time is not None and not any(STOPPED in (end.stated, end.mark.said) for end in ends):
+        errors += _asked_of_notes(table, keys, answers)
     if time is not None or duration is not None:
         errors += [_asked_of_column(table, k, one, time) for k, one in found.items() if one.asked]
     if time is not None and (doubtful := [r for r, mark in enumerate(marks) if mark.said == UNCLEAR]):
@@ -111,6 +113,27 @@ def _mark_of(table: TestTable, row: TestRow, time: int | None, answers: Mapping[
     if time is None or is_missing(row.cells[time]):
         return MarkedTime("", "")
     return marked_time(table.entry(row, time).text, answers)
+
+
+def _asked_of_notes(table: TestTable, keys: Sequence[str], answers: Mapping[str, str]) -> list[HistoryError]:
+    """Questions of notes that speak of tests which did not break, while the table has none."""
+    doubtful = [n for n in table.notes if end_said_by(n) not in ("", RUPTURED) and not legend_in(n)]
+    last = table.rows[-1].cells[keys.index("name")] if "name" in keys else ""
+    return [
+        Question(
+            table.grid.path,
+            table.location(table.line),
+            f"the note '{quoted(note, 80)}' may speak of tests that did not break; which are they?",
+            "ended",
+            ({last or "NAME OF A TEST": STOPPED}, {note: LABEL}),
+        )
+        for note in doubtful
+        if note.casefold() not in answers and not any(cell.casefold() in answers for cell in _names(table, keys))
+    ]
+
+
+def _names(table: TestTable, keys: Sequence[str]) -> list[str]:
+    return [row.cells[keys.index("name")] for row in table.rows] if "name" in keys else []
 
 
 def _contradiction(table: TestTable, row: TestRow, stated: Mapping[str, str]) -> HistoryError:

@@ -262,7 +262,7 @@ def peek_grid(path: Path) -> CellGrid | None:
     """The beginning of a text as a grid; None where it is no table; never raises for what it holds."""
     try:
         text = decode_text(_beginning(path), path).replace("\r\n", "\n").replace("\r", "\n")
-        head, offset = _head_of(path, text)
+        text, head, offset = _with_names_behind_marks(text, *_head_of(path, text))
         return None if offset == len(text) else _grid_of_texts(path, text, head, offset)
     except HistoryError:
         return None
