@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 140,
     "modules": 780,
     "quality": 1470,
-    "readers": 5760,
+    "readers": 5870,
     "records": 1950,
     "registry": 620,
     "reports": 8250,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34320
+TESTS = 34370
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -25,7 +25,7 @@ FITTED_FRAMES = 6
 def without_steps(
     conditions: StatedConditions, times: Floats, outputs: Mapping[str, Floats], used: Bools
 ) -> dict[str, Floats]:
-    """The outputs without the steps that are to be taken off, each of which is recorded with its size.
+    """The outputs (frames,) without the steps that are to be taken off, each of which is recorded with its size.
 
     times : (frames,) s. outputs : {name: (frames,)}. used : (frames,) those that a line may be laid through.
     """
