@@ -14,22 +14,22 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 270,
+    "api": 340,
     "app": 630,
     "cameras": 1170,
     "cli": 2380,
-    "core": 100,
+    "core": 70,
     "dataset": 820,
     "discovery": 1490,
     "experiments": 1710,
     "exporters": 2690,
-    "extraction": 1145,
+    "extraction": 1360,
     "fem": 1900,
     "files": 1315,
     "forecasts": 1490,
-    "instruments": 1370,
-    "integration": 1100,
-    "inverse": 12015,
+    "instruments": 1430,
+    "integration": 930,
+    "inverse": 11965,
     "jobs": 260,
     "kernels": 1710,
     "language": 1590,
@@ -37,20 +37,20 @@ BUDGET = {
     "modules": 785,
     "quality": 1470,
     "readers": 5760,
-    "records": 1970,
+    "records": 1975,
     "registry": 620,
     "reports": 8315,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
-    "specimens": 4050,
-    "studies": 2590,
+    "specimens": 3985,
+    "studies": 3070,
     "surrogates": 1790,
     "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34320
+TESTS = 34800
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -24,8 +24,8 @@ from creepkit.studies.camera_proposal import found_cameras
 from creepkit.studies.data_summary import FEWEST_RUPTURES, DataSummary
 from creepkit.studies.study_file import parse_study
 
-PLANNED_LAWS = ["norton", "strain-hardening", "time-hardening"]
-"""Of tests that cameras are still to be read of."""
+PLANNED_LAWS = ["norton", "strain-hardening", "time-hardening", "hyperbolic-sine"]
+"""Of tests that cameras are still to be read of: those of Table 1 of Chen et al."""
 
 
 FEWEST_TEMPERATURES = 3
@@ -42,10 +42,11 @@ MOST_FOLDERS, MOST_FILES_TRIED, MOST_FOLDERS_NAMED = 40, 3, 4
 
 @dataclass(frozen=True)
 class StudyProposal:
-    """The text of a study file, and what the files were found to hold, in lines."""
+    """The text of a study file, and what the files were found to hold, in lines; alloys : of a table beside it."""
 
     text: str
     summary: tuple[str, ...]
+    alloys: str = ""
 
 
 def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyProposal:
@@ -61,7 +62,7 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
     known["report"] = "report.html" if path.stem == "study" else f"{path.stem}.html"
     lines = cameras.summary
     if tests:
-        named = {str(one) for one in cameras.files}
+        named = {str(one) for one in cameras.names}
         problems = [f"not read: {one}" for one in problems if one.split(":")[0] not in named][:MOST_REMARKS]
         quality = ck.check_data_quality([history for history in tests if history.outputs])
         summary, left_out = DataSummary.of(tests), left_out_lines(quality)
@@ -81,7 +82,7 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
         raise failure or StudyError(f"{folder}: none of its files holds a test")
     text = rendered(known)
     parse_study(path, text)  # what is written must be valid
-    return StudyProposal(text, lines)
+    return StudyProposal(text, lines, cameras.empty_alloys)
 
 
 def one_line(text: str, length: int = 200) -> str:
