@@ -34,12 +34,12 @@ BUDGET = {
     "kernels": 1710,
     "language": 1590,
     "laws": 140,
-    "modules": 780,
+    "modules": 785,
     "quality": 1470,
     "readers": 5870,
-    "records": 1955,
+    "records": 1975,
     "registry": 620,
-    "reports": 8250,
+    "reports": 8315,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34850
+TESTS = 34950
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -38,6 +38,7 @@ from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from creepkit.inverse.search.global_search import SearchTrace
     from creepkit.inverse.sparsity.result import Sparsity
@@ -111,6 +112,14 @@ class Identification(
     sparsity: Sparsity | None = field(default=None, repr=False)
     problem: LeastSquaresProblem | None = field(default=None, repr=False)
     predictor_documents: Mapping[str, PredictorDocument] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} = {value:.4g}" for name, value in self.values.items())
+        return f"<Identification of {self.law.name} from {len(self.tests)} tests: {values}>"
+
+    def to_dataframe(self) -> DataFrame:
+        """(parameters,) rows of pandas: value, ends of the 95 % interval, unit and verdict."""
+        return present("reports.dataframes:to_dataframe", self)
 
     @property
     def headline(self) -> str:

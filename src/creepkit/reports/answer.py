@@ -245,7 +245,7 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
         what = "the two groups apart" if first.kind == "two groups" else f"{_named(first.tests, 'test')} again"
         return f"check {what} (label, unit, thermocouple), then identify without"
     if adequacy is not None and (adequacy.rejects or adequacy.verdict == "cannot be judged"):
-        if ranking is None:
+        if ranking is None or len(ranking.laws) < 2:
             return "compare laws: select(candidates(tests), tests)"
         return "use it within the tests, by the factors above; try other laws for more"
     if ranking is not None and len(ranking.laws) > 1 and not ranking.decisive:
