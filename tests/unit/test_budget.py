@@ -14,43 +14,43 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 270,
+    "api": 340,
     "app": 630,
-    "cameras": 1200,
-    "cli": 2300,
-    "core": 100,
+    "cameras": 1170,
+    "cli": 2380,
+    "core": 70,
     "dataset": 820,
     "discovery": 1490,
     "experiments": 1710,
     "exporters": 2690,
-    "extraction": 1150,
+    "extraction": 1360,
     "fem": 1900,
-    "files": 1310,
+    "files": 1315,
     "forecasts": 1490,
-    "instruments": 1400,
-    "integration": 1100,
-    "inverse": 12015,
+    "instruments": 1430,
+    "integration": 930,
+    "inverse": 11965,
     "jobs": 260,
     "kernels": 1710,
     "language": 1590,
     "laws": 140,
-    "modules": 780,
+    "modules": 785,
     "quality": 1470,
-    "readers": 4150,
-    "records": 1940,
+    "readers": 5870,
+    "records": 1975,
     "registry": 620,
-    "reports": 8250,
+    "reports": 8315,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
-    "specimens": 4050,
-    "studies": 2590,
+    "specimens": 3985,
+    "studies": 3070,
     "surrogates": 1790,
     "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33830
+TESTS = 34950
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -75,6 +75,10 @@ _CLOCK_TIME = re.compile(
 """A date, a time stamp or an elapsed time: as sound a cell as a number."""
 
 
+_WITH_UNIT = re.compile(r"[+-]?\d[\d.,]* ?[^\W\d_].{0,10}|[+-]?\d[\d.,]* ?°[CFK]")
+"""A value with its unit, `120 MPa`: neither a number nor a mangled one."""
+
+
 _THOUSANDS_LIKE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 """Three digits behind one comma: a number below 1000 with a decimal comma, or a larger one with a separator."""
 
@@ -313,7 +317,7 @@ def _score(sample: Sequence[str], delimiter: str) -> tuple[bool, int, int]:
         for cell in (cell.rstrip("% ") for cell in cells):
             if cell and (cell[0] in "+-.," or "0" <= cell[0] <= "9"):
                 is_numeric = _NUMBERS["."].fullmatch(cell) or (delimiter != "," and _NUMBERS[","].fullmatch(cell))
-                numbers += 1 if is_numeric or _CLOCK_TIME.fullmatch(cell) else -2
+                numbers += 1 if is_numeric or _CLOCK_TIME.fullmatch(cell) else 0 if _WITH_UNIT.fullmatch(cell) else -2
     return bool(counts), numbers, 0 if delimiter == " " else max(counts.values(), default=0)
 
 

@@ -44,6 +44,7 @@ from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from creepkit.inverse.search.global_search import SearchTrace
     from creepkit.inverse.sparsity.result import Sparsity
@@ -56,7 +57,9 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 
 @dataclass(frozen=True, eq=False)
-class Identification(Presentable, text="reports.identification_text:identification_text"):
+class Identification(
+    Presentable, text="reports.answer:answer_text", details="reports.identification_text:identification_text"
+):
     """The result of identify().
 
     estimates : one Estimate for each parameter, in the order of the law.
@@ -119,6 +122,14 @@ class Identification(Presentable, text="reports.identification_text:identificati
     sparsity: Sparsity | None = field(default=None, repr=False)
     problem: LeastSquaresProblem | None = field(default=None, repr=False)
     predictor_documents: Mapping[str, PredictorDocument] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} = {value:.4g}" for name, value in self.values.items())
+        return f"<Identification of {self.law.name} from {len(self.tests)} tests: {values}>"
+
+    def to_dataframe(self) -> DataFrame:
+        """(parameters,) rows of pandas: value, ends of the 95 % interval, unit and verdict."""
+        return present("reports.dataframes:to_dataframe", self)
 
     @property
     def headline(self) -> str:
@@ -269,6 +280,14 @@ class Identification(Presentable, text="reports.identification_text:identificati
             point = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
             warn_of_extrapolation(self.ranges, point)
         return self.interval_of(function)
+
+    def activation_energy(self) -> tuple[float, float, float]:
+        """Activation energy -R d ln rate / d(1/T), J/mol, at the reference point with its 95 % interval."""
+        from creepkit.inverse.uncertainty.quantities import activation_energy
+
+        r = self.reference
+        value, low, high = self.interval_of(activation_energy(self.coordinates, r.stress, r.temperature))
+        return float(value), float(low), float(high)
 
     def interval_of(self, function: CoordinateFunction) -> tuple[Floats, Floats, Floats]:
         """Value and 95 % interval, (...,) each, of a function of the coordinates: u (..., parameters) to (...,).

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -13,16 +12,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.errors import HistoryError, SolveError
+from creepkit.errors import HistoryError, SolveError, quoted
 from creepkit.readers.column_names import KnownNames
+from creepkit.readers.condition_texts import with_weak_sources
 from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, StatedNumber, errors_located_at
+from creepkit.readers.ends_of_tests import LABEL, NO, RUPTURED, STOPPED, UNCLEAR, YES, ends_in_column, kind_of_column
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
 from creepkit.readers.noise_correlation import read_noise_correlation
+from creepkit.readers.plain_bar import as_plain_bar, modulus_of_ramp
+from creepkit.readers.questions import Question
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
-from creepkit.readers.table_rows import NumberRows, cells_of, kept_alike
-from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, how_to_ignore, read_frames
-from creepkit.readers.unbroken_words import refuse_unbroken
+from creepkit.readers.steps_taken_off import without_steps
+from creepkit.readers.table_rows import NumberRows, cells_of
+from creepkit.readers.text_tables import (
+    UNUSED,
+    SourceText,
+    TableFrames,
+    TextTable,
+    column_means,
+    column_question,
+    read_frames,
+)
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, outputs_of_test, specimen_of
 
@@ -48,6 +59,9 @@ def assemble_history(
     resemble no key are labels, as columns of an index are.
     """
     entries, table = in_standard_names(entries, table, vocabulary)
+    known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
+    entries, assumed = with_weak_sources(entries, table, known)
+    table = replace(table, assumptions=(*table.assumptions, *assumed))
     conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
@@ -57,7 +71,7 @@ def assemble_history(
         conditions.record_assumption(
             f"{count} left out that another one at the same time follows with other conditions"
         )
-    frames = read_frames(table, vocabulary, conditions.terms, skipped_columns)
+    frames = as_plain_bar(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
     columns = table.location(table.columns_line)
     loading = read_loading(conditions, frames, marked)
     specimen, outputs = _specimen_and_outputs(conditions, frames, loading.quantity, columns)
@@ -65,7 +79,7 @@ def assemble_history(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
     temperature = read_temperature(conditions, frames, marked)
-    used, elastic = _used_frames(conditions, frames), _elastic(conditions)
+    used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
     if "strain" in outputs:
         record = without_loading(
             conditions, frames.times, outputs["strain"], used, _elastic_strain(loading, temperature, elastic)
@@ -73,7 +87,8 @@ def assemble_history(
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
     else:
         elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
-    rupture_time, unruptured = _end_of_test(conditions, frames, used)
+    outputs = without_steps(conditions, frames.times, outputs, used)
+    rupture_time, unruptured = _end_of_test(conditions, frames, used, name)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
     history = History(
         times=frames.times,
@@ -93,7 +108,7 @@ def assemble_history(
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )
-    _check_operator(history, columns, conditions.location_of("operator"))
+    _check_operator(history, columns)
     return history
 
 
@@ -112,25 +127,12 @@ def _stated_fields(conditions: StatedConditions, name: str, elastic: Elastic | N
     }
 
 
-_OBSERVATION = re.compile(r"[a-z][a-z -]*\d")
-"""Beginning of an operator of observation: a form and a number."""
-
-
-def _check_operator(history: History, location: str, operator_location: str) -> None:
-    """HistoryError where the operator of a test does not give the outputs of its columns, or is who made the test."""
-    specimen, operator = specimen_of(history), history.operator
-    person = f"a person is a label: write 'label operator: {operator}'"
-    is_observation = _OBSERVATION.match(operator) is not None
-    if operator and not is_observation and getattr(specimen, "outputs_of_test", None) is None:
-        raise HistoryError(
-            f"{operator_location}: operator '{operator}' does not say how outputs were observed, as 'profile 0-7.5 mm' "
-            f"does; {person}"
-        )
+def _check_operator(history: History, location: str) -> None:
+    """HistoryError where the operator of a test does not give the outputs of its columns."""
     try:
-        outputs_of_test(specimen, replace(history, source=location))
+        outputs_of_test(specimen_of(history), replace(history, source=location))
     except SolveError as error:
-        hint = f"; {person}" if operator and not is_observation else ""
-        raise HistoryError(f"{error}{hint}") from error
+        raise HistoryError(str(error)) from error
 
 
 def assemble_without_frames(
@@ -143,10 +145,14 @@ def assemble_without_frames(
     known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
     conditions = StatedConditions(in_standard_keys(entries, known), vocabulary, location)
     rate_known = conditions.states("minimum_rate")
-    time = conditions.take_number("rupture")
+    time, ended, is_end = _time_and_end(conditions, Path(source.partition(" (")[0]), name)
     end = conditions.take_number("end_time")
-    ended = conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
-    _check_end_without_frames(time, end, ended, conditions.labels, location)
+    if is_end:
+        time, end = None, end or time
+    if rate_known and time is None and ended == RUPTURED:  # when it broke is not known
+        conditions.labels.setdefault("ended", ended)
+        ended = ""
+    _check_end_without_frames(time, end, ended, location)
     if not rate_known and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
@@ -175,13 +181,11 @@ def assemble_without_frames(
         )
         history = history.replace(specimen=named) if named else history
     if history.operator:
-        _check_operator(history, location, conditions.location_of("operator"))
+        _check_operator(history, location)
     return history
 
 
-def _check_end_without_frames(
-    time: StatedNumber | None, end: StatedNumber | None, ended: str, labels: Mapping[str, str], location: str
-) -> None:
+def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | None, ended: str, location: str) -> None:
     """Refuse ends that contradict one another, or say too little."""
     if time is not None and (end is not None or ended == "stopped"):
         other = f"'{end.key}' says when it ended" if end is not None else "the test was stopped"
@@ -190,8 +194,38 @@ def _check_end_without_frames(
         raise HistoryError(f"{location}: the test ruptured, and nothing says when; write rupture_h")
     if ended == "stopped" and end is None:
         raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
-    if time is not None and not ended:
-        refuse_unbroken(labels, time.key, time.location)
+
+
+def _time_and_end(conditions: StatedConditions, path: Path, name: str) -> tuple[StatedNumber | None, str, bool]:
+    """The rupture time, how the test ended, by `ended`, an answer or a label, and whether the time is that of its end.
+
+    A label by which a test did not break makes its time that of its end. What may say so is asked about.
+    """
+    time, ended = conditions.take_number("rupture"), conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
+    answer = conditions.end_terms.get(name.casefold(), "")
+    if ended or answer in END_OF_TEST_TERMS:
+        return time, ended or answer, not ended and answer == STOPPED
+    firm, remarks, unclear = dict[str, str](), dict[str, str](), dict[str, str]()
+    for label, text in conditions.labels.items():
+        kind = kind_of_column(label)
+        if label in ("assumed", "heat", "laboratory", "operator") or (not kind and text.casefold() in YES | NO):
+            continue
+        (end,) = ends_in_column(label, [text], conditions.end_terms, False).ends
+        firmness = firm if kind not in ("", "remark") else remarks
+        (unclear if end == UNCLEAR else firmness)[label] = text if end == UNCLEAR else end
+    said = {end for end in firm.values() if end} or {STOPPED}.intersection(remarks.values())
+    label = next((name for name, end in (firm | remarks).items() if end in said), "")
+    if len(said) > 1:
+        raise HistoryError(f"{conditions.location}: labels say {' and '.join(sorted(said))}; state '# ended: ruptured'")
+    if time is not None and unclear and not said:
+        name, text = next(iter(unclear.items()))
+        what = f"'{quoted(name)}' says '{quoted(text)}', and '{time.key}' that the test broke; which holds?"
+        choices = [{text: STOPPED}, {text: RUPTURED}, {text: LABEL}]
+        raise Question(path, time.location, what, "ended", choices)
+    if said == {STOPPED}:
+        conditions.record_assumption(f"stopped before rupture by its label '{quoted(label)}'")
+        return time, STOPPED, True
+    return time, "".join(said), False
 
 
 def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | None]:
@@ -232,8 +266,7 @@ def _without_readings_before_steps(
     if not before:
         return table, set()
     dropped, lines = set(before), table.lines
-    kept = kept_alike(rows, (row for k, row in enumerate(rows) if k not in dropped))
-    return table.with_rows(kept), {int(lines[k + 1]) for k in before}
+    return table.with_rows([row for k, row in enumerate(rows) if k not in dropped]), {int(lines[k + 1]) for k in before}
 
 
 def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Elastic | None) -> float | None:
@@ -285,14 +318,26 @@ def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], l
         read_text = ", ".join(sorted(read_columns))
         table = frames.table
         column = next(k for k, name in enumerate(table.columns) if name.startswith(unread[0]))
-        how = how_to_ignore(table.as_written(column))
-        raise HistoryError(
-            f"{location}: a column of {unread[0]} has no meaning beside {read_text}; leave it out: {how}"
-        )
+        what = f"a column of {unread[0]} has no meaning beside {read_text}; is it to stay unread?"
+        raise column_question(table, what, {table.as_written(column): UNUSED})
 
 
-def _elastic(conditions: StatedConditions) -> Elastic | None:
+def _elastic(
+    conditions: StatedConditions, frames: TableFrames | None = None, loading: Loading | None = None
+) -> Elastic | None:
+    """The elastic data that are stated; of a test with imposed strain else those of its loading ramp."""
     modulus = conditions.take_number("modulus")
+    if modulus is None and frames is not None and loading is not None and loading.quantity == "strain":
+        if not {"strain", "stress"} <= frames.values.keys():
+            return None
+        found = modulus_of_ramp(loading.program().at(frames.times), frames.values["stress"])
+        if found is None:
+            raise conditions.missing_error(
+                "Young's modulus, and no loading ramp that shows it",
+                "write modulus_GPa: the stress is E (strain - creep)",
+            )
+        modulus = StatedNumber(found[0], "modulus", conditions.location)
+        conditions.record_assumption(found[1])
     if modulus is None:
         return None
     # Here, not above: the record of elasticity brings sympy, which listing the readers must not wait for.
@@ -333,18 +378,20 @@ def _used_frames(conditions: StatedConditions, frames: TableFrames) -> Bools:
     return used & ~after
 
 
-def _end_of_test(conditions: StatedConditions, frames: TableFrames, used: Bools) -> tuple[float | None, bool]:
+def _end_of_test(
+    conditions: StatedConditions, frames: TableFrames, used: Bools, name: str
+) -> tuple[float | None, bool]:
     """The rupture time, s, if the test ruptured, and whether it was stopped before; neither where nothing is said.
 
     A test that is said to have ruptured, without a time, did so when its last frame was taken.
     """
-    time, ended = conditions.take_number("rupture"), conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
+    time, ended, is_end = _time_and_end(conditions, frames.table.path, name)
+    if is_end:
+        return None, True
     if time is not None and ended == "stopped":
         raise HistoryError(
             f"{time.location}: the test was stopped, and '{time.key}' says when it ruptured; keep one of them"
         )
-    if time is not None and not ended:
-        refuse_unbroken(conditions.labels, time.key, time.location)
     if time is not None or ended != "ruptured":
         return None if time is None else time.value, ended == "stopped"
     conditions.record_assumption("rupture at the last frame")

@@ -12,7 +12,7 @@ from creepkit.readers.column_names import split_written_name
 from creepkit.readers.comment_lines import entry_of, is_comment
 from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.table_limits import refuse_many
-from creepkit.readers.table_rows import NumberRows, TableRow, TextRows, kept_alike, with_columns, without_empty
+from creepkit.readers.table_rows import NumberRows, TableRow, with_columns
 from creepkit.readers.text_tables import SourceText, TextTable, check_columns, location_in, some_of
 from creepkit.readers.vocabulary import plain_name
 
@@ -25,7 +25,8 @@ class CellGrid:
     no comment and not empty. numbers : the rows below the last of `rows`, where they hold numbers alone.
     comments : line, key and entry of each `# key: value` below the first row. positions : the column of the file, from
     0, in which each cell of a row stands, where some were left out. remarks : what was left aside, or read though it
-    was hidden. cut : the last number of the file, where the file may have been cut in it.
+    was hidden. cut : the last number of the file, where the file may have been cut in it. merged : row and column, from
+    0, of cells that are merged with one above them.
     """
 
     path: Path
@@ -38,6 +39,7 @@ class CellGrid:
     positions: Sequence[int] = ()
     remarks: tuple[str, ...] = ()
     cut: CutNumber | None = None
+    merged: frozenset[tuple[int, int]] = frozenset()
 
     def location(self, line: int) -> str:
         """Where a row stands."""
@@ -74,6 +76,14 @@ def grid_of_rows(path: Path, sheet: str, rows: Sequence[TableRow]) -> CellGrid:
     return CellGrid(path, sheet, Dialect("\t"), header, kept, None, comments)
 
 
+def with_stated(grid: CellGrid, stated: Mapping[str, tuple[str, str]]) -> CellGrid:
+    """The grid with what a file of answers states of its tests, {key: text and place}, in its head."""
+    for key, (text, place) in stated.items():
+        if key in grid.header and grid.header[key].text != text:
+            raise HistoryError(f"{place}: {key} is '{quoted(text)}', and {grid.header[key].location} says another one")
+    return replace(grid, header={**grid.header, **{key: SourceText(*one) for key, one in stated.items()}})
+
+
 def without_ignored(grid: CellGrid, names_at: int, ignored: Collection[str]) -> CellGrid:
     """The grid without the columns that its key `ignore` names, all of which must be there, and those in `ignored`.
 
@@ -99,9 +109,8 @@ def without_ignored(grid: CellGrid, names_at: int, ignored: Collection[str]) -> 
     width = max(len(row.cells) for row in grid.rows)
     kept = [k for k in range(width) if k not in left_out]
     numbers = grid.numbers and replace(grid.numbers, numbers=grid.numbers.numbers[:, kept])
-    return replace(
-        grid, header=header, rows=without_empty(with_columns(grid.rows, kept)), numbers=numbers, positions=kept
-    )
+    rows = [row for row in with_columns(grid.rows, kept) if any(row.cells)]
+    return replace(grid, header=header, rows=rows, numbers=numbers, positions=kept)
 
 
 def _columns_called(name: str, cells: Sequence[str]) -> list[int]:
@@ -120,8 +129,8 @@ def table_of(grid: CellGrid) -> TextTable:
     columns = names.cells[:width]
     check_columns(grid.location(names.line), columns)
     body: Sequence[TableRow] = rows if grid.numbers is None else grid.numbers
-    if not (isinstance(body, NumberRows) or (isinstance(body, TextRows) and body.has_only == {width})):
-        body = kept_alike(rows, _cut_rows(grid, rows, width))
+    if not isinstance(body, NumberRows):
+        body = list(_cut_rows(grid, rows, width))
     if not body:
         place = grid.location(names.line)
         raise HistoryError(f"{place}: no rows below the line of columns; a table needs at least one")

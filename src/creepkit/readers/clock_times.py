@@ -17,7 +17,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve
 from creepkit.readers.column_names import KnownNames, words_of
-from creepkit.readers.table_rows import NumberRows, TableRow, cells_of, kept_alike
+from creepkit.readers.table_rows import NumberRows, TableRow, cells_of
 from creepkit.readers.text_tables import SourceText, TextTable
 from creepkit.readers.vocabulary import split_unit
 
@@ -60,7 +60,7 @@ def with_elapsed_times(stated: dict[str, SourceText], table: TextTable, known: K
             "the unit out of the name, or write numbers"
         )
     columns[clock] = "time_s"
-    rows = kept_alike(table.rows, _with_times(table, clock, hours))
+    rows = list(_with_times(table, clock, hours))
     assumptions = (*table.assumptions, *([assumption] if assumption else []))
     return replace(table, columns=columns, rows=rows, written=table.written or table.columns, assumptions=assumptions)
 

@@ -10,6 +10,7 @@ from functools import cached_property, lru_cache
 from creepkit.readers.vocabulary import LABEL_KEYS, HeaderVocabulary, Terms, plain_name, split_unit
 from creepkit.records.quantities import (
     ANGLE,
+    AREA,
     FORCE,
     LENGTH,
     MODULUS,
@@ -24,7 +25,7 @@ from creepkit.records.units import CAPITALS_THAT_MATTER, UNITS, spellings
 
 _READ = dict.fromkeys(
     suffix
-    for kind in (TIME, STRAIN, TEMPERATURE, STRESS, MODULUS, LENGTH, FORCE, MOMENT, ANGLE)
+    for kind in (TIME, STRAIN, TEMPERATURE, STRESS, MODULUS, LENGTH, FORCE, MOMENT, ANGLE, AREA)
     for suffix in kind.units
     if suffix in UNITS
 )
@@ -35,36 +36,75 @@ UNIT_SPELLINGS: Mapping[str, str] = {spelling.lower(): symbol for spelling, symb
 """{spelling in small letters: creepkit's suffix}. Capitals do not matter but where they tell units apart."""
 
 
-NAME_SYNONYMS: Mapping[str, str] = {
-    **dict.fromkeys(
-        ("elapsed time", "time elapsed", "test time", "creep time", "zeit", "prüfzeit", "laufzeit"), "time"
+_NAMES_OF: Mapping[str, tuple[str, ...]] = {
+    "time": (
+        *("elapsed time", "time elapsed", "test time", "creep time", "time under load", "zeit", "prüfzeit", "laufzeit"),
+        *("belastungszeit", "beanspruchungsdauer", "versuchszeit", "temps", "durée", "temps écoulé", "x_value"),
+        *("timestamp", "time stamp", "datetime", "date time", "date/time", "time of day", "uhrzeit"),
     ),
-    **dict.fromkeys(
-        ("timestamp", "time stamp", "datetime", "date time", "date/time", "time of day", "uhrzeit"), "time"
+    "temperature": (
+        *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
+        *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
+        *("probentemperatur", "ofen", "ofentemperatur", "température", "température d'essai", "four"),
     ),
-    **dict.fromkeys(("temp", "test temperature", "test temp", "creep temperature"), "temperature"),
-    **dict.fromkeys(("temperatur", "prüftemperatur", "versuchstemperatur"), "temperature"),
-    **dict.fromkeys(("applied stress", "nominal stress", "initial stress", "creep stress"), "stress"),
-    **dict.fromkeys(("spannung", "prüfspannung", "nennspannung", "anfangsspannung"), "stress"),
-    **{"druck": "pressure", "prüfdruck": "pressure"},
-    **dict.fromkeys(("creep strain", "total strain", "engineering strain", "true strain"), "strain"),
-    **dict.fromkeys(("logarithmic strain", "dehnung", "kriechdehnung", "gesamtdehnung"), "strain"),
-    **dict.fromkeys(("plastische dehnung", "bleibende dehnung"), "strain"),
-    "anfangsdehnung": "loading_strain",
-    **dict.fromkeys(
-        ("young's modulus", "youngs modulus", "elastic modulus", "e modul", "elastizitätsmodul"), "modulus"
+    "stress": (
+        *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
+        *("spannung", "prüfspannung", "nennspannung", "anfangsspannung", "contrainte", "contrainte initiale"),
     ),
-    **dict.fromkeys(("poisson's ratio", "poissons ratio", "poisson ratio"), "poisson"),
-    **dict.fromkeys(("rupture time", "time to rupture", "rupture life", "bruchzeit", "standzeit"), "rupture"),
-    **dict.fromkeys(("standard deviation of strain", "strain standard deviation"), "strain_sd"),
-    **{"material": "alloy", "werkstoff": "alloy", "test name": "name", "test id": "name", "test": "name"},
+    "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
+    "strain": (
+        *("creep strain", "total strain", "engineering strain", "true strain", "logarithmic strain", "dehnung"),
+        *("kriechdehnung", "gesamtdehnung", "zeitdehnung", "plastische dehnung", "bleibende dehnung", "déformation"),
+        *("déformation de fluage", "allongement relatif", "deformation relative"),
+    ),
+    "loading_strain": ("anfangsdehnung",),
+    "force": ("load", "applied load", "axial load", "kraft", "prüfkraft", "last", "zugkraft", "effort", "force axiale"),
+    "elongation": (
+        *("extension", "creep extension", "extensometer", "gauge extension", "axial extension", "verlängerung"),
+        *("längenänderung", "allongement"),
+    ),
+    "modulus": (
+        "young's modulus",
+        "youngs modulus",
+        "elastic modulus",
+        "e modul",
+        "elastizitätsmodul",
+        "module d'young",
+    ),
+    "poisson": ("poisson's ratio", "poissons ratio", "poisson ratio"),
+    "rupture": ("rupture time", "time to rupture", "rupture life", "bruchzeit", "standzeit", "temps à rupture"),
+    "strain_sd": ("standard deviation of strain", "strain standard deviation"),
+    "diameter": (
+        *("specimen diameter", "sample diameter", "initial diameter", "gauge diameter", "durchmesser"),
+        *("probendurchmesser", "anfangsdurchmesser", "diamètre", "diamètre initial"),
+    ),
+    "gauge_length": (
+        *("gage length", "initial gauge length", "original gauge length", "reference length", "messlänge"),
+        *("anfangsmesslänge", "messbasis", "longueur utile", "longueur de base", "longueur de référence"),
+    ),
+    "width": ("specimen width", "breite", "probenbreite", "largeur"),
+    "thickness": ("specimen thickness", "dicke", "probendicke", "épaisseur"),
+    "area": (
+        *("cross section", "cross-section", "cross-sectional area", "cross section area", "initial area"),
+        *("querschnitt", "querschnittsfläche", "anfangsquerschnitt", "section", "section initiale"),
+    ),
+    "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung"),
+    "name": ("test name", "test id", "test"),
 }
+"""{quantity or text key: its names in small letters}."""
+
+
+NAME_SYNONYMS: Mapping[str, str] = {name: meaning for meaning, names in _NAMES_OF.items() for name in names}
 """{name in small letters: quantity or text key}."""
 
 
 SYMBOLS: Mapping[str, str] = {
     **{"t": "time", "T": "temperature", "σ": "stress", "sigma": "stress", "ε": "strain", "epsilon": "strain"},
     **{"p": "pressure", "P": "pressure", "E": "modulus", "ν": "poisson", "nu": "poisson"},
+    **{"F": "force", "ΔL": "elongation", "Δl": "elongation", "ΔL0": "elongation", "dL": "elongation"},
+    **dict.fromkeys(("d0", "D0", "ø", "Ø", "⌀"), "diameter"),
+    **dict.fromkeys(("L0", "l0", "Lo", "Le", "Lr0"), "gauge_length"),
+    **dict.fromkeys(("S0", "A0", "So", "Ao"), "area"),
 }
 """{symbol: quantity}; capitals matter."""
 
@@ -86,7 +126,7 @@ _PARTS_OF_UNIT = 8
 """Into which a unit may be divided by a separator, as `mm / mm` is."""
 
 
-_RATE_UNIT = re.compile(r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(/|per )\s*)?([a-z]+)(\^?-1)?")
+_RATE_UNIT = re.compile(r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(/|per )\s*)?([a-z]+|(?:1000|10\^?3|10³) ?h)(\^?-1)?")
 
 
 @lru_cache(maxsize=4096)
@@ -121,7 +161,7 @@ def split_written_name(text: str) -> tuple[str, str]:
         for k in range(max(1, len(parts) - _PARTS_OF_UNIT), len(parts)):
             name, unit = separator.join(parts[:k]), separator.join(parts[k:])
             # A blank before 1 sets a number apart, as of a sensor, and no unit.
-            if name and unit_suffix(unit) and not (separator == " " and unit in ("1", "-")):
+            if name and unit_suffix(unit) and not (separator in " _" and unit.casefold() in ("1", "-", "std")):
                 return name.strip(" ,_/"), unit.strip()
     return text, ""
 
@@ -170,6 +210,8 @@ class NameTable:
         whole = self._plain_names.get(plain_name(text))  # `Time of day` is no time in days
         name, unit = (text, "") if whole else split_written_name(text)
         quantity = self.meaning(name)
+        if quantity == "elongation" and unit_suffix(unit) in STRAIN.units:
+            quantity = "strain"  # of its gauge length
         if quantity is None or (unit and quantity not in self.kinds):
             last = re.split(r"[\s_\-()\[\],]+", text.strip(" )]"))[-1]
             return text if last in ("1", *CAPITALS_THAT_MATTER) else self._plain_keys.get(plain_name(text), text)

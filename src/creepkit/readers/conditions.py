@@ -5,14 +5,18 @@ Nothing that a file states goes unread, and no key is guessed: an unknown one is
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from pathlib import Path
 from typing import TypeVar
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
 from creepkit.readers.column_names import unit_suffix
+from creepkit.readers.ends_of_tests import INTERRUPTED, STOPPED, UNCLEAR, MarkedTime, end_said_by, marked_time
+from creepkit.readers.questions import Question
 from creepkit.readers.text_tables import SourceText
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
@@ -32,8 +36,20 @@ _ALLOWED_COMBINATIONS = (
 )
 
 
+_HELD = {
+    "strain": re.compile(r"strain|dehnung|relax|extension|displacement|verschiebung|déformation|\bweg"),
+    "stress": re.compile(r"(?:true|wahre|vraie).*(?:stress|spannung|contrainte)"),
+    "load": re.compile(r"\bloads?\b.*\w\W|\W.*\bload\b|dead|\blast\b|kraft|gewicht|weight"),
+}
+"""{what was held: words by which laboratories say so}."""
+
+
 END_OF_TEST_TERMS = ("ruptured", "stopped")
 """How a test may have ended: by rupture, or before it."""
+
+
+_OBSERVATION = re.compile(r"[a-z][a-z -]*\d")
+"""Beginning of an operator of observation, a form and a number; any other operator is who made the test."""
 
 
 _T = TypeVar("_T")
@@ -77,7 +93,7 @@ class StatedConditions:
         self.default_specimen = vocabulary.default_texts.get("specimen", "")
         self._kinds = self.terms.condition_kinds
         self._text_keys = self.terms.text_keys
-        self._end_of_test_terms = {**{word: word for word in END_OF_TEST_TERMS}, **vocabulary.end_of_test_terms}
+        self.end_terms = {word.casefold(): end for word, end in vocabulary.end_of_test_terms.items()}
         self._numbers: dict[str, StatedNumber] = {}
         self._texts: dict[str, SourceText] = {}
         self._assumptions: list[str] = []
@@ -106,6 +122,19 @@ class StatedConditions:
         """Whether a number or text is given that nothing has taken yet."""
         return key in self._numbers or key in self._texts
 
+    def text_of(self, key: str) -> str:
+        """A text that nothing has taken yet, "" where it is not given."""
+        return self._texts[key].text if key in self._texts else ""
+
+    def states_load(self, quantity: str) -> bool:
+        """Whether a load is stated in any form: a number, levels, steps or a program."""
+        return any(self.states(f"{quantity}{form}") for form in ("", "_1", "_steps", "_program"))
+
+    def put_number(self, quantity: str, number: StatedNumber) -> None:
+        """Add a number that others give; its place is that of the one it was made of."""
+        self._numbers[quantity] = number
+        self._locations[quantity] = number.location
+
     def take_choice(self, key: str, allowed: Sequence[str], required: bool) -> str:
         """Take one of the allowed texts; '' when it was not given, or what the layout assumes when it is needed."""
         entry = self._texts.pop(key, None)
@@ -131,18 +160,27 @@ class StatedConditions:
             raise HistoryError(f"{entry.location}: {description}; they must start at 0 and never decrease")
         return pairs
 
-    def record_assumption(self, what: str) -> None:
-        """Record in the label "assumed" what the file leaves unsaid."""
-        self._assumptions.append(what)
+    def record_assumption(self, what: str, *, first: bool = False) -> None:
+        """Record in the label "assumed" what the file leaves unsaid; first : before all others."""
+        self._assumptions.insert(0 if first else len(self._assumptions), what)
 
     def location_of(self, *keys: str) -> str:
         """The place of the first of these numbers and texts that was given, else that of the test."""
         return next((self._locations[key] for key in keys if key in self._locations), self.location)
 
-    def missing_error(self, what: str, advice: str) -> HistoryError:
-        """The error that says what is missing, and what was kept as labels."""
+    def missing_error(self, what: str, advice: str, key: str = "") -> HistoryError:
+        """The error that says what is missing, and what was kept as labels; a question where a key states it."""
         label_note = f" (kept as labels: {', '.join(self.labels)})" if self.labels else ""
-        return HistoryError(f"{self.location}: no {what}{label_note}; {advice}")
+        sentence = f"no {what}{label_note}; {advice}"
+        return self.question(sentence, key) if key else HistoryError(f"{self.location}: {sentence}")
+
+    def question(
+        self, sentence: str, key: str, *choices: str | float, location: str = "", is_free: bool = True
+    ) -> Question:
+        """The question of a condition, which the key states; choices : likely values."""
+        place = location or self.location
+        path = Path(re.sub(r"(?:, sheet '.*|:\d+)$", "", place))
+        return Question(path, place, sentence, key, choices, is_free=is_free)
 
     def all_labels(self) -> dict[str, str]:
         """The labels, with what was assumed; refuses numbers and texts that nothing has used."""
@@ -166,7 +204,7 @@ class StatedConditions:
     def _classify(self, key: str, entry: SourceText) -> bool:
         """Put an entry where it belongs; False where nothing is known of its key."""
         name = self._vocabulary.synonyms.get(key, key)
-        kept_as_label = name in self._vocabulary.labels
+        kept_as_label = name in self._vocabulary.labels or (name == "operator" and not _OBSERVATION.match(entry.text))
         result = None if kept_as_label else split_unit(name, self._kinds)
         word, _, rest = name.strip().partition(" ")
         if kept_as_label:
@@ -175,11 +213,14 @@ class StatedConditions:
             _put_once(self.labels, rest.strip(), entry.text, entry.location)
         elif word.casefold() == "geometry" and rest.strip():
             _put_once(self.geometry, *_specimen_dimension(rest.strip(), entry, self.terms), entry.location)
-        elif name == "ended" or (result and result[0] == "rupture" and entry.text in self._end_of_test_terms):
-            ended = replace(entry, text=self._end_of_test_terms.get(entry.text, entry.text))
-            _put_once(self._texts, "ended", ended, entry.location)
+        elif name == "ended":
+            _put_once(self._texts, "ended", replace(entry, text=self._end(entry.text)), entry.location)
+        elif result and result[0] == "rupture" and (mark := marked_time(entry.text, self.end_terms)).said != "":
+            self._put_marked(mark, result[1], entry, entry.key or key)
         elif name == "specimen":
             self._name_specimen(entry)
+        elif name == "control":
+            self._put_control(entry)
         elif name in self._text_keys:
             _put_once(self._texts, name, entry, entry.location)
             self._locations[name] = entry.location
@@ -196,6 +237,22 @@ class StatedConditions:
             self._locations[result[0]] = entry.location
         return True
 
+    def _end(self, text: str) -> str:
+        """A word for how the test ended as one of END_OF_TEST_TERMS, where it is understood."""
+        said = self.end_terms.get(text.casefold()) or end_said_by(text)
+        return {INTERRUPTED: STOPPED, UNCLEAR: text, "": text}.get(said, said)
+
+    def _put_marked(self, mark: MarkedTime, unit: str, entry: SourceText, key: str) -> None:
+        """Put a rupture time that is marked as a run-out, or a word in its place."""
+        if mark.said == STOPPED or not mark.number:
+            _put_once(self._texts, "ended", replace(entry, text=self._end(mark.said)), entry.location)
+        if mark.number:
+            quantity = "end_time" if mark.said == STOPPED else "rupture"
+            text = mark.number if mark.said != UNCLEAR else entry.text
+            number = self._stated_number((quantity, unit), key, replace(entry, text=text))
+            _put_once(self._numbers, quantity, number, entry.location)
+            self._locations[quantity] = entry.location
+
     def _name_specimen(self, entry: SourceText) -> None:
         """A text that is no name, such as `Round bar, 6 mm`, is a label, unless it is a misspelt name."""
         if SPECIMEN_NAME_PATTERN.fullmatch(entry.text) or entry.text.casefold() in self.terms.outputs:
@@ -206,6 +263,15 @@ class StatedConditions:
         if near:
             raise HistoryError(f"{entry.location}: there is no specimen '{entry.text}'; did you mean '{near[0]}'?")
         _put_once(self.labels, "specimen", entry.text, entry.location)
+
+    def _put_control(self, entry: SourceText) -> None:
+        """What was held, in a laboratory's words: `constant load`, `strain hold 0.15 %`."""
+        plain = entry.text.casefold()
+        held = next((held for held, pattern in _HELD.items() if pattern.search(plain)), entry.text)
+        if held != entry.text:
+            _put_once(self.labels, "control", entry.text, entry.location)
+        _put_once(self._texts, "control", replace(entry, text=held), entry.location)
+        self._locations["control"] = entry.location
 
     def _misspelt(self, key: str) -> str:
         """The key, the laboratory's own included, of which an unknown one is a misspelling; "" for none."""

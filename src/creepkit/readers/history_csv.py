@@ -22,7 +22,7 @@ error.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +34,7 @@ from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames
+from creepkit.readers.condition_texts import sources_of_names
 from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.noise_correlation import noise_correlation_text
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
@@ -120,10 +121,11 @@ def histories_of_tests(
     names = [test.name or (grid.sheet if len(sheets) > 1 else path.stem) for grid, test in found]
     histories = []
     for (grid, test), name in zip(found, names, strict=True):
-        unique = f"{grid.sheet}/{name}" if names.count(name) > 1 and grid.sheet else name
+        unique = f"{grid.sheet}/{name}" if len(set(names)) < len(names) and grid.sheet else name
         parts = [f"sheet {grid.sheet}"] * bool(grid.sheet) + [test.name] * bool(test.name)
         source = f"{path} ({', '.join(parts)})" if parts and len(found) > 1 else str(path)
-        history = assemble_history(unique, test.entries, test.table, vocabulary, location=grid.place, source=source)
+        table = replace(test.table, sources=(*test.table.sources, *sources_of_names(grid, vocabulary)))
+        history = assemble_history(unique, test.entries, table, vocabulary, location=grid.place, source=source)
         if grid.cut is not None and _holds_number(test.table, grid.cut):
             history = history.replace(labels={**history.labels, CUT_LABEL: str(grid.cut)})
         histories.append(history)

@@ -19,7 +19,12 @@ from creepkit.readers.text_tables import TableFrames
 from creepkit.readers.vocabulary import COMPONENT_LOADING_KINDS, Terms
 from creepkit.records import Loading, PointLoading, Program, TwoLevels, loading_of
 from creepkit.records.quantities import TEMPERATURE, QuantityKind
-from creepkit.records.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATURE_RECORD_TOLERANCE, recorded_program
+from creepkit.records.recorded_programs import (
+    LOAD_RECORD_TOLERANCE,
+    TEMPERATURE_RECORD_TOLERANCE,
+    noise_of_readings,
+    recorded_program,
+)
 
 _PROGRAM_FORMS = ("steps", "program")
 
@@ -35,8 +40,17 @@ LARGEST_BARE_STRAIN = 0.05
 """A held strain without a unit above it is as likely a percentage."""
 
 
-HELD_RANGE = 0.02
-"""Of its median: between its tenth and ninetieth percentile a quantity that is held varies by less."""
+RAMP_NOISE = 4.0
+"""Standard deviations of what is held by which a straight ramp is off a line at most."""
+
+
+HELD_RANGE, OUTLIERS = 0.02, 0.02
+"""Of its median: a quantity that is held varies by less, but for this fraction of its frames."""
+
+
+LONGEST_RAMP, SUSTAINED, STRAIGHT = 0.1, 0.5, 0.1
+"""Of the duration of a test the ramp to what is held; of the largest stress what one that was imposed does not fall
+below; of its range by how much a strain that was imposed by its rate is off a straight line."""
 
 
 def read_temperature(
@@ -45,7 +59,8 @@ def read_temperature(
     """The temperature, K; marked : lines of frames at which a load or temperature changed."""
     result = _stated_loading(conditions, frames, "temperature", marked)
     if result is None:
-        raise conditions.missing_error("temperature", "write temperature_C or temperature_K, or a column of that name")
+        advice = "write temperature_C or temperature_K, or a column of that name"
+        raise conditions.missing_error("temperature", advice, "temperature_C")
     return Program.steps(result) if isinstance(result, tuple) else result
 
 
@@ -63,10 +78,13 @@ def read_loading(conditions: StatedConditions, frames: TableFrames, marked: Coll
         likely = {load for one in conditions.terms.specimens_with(frames.values) for load in terms.loads.get(one, ())}
         for name in sorted(load_kinds, key=lambda name: (name in terms.number_kinds, name not in likely)):
             loading = loading or _loading_by(name, conditions, frames, marked)
+        if loading is not None and loading.quantity == "strain" and conditions.text_of("control") == "strain":
+            conditions.take_text("control")
     if loading is None:
         stated = sorted(likely) or [*load_kinds]
         wanted = " or ".join(name for name in stated if name in load_kinds)
-        raise conditions.missing_error(f"loading (no {wanted})", _loading_advice(terms, stated))
+        key = "stress_MPa" if "stress" in stated else ""
+        raise conditions.missing_error(f"loading (no {wanted})", _loading_advice(terms, stated), key)
     return loading
 
 
@@ -239,24 +257,70 @@ def _imposed_column(conditions: StatedConditions, frames: TableFrames, quantity:
 
 
 def _imposed_of(conditions: StatedConditions, frames: TableFrames, first: str, second: str) -> str:
-    """Which of two quantities was imposed, where each may be the answer to the other: the stated or the held one."""
+    """Which of two quantities was imposed, where each may be the answer to the other: the stated or the held one.
+
+    A quantity is held where it stays once a ramp has reached it. Of two that change, a stress that never falls below
+    half of its largest was imposed, else a strain that grows by a constant rate; else it is asked for.
+    """
     pair = sorted((first, second))
-    stated = [q for q in pair if any(conditions.states(f"{q}{form}") for form in _LOADING_SUFFIXES)]
+    stated = [q for q in pair if conditions.states_load(q)]
+    control = conditions.text_of("control")
+    if "strain" in pair and control == "strain":
+        stated = ["strain"]
+    elif control and set(pair) == {"strain", "stress"}:
+        stated = ["stress"]
     if len(stated) == 1:
         return stated[0]
     columns = {q: frames.values[q] for q in pair}
-    held = [q for q, column in columns.items() if _is_held(column)] or [
+    held = [q for q, column in columns.items() if hold_begins(frames.times, column) is not None] or [
         q for q, column in columns.items() if _level_starts(column, LOAD_RECORD_TOLERANCE * float(np.ptp(column)))
     ]
-    imposed = held[0] if len(held) == 1 else next(q for q in pair if q in conditions.terms.number_kinds)
-    why = "its column is held" if imposed in held else "neither column is held"
-    conditions.record_assumption(f"{imposed} imposed, for {why}")
-    return imposed
+    if len(held) == 1:
+        conditions.record_assumption(f"{held[0]} imposed, for its column is held")
+        return held[0]
+    load = next(q for q in pair if q in conditions.terms.number_kinds)
+    other = pair[1 - pair.index(load)]
+    if held or columns[load].min() >= SUSTAINED * columns[load].max():
+        why = "both columns are held" if held else "it never falls below half of its largest"
+        conditions.record_assumption(f"{load} imposed, for {why}")
+        return load
+    if _grows_steadily(frames.times, columns[other]):
+        conditions.record_assumption(f"{other} imposed, for its rate is constant")
+        return other
+    raise conditions.question(
+        f"{load} and {other} both change, and nothing says which was imposed; write 'specimen: uniaxial' for an "
+        "imposed stress, 'specimen: relaxation' for an imposed strain",
+        "specimen",
+        *("uniaxial", "relaxation"),
+        location=frames.table.location(frames.table.columns_line),
+        is_free=False,
+    )
 
 
-def _is_held(column: Floats) -> bool:
-    low, middle, high = np.percentile(column, (10, 50, 90))
-    return bool(high - low <= HELD_RANGE * abs(middle) and middle != 0.0)
+def hold_begins(times: Floats, column: Floats) -> int | None:
+    """The first frame from which on a column is held, perhaps after a ramp; None where it is not.
+
+    times, column : (frames,) s, and in any unit. It stays then within HELD_RANGE, or four standard deviations of its
+    noise, of its median over the last half.
+    """
+    late = column[column.size // 2 :]
+    level = float(np.median(late))
+    band = max(HELD_RANGE * abs(level), 4.0 * noise_of_readings(late))
+    inside = np.abs(column - level) <= band
+    outside_later = np.cumsum(~inside[::-1])[::-1]
+    begins = np.flatnonzero(inside[:-1] & inside[1:] & (outside_later[:-1] <= OUTLIERS * column.size))
+    start = int(begins[0]) if begins.size else column.size
+    if level == 0.0 or band > 0.25 * abs(level) or column.size - start < 2:
+        return None
+    is_ramp = bool((np.diff(column[: start + 1]) > -band).all()) and column[0] < level + band
+    is_short = start < 2 or times[start] - times[0] <= LONGEST_RAMP * (times[-1] - times[0])
+    return start if is_ramp and is_short else None
+
+
+def _grows_steadily(times: Floats, column: Floats) -> bool:
+    """Whether a column is a straight line over time, but for STRAIGHT of its range."""
+    line = np.polyval(np.polyfit(times, column, 1), times)
+    return bool(np.ptp(column) > 0.0 and np.abs(column - line).max() <= STRAIGHT * np.ptp(column))
 
 
 def _levels_of_steps(conditions: StatedConditions, frames: TableFrames, quantity: str) -> Floats | None:
@@ -283,6 +347,9 @@ def _recorded(
     if np.ptp(column) == 0.0:
         return float(column[0])
     is_temperature = quantity == "temperature"
+    start = hold_begins(frames.times, column) if quantity == "strain" else None
+    if start is not None and 0 < start < column.size - 2:
+        return _ramp_and_hold(frames.times, np.maximum(column, 0.0), start)
     tolerance = TEMPERATURE_RECORD_TOLERANCE if is_temperature else LOAD_RECORD_TOLERANCE * float(np.abs(column).max())
     starts = _level_starts(column, tolerance)
     if not starts:
@@ -302,6 +369,22 @@ def _recorded(
     conditions.record_assumption(f"steps of {quantity} from the first frame of each level on")
     values = [float(np.median(column[first:last])) for first, last in pairwise(bounds)]
     return tuple((0.0 if k == 0 else float(frames.times[k]), v) for k, v in zip(starts, values, strict=True))
+
+
+def _ramp_and_hold(times: Floats, column: Floats, start: int) -> Program:
+    """The program of a quantity that a ramp reached and that was held from frame `start` on, as its mean.
+
+    A ramp that is straight but for the noise of what was held is a line, which ends where it meets the level.
+    """
+    level, noise = float(np.mean(column[start:])), float(np.std(column[start:]))
+    before, ramp = times[:start], column[:start]
+    slope, offset = np.polyfit(before, ramp, 1) if start > 2 else (0.0, 0.0)
+    straight = start > 2 and np.abs(ramp - slope * before - offset).max() <= RAMP_NOISE * noise and slope > 0.0
+    if not straight:
+        return Program(np.append(times[: start + 1], times[-1]), np.append(ramp, (level, level)))
+    end = float(np.clip((level - offset) / slope, before[-1], times[start]))
+    first = max(offset + slope * before[0], 0.0)
+    return Program(np.array([before[0], end, times[-1]]), np.array([first, level, level]))
 
 
 def _level_starts(column: Floats, tolerance: float) -> list[int]:

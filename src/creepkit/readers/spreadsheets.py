@@ -7,9 +7,10 @@ and none of time states conditions, one row a test; other sheets are left aside,
 from __future__ import annotations
 
 import io
+import posixpath
 import warnings
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from functools import partial
@@ -36,6 +37,10 @@ SPREADSHEET_FILE = FileKind("a spreadsheet of tests", HistoryError, "save the sh
 
 _FILLED_ROWS = 60
 """Rows from the top in which a merged cell counts for all the columns that it covers."""
+
+
+_MOST_REMARKS = 20
+"""Cells of a sheet of remarks that is kept as a label."""
 
 
 _LAST_ROW = 1_048_576
@@ -76,7 +81,20 @@ def read_sheets(path: Path) -> list[CellGrid]:
     found = [grid for grid in grids if grid is not None]
     if aside and not found:
         raise HistoryError(f"{path}: {aside[0]}, and no other holds anything; unhide the sheets that count")
-    return [replace(grid, remarks=(*notes[grid.sheet].remarks(grid.sheet), *aside)) for grid in found]
+    return [
+        replace(
+            grid,
+            remarks=(*notes[grid.sheet].remarks(grid.sheet), *aside),
+            header={
+                **grid.header,
+                **{
+                    f"label cell {cell}": SourceText(text, f"{grid.place}, comment of cell {cell}")
+                    for cell, text in notes[grid.sheet].comments
+                },
+            },
+        )
+        for grid in found
+    ]
 
 
 @dataclass(frozen=True)
@@ -84,13 +102,15 @@ class _SheetNotes:
     """What openpyxl does not say of a sheet that it reads row by row.
 
     hidden : numbers of rows. hidden_columns : whether there are some. uncomputed : the first cell with a formula and no
-    value, "" for none. merged : row, first and last column of each range of merged cells.
+    value, "" for none. merged : first row and column, last row and column of each range of merged cells, from 1.
+    comments : cell and text.
     """
 
     hidden: tuple[str, ...]
     hidden_columns: bool
     uncomputed: str
-    merged: tuple[tuple[int, int, int], ...]
+    merged: tuple[tuple[int, int, int, int], ...]
+    comments: tuple[tuple[str, str], ...] = ()
 
     def remarks(self, sheet: str) -> tuple[str, ...]:
         """What was hidden and read nevertheless, for the label "assumed"."""
@@ -103,7 +123,7 @@ def _notes_of(archive: zipfile.ZipFile, sheet: Any) -> _SheetNotes:
     """The notes of a sheet; ValueError for a row that no spreadsheet has."""
     from openpyxl.utils import range_boundaries
 
-    hidden, merged, uncomputed, hidden_columns = list[str](), list[tuple[int, int, int]](), "", False
+    hidden, merged, uncomputed, hidden_columns = list[str](), list[tuple[int, int, int, int]](), "", False
     with archive.open(sheet._worksheet_path.lstrip("/")) as stream:
         for _, element in ElementTree.iterparse(stream):
             kind, is_hidden = element.tag.rpartition("}")[2], element.get("hidden") in ("1", "true")
@@ -119,9 +139,28 @@ def _notes_of(archive: zipfile.ZipFile, sheet: Any) -> _SheetNotes:
             elif kind == "col":
                 hidden_columns |= is_hidden
             elif kind == "mergeCell":
-                first, row, last, _ = range_boundaries(element.get("ref", ""))
-                merged.append((row, first, last))
-    return _SheetNotes(tuple(hidden), hidden_columns, uncomputed, tuple(merged))
+                first, row, last, below = range_boundaries(element.get("ref", ""))
+                merged.append((row, first, below, last))
+    comments = tuple(_comments_of(archive, sheet._worksheet_path.lstrip("/")))
+    return _SheetNotes(tuple(hidden), hidden_columns, uncomputed, tuple(merged), comments)
+
+
+def _comments_of(archive: zipfile.ZipFile, sheet: str) -> Iterator[tuple[str, str]]:
+    """Cell and text of each comment of a sheet, by the path of its part."""
+    folder, _, name = sheet.rpartition("/")
+    relations = f"{folder}/_rels/{name}.rels"
+    if relations not in archive.namelist():
+        return
+    for relation in ElementTree.fromstring(archive.read(relations)):
+        if not relation.get("Type", "").endswith("/comments"):
+            continue
+        target = relation.get("Target", "")
+        part = target.lstrip("/") if target.startswith("/") else posixpath.normpath(f"{folder}/{target}")
+        for element in ElementTree.fromstring(archive.read(part)).iter():
+            if element.tag.rpartition("}")[2] == "comment":
+                texts = (one.text or "" for one in element.iter() if one.tag.rpartition("}")[2] == "t")
+                if text := " ".join("".join(texts).split()):
+                    yield element.get("ref", "?"), text
 
 
 def _grid(path: Path, sheet: Any, notes: _SheetNotes) -> CellGrid | None:
@@ -147,7 +186,8 @@ def _grid(path: Path, sheet: Any, notes: _SheetNotes) -> CellGrid | None:
     if not rows:
         return None
     rows = _with_points(rows, texts, place)
-    return grid_of_rows(path, str(sheet.title), _with_merged(rows, notes.merged))
+    grid = grid_of_rows(path, str(sheet.title), _with_merged(rows, notes.merged))
+    return replace(grid, merged=_cells_below(rows, notes.merged))
 
 
 def _is_text(cell: Any) -> bool:
@@ -196,10 +236,22 @@ def _with_points(rows: list[TableRow], texts: list[str], place: str) -> list[Tab
     ]
 
 
-def _with_merged(rows: list[TableRow], merged: Sequence[tuple[int, int, int]]) -> list[TableRow]:
+def _cells_below(rows: list[TableRow], merged: Sequence[tuple[int, int, int, int]]) -> frozenset[tuple[int, int]]:
+    """Row and column, from 0, of cells that are merged with one above them."""
+    lines, width = {row.line for row in rows}, max(len(row.cells) for row in rows)
+    ranges = [(top, first, min(bottom, max(lines)), min(last, width)) for top, first, bottom, last in merged]
+    return frozenset(
+        (line, column - 1)
+        for top, first, bottom, last in ranges
+        for line in range(top + 1, bottom + 1)
+        for column in range(first, last + 1)
+    )
+
+
+def _with_merged(rows: list[TableRow], merged: Sequence[tuple[int, int, int, int]]) -> list[TableRow]:
     """The rows with the text of each merged cell in all columns that it covers, in its first row."""
     by_line = {row.line: row for row in rows}
-    for line, first, last in merged:
+    for line, first, _, last in merged:
         row = by_line.get(line)
         if row is None or row.line > _FILLED_ROWS or last - first > 1000 or first > len(row.cells):
             continue
@@ -232,6 +284,7 @@ class SpreadsheetReader:
             raise HistoryError(f"{path}: no sheet has a column of time (sheets: {sheets}); name one time_h or Time (h)")
         stated: dict[str, dict[str, SourceText]] = {}
         aside: list[str] = []
+        notes: dict[str, SourceText] = {}
         found = [(grid, test) for grid in framed for test in tests_in(grid, self.vocabulary)]
         names = {name for grid, test in found for name in (grid.sheet, test.name)}
         for grid in grids:
@@ -241,6 +294,8 @@ class SpreadsheetReader:
                     _add_conditions(stated, conditions, grid)
                 else:  # remarks
                     aside.append(f"sheet '{grid.sheet}' not read as it has no column of time")
+                    notes |= _note_of_sheet(grid)
+        found = [(grid, replace(test, entries={**notes, **test.entries})) for grid, test in found]
         return histories_of_tests(_with_conditions(path, found, stated, aside), path, self.vocabulary)
 
 
@@ -277,6 +332,14 @@ def _conditions_by_test(grid: CellGrid, vocabulary: HeaderVocabulary) -> dict[st
         if empty := [name for name in table.empty_columns(row) if known.is_condition(name)]:
             tests[test]["label assumed"] = SourceText(", ".join(map(unknown_text, empty)), place)
     return tests
+
+
+def _note_of_sheet(grid: CellGrid) -> dict[str, SourceText]:
+    """The texts of a sheet of few remarks as one label; {} of a sheet that holds more."""
+    cells = [cell for row in grid.rows for cell in row.cells if cell]
+    text = "; ".join(cells)
+    is_note = len(cells) <= _MOST_REMARKS and not any(is_number(cell, grid.dialect) for cell in cells)
+    return {f"label sheet {grid.sheet}": SourceText(text, grid.place)} if is_note else {}
 
 
 def _states_a_condition(entries: Mapping[str, SourceText]) -> bool:

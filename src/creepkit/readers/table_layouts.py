@@ -1,22 +1,33 @@
 """Tests in a grid of cells: one test, one column a test beside a shared time, pairs of columns, or one column of names.
 
-Rows above the names of the columns state conditions, for all tests (`Stress (MPa) | 120`) or one value a test.
+LAYOUTS lists them, each with an example. Whatever else stands in the head of a table (table_heads.py) holds for the
+test above whose columns it stands, else for all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import pairwise
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing, is_number
-from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
-from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, unit_suffix, words_of
-from creepkit.readers.head_rows import entries_above, entries_of_blocks
-from creepkit.readers.table_rows import NumberRows, TableRow, cells_of, grouped, kept_alike, with_columns, with_first
-from creepkit.readers.text_tables import SourceText, TextTable, check_columns, unknown_text
+from creepkit.readers.cell_grids import CellGrid, table_of, with_stated, without_ignored
+from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, words_of
+from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
+from creepkit.readers.table_heads import (
+    MAXIMUM_ROWS_BELOW,
+    Head,
+    head_of,
+    head_of_one_test,
+    heads_of_tests,
+    is_time,
+    row_of_names,
+    test_and_column,
+)
+from creepkit.readers.table_rows import NumberRows, TableRow, cells_of, grouped, with_columns
+from creepkit.readers.text_tables import SourceText, TextTable, check_columns, some_of, unknown_text
 from creepkit.readers.vocabulary import HeaderVocabulary
 
 
@@ -37,57 +48,110 @@ class TestColumns:
     columns: Mapping[int, str]
 
 
-_MAXIMUM_HEAD_ROWS = 60
-"""Rows among which the names of the columns are looked for."""
+@dataclass(frozen=True)
+class HeadedGrid:
+    """A grid from the names of its columns on, and its head.
+
+    times : positions of the columns of time. whole : the rows of the head, columns that are left out included.
+    """
+
+    grid: CellGrid
+    head: Head
+    times: Sequence[int]
+    known: KnownNames
+    whole: Sequence[TableRow]
 
 
-_NOT_TESTS = frozenset(
-    (
-        *("plastic", "elastic", "total", "creep", "true", "engineering", "logarithmic", "inelastic", "thermal"),
-        *("primary", "axial", "diametral", "lateral", "hoop", "radial", "transverse", "local", "global", "mean"),
-        *("average", "max", "min", "maximum", "minimum", "rate", "sd", "corrected", "raw", "left", "right", "front"),
-        *("clock", "start", "end", "cycle", "date", "loading", "hold", "ramp", "step", "rupture", "test", "no", "of"),
-        *("back", "lvdt", "extensometer", "channel", "sensor", "upper", "lower", "top", "bottom"),
-    )
-)
-"""Words beside a quantity that tell another quantity or another sensor, not another test."""
+@dataclass(frozen=True)
+class Layout:
+    """How tests may stand in a table. example : a text in this layout. match, tests : of a headed grid."""
+
+    name: str
+    example: str
+    match: Callable[[HeadedGrid], bool]
+    tests: Callable[[HeadedGrid], list[TabulatedTest]]
 
 
 def tests_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
     """The tests of a grid; HistoryError, in one sentence, where it cannot be told how it is laid out."""
+    grid = with_stated(grid, vocabulary.stated)
     stated = grid.header.get("specimen")
     known = KnownNames.of(vocabulary, stated.text if stated else "")
-    names_at = _row_of_names(grid, known)
-    names_line, conditions = grid.rows[names_at].line, grid.rows[:names_at]
+    names_at = row_of_names(grid, known)
+    names_line, all_rows = grid.rows[names_at].line, list(grid.rows[: names_at + MAXIMUM_ROWS_BELOW])
     grid = without_ignored(_with_comments(grid, names_line, known), names_at, vocabulary.ignored)
-    names_at = next((k for k, row in enumerate(grid.rows) if row.line == names_line), -1)
-    if names_at < 0:
+    if not any(row.line == names_line for row in grid.rows):
         raise HistoryError(f"{grid.location(names_line)}: every column is left out by ignore; keep those of the test")
-    head, names = grid.rows[:names_at], grid.rows[names_at]
-    cells, tests_below, body_at = _joined_names(grid, names_at)
-    below = replace(grid, rows=with_first(TableRow(names.line, cells), grid.rows[body_at:]))
-    times = [k for k, cell in enumerate(cells) if _is_time(cell, known)]
-    if len(times) > 1 and not _one_time_in_two_units(cells, times):
-        return _tests_of_blocks(below, head, _pairs(below, times, known), set(range(times[0])), known)
-    if len(times) == 1 and (tests_below or _is_wide(cells, times[0], known, bool(head))):
-        blocks = _columns_beside(below, head, times[0], tests_below, known)
-        return _tests_of_blocks(below, head, blocks, set(range(times[0] + 1)), known)
-    below, footers = _without_footers(below)
-    entries = entries_above(grid, conditions, known)  # they stand above columns that are left out, too
-    _refuse_twice(entries, grid.header, known)
-    return _rows_by_test(replace(table_of(below), assumptions=footers), {**grid.header, **entries}, known)
+    head = head_of(grid, known)
+    below = replace(grid, rows=[TableRow(head.line, head.names), *grid.rows[head.body :]])
+    times = [k for k, cell in enumerate(head.names) if cell and is_time(cell, known)]
+    lines = {row.line for row in head.rows}
+    whole = [row for k, row in enumerate(all_rows) if k < names_at or row.line in lines]
+    headed = HeadedGrid(below, head, times, known, whole)
+    return next(layout for layout in LAYOUTS if layout.match(headed)).tests(headed)
 
 
 def names_time(grid: CellGrid, vocabulary: HeaderVocabulary) -> bool:
     """Whether some row of a grid names a time, as that above frames does."""
     known = KnownNames.of(vocabulary)
-    row = grid.rows[_row_of_names(grid, known)]
-    return any(_is_time(cell, known) for cell in row.cells)
+    row = grid.rows[row_of_names(grid, known)]
+    return any(is_time(cell, known) for cell in row.cells)
 
 
-def _is_time(cell: str, known: KnownNames) -> bool:
-    """Whether a name of a column is a time, perhaps that of a test, as in `Time A1 (h)`."""
-    return known.quantity(_test_and_column(cell, known)[1]) == "time"
+def _are_pairs(headed: HeadedGrid) -> bool:
+    return len(headed.times) > 1 and not _one_time_in_two_units(headed.head.names, headed.times)
+
+
+def _tests_of_pairs(headed: HeadedGrid) -> list[TabulatedTest]:
+    tests = _pairs(headed.grid, headed.times, headed.known)
+    return _tests_of_blocks(headed, tests, set(range(headed.times[0])))
+
+
+def _are_columns(headed: HeadedGrid) -> bool:
+    return len(headed.times) == 1 and _is_wide(headed)
+
+
+def _tests_of_columns(headed: HeadedGrid) -> list[TabulatedTest]:
+    time = headed.times[0]
+    return _tests_of_blocks(headed, _columns_beside(headed, time), set(range(time + 1)))
+
+
+def _tests_of_rows(headed: HeadedGrid) -> list[TabulatedTest]:
+    grid, footers = _without_footers(headed.grid)
+    if not headed.times:
+        place, names = grid.location(headed.head.line), some_of(list(filter(None, headed.head.names)))
+        raise HistoryError(
+            f"{place}: missing column: no time among {names}; name one time_s, time_min or time_h in that row, behind "
+            "its '#' where it has one"
+        )
+    head = head_of_one_test(grid, headed.whole, headed.known)
+    _refuse_twice(head.entries, grid.header, headed.known)
+    table = table_of(_without_margin(grid, head.entries))
+    table = replace(table, assumptions=(*head.assumptions, *footers), sources=tuple(head.sources))
+    return _rows_by_test(table, {**grid.header, **head.entries}, headed.known)
+
+
+LAYOUTS: Sequence[Layout] = (
+    Layout(
+        "columns of each test side by side, each with its time",
+        "140 MPa;;160 MPa;\ntime;strain;time;strain\nh;%;h;%\n0;0;0;0\n1;0.02;1;0.03\n",
+        _are_pairs,
+        _tests_of_pairs,
+    ),
+    Layout(
+        "one column a test beside one time",
+        "Stress (MPa);140;160\nTime (h);A1 strain (%);A2 strain (%)\n0;0;0\n1;0.02;0.03\n",
+        _are_columns,
+        _tests_of_columns,
+    ),
+    Layout(
+        "one test, or a column that names the test of each row",
+        "Test;Stress (MPa);Time (h);Strain (%)\nA1;140;0;0\nA1;140;1;0.02\nA2;160;0;0\nA2;160;1;0.03\n",
+        lambda headed: True,
+        _tests_of_rows,
+    ),
+)
+"""The first that matches is the layout of a table."""
 
 
 def _with_comments(grid: CellGrid, names_line: int, known: KnownNames) -> CellGrid:
@@ -113,104 +177,61 @@ def _refuse_twice(entries: Mapping[str, SourceText], header: Mapping[str, Source
             raise HistoryError(f"{entry.location}: '{key}' was already given; keep one of them")
 
 
-def _row_of_names(grid: CellGrid, known: KnownNames) -> int:
-    """The first row that names a time among texts alone; the first of all where there is none."""
-    for k, row in enumerate(grid.rows[:_MAXIMUM_HEAD_ROWS]):
-        cells = [cell for cell in row.cells if cell]
-        if any(is_number(cell, grid.dialect) for cell in cells):
-            continue
-        if any(_is_time(cell, known) for cell in cells) and (len(cells) > 1 or k == 0):
-            return k
-    return 0
-
-
-def _joined_names(grid: CellGrid, names_at: int) -> tuple[list[str], dict[int, str], int]:
-    """Names with the units of the row below them; names of tests below them by column; the row where frames begin."""
-    cells = list(grid.rows[names_at].cells)
-    nothing: tuple[list[str], dict[int, str], int] = cells, {}, names_at + 1
-    if grid.numbers is not None or names_at + 1 >= len(grid.rows):
-        return nothing
-    below = list(grid.rows[names_at + 1].cells)
-    texts = [cell for cell in below if cell]
-    units = [unit_suffix(cell) for cell in texts]
-    if all(units) and any(cell != "1" for cell in texts):
-        return [f"{c} ({u.strip('()[] ')})" if u and c else c for c, u in _padded(cells, below)], {}, names_at + 2
-    if any(is_number(cell, grid.dialect) for cell in texts) or len(set(texts)) < max(2, len(texts)) or any(units):
-        return nothing
-    tests, filled, joined = dict[int, str](), "", list[str]()
-    for k, (cell, test) in enumerate(_padded(cells, below)):
-        filled = cell or filled
-        joined.append(filled if test else cell)
-        if test:
-            tests[k] = test
-    return (joined, tests, names_at + 2) if len(tests) == len(list(filter(None, joined))) - 1 else nothing
-
-
-def _padded(cells: Sequence[str], below: Sequence[str]) -> Iterator[tuple[str, str]]:
-    width = max(len(cells), len(below))
-    yield from zip([*cells, *[""] * (width - len(cells))], [*below, *[""] * (width - len(below))], strict=True)
-
-
 def _one_time_in_two_units(cells: Sequence[str], times: Sequence[int]) -> bool:
     """Whether columns of time have no other column between them, as in `time_s,time_h,strain_pct`."""
     return any(b - a == 1 for a, b in pairwise(times)) or times[-1] == len(cells) - 1
 
 
-def _is_wide(cells: Sequence[str], time: int, known: KnownNames, has_head: bool) -> bool:
+def _is_wide(headed: HeadedGrid) -> bool:
     """Whether the columns beside a time are one a test."""
+    cells, time, known = headed.head.names, headed.times[0], headed.known
     others = [cell for k, cell in enumerate(cells) if k != time and cell]
     if len(others) < 2 or known.declared.intersection(others):
         return False
-    named = [_test_and_column(cell, known) for cell in others]
+    named = [test_and_column(cell, known) for cell in others]
     if all(test for test, _ in named):
         return len({known.quantity(column) for _, column in named}) < len(named)
     if any(known.quantity(cell) for cell in others):
-        return has_head and len(set(others)) == 1
+        return bool(headed.head.rows) and len(set(others)) == 1
+    if _are_conditions(headed):
+        return True
     if any(words_of(cell) in TEST_NAME_COLUMNS or known.is_condition(cell) for cell in others):
         return False
     spelled = {words_of(name) for name in known.columns.kinds}
     return not any(get_close_matches(words_of(split_written_name(cell)[0]), spelled, 1, cutoff=0.75) for cell in others)
 
 
-def _test_and_column(cell: str, known: KnownNames) -> tuple[str, str]:
-    """Name of the test and of the column in `A1 strain (%)` or `Strain A1 (%)`; ("", cell) where there are not both."""
-    if known.quantity(cell) or known.is_condition(cell):
-        return "", cell
-    written, unit = split_written_name(cell)
-    words = written.replace(":", " ").replace("_", " ").split()
-    for size in range(min(len(words) - 1, 3), 0, -1):
-        for first, rest in ((words[:size], words[size:]), (words[-size:], words[:-size])):
-            name, column = " ".join(rest).strip("-–, "), " ".join(first)
-            if name and known.quantity(column) and not _NOT_TESTS.intersection(name.lower().split()):
-                return name, f"{column} ({unit})" if unit else column
-    return "", cell
+def _are_conditions(headed: HeadedGrid) -> bool:
+    """Whether the columns beside a time are named by a load or a temperature, as `120 MPa`."""
+    written = [cell for k, cell in enumerate(headed.head.written) if cell and k not in headed.times]
+    return all(conditions_of_head(cell, headed.known) for cell in written)
 
 
-def _columns_beside(
-    grid: CellGrid, head: Sequence[TableRow], time: int, tests_below: Mapping[int, str], known: KnownNames
-) -> list[TestColumns]:
+def _columns_beside(headed: HeadedGrid, time: int) -> list[TestColumns]:
     """One column a test, beside one time."""
-    names, stated = grid.rows[0], grid.header.get("columns")
-    place = grid.location(names.line)
-    blocks: list[TestColumns] = []
-    for k, cell in enumerate(names.cells):
+    names, grid, known = headed.head.names, headed.grid, headed.known
+    stated, place = grid.header.get("columns"), grid.location(headed.head.line)
+    of_conditions = _are_conditions(headed)
+    results: list[TestColumns] = []
+    for k, cell in enumerate(names):
         if k == time or not cell:
             continue
-        test, column = (tests_below[k], cell) if k in tests_below else _test_and_column(cell, known)
+        test, column = test_and_column(cell, known)
         if not known.quantity(column):
-            if stated is None:
+            if stated is None and not of_conditions:
                 raise HistoryError(
                     f"{place}: the column '{quoted(cell)}' does not say what it holds; write '# columns: strain_pct' "
                     "above, or names such as 'A1 strain (%)'"
                 )
-            test, column = cell, stated.text
-        blocks.append(TestColumns(test, {time: names.cells[time], k: column}))
-    if not head and all(block.test.isdigit() for block in blocks):
+            written = headed.head.written[k]
+            test, column = written, stated.text if stated else f"strain{cell.removeprefix(written)}"
+        results.append(TestColumns(test, {time: names[time], k: column}))
+    if not headed.head.rows and all(one.test.isdigit() for one in results):
         raise HistoryError(
             f"{place}: several columns of one quantity, and no conditions above them, may be tests or sensors of one "
             "test; name the tests, such as 'A1 strain (%)', or keep one column, with '# ignore: NAME' for the others"
         )
-    return blocks
+    return results
 
 
 def _pairs(grid: CellGrid, times: Sequence[int], known: KnownNames) -> list[TestColumns]:
@@ -225,7 +246,7 @@ def _pairs(grid: CellGrid, times: Sequence[int], known: KnownNames) -> list[Test
         )
     blocks = []
     for start, end in zip(times, [*times[1:], len(names.cells)], strict=True):
-        named = {k: _test_and_column(names.cells[k], known) for k in range(start, end) if names.cells[k]}
+        named = {k: test_and_column(names.cells[k], known) for k in range(start, end) if names.cells[k]}
         tests = sorted({test for test, _ in named.values() if test})
         if len(tests) > 1:
             raise HistoryError(
@@ -237,35 +258,43 @@ def _pairs(grid: CellGrid, times: Sequence[int], known: KnownNames) -> list[Test
     return blocks
 
 
-def _tests_of_blocks(
-    grid: CellGrid, head: Sequence[TableRow], blocks: Sequence[TestColumns], key_columns: set[int], known: KnownNames
-) -> list[TabulatedTest]:
-    """The tests of blocks of columns, with what the rows above say of each."""
+def _tests_of_blocks(headed: HeadedGrid, tests: Sequence[TestColumns], key_columns: set[int]) -> list[TabulatedTest]:
+    """The tests of several columns each, with what the rows above say of each."""
+    grid, known = headed.grid, headed.known
     header = {key: entry for key, entry in grid.header.items() if key != "columns"}
-    used = {k for block in blocks for k in block.columns}
+    used = {k for test in tests for k in test.columns}
+    notes: dict[str, SourceText] = {}
     rows: Sequence[TableRow] = grid.rows[1:] if grid.numbers is None else grid.numbers
     if grid.numbers is None:
-        rows = kept_alike(rows, _checked_cells(grid, rows, used))
+        rows = list(_checked_cells(grid, rows, used, notes))
     else:
-        list(_checked_cells(grid, grid.numbers[:1], used))  # every row has the same columns
-    place = grid.location(grid.rows[0].line)
-    tests: dict[str, TabulatedTest] = {}
-    above = entries_of_blocks(grid, head, [list(block.columns) for block in blocks], key_columns, known)
-    for number, (block, stated) in enumerate(zip(blocks, above, strict=True), 1):
-        entries = dict(stated.entries)
+        list(_checked_cells(grid, grid.numbers[:1], used, notes))  # every row has the same columns
+    place = grid.location(headed.head.line)
+    results: dict[str, TabulatedTest] = {}
+    heads = heads_of_tests(grid, headed.head.rows, [list(test.columns) for test in tests], key_columns, known)
+    for number, (test, head) in enumerate(zip(tests, heads, strict=True), 1):
+        entries = dict(head.entries)
+        for quantity, text in conditions_of_head(test.test, known):
+            entries[quantity] = SourceText(text, place, grid.dialect.decimal, test.test)
         _refuse_twice(entries, header, known)
         written = entries.pop("name", None)
-        name = block.test or (written.text if written else str(number))
-        if name in tests:
+        measured = [entry.text for key, entry in entries.items() if entry.key in known.conditions.kinds]
+        name = test.test or (written.text if written else " ".join(measured) or str(number))
+        name = f"{name} ({number})" if name in results and not (test.test or written) else name
+        if name in results:
             raise HistoryError(f"{place}: two tests are called '{quoted(name)}'; give each its own name")
-        check_columns(f"{place}, test '{quoted(name)}'", list(block.columns.values()))
-        table = replace(_table_of_block(grid, rows, name, block.columns), assumptions=stated.assumptions)
-        tests[name] = TabulatedTest(name, {**header, **entries}, table)
-    return list(tests.values())
+        check_columns(f"{place}, test '{quoted(name)}'", list(test.columns.values()))
+        sources = (*conditions_in_text(test.test, place, known), *head.sources)
+        table = _table_of_block(grid, rows, name, test.columns)
+        table = replace(table, assumptions=head.assumptions, sources=sources)
+        results[name] = TabulatedTest(name, {**notes, **header, **entries}, table)
+    return list(results.values())
 
 
-def _checked_cells(grid: CellGrid, rows: Sequence[TableRow], used: set[int]) -> Iterator[TableRow]:
-    """The rows, of as many cells as there are columns in use."""
+def _checked_cells(
+    grid: CellGrid, rows: Sequence[TableRow], used: set[int], notes: dict[str, SourceText]
+) -> Iterator[TableRow]:
+    """The rows, of as many cells as there are columns in use; texts beside them are added to the notes."""
     width = max(used) + 1
     for row in rows:
         if len(row.cells) < width and not grid.sheet:  # a cell lost within a line of text moves those behind it
@@ -273,24 +302,45 @@ def _checked_cells(grid: CellGrid, rows: Sequence[TableRow], used: set[int]) -> 
                 f"{grid.location(row.line)}: number of cells {len(row.cells)}, of columns {width}; write one cell a "
                 "column, empty ones too"
             )
-        foreign = next((cell for k, cell in enumerate(row.cells) if cell and k not in used), "")
-        if foreign:
-            raise HistoryError(
-                f"{grid.location(row.line)}: '{quoted(foreign)}' stands in a column without a name; name it or "
-                "remove it"
-            )
+        for foreign in (cell for k, cell in enumerate(row.cells) if cell and k not in used):
+            _add_note(grid, row, foreign, notes)
         yield TableRow(row.line, [*row.cells[:width], *[""] * (width - len(row.cells))])
+
+
+def _add_note(grid: CellGrid, row: TableRow, text: str, notes: dict[str, SourceText]) -> None:
+    """Keep a text that stands in a column without a name; HistoryError for a number."""
+    place, key = grid.location(row.line), f"label line {row.line}"
+    if is_number(text, grid.dialect):
+        raise HistoryError(f"{place}: '{quoted(text)}' stands in a column without a name; name it or remove it")
+    earlier = f"{notes[key].text}; " if key in notes else ""
+    notes[key] = SourceText(earlier + text, place)
+
+
+def _without_margin(grid: CellGrid, notes: dict[str, SourceText]) -> CellGrid:
+    """The grid without texts right of its named columns, which become notes; other cells are told by who reads them."""
+    width = max((k for k, cell in enumerate(grid.rows[0].cells, 1) if cell), default=0)
+    if grid.numbers is not None or not any(any(row.cells[width:]) for row in grid.rows):
+        return grid
+
+    def rows() -> Iterator[TableRow]:
+        for row in grid.rows:
+            beside = [cell for cell in row.cells[width:] if cell]
+            if any(is_number(cell, grid.dialect) for cell in beside):
+                yield row
+                continue
+            for cell in beside:
+                _add_note(grid, row, cell, notes)
+            if any(row.cells[:width]):
+                yield TableRow(row.line, row.cells[:width])
+
+    return replace(grid, rows=list(rows()))
 
 
 def _table_of_block(grid: CellGrid, rows: Sequence[TableRow], name: str, columns: Mapping[int, str]) -> TextTable:
     """The frames of one test: the rows in which a column of its own holds something, its time in pairs among them."""
     positions, line = list(columns), grid.rows[0].line
     own = with_columns(rows, positions)
-    cut = (
-        own
-        if isinstance(own, NumberRows)
-        else kept_alike(own, (row for row in own if not all(map(is_missing, row.cells[1:]))))
-    )
+    cut = own if isinstance(own, NumberRows) else [row for row in own if not all(map(is_missing, row.cells[1:]))]
     if not cut:
         raise HistoryError(
             f"{grid.location(line)}: test '{quoted(name)}' has no rows below the names of its columns; remove it or "

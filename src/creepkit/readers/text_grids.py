@@ -18,6 +18,7 @@ from creepkit.files.delimited_text import (
     Dialect,
     decode_text,
     detect_dialect,
+    is_number,
     parts_of_lines,
     split_line,
     split_lines,
@@ -25,8 +26,16 @@ from creepkit.files.delimited_text import (
     text_lines,
 )
 from creepkit.files.reading import FileKind, read_bytes
+from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
-from creepkit.readers.comment_lines import BEFORE_COMMENT, head_entries, is_comment, late_entries, stated_decimal
+from creepkit.readers.comment_lines import (
+    BEFORE_COMMENT,
+    entry_of,
+    head_entries,
+    is_comment,
+    late_entries,
+    stated_decimal,
+)
 from creepkit.readers.cut_files import cut_number
 from creepkit.readers.table_limits import (
     MAXIMUM_CELL,
@@ -37,7 +46,7 @@ from creepkit.readers.table_limits import (
     refuse_many_skipped,
     refuse_many_texts,
 )
-from creepkit.readers.table_rows import NumberRows, TableRow, packed
+from creepkit.readers.table_rows import NumberRows, TableRow
 from creepkit.readers.text_tables import SourceText, TextTable
 
 TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
@@ -66,6 +75,7 @@ def read_text_grid(path: Path) -> CellGrid:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     refuse_long_lines(text, path)
     head, offset = _head_of(path, text)
+    text, head, offset = _with_names_behind_marks(text, head, offset)
     if offset == len(text):
         problem = "holds a header but no table" if any(line.strip() for line in head) else "is empty"
         raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain_pct, then rows")
@@ -89,6 +99,47 @@ def _head_of(path: Path, text: str) -> tuple[list[str], int]:
         refuse_many_skipped(path, len(head), 0)
         offset += len(line) + 1
     return head, min(offset, len(text))
+
+
+def _with_names_behind_marks(text: str, head: list[str], offset: int) -> tuple[str, list[str], int]:
+    """The text with names of columns, that stand behind a mark of comments above rows of numbers, as its first row.
+
+    numpy.savetxt and digitisers write them so. They are the first of the last comments that have as many cells as the
+    row below has; further ones are rows of the head too.
+    """
+    sample = [line for line in text[offset : offset + _LARGE_TEXT].split("\n")[:50] if line.strip()]
+    try:
+        dialect = detect_dialect(sample, decimal=".")
+        first = split_line(sample[0], dialect) if sample else []
+    except HistoryError:
+        return text, head, offset
+    comma = Dialect(dialect.delimiter, ",")
+    numeric = [is_number(cell, dialect) or is_number(cell, comma) or is_clock_time(cell) for cell in first if cell]
+    if len(first) < 2 or not numeric or not all(numeric):
+        return text, head, offset
+    names = list[str]()
+    for line in reversed(head):
+        cells = _names_behind_mark(line, len(first), dialect)
+        if not cells:
+            break
+        names.insert(0, dialect.delimiter.join(f'"{c}"' if dialect.delimiter in c else c for c in cells))
+    kept = head[: len(head) - len(names)]
+    start = sum(len(line) + 1 for line in kept)
+    return ("\n".join([*kept, *names, text[offset:]]), kept, start) if names else (text, head, offset)
+
+
+def _names_behind_mark(line: str, count: int, dialect: Dialect) -> list[str]:
+    """The cells of a comment, as many as a row has and none of them a number; [] of any other line."""
+    entry = entry_of(line)
+    body = line.strip().lstrip("#/ ")
+    for delimiter in dict.fromkeys((dialect.delimiter, "\t", ";", ",", "|", " ")):
+        try:
+            cells = split_line(body, Dialect(delimiter))
+        except HistoryError:
+            continue
+        if len(cells) == count and all(cells) and not any(is_number(cell, Dialect(delimiter)) for cell in cells):
+            return [] if entry[1] and delimiter == " " else cells
+    return []
 
 
 def read_head_alone(path: Path) -> dict[str, SourceText]:
@@ -141,7 +192,7 @@ def _grid_of_texts(path: Path, text: str, head: Sequence[str], offset: int) -> C
     dialect = detect_dialect((line for _, line in lines.numbered()), str(path), stated_decimal(path, head))
     width = len(split_line(next(lines.numbered())[1], dialect, f"{path}:{first}"))
     refuse_many_texts(path, text.count("\n", offset) * max(width, 2))  # a table has two columns or more
-    rows = packed(_rows(lines.numbered(), dialect, path))
+    rows = list(_rows(lines.numbered(), dialect, path))
     if not rows:
         raise HistoryError(f"{path}:{first}: no cell holds anything; write a line of columns, then rows")
     late = late_entries(path, lines.comments, dialect)
@@ -207,17 +258,30 @@ def read_table(path: Path, ignored: Collection[str] = ()) -> TextTable:
     return table_of(without_ignored(read_text_grid(path), 0, ignored))
 
 
-def peek_columns(path: Path, byte_limit: int = 65536) -> tuple[str, ...]:
+def peek_grid(path: Path) -> CellGrid | None:
+    """The beginning of a text as a grid; None where it is no table; never raises for what it holds."""
+    try:
+        text = decode_text(_beginning(path), path).replace("\r\n", "\n").replace("\r", "\n")
+        text, head, offset = _with_names_behind_marks(text, *_head_of(path, text))
+        return None if offset == len(text) else _grid_of_texts(path, text, head, offset)
+    except HistoryError:
+        return None
+
+
+def _beginning(path: Path, byte_limit: int = _LARGE_TEXT) -> bytes:
+    """The whole lines with which a file begins."""
+    content = read_bytes(path, TABLE_FILE, first=byte_limit)
+    if len(content) < byte_limit:
+        return content
+    end = content.rfind(b"\n") + 1  # not within a character: a line feed of UTF-16 has two bytes
+    return content[: end + end % 2] if content[:2] in (b"\xff\xfe", b"\xfe\xff") else content[:end]
+
+
+def peek_columns(path: Path) -> tuple[str, ...]:
     """The columns of a file as far as its beginning shows them, () when it has none; never raises for what it holds."""
     try:
-        content = read_bytes(path, TABLE_FILE, first=byte_limit)
-        is_cut = len(content) == byte_limit
-        if is_cut:  # not within a character: a line feed of UTF-16 has two bytes
-            end = content.rfind(b"\n") + 1
-            content = content[: end + end % 2] if content[:2] in (b"\xff\xfe", b"\xfe\xff") else content[:end]
-        lines = [line for line in text_lines(decode_text(content, path)) if line.strip() and not is_comment(line)]
-        if not lines:
-            return ()
-        return tuple(split_line(lines[0], detect_dialect(lines, decimal=".")))
+        lines = text_lines(decode_text(_beginning(path), path))
+        lines = [line for line in lines if line.strip() and not is_comment(line)]
+        return tuple(split_line(lines[0], detect_dialect(lines, decimal="."))) if lines else ()
     except HistoryError:
         return ()

@@ -10,7 +10,6 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,8 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_missing, is_number, parse_number, parse_numbers
 from creepkit.readers.column_names import NameTable, split_written_name
-from creepkit.readers.table_rows import NumberRows, TableRow, TextRows, cells_by_part
+from creepkit.readers.questions import Question
+from creepkit.readers.table_rows import NumberRows, TableRow, cells_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records.quantities import QuantityKind
 
@@ -49,6 +49,10 @@ _POINT_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
 """Beside decimal commas 1.234 may be 1234."""
 
 
+NOISE_OF_ZERO = 0.01
+"""Of the largest reading of a load: a reading that is less below zero is one of none."""
+
+
 def some_of(names: Sequence[str], count: int = 12) -> str:
     """Names as messages list them: the first ones, each not longer than 40, and how many there are."""
     shown = ", ".join(quoted(name, 40) for name in names[:count])
@@ -61,7 +65,8 @@ class TextTable:
 
     sheet : of a spreadsheet, "" elsewhere. positions : the column of the file, from 0, in which each column stands,
     where errors must tell it. assumptions : what was assumed of the table, for the label "assumed". written : the
-    columns as they were written, where they were given creepkit's names.
+    columns as they were written, where they were given creepkit's names. sources : what titles and names of sheets and
+    files state of its test, which must agree with what else does.
     """
 
     path: Path
@@ -74,6 +79,7 @@ class TextTable:
     positions: Sequence[int] = ()
     assumptions: tuple[str, ...] = ()
     written: Sequence[str] = ()
+    sources: tuple[SourceText, ...] = ()
 
     def location(self, line_number: int, column: int | None = None) -> str:
         """Where a line stands, 'file:line', or 'file, sheet 'creep', row 3' in a spreadsheet; or a cell of it."""
@@ -96,19 +102,13 @@ class TextTable:
         k = self.column(name)
         if isinstance(self.rows, NumberRows):
             return self.rows.numbers[:, k]
-        found = list[Floats]()
-        for lines, cells in cells_by_part(self.rows, k):
-            place = partial(self._location_among, lines, k)
-            found.append(parse_numbers(cells, self.dialect, place, self.as_written(k)))
-        return np.concatenate(found) if found else np.zeros(0)
-
-    def _location_among(self, lines: Ints, column: int, row: int) -> str:
-        return self.location(int(lines[row]), column)
+        cells = list(cells_of(self.rows, k))
+        return parse_numbers(cells, self.dialect, lambda row: self.location(self.rows[row].line, k), self.as_written(k))
 
     @property
     def lines(self) -> Ints:
         """(rows,) The line of the file in which each row stands."""
-        if isinstance(self.rows, (NumberRows, TextRows)):
+        if isinstance(self.rows, NumberRows):
             return self.rows.lines
         return np.array([row.line for row in self.rows], dtype=int)
 
@@ -194,9 +194,10 @@ def read_frames(
             written = table.as_written(k)
             quantity, suffix = _parsed_column(table, k, vocabulary.synonyms.get(name, name), kinds)
             if quantity in values:
-                raise HistoryError(
-                    f"{table.location(table.columns_line)}: '{found[quantity]}' and '{written}' both hold the "
-                    f"{quantity}; keep one and leave the other out: {how_to_ignore(written)}"
+                raise column_question(
+                    table,
+                    f"'{found[quantity]}' and '{written}' both hold the {quantity}; which counts?",
+                    *({one: UNUSED} for one in (written, found[quantity])),
                 )
             values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
             if quantity == "used":
@@ -222,9 +223,14 @@ def unknown_text(quantity: str) -> str:
     return f"{quantity} unknown (empty cell)"
 
 
-def how_to_ignore(column: str) -> str:
-    """How to have a column left out."""
-    return f"write '# ignore: {column}' above, or read it with --ignore '{column}'"
+UNUSED = "unused"
+"""What an answer says of a column that stays unread."""
+
+
+def column_question(table: TextTable, sentence: str, *choices: dict[str, str]) -> Question:
+    """The question of what columns of a table are; choices : {column: what it is}, the likely one first."""
+    place = table.location(table.columns_line)
+    return Question(table.path, place, sentence, "columns", choices, is_free=True)
 
 
 def _parsed_column(table: TextTable, k: int, name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:
@@ -235,20 +241,21 @@ def _parsed_column(table: TextTable, k: int, name: str, kinds: Mapping[str, Quan
         unit = split_written_name(written)[1]
         sensor, names = _sensor(written, kinds), table.written or table.columns
         others = [other for other in names if other != written and sensor and _sensor(other, kinds) == sensor]
-        way_out = how_to_ignore(written)
+        measured = f"{sensor} ({unit})" if unit else sensor
         if others:
-            raise HistoryError(
-                f"{location}: '{written}' and '{others[0]}' seem to be several sensors of the {sensor}; name the one "
-                f"that counts '{sensor}{unit and f' ({unit})'}', and leave the others out: {how_to_ignore(others[0])}"
-            )
+            counts = [
+                {one: measured, **{o: UNUSED for o in (written, *others) if o != one}} for one in (written, *others)
+            ]
+            what = f"'{written}' and '{others[0]}' seem to be several sensors of the {sensor}; which counts?"
+            raise column_question(table, what, *counts[:3])
         if sensor and sensor not in {(split_unit(other, kinds) or ("",))[0] for other in table.columns}:
-            raise HistoryError(
-                f"{location}: '{written}' seems to be a sensor of the {sensor}; name it "
-                f"'{sensor}{unit and f' ({unit})'}', or leave it out: {way_out}"
-            )
+            what = f"'{written}' seems to be a sensor of the {sensor}; is it?"
+            raise column_question(table, what, {written: measured}, {written: UNUSED})
         near = get_close_matches(written, kinds, 1, cutoff=0.55)
-        meant = f"did you mean '{near[0]}'? Else" if near else "name it as creepkit does, or"
-        raise HistoryError(f"{location}: column '{written}' is not understood; {meant} leave it out: {way_out}")
+        meant = f"column '{written}' is not understood; " + (
+            f"did you mean '{near[0]}'?" if near else "what does it hold?"
+        )
+        raise column_question(table, meant, *({written: f"{one} ({unit})"} for one in near), {written: UNUSED})
     quantity, suffix = result
     kinds[quantity].unit(suffix, location, written)
     return result
@@ -263,9 +270,11 @@ def _sensor(name: str, kinds: Mapping[str, QuantityKind]) -> str:
 
 def _converted_column(table: TextTable, name: str, kind: QuantityKind, suffix: str) -> Floats:
     """One column in creepkit's unit."""
-    k = table.column(name)
+    k, numbers = table.column(name), table.numbers(name)
     written = table.as_written(k)
-    return kind.convert_all(table.numbers(name), suffix, lambda row: table.location(int(table.lines[row]), k), written)
+    if kind.low == 0.0 and kind.name in ("stress", "pressure") and numbers.size:  # a reading of none may be below it
+        numbers = np.where((numbers < 0.0) & (numbers >= -NOISE_OF_ZERO * numbers.max()), 0.0, numbers)
+    return kind.convert_all(numbers, suffix, lambda row: table.location(int(table.lines[row]), k), written)
 
 
 def _check_marks(table: TextTable, k: int, marks: Floats) -> None:

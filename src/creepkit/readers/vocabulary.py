@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 
 from creepkit.records import TENSOR_COMPONENTS, dimensions_of, known_specimens, loads_of, outputs_of
 from creepkit.records.quantities import (
+    AREA,
     COUNT,
     FLAG,
     LENGTH,
@@ -77,6 +78,7 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
     "temperature": TEMPERATURE,
     **dict.fromkeys(("jump_time", "end_time", "ramp", "rupture", "loading_time"), TIME),
     "loading_strain": STRAIN,
+    "area": AREA,
     "modulus": MODULUS,
     "poisson": POISSON,
     "minimum_rate": RATE,
@@ -87,7 +89,7 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 
 TEXT_KEYS = (
     *("name", "alloy", "specimen", "operator", "control", "strain_measure", "stress_measure"),
-    *("includes_elastic", "includes_loading", "ended", "noise_correlation"),
+    *("includes_elastic", "includes_loading", "ended", "noise_correlation", "steps_taken_off"),
     *("decimal", "columns", "ignore", "strain_unit", "date_order", "time_zone"),
 )
 """Words that stand once for a whole test, beside steps and programs; the last line says how its table is written."""
@@ -133,6 +135,7 @@ class HeaderVocabulary:
         column of rupture times such a word may stand in the place of a number.
     labels : its keys and columns that are kept as labels though nothing is known of them.
     ignored : columns, as they are written in its files, that are left out.
+    stated : {key: text and place} of conditions that a file of answers beside a file states of its tests.
     """
 
     synonyms: Mapping[str, str] = field(default_factory=dict)
@@ -142,6 +145,7 @@ class HeaderVocabulary:
     end_of_test_terms: Mapping[str, str] = field(default_factory=dict)
     labels: Collection[str] = ()
     ignored: Collection[str] = ()
+    stated: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def terms(self, specimen: str = "") -> Terms:
         """What headers and columns of a file may say; specimen : that the file names, whose own terms then count most.

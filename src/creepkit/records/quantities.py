@@ -98,7 +98,7 @@ def _before(location: str) -> str:
     return f"{location}: " if location else ""
 
 
-TIME = QuantityKind("time", conversions("s", "min", "h", "d"), low=0.0)
+TIME = QuantityKind("time", conversions("s", "min", "h", "d", "kh"), low=0.0)
 
 
 LENGTH = QuantityKind("length", conversions("mm", "um", "m", "in"))
@@ -154,7 +154,10 @@ FLAG = QuantityKind("flag", NUMBER.units, low=0.0, high=1.0)
 COUNT = QuantityKind("number from 1 on", NUMBER.units, low=1.0, high=1e6)
 
 
-FORCE = QuantityKind("force", conversions("N", "kN", "lbf"))
+FORCE = QuantityKind("force", conversions("N", "kN", "lbf", "kgf", "daN"))
+
+
+AREA = QuantityKind("area", conversions("mm2", "cm2", "in2"), 0.0, 1e9, open_interval=True)
 
 
 MOMENT = QuantityKind("moment", conversions("Nmm", "Nm"))

@@ -17,14 +17,15 @@ from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import followed_duration
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
+from creepkit.readers.questions import ANSWERS_FILE
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
 from creepkit.registry.reading import read_those_that_can_be
 from creepkit.studies.camera_proposal import found_cameras
 from creepkit.studies.data_summary import FEWEST_RUPTURES, DataSummary
 from creepkit.studies.study_file import parse_study
 
-PLANNED_LAWS = ["norton", "strain-hardening", "time-hardening"]
-"""Of tests that cameras are still to be read of."""
+PLANNED_LAWS = ["norton", "strain-hardening", "time-hardening", "hyperbolic-sine"]
+"""Of tests that cameras are still to be read of: those of Table 1 of Chen et al."""
 
 
 FEWEST_TEMPERATURES = 3
@@ -41,10 +42,11 @@ MOST_FOLDERS, MOST_FILES_TRIED, MOST_FOLDERS_NAMED = 40, 3, 4
 
 @dataclass(frozen=True)
 class StudyProposal:
-    """The text of a study file, and what the files were found to hold, in lines."""
+    """The text of a study file, and what the files were found to hold, in lines; alloys : of a table beside it."""
 
     text: str
     summary: tuple[str, ...]
+    alloys: str = ""
 
 
 def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyProposal:
@@ -60,7 +62,7 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
     known["report"] = "report.html" if path.stem == "study" else f"{path.stem}.html"
     lines = cameras.summary
     if tests:
-        named = {str(one) for one in cameras.files}
+        named = {str(one) for one in cameras.names}
         problems = [f"not read: {one}" for one in problems if one.split(":")[0] not in named][:MOST_REMARKS]
         quality = ck.check_data_quality([history for history in tests if history.outputs])
         summary, left_out = DataSummary.of(tests), left_out_lines(quality)
@@ -80,7 +82,7 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
         raise failure or StudyError(f"{folder}: none of its files holds a test")
     text = rendered(known)
     parse_study(path, text)  # what is written must be valid
-    return StudyProposal(text, lines)
+    return StudyProposal(text, lines, cameras.empty_alloys)
 
 
 def one_line(text: str, length: int = 200) -> str:
@@ -150,7 +152,8 @@ def _readable(
     """Patterns of the files that hold tests, these tests, a sentence for each other file, and why there are none."""
     import creepkit as ck
 
-    files = [one for one in sorted(folder.iterdir()) if one.is_file() and one.name[0] != "." and one != path]
+    files = [one for one in sorted(folder.iterdir()) if one.is_file() and one.name[0] != "."]
+    files = [one for one in files if one not in (path, folder / ANSWERS_FILE)]
     try:
         whole = ck.read_histories([folder], reader)
     except CreepkitError as error:

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
     from creepkit.instruments.imposed import Imposed
+    from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.quality import DataQuality
     from creepkit.records import History
@@ -81,7 +82,8 @@ class StudyResult:
     def __repr__(self) -> str:
         """Stages by their states, the verdict on each group, and where the report is."""
         counted = ", ".join(f"{n} {state}" for state, n in Counter(one.state for one in self.stages).items()) or "none"
-        verdicts = [f"{name}: {one.verdict}" if name else one.verdict for name, one in self.rankings.items()]
+        found = {name: one.best.headline for name, one in self.rankings.items()}
+        verdicts = [f"{name}: {headline}" if name else headline for name, headline in found.items()]
         if len(verdicts) > MOST_VERDICTS:
             verdicts[MOST_VERDICTS:] = [f"and {len(verdicts) - MOST_VERDICTS} more groups"]
         failed = [f"failed: {one.stage}: {one.sentence}" for one in self.failures]
@@ -123,6 +125,11 @@ class StudyResult:
     def rankings(self) -> Mapping[str, Ranking]:
         """{group: its laws}."""
         return self._by_group("identification")
+
+    @property
+    def confirmations(self) -> Mapping[str, Confirmation]:
+        """{group: its best law as the specimen itself simulates it}."""
+        return self._by_group("confirmation")
 
     @property
     def temperature(self) -> Mapping[str, TemperatureStudy]:
@@ -169,6 +176,7 @@ class StudyResult:
         rankings: Mapping[str, Any] = self.rankings
         attached, notes = self._attachments()
         notes += [f"{one.name} {one.sentence}" for one in self.stages if one.state == "left out"]
+        notes += [f"{name}: {one.verdict}".removeprefix(": ") for name, one in self.confirmations.items()]
         carried = self.identified
         if sum(len(one.text) for one in carried) > MOST_IDENTIFIED:
             folder, carried = f"{self.file.path.stem}.results/identified", ()

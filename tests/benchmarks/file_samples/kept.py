@@ -99,7 +99,7 @@ class StageResult:
     def _making(self, made: Any) -> Stage:
         make = made if callable(made) else lambda results, tick: made
         settings = {"laws": ["norton"]}
-        return Stage("identification", "identification", "", settings, make, Ranking, numbers_of_ranking)
+        return Stage("identification", "", settings, make, Ranking, numbers_of_ranking)
 
 
 def read_header(path: Path) -> Any:

@@ -16,8 +16,7 @@ FORMATS = ROOT / "tests" / "data" / "formats" / "0.1.0"
 
 def samples() -> Iterator[ReaderSample]:
     """The samples of results."""
-    fit, ranking = ((FORMATS / name).read_bytes() for name in ("identification.json", "ranking.json"))
     keys = '"format" "version"'
-    yield document("identification", "identification.json", fit, load, keys)
-    others = {"identification.json": fit}
+    yield document("identification", "identification.json", (FORMATS / "identification.json").read_bytes(), load, keys)
+    ranking, others = (FORMATS / "ranking.json").read_bytes(), {"norton.json": (FORMATS / "norton.json").read_bytes()}
     yield document("ranking", "ranking.json", ranking, load_ranking, '"format" "weight"', others)

@@ -53,3 +53,148 @@ def test_values_with_units_above_pairs_are_conditions(tmp_path: Path) -> None:
     tests = ck.read_histories(workbook(tmp_path / "wide.xlsx", {"curves": rows}))
     assert [test.loading.program().values.tolist() for test in tests] == [[120.0], [140.0]]
     assert [test.temperature for test in tests] == [923.15, 923.15]
+
+
+SHEETS = {"575°C": (140, 160), "600 °C": (110, 130)}
+
+
+def sheet_by_temperature(title: str) -> list[list[object]]:
+    """Titles, stresses above pairs of columns, names, units, and a note in the margin."""
+    stresses = SHEETS[title]
+    head = [[f"Creep tests, {title}, constant load, furnace 2"], ["d0 = 8 mm, L0 = 40 mm"], ["operator: day shift"], []]
+    names = [["time", "strain", "time", "strain"], ["h", "%", "h", "%"]]
+    rows: list[list[object]] = [[t, 1e-3 * t * stresses[0], t, 1e-3 * t * stresses[1]] for t in (0.1, 1.0, 2.0)]
+    rows[1] += [None, "13.05. power failure 1 h"]
+    return [*head, [f"{stresses[0]} MPa", None, f"{stresses[1]} MPa"], *names, *rows]
+
+
+def test_sheets_named_by_temperature(tmp_path: Path) -> None:
+    """Twelve things that a laboratory writes about its columns, and none of them is a column."""
+    from openpyxl import load_workbook
+    from openpyxl.comments import Comment
+
+    sheets = {title: sheet_by_temperature(title) for title in SHEETS}
+    path = workbook(tmp_path / "creep.xlsx", {**sheets, "notes": [["heat 4711, normalised 1060 °C, tempered 770 °C"]]})
+    book = load_workbook(path)
+    book["575°C"]["C5"].comment = Comment("thermocouple 2 exchanged", "lab")
+    book.save(path)
+    tests = ck.read_histories(path)
+    assert [test.condition for test in tests] == [
+        "575 °C, 140 MPa",
+        "575 °C, 160 MPa",
+        "600 °C, 110 MPa",
+        "600 °C, 130 MPa",
+    ]
+    np.testing.assert_allclose(tests[3].outputs["strain"], 1.3e-3 * np.array([0.1, 1.0, 2.0]))
+    labels = tests[1].labels
+    assert "temperature 575 °C from sheet '575°C' row 1" in labels["assumed"]
+    assert labels["line 9"] == "13.05. power failure 1 h"
+    assert labels["cell C5"] == "thermocouple 2 exchanged"
+    assert labels["sheet notes"] == "heat 4711, normalised 1060 °C, tempered 770 °C"
+    assert labels["operator"] == "day shift"
+
+
+FRAMES = "Time (h);Strain (%)\n0;0\n1;0,5\n"
+WHERE_CONDITIONS_STAND = {
+    "file name": ("RX_550C_120MPa.csv", FRAMES),
+    "file name with blanks": ("P91 550 °C 120 MPa.csv", FRAMES),
+    "title": ("x.csv", "Zeitstandversuch bei 550 °C und 120 N/mm²\n" + FRAMES),
+    "assignments in a title": ("x.csv", "T = 550 °C; σ = 120 MPa\n" + FRAMES.replace(";", ",").replace("0,5", "0.5")),
+    "title and file name": ("x_550C.csv", "Creep test, 823.15 K, 120 MPa\n" + FRAMES),
+    "title and key": ("x_120MPa.csv", "# temperature_C: 551\nCreep at 550 °C\n" + FRAMES),
+    "head of the columns": ("x.csv", "120 MPa;550 °C\n" + FRAMES),
+}
+
+
+@pytest.mark.parametrize("place", WHERE_CONDITIONS_STAND)
+def test_conditions_wherever_they_stand(tmp_path: Path, place: str) -> None:
+    name, text = WHERE_CONDITIONS_STAND[place]
+    (tmp_path / name).write_text(text)
+    (test,) = ck.read_histories(tmp_path / name)
+    assert test.temperature == pytest.approx(824.15 if "key" in place else 823.15)
+    assert test.loading.program().values.tolist() == [120.0]
+
+
+CONTRADICTIONS = [
+    ("x_550C.csv", "# temperature_C: 600\n# stress_MPa: 120\n", "states a temperature of 550 C, but "),
+    ("x.csv", "# stress_MPa: 120\nCreep at 550 °C\nTemperature (°C);600\n", "x.csv:2: states a temperature of 550 °C"),
+    ("x_130MPa.csv", "# temperature_C: 600\nCreep at 120 MPa\n", "a stress of 130 MPa, but .*x.csv:2 states 120"),
+]
+NOT_OF_THE_TEST = ("tempered at 770 °C", "E = 168 GPa", "Rp0.2 = 300 MPa", "110 to 180 MPa", "calibrated at 20 °C")
+
+
+def test_sources_that_disagree_and_numbers_of_other_things(tmp_path: Path) -> None:
+    for name, head, message in CONTRADICTIONS:
+        (tmp_path / name).write_text(head + FRAMES)
+        with pytest.raises(HistoryError, match=message.replace("x.csv", name)):
+            ck.read_histories(tmp_path / name)
+    for title in NOT_OF_THE_TEST:
+        (tmp_path / "x.csv").write_text(f"# temperature_C: 600\n# stress_MPa: 120\n{title}\n{FRAMES}")
+        (test,) = ck.read_histories(tmp_path / "x.csv")
+        assert (test.condition, test.labels["line 3"]) == ("600 °C, 120 MPa", title)
+
+
+HEADS_IN_ANY_ORDER = {
+    "names, units, tests": ["Time;Strain;Strain", "h;%;%", ";B1;B2"],
+    "names, tests, units": ["Time;Strain;Strain", ";B1;B2", "h;%;%"],
+    "tests, names, units": [";B1;B2", "Time;Strain;Strain", "h;%;%"],
+    "units above": ["h;%;%", "Time;Strain;Strain", ";B1;B2"],
+    "stresses below": ["Time (h);Strain (%);Strain (%)", ";B1;B2", "Stress (MPa);120;140"],
+    "stresses with units below": ["Time;Strain;Strain", "h;%;%", ";120 MPa;140 MPa", ";B1;B2"],
+    "one name for both": ["Time (h);Strain (%);", ";B1;B2", ";120 MPa;140 MPa"],
+    "heads of stress alone": ["Time (h);120 MPa;140 MPa", ";%;%", ";B1;B2"],
+}
+
+
+@pytest.mark.parametrize("order", HEADS_IN_ANY_ORDER)
+def test_rows_of_a_head_in_any_order(tmp_path: Path, order: str) -> None:
+    head = "\n".join(HEADS_IN_ANY_ORDER[order])
+    stress = "" if "140" in head else "# stress_MPa: 120\n"
+    (tmp_path / "x.csv").write_text(f"# temperature_C: 600\n{stress}{head}\n0;0;0\n1,5;0,021;0,024\n4;0,044;0,047\n")
+    first, second = ck.read_histories(tmp_path / "x.csv")
+    assert (second.times[1], second.outputs["strain"][1]) == (5400.0, pytest.approx(2.4e-4))
+    assert (first.condition, second.condition) == ("600 °C, 120 MPa", f"600 °C, {120 if stress else 140} MPa")
+    assert {first.name, second.name} in ({"B1", "B2"}, {"120 MPa", "140 MPa"})
+
+
+def test_a_condition_of_a_group_of_columns(tmp_path: Path) -> None:
+    """Of 600 °C, which stands once above two tests."""
+    head = "Temperature (°C);600;;650;\nStress (MPa);120;140;100;110\nTime (h);A strain (%);B strain (%);C strain (%);"
+    (tmp_path / "x.csv").write_text(f"{head}D strain (%)\n0;0;0;0;0\n1;0,1;0,2;0,3;0,4\n")
+    tests = ck.read_histories(tmp_path / "x.csv")
+    assert [test.condition for test in tests] == [
+        "600 °C, 120 MPa",
+        "600 °C, 140 MPa",
+        "650 °C, 100 MPa",
+        "650 °C, 110 MPa",
+    ]
+    assert "Temperature (°C) in line 1 holds from '600' on" in tests[1].labels["assumed"]
+
+
+NAMES_BEHIND_A_MARK = {
+    "numpy.savetxt": ("# time_h,strain_pct\n", ","),
+    "blanks": ("# time_h strain_pct\n", " "),
+    "other delimiter than the rows": ("# Time (h), Strain (%)\n", " "),
+    "tabs": ("#Time (h)\tStrain (%)\n", "\t"),
+    "units in a row of their own": ("# time;strain\n# h;%\n", ";"),
+    "below a remark": ("# digitised\n# figure 3 of the report\n# Time (h);Strain (%)\n", ";"),
+}
+
+
+@pytest.mark.parametrize("form", NAMES_BEHIND_A_MARK)
+def test_names_behind_a_mark_of_comments(tmp_path: Path, form: str) -> None:
+    names, delimiter = NAMES_BEHIND_A_MARK[form]
+    rows = "".join(f"{t}{delimiter}{0.01 * t}\n" for t in (0.5, 2.25, 6.0))
+    (tmp_path / "x.csv").write_text(f"# stress_MPa: 120\n# temperature_C: 600\n{names}{rows}")
+    (test,) = ck.read_histories(tmp_path / "x.csv")
+    np.testing.assert_allclose(test.times, [1800.0, 8100.0, 21600.0])
+    np.testing.assert_allclose(test.outputs["strain"], [5e-5, 2.25e-4, 6e-4])
+
+
+def test_numbers_that_nothing_names_are_asked_for(tmp_path: Path) -> None:
+    """A reading is never taken for a name, and no advice would throw one away."""
+    for text in ("# stress_MPa: 120\n0.5,0.02\n1,0.03\n", "# x, Curve1\n0.5,0.02\n1,0.03\n"):
+        (tmp_path / "x.csv").write_text(text)
+        with pytest.raises(HistoryError, match="time_h") as caught:
+            ck.read_histories(tmp_path / "x.csv")
+        assert "ignore" not in str(caught.value)

@@ -5,8 +5,8 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
+from creepkit.readers.columns_of_tests import key_of_column
 from creepkit.readers.history_csv import write_history
-from creepkit.readers.rate_and_rupture_tables import key_of_column
 from creepkit.records import UNKNOWN_DURATION, History, constant_stress
 from helpers.workbooks import workbook
 
@@ -89,7 +89,7 @@ REFUSED = [
     (("heat", "stres_MPa"), r"table.csv:3: column 'stres_MPa' is not understood; did you mean 'stress'\?"),
     (("heat", "sigma_MPa"), r"table.csv:3: 'stress_MPa' and 'sigma_MPa' mean the same; keep one of them"),
     (("# control: stress", "# stress_MPa: 80"), r"table.csv:2: 'stress_MPa' is also a column"),
-    (("grain size", "ended"), r"table.csv:4: the test ended '40'; allowed: ruptured, stopped"),
+    (("grain size", "ended"), r"table.csv:4: 'ended' says '40' and '41': did these tests break, .*tests\.toml"),
     (("Temperature (C)", "note"), r"table.csv:4: no temperature"),
 ]
 

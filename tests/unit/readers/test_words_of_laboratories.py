@@ -4,7 +4,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.readers.unbroken_words import unbroken_words
 
 TABLE = "test,stress_MPa,T (C),t_r (h),{name}\nA,200,800,1200,{a}\nB,220,800,800,{b}\n"
 HEAD = "# specimen: uniaxial\n# stress_MPa: 100\n# temperature_C: 750\n# control: load\n"
@@ -18,17 +17,23 @@ def _read(tmp_path, text, name="t.csv"):
 @pytest.mark.parametrize("name", ["remark", "Bemerkung", "comment", "note"])
 @pytest.mark.parametrize(
     "text", ["run-out", "Run out", "stopped; unbroken", "Läufer", "Durchläufer", "not ruptured", "nicht gebrochen",
-             "did not break", "kein Bruch", "running", "censored at 800 h", "no failure yet", "test abgebrochen"],
+             "did not break", "kein Bruch", "running", "censored at 800 h", "no failure yet"],
 )  # fmt: skip
 def test_a_remark_that_a_test_did_not_break_makes_no_rupture(tmp_path, name, text):
-    with pytest.raises(HistoryError, match="status") as caught:
-        _read(tmp_path, TABLE.format(name=name, a="", b=text))
-    assert "t.csv:3" in str(caught.value)
-    both = "test,stress_MPa,T (C),t_r (h),remark,status\nA,200,800,1200,,\nB,220,800,800,{},{}\n"
+    first, second = _read(tmp_path, TABLE.format(name=name, a="", b=text))
+    assert (first.unruptured, second.unruptured, second.rupture_time) == (False, True, None)
+    assert "stopped before rupture by its remark" in second.labels["assumed"]
+    both = "test,stress_MPa,T (C),t_r (h),remark,status\nA,200,800,1200,,stopped\nB,220,800,800,{},{}\n"
     stopped = _read(tmp_path, both.format(text, "stopped"))[1]
     assert (stopped.unruptured, stopped.rupture_time) == (True, None)
     ruptured = _read(tmp_path, both.format(text, "ruptured"))[1]
     assert (ruptured.unruptured, ruptured.rupture_time) == (False, 800 * 3600.0)
+
+
+@pytest.mark.parametrize("text", ["test abgebrochen", "interrupted", "furnace failure", "Kopf abgebrochen", "stopped"])
+def test_a_remark_that_a_test_was_interrupted_is_asked_about(tmp_path, text):
+    with pytest.raises(HistoryError, match=r"t.csv:3: 'remark' says .* did these tests break, .* tests\.toml"):
+        _read(tmp_path, TABLE.format(name="remark", a="", b=text))
 
 
 @pytest.mark.parametrize(
@@ -36,8 +41,8 @@ def test_a_remark_that_a_test_did_not_break_makes_no_rupture(tmp_path, name, tex
     ["ruptured in gauge length", "necking", "breakthrough of oxide", "heat X7", "failure outside gauge", "Bruch"],
 )
 def test_other_remarks_are_labels(tmp_path, text):
-    assert unbroken_words(text) == ""
-    assert _read(tmp_path, TABLE.format(name="remark", a="", b=text))[1].labels["remark"] == text
+    second = _read(tmp_path, TABLE.format(name="remark", a="", b=text))[1]
+    assert (second.labels["remark"], second.rupture_time) == (text, 800 * 3600.0)
 
 
 @pytest.mark.parametrize("mark", ["n.a.", "n/a", "NA", "n.b.", "-", "--", "k.A.", ""])
@@ -71,8 +76,3 @@ def test_german_names_and_units(tmp_path):
     assert one.outputs["strain"] == pytest.approx(other.outputs["strain"], rel=1e-12)
     assert one.loading.program().values[-1] == pytest.approx(20 * 9.80665, rel=1e-12)
     assert not one.includes_elastic
-
-
-def test_with_the_column_renamed_the_row_is_a_run_out(tmp_path):
-    first, second = _read(tmp_path, TABLE.format(name="status", a="", b="Läufer"))
-    assert (first.rupture_time, second.rupture_time, second.unruptured) == (1200 * 3600.0, None, True)

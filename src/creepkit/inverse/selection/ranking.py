@@ -37,6 +37,7 @@ from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from creepkit.inverse.adequacy import Adequacy
     from creepkit.inverse.selection.discrimination import EquivalentLaws
@@ -64,7 +65,7 @@ class RankedLaw:
 
 
 @dataclass(frozen=True)
-class Ranking(Presentable, text="reports.ranking:ranking_text"):
+class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="reports.ranking:ranking_text"):
     """Identified laws, best first.
 
     criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.
@@ -78,6 +79,13 @@ class Ranking(Presentable, text="reports.ranking:ranking_text"):
     failed: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     further: tuple[str, ...] = ()
     challenges: tuple[Challenge, ...] | None = None
+
+    def __repr__(self) -> str:
+        return f"<Ranking: {', '.join(f'{one.fit.law.name} {one.weight:.3f}' for one in self.laws)}>"
+
+    def to_dataframe(self) -> DataFrame:
+        """(laws,) rows of pandas: weight, criterion less that of the best, chi-square and verdict."""
+        return present("reports.dataframes:to_dataframe", self)
 
     @property
     def best(self) -> Identification:

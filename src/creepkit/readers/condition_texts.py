@@ -1,0 +1,173 @@
+"""Conditions in what people write beside a table: `140 MPa` above a pair of columns, titles, names of sheets and files.
+
+What stands above the columns of a test holds for it. A title, the name of a sheet or that of a file is a weaker source:
+it fills in what nothing else states, and must agree with what does.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+
+from creepkit.errors import HistoryError, quoted
+from creepkit.readers.cell_grids import CellGrid
+from creepkit.readers.column_names import KnownNames, unit_suffix
+from creepkit.readers.text_tables import SourceText, TextTable
+from creepkit.readers.vocabulary import HeaderVocabulary, split_unit
+from creepkit.records.quantities import LENGTH
+
+_NUMBER = r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?"
+_UNIT = r"[^\W\d_][^\W_]*(?:/[^\W_]+(?:\^2)?)?|[°º℃℉]\s?[A-Za-z]?|deg\.? ?[A-Za-z]"
+_VALUE = re.compile(rf"(?<![^\W_])(?<![.,])({_NUMBER})[ _]?({_UNIT})(?![^\W_]|°)")
+_ASSIGNED = re.compile(rf"([^\W\d_][\w .'-]{{0,30}}?)\s*[=:]\s*({_NUMBER})\s*({_UNIT})(?![\w°])")
+_VALUE_WITH_UNIT = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?\s*([^\d\s.,;:+-][^;:]{0,10})", re.ASCII)
+
+
+_RANGE = re.compile(r"(?<![^\W_])\d[\d.,]*\s*(?:to|bis|à|and|und|et|or|oder|-|–|/|,|;|\.\.\.?|…)\s*$", re.IGNORECASE)
+"""What makes a number the last one of several."""
+
+
+_OF_THE_MATERIAL = re.compile(
+    r"normali[sz]|temper(?:ed|ing)|anneal|\bag(?:e?ing|ed)\b|solution|quench|forg|\brolled|\bhip(?:ped)?\b|heat.?treat"
+    r"|geglüht|vergütet|angelassen|lösungs|ausgelagert|wärmebehand|abgeschreckt|gehärtet|trempe|trempé|revenu|recuit"
+    r"|vieilli|traitement|yield|strength|\buts\b|\brm\b|\brp|streckgrenze|festigkeit|melting|solidus|room temp",
+    re.IGNORECASE,
+)
+"""Words of a text whose temperatures and stresses are those of a treatment or a property."""
+
+
+_LOWEST = 100.0
+"""Number of a temperature below which a text hardly means that of a creep test, unless it is called a temperature."""
+
+
+TEMPERATURE_AGREEMENT, LOAD_AGREEMENT = 3.0, 0.03
+"""K, and a fraction of the load, by which a nominal value may differ from a measured one."""
+
+
+def conditions_of_head(cell: str, known: KnownNames) -> list[tuple[str, str]]:
+    """Load and temperature of a head such as `120 MPa`, or `120 MPa / 650 °C`; [] where a part of it is neither.
+
+    A load is a stress, where the file names no specimen that takes another one.
+    """
+    found: list[tuple[str, str]] = []
+    for part in re.split(r"\s*[/;|@]\s*|,\s+", cell.strip()):
+        value = _VALUE_WITH_UNIT.fullmatch(part)
+        found.append((_quantity_of(value[1], known) if value else "", part))
+    quantities = [quantity for quantity, _ in found]
+    return found if all(quantities) and len(set(quantities)) == len(quantities) else []
+
+
+def _quantity_of(unit: str, known: KnownNames) -> str:
+    suffix, kinds = unit_suffix(unit), known.terms.condition_kinds
+    loads = known.terms.own_loads or ("stress",)
+    names = (name for name in ("temperature", *loads) if name in kinds and suffix and suffix in kinds[name].units)
+    return next(names, "")
+
+
+def conditions_in_text(text: str, place: str, known: KnownNames) -> list[SourceText]:
+    """Temperature and load that a text states, once each, and lengths such as `L0 = 40 mm`, each with its key.
+
+    [] for what is said of a heat treatment or of a strength, and for ranges such as `110 to 180 MPa`.
+    """
+    found: dict[str, list[str]] = {}
+    if _OF_THE_MATERIAL.search(text):
+        return []
+    for match in _ASSIGNED.finditer(text):
+        name, suffix = known.condition(match[1].split(",")[-1].strip()), unit_suffix(match[3])
+        kind = known.conditions.kinds.get(name)
+        if kind is not None and suffix in kind.units:
+            found.setdefault(name, []).append(f"{match[2]} {match[3]}")
+    rest = _ASSIGNED.sub(" ; ", text)
+    for match in _VALUE.finditer(rest):
+        quantity = _quantity_of(match[2], known)
+        is_range = _RANGE.search(rest[: match.start()]) is not None
+        number = float(match[1].replace(",", "."))
+        if unit_suffix(match[2]) in ("GPa", "Pa") or (quantity == "temperature" and number < _LOWEST):
+            continue
+        if quantity:
+            found.setdefault(quantity, []).extend([f"{match[1]} {match[2]}"] * (1 + is_range))
+    return [SourceText(values[0], place, key=name) for name, values in found.items() if len(values) == 1]
+
+
+def sources_of_names(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[SourceText]:
+    """What the names of sheet and file state of a test."""
+    known, path = KnownNames.of(vocabulary), grid.path
+    sheet = conditions_in_text(grid.sheet, f"{path}, name of sheet '{grid.sheet}'", known) if grid.sheet else []
+    return [*sheet, *conditions_in_text(path.stem, f"{path}, name of the file", known)]
+
+
+def with_weak_sources(
+    entries: Mapping[str, SourceText], table: TextTable, known: KnownNames
+) -> tuple[dict[str, SourceText], list[str]]:
+    """Entries with what titles and names state beside them, and what is assumed so; HistoryError where two disagree.
+
+    entries, table : under creepkit's names.
+    """
+    result, assumptions = dict(entries), list[str]()
+    taken: dict[str, tuple[float, str]] = {}
+    for source in table.sources:
+        quantity, kind = source.key, known.conditions.kinds[source.key]
+        text, unit = source.text.replace(",", ".").split(" ", 1)
+        suffix = unit_suffix(unit) or unit
+        value = kind.convert(float(text), suffix, source.location, quantity)
+        other = taken.get(quantity) or _stated(quantity, result, table, known)
+        if other is not None:
+            _check_agreement(quantity, value, source, *other)
+            continue
+        if _is_stated_otherwise(quantity, result, table, known):
+            continue
+        taken[quantity] = (value, f"{source.location} states {source.text}")
+        result[f"{quantity}_{suffix}"] = SourceText(text, source.location, key=quantity)
+        where = source.location.removeprefix(str(table.path)).lstrip(":, ")
+        assumptions.append(f"{quantity} {source.text} from {'line ' * where.isdigit()}{where}".replace(", ", " "))
+    return result, assumptions
+
+
+def _stated(
+    quantity: str, entries: Mapping[str, SourceText], table: TextTable, known: KnownNames
+) -> tuple[float, str] | None:
+    """What is stated or was recorded of a quantity, with where; None for what changes or is not there."""
+    kind = known.conditions.kinds[quantity]
+    for key, entry in entries.items():
+        found = split_unit(key, known.conditions.kinds)
+        if found and found[0] == quantity and found[1] in kind.units:
+            return kind.convert(
+                entry.number(key), found[1], entry.location, key
+            ), f"{entry.location} states {entry.text}"
+    for name in table.columns:
+        found = split_unit(name, known.columns.kinds)
+        if found and found[0] == quantity and found[1] in kind.units:
+            unit = kind.units[found[1]]
+            low, middle, high = unit.factor * np.percentile(table.numbers(name), (10, 50, 90)) + unit.offset
+            held = high - low <= max(_tolerance(quantity, float(middle)), 0.0)
+            where = table.location(table.columns_line)
+            return (float(middle), f"the column '{name}' of {where} holds {middle:g}") if held else None
+    return None
+
+
+def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table: TextTable, known: KnownNames) -> bool:
+    """Whether steps, programs, columns or another load leave nothing to state."""
+    names, terms = [*entries, *table.columns], known.terms
+    if any(name == quantity or name.startswith(f"{quantity}_") for name in names):
+        return True
+    if quantity not in terms.load_kinds:
+        return False
+    others = [(split_unit(name, terms.load_kinds) or ("", ""), name in entries) for name in names]
+    forms = ("steps", "program", "1", *LENGTH.units)
+    return any(
+        load and (is_entry or load in terms.number_kinds) and (unit in forms or unit in terms.load_kinds[load].units)
+        for (load, unit), is_entry in others
+    )
+
+
+def _tolerance(quantity: str, value: float) -> float:
+    return TEMPERATURE_AGREEMENT if quantity == "temperature" else LOAD_AGREEMENT * abs(value)
+
+
+def _check_agreement(quantity: str, value: float, source: SourceText, other: float, said: str) -> None:
+    if abs(value - other) > _tolerance(quantity, other):
+        raise HistoryError(
+            f"{source.location}: states a {quantity} of {quoted(source.text, 20)}, but {said}; correct one of them"
+        )

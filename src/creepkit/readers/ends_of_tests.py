@@ -1,0 +1,418 @@
+"""How a test ended, by rupture or before it, from what laboratories write of it in English, German and French.
+
+A text is taken apart into clauses and words without accents. Words of rupture count unless they are negated ("not yet
+broken", "kein Bruch", "pas de rupture") or said to lie ahead ("removed before rupture"). A column is decided by the
+words of its name and its two values (Censored: 1 and 0), by its texts, or by a pair of codes (F and S). What speaks of
+the end and does not decide is asked for: a test that did not break never becomes a rupture without a word.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+from creepkit.files.delimited_text import is_missing
+from creepkit.readers.column_names import unit_suffix
+from creepkit.records.quantities import TIME
+
+RUPTURED, STOPPED, INTERRUPTED, UNCLEAR = "ruptured", "stopped", "interrupted", "unclear"
+"""What a text says of the end. INTERRUPTED: it stopped, for good or for a while. UNCLEAR: of both, or of neither."""
+
+LABEL = "label"
+"""An answer: the text says nothing of the end."""
+
+
+def _words(*alternatives: str) -> re.Pattern[str]:
+    return re.compile(rf"(?<![\w])(?:{'|'.join(alternatives)})(?![\w])")
+
+
+_RUPTURE = (
+    r"rupt(?:ur\w*|ed|s)?|broken?|brk|breaks?|breaking|breakage|fail(?:s|ed|ing|ures?)?|fractur\w*|snapped|parted"
+    r"|(?:zer)?gebrochen\w*|zerbrochen\w*|(?:kriech|zeitstand|dauer|proben|gewalt|sprod|rest)?br[uü]che?|bricht"
+    r"|(?:ab|durch)?gerissen\w*|zerrissen\w*|versag\w*|romp(?:u|us|ues?|t|re)|cass(?:e|ee|es|ees|er|ure)"
+    r"|bris(?:e|ee|es|ees|er|ure)|defaillance"
+)
+_CENSORED = r"(?:right |left )?censor\w*|censur\w*|zensi?er\w*|suspen[sd]\w*"
+_GOES_ON = (
+    rf"run ?outs?|{_CENSORED}|unbroken|unfailed|unruptured|unfractured|discontinu\w+|surviv\w*|survecu\w*|running"
+    r"|on ?going|in progress|(?:in|on|under) test|test continu\w*|(?:durch)?lauf(?:er|end\w*|t(?: noch| weiter)?)"
+    r"|ungebroch\w*|bruchfrei\w*|bruchlos\w*|uberleb\w*|im versuch|en cours|en essai|essai continu\w*"
+)
+_INTERRUPTED = (
+    r"stopp?(?:ed|s)?|halted|aborted|interrupt\w*|removed|withdrawn|unloaded|truncated|intact|active|gestoppt\w*"
+    r"|abgebroch\w*|angehalten|ausgebaut\w*|entlastet\w*|unterbroch\w*|unterbruch|abbruch|intakt\w*|arret\w*|stoppe\w*"
+    r"|interromp\w*|interruption|demont\w*|decharg\w*|retire\w*"
+)
+_NOT = (
+    r"no|not|non|none|never|without|(?:did|has|does|was|had|is|have)n ?t|yet to|nicht|kein\w*|ohne|nie|pas|sans|jamais"
+    r"|aucun\w*|nein"
+)
+_FILLERS = (
+    r"(?: (?:yet|a|any|been|be|has|have|the|specimen|sample|test|bar|probe|noch|der|die|den|de|d|la|l|le|ete|encore|est"
+    r"|eprouvette|essai|creep|zum|es|ist|wurde|was|did|to|due))*"
+)
+_AHEAD = r"before|prior to|short of|vor|vor dem|avant|avant la|bevor"
+_EXPECTED = _words(
+    *("near", "close to", "nearly", "almost", "imminent", "expected", "likely", "will", "soon", "kurz vor", "fast"),
+    *("beinahe", "erwartet", "bald", "wird", "soll", "presque", "proche", "prevue?", "attendue?", "bientot", "if"),
+)
+_REACHED = (
+    r"(?: (?:reached|observed|occurred|seen|yet|noch|erreicht|eingetreten|aufgetreten|atteinte?|observee?|survenue?))*"
+)
+_UNBROKEN = re.compile(
+    rf"(?<!\w)(?:(?:{_NOT}){_FILLERS} (?:{_RUPTURE})|(?:{_AHEAD}){_FILLERS} (?:{_RUPTURE})"
+    rf"|(?:{_RUPTURE}) (?:noch )?(?:{_NOT}){_REACHED}(?= ?(?:\||$)))(?!\w)"
+)
+_UNCENSORED = re.compile(rf"(?<!\w)(?:(?:{_NOT}){_FILLERS} (?:{_CENSORED})|un(?:{_CENSORED}))(?!\w)")
+_NOT_INTERRUPTED = re.compile(
+    rf"(?<!\w)(?:(?:{_NOT}|plus|longer){_FILLERS} (?:{_GOES_ON}|{_INTERRUPTED})|lauft (?:nicht|nimmer))(?!\w)"
+)
+_ENDED = _words(r"ended|finished|complete[d]?|terminat\w*|beendet\w*|abgeschlossen|fertig|termine\w*|fini\w*|stop date")
+_EQUIPMENT = _words(
+    *("furnace", "oven", "thermocouples?", "tc", "power", "mains", "grips?", "machine", "rig", "heaters?", "heating"),
+    *("controller", "extensometer", "lvdt", "lever", "pull rod", "adapter", "ofen", "ofens", "thermoelemente?s?"),
+    *("strom", "stromausfall", "netz", "einspannung", "maschine", "heizung", "regler", "gestange", "four"),
+    *("thermocouple", "courant", "regulation", "extensometre", "equipment", "chauffage"),
+)
+
+
+@lru_cache(maxsize=4096)
+def plain_words(text: str) -> str:
+    """A text in small letters without accents, its words one blank apart, and | between its clauses."""
+    plain = unicodedata.normalize("NFKD", text.casefold())
+    plain = "".join(sign for sign in plain if not unicodedata.combining(sign))
+    for pair in ("ae", "oe", "ue"):  # also how umlauts are written without them
+        plain = re.sub(rf"(?<!q){pair}(?=[a-z])", pair[0], plain)
+    plain = re.sub(r"(?<=\d)[.,](?=\d)", "_", plain)
+    plain = re.sub(r"[;:,.!()\[\]/|]+", " | ", plain)
+    return " ".join(re.sub(r"[^\w|?]+", " ", plain).split()).strip(" |")
+
+
+@lru_cache(maxsize=4096)
+def end_said_by(text: str) -> str:
+    """What a text says of the end of a test: RUPTURED, STOPPED, INTERRUPTED, UNCLEAR; "" where it speaks of none."""
+    plain, said = plain_words(text), set[str]()
+    if plain.endswith("?"):
+        return UNCLEAR if end_said_by(plain.rstrip("? ")) else ""
+    for pattern, what in ((_UNBROKEN, STOPPED), (_UNCENSORED, RUPTURED), (_NOT_INTERRUPTED, UNCLEAR)):
+        plain, count = pattern.subn(" ", plain)
+        said |= {what} if count else set()
+    goes_on, breaks, stops = _words(_GOES_ON), _words(_RUPTURE), _words(_INTERRUPTED)
+    for clause in plain.split("|"):
+        if goes_on.search(clause):
+            said.add(STOPPED)
+            clause = goes_on.sub(" ", clause)
+        if breaks.search(clause):
+            is_doubtful = _EQUIPMENT.search(clause) or _EXPECTED.search(clause) or _words(_NOT).search(clause)
+            without = re.search(rf"(?:{_RUPTURE}) (?:without|ohne|sans) ", clause)
+            said.add(UNCLEAR if is_doubtful and not without else RUPTURED)
+        if stops.search(clause):
+            said.add(INTERRUPTED)
+    if STOPPED in said:
+        said.discard(INTERRUPTED)
+    return said.pop() if len(said) == 1 else UNCLEAR if said or _ENDED.search(plain) else ""
+
+
+YES = frozenset(("1", "1.0", "1,0", "yes", "y", "ja", "j", "oui", "o", "true", "wahr", "vrai", "t", "x", "✓", "✔", "✗"))
+NO = frozenset(("0", "0.0", "0,0", "no", "n", "nein", "non", "false", "falsch", "faux"))
+"""Values of a column that says yes or no, in small letters."""
+
+
+_CODES: Mapping[frozenset[str], Mapping[str, str]] = {
+    frozenset((broken, *others)): {broken: RUPTURED, **dict.fromkeys(others, STOPPED)}
+    for broken, others in (
+        *(("f", (one,)) for one in ("s", "c", "ro", "r", "u", "nf", "d", "i")),
+        *(("r", (one,)) for one in ("ro", "nr", "u", "ur", "c", "s", "d")),
+        *(("b", (one,)) for one in ("nb", "ub", "u", "ro", "d", "l", "s")),
+        *(("g", (one,)) for one in ("ng", "u", "l", "d")),
+        ("f", ()),
+    )
+} | {frozenset((one,)): {one: STOPPED} for one in ("ro", "nb", "nf", "nr", "ub", "ng")}
+"""Codes that stand together in a column: F and S, R and RO, B and NB, G and L."""
+
+
+_STATUS_WORDS = frozenset(
+    (
+        *("status", "statut", "state", "etat", "zustand", "result", "resultat", "ergebnis", "outcome", "ende", "end"),
+        *("ended", "ending", "fin", "issue", "termination", "versuchsende", "prufende", "prufstatus", "abbruchgrund"),
+        *("versuchsstatus", "code", "versuchsausgang", "ausgang", "endart", "motif"),
+    )
+)
+_STATUS_FILLERS = frozenset(
+    (
+        *(
+            "test",
+            "of",
+            "the",
+            "specimen",
+            "sample",
+            "final",
+            "de",
+            "l",
+            "d",
+            "essai",
+            "der",
+            "des",
+            "probe",
+            "versuch",
+        ),
+        *("prufung", "reason", "for", "type", "how", "it", "why", "grund", "du", "arret", "eprouvette", "versuchs"),
+        *("mode", "art", "end", "at"),
+    )
+)
+_REMARK_WORDS = frozenset(
+    (
+        *("remark", "remarks", "note", "notes", "comment", "comments", "bemerkung", "bemerkungen", "anmerkung", "bem"),
+        *("anmerkungen", "kommentar", "kommentare", "hinweis", "hinweise", "notiz", "notizen", "remarque", "remarques"),
+        *("observation", "observations", "commentaire", "commentaires", "rem", "anm", "beobachtung", "beobachtungen"),
+    )
+)
+_OTHER_USES = _words(
+    *(
+        "time",
+        "life",
+        "zeit",
+        "temps",
+        "duree",
+        "elongation",
+        "strain",
+        "dehnung",
+        "load",
+        "stress",
+        "hours",
+        "parameter",
+    ),
+    *("stunden", "heures", "location", "position", "lage", "mode", "type", "typ", "ort", "appearance", "allongement"),
+)
+"""Words beside one of rupture that make the name of a column that of a quantity or a description."""
+
+
+_NEUTRAL = _words(
+    *(
+        r"neck\w*",
+        r"oxid\w*",
+        r"scal\w*",
+        "heat",
+        "cast",
+        "batch",
+        "charge",
+        "lot",
+        r"gau?ge\w*",
+        "length",
+        r"thread\w*",
+    ),
+    *(
+        r"shoulder\w*",
+        r"fillet\w*",
+        r"head\w*",
+        r"surface\w*",
+        r"crack\w*",
+        r"cavit\w*",
+        r"void\w*",
+        r"pore\w*",
+        "creep",
+    ),
+    *(r"ductile\w*", r"brittle\w*", r"intergranular\w*", r"transgranular\w*", r"grain\w*", r"notch\w*", r"weld\w*"),
+    *(r"breakthrough\w*", "of", "in", "the", "a", "an", "and", "with", "near", "at", "outside", "inside", r"normal\w*"),
+    *(r"specimen\w*", r"sample\w*", r"bar\w*", "ok", r"air", "argon", r"vacuum", r"batch\w*", r"aged", r"anneal\w*"),
+    *(
+        r"einschnur\w*",
+        r"messlange",
+        r"gewinde",
+        r"schulter",
+        "kopf",
+        "oxidiert",
+        r"verzunder\w*",
+        "charge",
+        r"riss\w*",
+    ),
+    *(
+        r"pore\w*",
+        r"korngrenz\w*",
+        r"duktil\w*",
+        r"sprod\w*",
+        r"schmelze",
+        r"probe\w*",
+        "im",
+        "der",
+        "die",
+        "das",
+        "und",
+    ),
+    *(
+        r"striction\w*",
+        r"fissur\w*",
+        r"ductile",
+        r"fragile",
+        r"coulee\w*",
+        "filetage",
+        "conge",
+        "dans",
+        "la",
+        "le",
+        "du",
+    ),
+    *(r"de", "hors", "partie", "utile", r"intergranulaire\w*", r"transgranulaire\w*", r"oxyd\w*", "et", "tete", "mode"),
+    r"[a-z]{0,3}\d[\w]*",
+)
+"""Words of remarks that tell something else than an end: what a specimen looks like, where it stems from."""
+
+
+def is_neutral(text: str) -> bool:
+    """Whether a remark speaks of nothing but what a specimen looks like, or where it stems from."""
+    return not _NEUTRAL.sub(" ", plain_words(text)).replace("|", " ").strip()
+
+
+def legend_in(text: str) -> dict[str, str]:
+    """{sign or code: end} of `1 = failed, 0 = censored` or `* run-out`, as names of columns and notes explain them."""
+    found: dict[str, str] = {}
+    for sign, words in re.findall(r"(\(\)|\S{1,12}?)\s*(?:=|:|\N{EN DASH}|means|bedeutet)\s*([^,;()=]+)", text):
+        if (said := end_said_by(words)) in (RUPTURED, STOPPED, INTERRUPTED):
+            found[sign.strip("'\"([ ").casefold() or "()"] = RUPTURED if said == RUPTURED else STOPPED
+    marked = re.match(r"\s*([*+†‡#^]+|\(\))\)?\s*(.+)", text)
+    if marked and (said := end_said_by(marked[2].lstrip("=: "))) in (RUPTURED, STOPPED, INTERRUPTED):
+        found[marked[1]] = RUPTURED if said == RUPTURED else STOPPED
+    return found
+
+
+@dataclass(frozen=True)
+class EndsOfColumn:
+    """What a column says of the ends of the tests.
+
+    ends : of each test RUPTURED, STOPPED, or "" where it says nothing. asked : texts that may say something and are not
+    understood, "" for an empty cell; they stand where `ends` has UNCLEAR. is_remark : whether it is a column of
+    remarks, which a status overrules.
+    """
+
+    ends: tuple[str, ...]
+    asked: tuple[str, ...] = ()
+    is_remark: bool = False
+    values: frozenset[str] = field(default_factory=frozenset)
+
+
+def kind_of_column(name: str) -> str:
+    """What the name of a column says: RUPTURED or STOPPED of tests with a yes, "status", "remark", or ""."""
+    plain = plain_words(re.sub(r"\(.*?\)|\[.*?\]|\?", " ", name))
+    words = set(plain.replace("|", " ").split()) - {"y", "n", "j", "ja", "nein", "yes", "no", "oui", "non"}
+    if words & _REMARK_WORDS:
+        return "remark"
+    said = end_said_by(plain)
+    if not said and words & {"event", "evenement", "ereignis"} and len(words) == 1:
+        return RUPTURED
+    if said in (RUPTURED, STOPPED, INTERRUPTED) and not _OTHER_USES.search(plain) and len(words) <= 4:
+        return RUPTURED if said == RUPTURED else STOPPED
+    return "status" if words & _STATUS_WORDS and words <= _STATUS_WORDS | _STATUS_FILLERS else ""
+
+
+def ends_in_column(name: str, cells: Sequence[str], answers: Mapping[str, str], others_decide: bool) -> EndsOfColumn:
+    """What a column says of the end of each test.
+
+    answers : {text or code in small letters: RUPTURED, STOPPED or LABEL} that were given. others_decide : whether
+    another column says how each test ended, so that a remark that is not understood leaves nothing open.
+    """
+    kind, answers = kind_of_column(name), {**legend_in(name), **answers}
+    texts = ["" if is_missing(cell) else " ".join(cell.split()) for cell in cells]
+    plain = {text.casefold() for text in texts if text}
+    meanings = _meanings(kind, plain)
+    meanings |= {text: answers[text] for text in {*plain, ""} if text in answers}
+    ends, asked = list[str](), dict[str, None]()
+    for text in texts:
+        end = meanings.get(text.casefold(), UNCLEAR)
+        if end == UNCLEAR and kind in ("remark", "") and others_decide:
+            end = ""
+        if end == UNCLEAR:
+            asked[text] = None
+        ends.append("" if end == LABEL else end)
+    return EndsOfColumn(tuple(ends), tuple(asked), kind == "remark", frozenset(plain))
+
+
+def _meanings(kind: str, plain: Set[str]) -> dict[str, str]:
+    """{text in small letters: end} of the distinct texts of a column, and of an empty cell."""
+    if kind != "remark" and plain and plain <= YES | NO:
+        return _meanings_of_flags(kind, plain)
+    if kind in ("status", RUPTURED, STOPPED) and (codes := _CODES.get(frozenset(plain))):
+        found: dict[str, str] = dict(codes)
+    else:
+        found = {text: _meaning_of_text(kind, text) for text in plain}
+    says = set(found.values())
+    # Beside texts that all say that a test broke, an empty cell may say that this one did not.
+    found[""] = UNCLEAR if kind in ("status", RUPTURED, STOPPED) and RUPTURED in says else ""
+    return found
+
+
+def _meanings_of_flags(kind: str, plain: Set[str]) -> dict[str, str]:
+    if kind == "" and len(plain) == 1 and not plain <= {"x", "yes", "ja", "oui", "✓", "✔"}:
+        return {**dict.fromkeys(plain, ""), "": ""}
+    if kind not in (RUPTURED, STOPPED):
+        return {**dict.fromkeys(plain, UNCLEAR), "": ""}
+    other = STOPPED if kind == RUPTURED else RUPTURED
+    found = {text: kind if text in YES else other for text in plain}
+    # x and empty cells are yes and no; an empty cell beside yes and no may be either.
+    return {**found, "": other if YES.issuperset(plain) else UNCLEAR}
+
+
+def _meaning_of_text(kind: str, text: str) -> str:
+    said = end_said_by(text)
+    if kind in ("status", RUPTURED, STOPPED):
+        return STOPPED if said == INTERRUPTED else said or UNCLEAR
+    if kind == "remark":
+        return UNCLEAR if said == INTERRUPTED else said or ("" if is_neutral(text) else UNCLEAR)
+    return {STOPPED: STOPPED, INTERRUPTED: UNCLEAR, UNCLEAR: UNCLEAR}.get(said, "")
+
+
+# ---- marks of times ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class MarkedTime:
+    """A time with what its mark says: RUPTURED, STOPPED, UNCLEAR or ""; number : "" where a word takes its place."""
+
+    number: str
+    said: str
+    mark: str = ""
+
+
+TIME_IN_CELL = re.compile(
+    r"(?P<before>[^\d+-]*?)\s*(?P<number>[+-]?\d[\d.,]*(?:[eEdD][+-]?\d+)?|[+-]?[.,]\d+)\s*(?P<after>[^\d].*)?",
+    re.DOTALL,
+)
+"""A number in a cell of times, with what stands before and behind it."""
+
+
+_LONGER = re.compile(
+    r"[>≥＞⩾]=?|=>|over|above|more than|greater than|longer than|at least|über|ueber|mehr als|länger als|mind\.?"
+    r"|mindestens|plus de|supérieure? à|au moins",
+    re.IGNORECASE,
+)
+_ONWARDS = re.compile(r"[+→⇒➔>]|->|-->|=>|\.\.\.|…|ff\.?")
+
+
+def marked_time(text: str, answers: Mapping[str, str]) -> MarkedTime:
+    """A cell of times: a number, marked as a run-out or not, or a word.
+
+    answers : {sign or text in small letters: end}.
+    """
+    whole = " ".join(text.split())
+    match = TIME_IN_CELL.fullmatch(whole)
+    if match is None:
+        return MarkedTime("", answers.get(whole.casefold()) or end_said_by(whole) or UNCLEAR, whole)
+    before, number, after = match["before"] or "", match["number"], (match["after"] or "").strip()
+    after = after if unit_suffix(after.split(" ")[0].rstrip(".,;()")) not in TIME.units else after.partition(" ")[2]
+    if before.strip("([ ") == "" and before:
+        before, after = "", "()" + after.replace(")", "").replace("]", "").strip()
+    before = before.strip()
+    if not before and not after:
+        return MarkedTime(number, "")
+    mark = before or after
+    if (said := answers.get(mark.casefold()) or answers.get(whole.casefold())) is not None:
+        return MarkedTime(number, "" if said == LABEL else said, mark)
+    if _LONGER.fullmatch(before) and (not after or end_said_by(after) != RUPTURED):
+        return MarkedTime(number, STOPPED, mark)
+    if not before and _ONWARDS.fullmatch(after):
+        return MarkedTime(number, STOPPED, mark)
+    said = {STOPPED: STOPPED, "interrupted": STOPPED, RUPTURED: RUPTURED}.get(end_said_by(after), "")
+    codes = {"ro": STOPPED, "nb": STOPPED, "nr": STOPPED, "nf": STOPPED}
+    return MarkedTime(number, said or codes.get(after.strip("() ").casefold(), UNCLEAR), mark)

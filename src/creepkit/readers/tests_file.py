@@ -1,0 +1,169 @@
+"""tests.toml: what the files of a laboratory leave open, answered beside them; the files stay as they are.
+
+    ["RX*.csv"]
+    specimen = "uniaxial"
+    gauge_length_mm = 40
+    columns = {Dehnung = "strain_pct", Bemerkung = "label", Kanal7 = "unused"}
+
+    ["rates.csv"]
+    ended = {abgestellt = "stopped", K013 = "ruptured"}
+
+A table holds for the files that its pattern matches, later ones over earlier ones. Its keys are conditions as they
+stand in the head of a file; `columns`, {name as written: what it is}; `ended`, a word for all tests, or {text, code or
+name of a test: ruptured, stopped or label}.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from creepkit.errors import HistoryError, quoted
+from creepkit.files.reading import FileKind, read_text
+from creepkit.readers.column_names import KnownNames, NameTable, split_written_name
+from creepkit.readers.columns_of_tests import NAMES
+from creepkit.readers.ends_of_tests import LABEL, RUPTURED, STOPPED
+from creepkit.readers.questions import ANSWERS_FILE, raise_all
+from creepkit.readers.text_tables import UNUSED
+from creepkit.readers.vocabulary import HeaderVocabulary
+
+ANSWERS = FileKind("answers about tests", HistoryError, "correct or remove it", maximum_bytes=1_000_000)
+
+_ENDS = (RUPTURED, STOPPED, LABEL)
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What tests.toml says of one file.
+
+    stated : {condition: text and place}. columns : {name as written: what it is}. ended : {text: end}.
+    """
+
+    stated: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    columns: Mapping[str, str] = field(default_factory=dict)
+    ended: Mapping[str, str] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self.stated or self.columns or self.ended)
+
+    def added_to(self, vocabulary: HeaderVocabulary) -> HeaderVocabulary:
+        """The vocabulary of a reader with the answers."""
+        ignored = tuple(name for name, meaning in self.columns.items() if meaning == UNUSED)
+        labels = tuple(name for name, meaning in self.columns.items() if meaning == LABEL)
+        names = NameTable({**KnownNames.of(vocabulary).columns.kinds, **NAMES.kinds})
+        meant = {name: what for name, what in self.columns.items() if what not in (UNUSED, LABEL)}
+        synonyms = {name: names.standard(_with_unit(what, name, names)) for name, what in meant.items()}
+        return replace(
+            vocabulary,
+            synonyms={**vocabulary.synonyms, **synonyms},
+            labels=(*vocabulary.labels, *labels),
+            ignored=(*vocabulary.ignored, *ignored),
+            end_of_test_terms={**vocabulary.end_of_test_terms, **self.ended},
+            stated={**vocabulary.stated, **self.stated},
+        )
+
+
+def _with_unit(what: str, written: str, names: NameTable) -> str:
+    """What a column is, with the unit that it has as it is written, where the answer has none."""
+    unit = split_written_name(written)[1]
+    return f"{what} ({unit})" if what in names.kinds and unit else what
+
+
+def answers_of(path: Path) -> Answers:
+    """What the file of answers beside a file, or in a folder, says of it; HistoryError for what is wrong in that."""
+    folder = path if path.is_dir() else path.parent
+    file = folder / ANSWERS_FILE
+    if path.name == ANSWERS_FILE or not file.is_file():
+        return Answers()
+    found = Answers()
+    for pattern, table in read_answers(file).items():
+        if fnmatchcase(path.name, pattern) or (path.is_dir() and pattern == "*"):
+            one = _answers_in(file, pattern, table)
+            found = Answers(
+                {**found.stated, **one.stated}, {**found.columns, **one.columns}, {**found.ended, **one.ended}
+            )
+    return found
+
+
+def read_answers(file: Path) -> dict[str, dict[str, Any]]:
+    """{pattern: table} of a file of answers, all of whose keys are checked."""
+    try:
+        data = tomllib.loads(read_text(file, ANSWERS))
+    except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise HistoryError(f"{file}: is no TOML ({quoted(reason, 120)}); correct or remove it") from None
+    errors = list[HistoryError]()
+    known = KnownNames.of(HeaderVocabulary())
+    for pattern, table in data.items():
+        if not isinstance(table, dict):
+            errors.append(
+                HistoryError(
+                    f"{file}: '{quoted(pattern)}' stands in no table; begin with the files that it is about, such as "
+                    '["*.csv"]'
+                )
+            )
+            continue
+        for key, value in table.items():
+            if problem := _problem(key, value, known):
+                errors.append(HistoryError(f'{file}: ["{quoted(pattern)}"] {quoted(key)}: {problem}'))
+    raise_all(errors)
+    return data
+
+
+def _problem(key: str, value: Any, known: KnownNames) -> str:
+    """What is wrong with a key of a table or its value; "" for nothing."""
+    if key == "columns":
+        is_table = isinstance(value, dict) and all(isinstance(one, str) and one for one in value.values())
+        return "" if is_table else 'write {name of a column = what it is}, such as {Dehnung = "strain_pct"}'
+    if key == "ended":
+        values = list(value.values()) if isinstance(value, dict) else [value]
+        wrong = [one for one in values if one not in (_ENDS if isinstance(value, dict) else _ENDS[:2])]
+        return f"'{quoted(wrong[0])}' is no end; allowed: {', '.join(_ENDS)}" if wrong else ""
+    if known.is_condition(key):
+        is_single = isinstance(value, (str, int, float)) and not isinstance(value, bool)
+        return "" if is_single else "write a number or a text"
+    near = get_close_matches(key, ["columns", "ended"], 1)
+    meant = near[0] if near else known.terms.suggestion(key)
+    allowed = "allowed are columns, ended, and conditions as in the head of a file, such as stress_MPa or specimen"
+    return f"is no key; did you mean '{meant}'?" if meant else f"is no key; {allowed}"
+
+
+def _answers_in(file: Path, pattern: str, table: Mapping[str, Any]) -> Answers:
+    place, ended = f'{file} ["{pattern}"]', table.get("ended", {})
+    conditions = {key: value for key, value in table.items() if key not in ("columns", "ended")}
+    if isinstance(ended, str):
+        conditions["ended"] = ended
+    return Answers(
+        {key: (value if isinstance(value, str) else repr(value), place) for key, value in conditions.items()},
+        table.get("columns", {}),
+        {} if isinstance(ended, str) else {text.casefold(): end for text, end in ended.items()},
+    )
+
+
+def with_answer(text: str, name: str, key: str, value: str) -> str:
+    """The text of a file of answers with one more: `key = value` in the table of a file.
+
+    value : as TOML, {name: value} where the key holds a table, whose further entries stay.
+    """
+    lines = text.rstrip("\n").split("\n") if text.strip() else []
+    heading = f'["{name}"]'
+    if heading not in lines:
+        lines += [*([""] if lines else []), heading]
+    start = lines.index(heading) + 1
+    end = next((k for k in range(start, len(lines)) if lines[k].startswith("[")), len(lines))
+    at = next((k for k in range(start, end) if re.match(rf"{re.escape(key)}\s*=", lines[k])), None)
+    if at is None:
+        while end > start and not lines[end - 1].strip():
+            end -= 1
+        lines.insert(end, f"{key} = {value}")
+    elif value.startswith("{") and lines[at].rstrip().endswith("}"):
+        lines[at] = f"{lines[at].rstrip()[:-1].rstrip()}, {value[1:]}"
+    else:
+        lines[at] = f"{key} = {value}"
+    return "\n".join(lines) + "\n"
