@@ -21,15 +21,15 @@ BUDGET = {
     "core": 70,
     "dataset": 820,
     "discovery": 1490,
-    "experiments": 1710,
+    "experiments": 1695,
     "exporters": 2690,
     "extraction": 1360,
     "fem": 1900,
     "files": 1315,
-    "forecasts": 1490,
+    "forecasts": 1500,
     "instruments": 1430,
     "integration": 930,
-    "inverse": 11965,
+    "inverse": 12295,
     "jobs": 260,
     "kernels": 1710,
     "language": 1590,
@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 5870,
     "records": 1975,
     "registry": 620,
-    "reports": 8315,
+    "reports": 8345,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34950
+TESTS = 35125
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -73,6 +73,8 @@ class Perturbation:
     @property
     def description(self) -> str:
         """What, and of which size, in one test."""
+        if self.unit == "mm" and not self.kind.startswith(OFFSET):
+            return f"an error of {self.amount} in the {self.kind}"
         return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind} of {self.amount}"
 
     @property

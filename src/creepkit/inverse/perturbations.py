@@ -189,6 +189,22 @@ def with_unknown_effects(linear: LinearisedProblem, changes: Floats) -> Linearis
     )
 
 
+def effect_columns(effect: Perturbation, *, common: bool) -> Floats:
+    """(tests, observations, unknowns) change of the residuals by a perturbation of all tests alike, or of each test."""
+    column = effect.residual_change[..., None]
+    return np.asarray(column if common else column * np.eye(len(column))[:, None, :])
+
+
+def sizes_of_effect(
+    linear: LinearisedProblem, effect: Perturbation, noise_model: NoiseModel, *, common: bool = False
+) -> Floats:
+    """(1,) of all tests or (tests,) sizes that a perturbation takes in a linear problem, in standard deviations."""
+    columns = effect_columns(effect, common=common)
+    perturbed = with_unknown_effects(linear, columns)
+    factor = CovarianceFactor.of_residuals(perturbed.residuals, noise_model)
+    return perturbed.solve(factor).step[-columns.shape[-1] :]
+
+
 # ---- what each does to the residuals ---------------------------------------------------------------------------------
 
 

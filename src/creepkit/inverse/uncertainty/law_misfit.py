@@ -147,7 +147,7 @@ class LawMisfits:
         ramps = [a.effects(np.array([x]))[0] for a, x, seen in zip(self._axes, where, self._seen, strict=True) if seen]
         question = np.concatenate([row, *ramps])
         second, without = self._second_moments
-        total = float(question @ second @ question)
+        total = max(float(question @ second @ question), 0.0)
         own = max(total - float(question @ without @ question), 0.0)
         beyond = min(max(total - float(row @ self._by_law @ row), 0.0), own)
         distance = np.hypot(*(a.distance(x) for a, x in zip(self._axes, where, strict=True)))
