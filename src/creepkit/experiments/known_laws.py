@@ -65,6 +65,7 @@ class KnownLaw:
             law=altered.problem.law,
             u=u,
             covariance=np.eye(u.size),
+            error_covariance=None,
             nuisances=nuisances,
             samples=None,
             problem=None,

@@ -249,8 +249,7 @@ class Identification(
         found = [self.misfit_at(float(s), float(T)) for s, T in zip(stresses.flat, temperatures.flat, strict=True)]
         if not any(found):
             return np.zeros(())
-        known = self.by_tests_alone if self.samples is None else self
-        value, _, high = known.interval_of(function)
+        value, _, high = self.by_tests_alone.interval_of(function)
         total, own = (
             np.reshape([0.0 if one is None else float(getattr(one, name)) for one in found], stresses.shape)
             for name in ("total", "own")
@@ -295,7 +294,7 @@ class Identification(
         By the delta method; from samples of the posterior where a value lies at its bound or is not determined.
         """
         if self.samples is not None:
-            value, draws = function(self.u), function(self.samples)
+            value, draws = function(self.u), function(self.samples_with_errors)
             low, high = np.quantile(draws, (0.025, 0.975), axis=0)
             return value, np.minimum(low, value), np.maximum(high, value)
         value, sd = delta_method(function, self.u, self.covariance)
@@ -420,8 +419,13 @@ class Identification(
         return predictor
 
     @cached_property
+    def samples_with_errors(self) -> Floats:
+        """(samples, parameters) as `samples`, moved by the errors that tests usually have."""
+        return cast(Floats, present("inverse.uncertainty.importance_sampling:with_usual_errors", self))
+
+    @cached_property
     def by_tests_alone(self) -> Identification:
-        """The same with intervals that take temperatures, loads and dimensions as exactly known, not from samples."""
+        """The same with intervals that take temperatures, loads and dimensions as exactly known."""
         if self.error_covariance is None:
             return self
         covariance = positive_semidefinite(self.covariance - self.error_covariance)
@@ -433,12 +437,11 @@ class Identification(
             error_covariance=None,
             estimates=parameter_estimates(self.law, self.coordinates, self.u, covariance, self._quantile),
             rate_scatter=scatter,
-            samples=None,
         )
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the problem, which holds compiled code and is set up again when it is needed."""
-        worked_out = ("least_squares_problem", "by_tests_alone", "misfits")
+        worked_out = ("least_squares_problem", "by_tests_alone", "misfits", "samples_with_errors")
         state = {name: value for name, value in self.__dict__.items() if name not in worked_out}
         return {**state, "problem": None}
 

@@ -80,11 +80,13 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
             "values lie at their bounds or are not determined, and their posterior could not be sampled: intervals of "
         )
         return replace(fit, notes=(*fit.notes, f"{note}rates may be too narrow"))
-    return replace(fit, samples=_with_usual_errors(fit, samples))
+    return replace(fit, samples=samples)
 
 
-def _with_usual_errors(fit: Identification, samples: Floats) -> Floats:
-    """Samples moved by the errors that tests usually have and nobody modelled, within the bounds of the law."""
+def with_usual_errors(fit: Identification) -> Floats:
+    """(samples, parameters) of a fit, moved by errors that tests usually have, within the bounds of the law."""
+    samples = fit.samples
+    assert samples is not None
     if fit.error_covariance is None:
         return samples
     scale = interval_quantile(fit.freedom) / interval_quantile(1e9)
