@@ -12,6 +12,7 @@ from creepkit.forecasts.draws import (
     LawDraws,
     UncertainQuantity,
     dimension_draws,
+    has_sampled_draws,
     log_factor_draws,
     own_variances,
     uncertain_quantities,
@@ -30,6 +31,7 @@ from creepkit.forecasts.simulation import (
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.uncertainty.law_misfit import LawMisfit
+from creepkit.inverse.uncertainty.quantities import log_rate
 from creepkit.records import History, Predictor
 
 LEAST_SOLVED = 0.8
@@ -72,8 +74,12 @@ def drawn_law(
     centre = {d.kind: d.mean for d in dimensions}
     followed, own = followed_history(history, predictor, [*centre]), predictor_for(predictor, history)
     mean, _ = fit.scatter_of_rates.mean_joint
-    misfit = fit.misfit_at(*reference_condition(history, predictor))
-    test = fit.scatter_of_rates.new_test(history, 0.0 if misfit is None else misfit.sd)
+    condition = reference_condition(history, predictor)
+    misfit = fit.misfit_at(*condition)
+    of_rate = 0.0 if misfit is None else misfit.sd
+    if has_sampled_draws(fit):  # samples are those of the tests alone
+        of_rate = float(np.hypot(of_rate, fit.error_sd(log_rate(fit.coordinates, *condition))))
+    test = fit.scatter_of_rates.new_test(history, of_rate)
     known = float(mean[[*test.known.values()]].sum())
     central, numerical = central_curves(fit, predictor, followed, centre, known)
     cheaper = drawing_predictor(fit, predictor, history, [*centre])

@@ -123,11 +123,9 @@ def _sampled_draws(fit: Identification, count: int, rng: np.random.Generator) ->
     assert fit.samples is not None
     posterior = fit.scatter_of_rates.posterior
     nodes = rng.permutation(systematic(posterior.weight, count, rng))
-    samples = len(fit.samples_with_errors)
+    samples = len(fit.samples)
     joint = np.tile(fit.x, (count, 1))
-    joint[:, : fit.u.size] = fit.samples_with_errors[
-        rng.permutation(systematic(np.full(samples, 1.0 / samples), count, rng))
-    ]
+    joint[:, : fit.u.size] = fit.samples[rng.permutation(systematic(np.full(samples, 1.0 / samples), count, rng))]
     return LawDraws(fit, joint, posterior.sd[nodes])
 
 

@@ -294,9 +294,11 @@ class Identification(
         By the delta method; from samples of the posterior where a value lies at its bound or is not determined.
         """
         if self.samples is not None:
-            value, draws = function(self.u), function(self.samples_with_errors)
+            value, draws = function(self.u), function(self.samples)
             low, high = np.quantile(draws, (0.025, 0.975), axis=0)
-            return value, np.minimum(low, value), np.maximum(high, value)
+            below, above = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
+            errors = self._quantile * self.error_sd(function)
+            return value, value - np.hypot(below, errors), value + np.hypot(above, errors)
         value, sd = delta_method(function, self.u, self.covariance)
         return value, value - self._quantile * sd, value + self._quantile * sd
 
@@ -418,10 +420,14 @@ class Identification(
             raise FitError(missing_predictor(self.predictor_documents))
         return predictor
 
-    @cached_property
-    def samples_with_errors(self) -> Floats:
-        """(samples, parameters) as `samples`, moved by the errors that tests usually have."""
-        return cast(Floats, present("inverse.uncertainty.importance_sampling:with_usual_errors", self))
+    def error_sd(self, function: CoordinateFunction) -> Floats:
+        """(...,) standard deviation that usual errors of tests make of a function of the coordinates; 0 without them.
+
+        Scaled as `error_covariance` is.
+        """
+        if self.error_covariance is None:
+            return np.zeros(())
+        return delta_method(function, self.u, self.error_covariance)[1]
 
     @cached_property
     def by_tests_alone(self) -> Identification:
@@ -441,7 +447,7 @@ class Identification(
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the problem, which holds compiled code and is set up again when it is needed."""
-        worked_out = ("least_squares_problem", "by_tests_alone", "misfits", "samples_with_errors")
+        worked_out = ("least_squares_problem", "by_tests_alone", "misfits")
         state = {name: value for name, value in self.__dict__.items() if name not in worked_out}
         return {**state, "problem": None}
 

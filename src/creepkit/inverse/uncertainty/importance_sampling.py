@@ -20,7 +20,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile, lies_at_bound
+from creepkit.inverse.uncertainty.laplace_approximation import lies_at_bound
 from creepkit.inverse.uncertainty.posterior import Posterior
 from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals, quadratic_terms
 from creepkit.records import Predictor
@@ -81,19 +81,6 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
         )
         return replace(fit, notes=(*fit.notes, f"{note}rates may be too narrow"))
     return replace(fit, samples=samples)
-
-
-def with_usual_errors(fit: Identification) -> Floats:
-    """(samples, parameters) of a fit, moved by errors that tests usually have, within the bounds of the law."""
-    samples = fit.samples
-    assert samples is not None
-    if fit.error_covariance is None:
-        return samples
-    scale = interval_quantile(fit.freedom) / interval_quantile(1e9)
-    root = covariance_root(fit.error_covariance) * scale
-    unit = np.random.default_rng(fit.settings.seed).standard_normal(samples.shape)
-    low, high = fit.law.internal_bounds
-    return fit.coordinates.u(np.clip(fit.coordinates.theta(samples + unit @ root.T), low, high))
 
 
 def covariance_root(covariance: Floats) -> Floats:
