@@ -15,16 +15,25 @@ Result = TypeVar("Result")
 
 
 class Presentable:
-    """A record whose text for a terminal is written by a function that its class names by text="module:function"."""
+    """A record whose text for a terminal is written by a function that its class names by text="module:function".
+
+    Classes of long answers name another function for `details()`.
+    """
 
     __slots__ = ()
     _text: ClassVar[str]
+    _details: ClassVar[str]
 
-    def __init_subclass__(cls, text: str = "", **further: Any) -> None:
-        """Text : the function, which takes the record; that of the base class if none is named."""
+    def __init_subclass__(cls, text: str = "", details: str = "", **further: Any) -> None:
+        """Text, details : the functions, which take the record; those of the base class if none is named."""
         super().__init_subclass__(**further)
         if text:
             cls._text = text
+            cls._details = details or text
+
+    def details(self) -> str:
+        """Everything that there is to say, as text."""
+        return present(self._details, self)
 
     def __str__(self) -> str:
         return present(self._text, self)

@@ -17,7 +17,7 @@ BUDGET = {
     "api": 270,
     "app": 630,
     "cameras": 1170,
-    "cli": 2300,
+    "cli": 2380,
     "core": 100,
     "dataset": 820,
     "discovery": 1490,
@@ -25,9 +25,9 @@ BUDGET = {
     "exporters": 2690,
     "extraction": 1145,
     "fem": 1900,
-    "files": 1315,
+    "files": 1425,
     "forecasts": 1490,
-    "instruments": 1370,
+    "instruments": 1380,
     "integration": 1100,
     "inverse": 12015,
     "jobs": 260,
@@ -35,8 +35,8 @@ BUDGET = {
     "language": 1590,
     "laws": 140,
     "modules": 780,
-    "quality": 1470,
-    "readers": 5660,
+    "quality": 1540,
+    "readers": 5760,
     "records": 1950,
     "registry": 620,
     "reports": 8250,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34200
+TESTS = 34400
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -77,7 +77,8 @@ def test_readme_commands_run_in_order(tmp_path, monkeypatch, capsys):
         assert result.exit_code == 0, f"{line}\n{result.output}"
         if words[0] == "run":
             truth = json.loads(Path("curves/truth.json").read_text())
-            assert f"decisive: {truth['law']}" in result.stdout
+            assert f"decisive; weights: {truth['law']}" in result.stdout
+            assert "not decisive" not in result.stdout
 
 
 def test_readme_has_one_road_for_files_and_one_for_python():

@@ -43,15 +43,32 @@ def test_it_opens_from_a_file_and_is_whole(browser, address, scripts) -> None:
     assert [url for url in asked if not url.startswith("data:")] == [address]
     assert said == []
     assert page.get_by_role("heading", level=1).inner_text().startswith("Creep of")
-    assert page.locator("figure.drawing svg:not(.part)").count() == 5
+    assert page.locator("figure.drawing svg").count() == 4
+    for section in page.locator("summary").all():
+        section.click()
     for figure in page.locator("figure.drawing").get_by_role("img").all():
         box = figure.bounding_box()
         assert box is not None
         assert box["width"] > 300
         assert box["height"] > 100
-    for heading in ("Findings", "The law over the tests", "Laws tried", "Data", "Methods text", "What is missing"):
+    for heading in ("Values and verdict", "Tests", "Laws compared", "Data", "Methods text", "What is missing"):
         assert page.get_by_role("heading", name=heading, exact=True).is_visible()
     assert page.locator("math").first.is_visible()
+    page.context.close()
+
+
+def test_the_answer_is_one_screen(browser, tmp_path) -> None:
+    """Headline, picture and card within 1400 x 900 pixels; what is not folded is short."""
+    path = tmp_path / "report.html"
+    path.write_text(report_html(contents()), encoding="utf-8")
+    page, _, _ = opened(browser, path.as_uri(), viewport={"width": 1400, "height": 900})
+    assert len(page.locator(".lead").first.inner_text().split()) <= 25
+    for part in (".lead", ".answer .seen", ".answer .card"):
+        box = page.locator(part).first.bounding_box()
+        assert box["y"] + box["height"] <= 900
+    assert page.locator(".cautions li").count() <= 3
+    assert len(page.locator("body").inner_text().split()) <= 700
+    assert page.evaluate("document.documentElement.scrollHeight") <= 4 * 900
     page.context.close()
 
 
@@ -59,6 +76,7 @@ def test_it_opens_from_a_file_and_is_whole(browser, address, scripts) -> None:
 def test_the_law_answers_to_its_sliders(browser, address, width) -> None:
     page, _, said = opened(browser, address, viewport={"width": width, "height": 900})
     assert page.locator("#sliders h2").count() == page.locator("h1").count() == 1
+    page.locator("#sliders summary").first.click()
     curves = "[...document.querySelectorAll('#sliders path.line')].map(path => path.getAttribute('d')).join()"
     for _ in range(500):
         if page.evaluate(SETTLED) and page.evaluate(curves):

@@ -131,7 +131,8 @@ class CommandGroup(TyperGroup):
                     hint = before if message.startswith("No such option: --plugin") else ""
                     error.message = f"{printable(message)}{hint}"  # type: ignore[attr-defined]
                 raise
-            say(sentence_of(error))
+            for one in getattr(error, "errors", (error,)):
+                say(sentence_of(one))
             raise typer.Exit(1) from None
 
     def list_commands(self, ctx: Any) -> list[str]:

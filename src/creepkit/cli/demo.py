@@ -15,7 +15,6 @@ from creepkit.reports.terminal import ProgressBar, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection import Ranking
     from creepkit.studies.result import StudyResult
 
 
@@ -99,7 +98,6 @@ def _run(data: Path, folder: Path) -> StudyResult:
     """Carry out the study of example data, and print what it found; FitError where a stage fails."""
     import creepkit as ck
     from creepkit.errors import FitError
-    from creepkit.reports.interval_basis import interval_basis
 
     tell(HEADINGS[data])
     study = ck.Study.load(data / "study.toml")
@@ -108,47 +106,12 @@ def _run(data: Path, folder: Path) -> StudyResult:
     for failure in result.failures:
         raise FitError(f"{failure.stage}: {failure.sentence}")
     ranking = result.rankings[""]
-    _print_ranking(ranking)
-    if data == MEASURED:
-        _print_values(ranking.best)
-    else:
-        _print_truth(data, ranking.best)
-    for line in interval_basis(ranking.best):
-        tell(f"  {line}")
+    tell(str(ranking))
     if data == MEASURED:
         _print_rupture_times(ranking.best)
+    else:
+        _print_truth(data, ranking.best)
     return result
-
-
-def _print_ranking(ranking: Ranking) -> None:
-    """Each law with its misfit and weight, and the verdict."""
-    from creepkit.reports.ranking import misfit_cells, misfit_columns
-
-    rows = [
-        (
-            one.fit.law.name,
-            str(len(one.fit.law.params)),
-            misfit_cells(one.fit)[0],
-            f"{one.excess:.1f}",
-            f"{one.weight:.3f}",
-        )
-        for one in ranking.laws
-    ]
-    _print_rows(("law", "parameters", misfit_columns(ranking.best)[0], "BIC - best", "weight"), rows)
-    tell(ranking.verdict)
-
-
-def _print_values(fit: Identification) -> None:
-    """The identified values with 95 % intervals, three a line."""
-    from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
-
-    marks = [bound_marks(fit.law, e) for e in fit.estimates]
-    texts = [
-        f"{e.name} = {e.value:.4g} [{e.low:.3g}{low}, {e.high:.3g}{high}] {e.unit}".rstrip()
-        for e, (low, high) in zip(fit.estimates, marks, strict=True)
-    ]
-    for start in range(0, len(texts), 3):
-        tell("  " + ", ".join(texts[start : start + 3]))
 
 
 def _print_rupture_times(fit: Identification) -> None:

@@ -228,6 +228,13 @@ NOTHING = object()
 """What `none` is of an option that may be None, and is not without it."""
 
 
+def _without_unit(one: Option, text: Any) -> Any:
+    """What was written, without the unit of the option behind its numbers, as in 1e4h."""
+    if not one.unit or not isinstance(text, str):
+        return text
+    return re.sub(rf"(?<=[\d.])\s?{re.escape(one.unit)}(?=,|:|$)", "", text)
+
+
 def given_value(one: Option, text: Any, error: type[CreepkitError]) -> Any:
     """The value of what was written, in creepkit's unit; None where the option was not given.
 
@@ -237,7 +244,7 @@ def given_value(one: Option, text: Any, error: type[CreepkitError]) -> Any:
         return text if isinstance(text, bool) else None
     if text == "none" and one.is_optional and one.default is not None:
         return NOTHING
-    form = text_form(one.type)
+    form, text = text_form(one.type), _without_unit(one, text)
     shown = quoted(" ".join(text) if isinstance(text, list) else text)
     try:
         value = form.parse(text)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -41,6 +43,9 @@ def command(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the outputs over time."), OutputPath("picture")
     ] = None,
+    ask: Annotated[
+        bool, typer.Option("--ask", help="Put what is not clear as questions; answers are written into tests.toml.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Tests, conditions, units, what was assumed, and what is suspect.
@@ -48,6 +53,7 @@ def command(
     A record of an instrument is shown with its channels, units, gaps and clock.
     """
     import creepkit as ck
+    from creepkit.readers.questions import single_errors
     from creepkit.readers.table_summary import summarise_tables
     from creepkit.reports import histories as report
     from creepkit.reports.data_quality import data_quality_to_json
@@ -60,6 +66,13 @@ def command(
         _show_records(records, to, plot, as_json)
         return
     ignored = list(ignore)
+    if ask:
+        from creepkit.cli.asking import put_questions
+
+        is_terminal = sys.stdin.isatty() and sys.stdout.isatty()
+        read = partial(ck.read_histories, files, reader=reader, ignore=ignored)
+        for path in put_questions(read, input if is_terminal else None):
+            tell_written(path)
     found, unread = _readable_tests(files, reader, ignored)
     general = {str(path) for path in files if path.is_file() and reader in (None, "csv", "xlsx")}
     sources = {history.source.partition(" (")[0] for history in found}
@@ -80,7 +93,7 @@ def command(
     if plot is not None:
         report.histories_figure(found, plot)
         tell_written(plot, err=as_json)
-    for error in unread:
+    for error in (one for several in unread for one in single_errors(several)):
         tell(f"not read: {error}", err=True)
     if unread:
         raise typer.Exit(1)

@@ -69,14 +69,15 @@ def command(
 def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
     tell(result.title)
-    print_table("", ("stage", "state", ""), [(one.name, one.state, one.sentence) for one in result.stages])
+    told = [(one.name, one.state, one.sentence) for one in result.stages if one.state != "made" or one.sentence]
+    if told:
+        print_table("", ("stage", "state", ""), told)
     for exclusion in result.exclusions:
         count = len(exclusion.frames)
         frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""
         tell(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
     for group, ranking in result.rankings.items():
-        for sentence in (ranking.best.headline, ranking.verdict):
-            tell(f"{group}: {sentence}" if group else sentence)
+        tell(f"{group}: {ranking.best.headline}" if len(result.rankings) > 1 else str(ranking))
     if result.report is not None:
         tell(f"report: {result.report}")
 

@@ -61,7 +61,7 @@ class Description:
         logarithmic = [
             (f"rupture times{lost}", self.ruptures),
             ("minimum creep rates", self.minimum_rates),
-            ("rates of single tests" if self.outputs else "rates", self.rates),
+            ("creep rates", self.rates),
             *((_plural(name), value) for name, value in self.outputs.items() if is_logarithmic(name)),
         ]
         texts = [f"{name} to {spread_text(value)}" for name, value in logarithmic if np.isfinite(value)]
@@ -70,7 +70,7 @@ class Description:
             for name, value in self.outputs.items()
             if np.isfinite(value) and not is_logarithmic(name)
         ]
-        return f"{', '.join(texts[:3])} (rms)" if texts else ""
+        return " and ".join(texts[:2])
 
 
 def spread_text(spread: float) -> str:
@@ -91,10 +91,10 @@ def headline(fit: Identification) -> str:
     elif adequacy.is_explained:
         truth = f"but {adequacy.explanations[0].headline}"
     elif adequacy.contradicting is not None:
-        truth = "yet minimum rates and rupture times contradict one another by it"
+        truth = "but minimum rates and rupture times contradict one another by it"
     else:
         shape = adequacy.discrepancy_in_noises > SHAPE_MISFIT
-        truth = f"yet it is not the true law: it misses {'the shape of the curves' if shape else 'more than noise'}"
+        truth = "the shape of the curves contradicts it" if shape else "the tests contradict it beyond their noise"
     return f"{fit.law.name} {useful}; {truth}"
 
 

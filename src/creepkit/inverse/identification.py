@@ -49,7 +49,9 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 
 @dataclass(frozen=True, eq=False)
-class Identification(Presentable, text="reports.identification_text:identification_text"):
+class Identification(
+    Presentable, text="reports.answer:answer_text", details="reports.identification_text:identification_text"
+):
     """The result of identify().
 
     estimates : one Estimate for each parameter, in the order of the law.
@@ -219,6 +221,14 @@ class Identification(Presentable, text="reports.identification_text:identificati
             point = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
             warn_of_extrapolation(self.ranges, point)
         return self.interval_of(function)
+
+    def activation_energy(self) -> tuple[float, float, float]:
+        """Activation energy -R d ln rate / d(1/T), J/mol, at the reference point with its 95 % interval."""
+        from creepkit.inverse.uncertainty.quantities import activation_energy
+
+        r = self.reference
+        value, low, high = self.interval_of(activation_energy(self.coordinates, r.stress, r.temperature))
+        return float(value), float(low), float(high)
 
     def interval_of(self, function: CoordinateFunction) -> tuple[Floats, Floats, Floats]:
         """Value and 95 % interval, (...,) each, of a function of the coordinates: u (..., parameters) to (...,).

@@ -16,14 +16,23 @@ from creepkit.errors import HistoryError, SolveError, quoted
 from creepkit.readers.column_names import KnownNames
 from creepkit.readers.condition_texts import with_weak_sources
 from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, StatedNumber, errors_located_at
-from creepkit.readers.ends_of_tests import STOPPED, UNCLEAR, ends_in_column
+from creepkit.readers.ends_of_tests import LABEL, NO, RUPTURED, STOPPED, UNCLEAR, YES, ends_in_column, kind_of_column
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
 from creepkit.readers.noise_correlation import read_noise_correlation
 from creepkit.readers.plain_bar import as_plain_bar, modulus_of_ramp
+from creepkit.readers.questions import Question
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table_rows import NumberRows, cells_of
-from creepkit.readers.text_tables import SourceText, TableFrames, TextTable, column_means, how_to_ignore, read_frames
+from creepkit.readers.text_tables import (
+    UNUSED,
+    SourceText,
+    TableFrames,
+    TextTable,
+    column_means,
+    column_question,
+    read_frames,
+)
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, outputs_of_test, specimen_of
 
@@ -77,7 +86,7 @@ def assemble_history(
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
     else:
         elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
-    rupture_time, unruptured = _end_of_test(conditions, frames, used)
+    rupture_time, unruptured = _end_of_test(conditions, frames, used, name)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
     history = History(
         times=frames.times,
@@ -134,10 +143,14 @@ def assemble_without_frames(
     known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
     conditions = StatedConditions(in_standard_keys(entries, known), vocabulary, location)
     rate_known = conditions.states("minimum_rate")
-    time = conditions.take_number("rupture")
+    time, ended, is_end = _time_and_end(conditions, Path(source.partition(" (")[0]), name)
     end = conditions.take_number("end_time")
-    ended = conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
-    _check_end_without_frames(time, end, ended, conditions.labels, location)
+    if is_end:
+        time, end = None, end or time
+    if rate_known and time is None and ended == RUPTURED:  # when it broke is not known
+        conditions.labels.setdefault("ended", ended)
+        ended = ""
+    _check_end_without_frames(time, end, ended, location)
     if not rate_known and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
@@ -170,9 +183,7 @@ def assemble_without_frames(
     return history
 
 
-def _check_end_without_frames(
-    time: StatedNumber | None, end: StatedNumber | None, ended: str, labels: Mapping[str, str], location: str
-) -> None:
+def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | None, ended: str, location: str) -> None:
     """Refuse ends that contradict one another, or say too little."""
     if time is not None and (end is not None or ended == "stopped"):
         other = f"'{end.key}' says when it ended" if end is not None else "the test was stopped"
@@ -181,19 +192,38 @@ def _check_end_without_frames(
         raise HistoryError(f"{location}: the test ruptured, and nothing says when; write rupture_h")
     if ended == "stopped" and end is None:
         raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
-    if time is not None and not ended:
-        _refuse_unbroken(labels, time)
 
 
-def _refuse_unbroken(labels: Mapping[str, str], time: StatedNumber) -> None:
-    """HistoryError where a label says, or may say, that a test did not break that has a rupture time."""
-    for label, text in labels.items():
-        (end,) = ends_in_column(label, [text], {}, False).ends if label != "assumed" else ("",)
-        if end in (STOPPED, UNCLEAR):
-            raise HistoryError(
-                f"{time.location}: '{quoted(label)}' says '{quoted(text)}', and '{time.key}' makes it a test that "
-                "ruptured then; state which holds, as in '# ended: ruptured', or 'stopped' without that time"
-            )
+def _time_and_end(conditions: StatedConditions, path: Path, name: str) -> tuple[StatedNumber | None, str, bool]:
+    """The rupture time, how the test ended, by `ended`, an answer or a label, and whether the time is that of its end.
+
+    A label by which a test did not break makes its time that of its end. What may say so is asked about.
+    """
+    time, ended = conditions.take_number("rupture"), conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
+    answer = conditions.end_terms.get(name.casefold(), "")
+    if ended or answer in END_OF_TEST_TERMS:
+        return time, ended or answer, not ended and answer == STOPPED
+    firm, remarks, unclear = dict[str, str](), dict[str, str](), dict[str, str]()
+    for label, text in conditions.labels.items():
+        kind = kind_of_column(label)
+        if label in ("assumed", "heat", "laboratory", "operator") or (not kind and text.casefold() in YES | NO):
+            continue
+        (end,) = ends_in_column(label, [text], conditions.end_terms, False).ends
+        firmness = firm if kind not in ("", "remark") else remarks
+        (unclear if end == UNCLEAR else firmness)[label] = text if end == UNCLEAR else end
+    said = {end for end in firm.values() if end} or {STOPPED}.intersection(remarks.values())
+    label = next((name for name, end in (firm | remarks).items() if end in said), "")
+    if len(said) > 1:
+        raise HistoryError(f"{conditions.location}: labels say {' and '.join(sorted(said))}; state '# ended: ruptured'")
+    if time is not None and unclear and not said:
+        name, text = next(iter(unclear.items()))
+        what = f"'{quoted(name)}' says '{quoted(text)}', and '{time.key}' that the test broke; which holds?"
+        choices = [{text: STOPPED}, {text: RUPTURED}, {text: LABEL}]
+        raise Question(path, time.location, what, "ended", choices)
+    if said == {STOPPED}:
+        conditions.record_assumption(f"stopped before rupture by its label '{quoted(label)}'")
+        return time, STOPPED, True
+    return time, "".join(said), False
 
 
 def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | None]:
@@ -286,10 +316,8 @@ def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], l
         read_text = ", ".join(sorted(read_columns))
         table = frames.table
         column = next(k for k, name in enumerate(table.columns) if name.startswith(unread[0]))
-        how = how_to_ignore(table.as_written(column))
-        raise HistoryError(
-            f"{location}: a column of {unread[0]} has no meaning beside {read_text}; leave it out: {how}"
-        )
+        what = f"a column of {unread[0]} has no meaning beside {read_text}; is it to stay unread?"
+        raise column_question(table, what, {table.as_written(column): UNUSED})
 
 
 def _elastic(
@@ -348,18 +376,20 @@ def _used_frames(conditions: StatedConditions, frames: TableFrames) -> Bools:
     return used & ~after
 
 
-def _end_of_test(conditions: StatedConditions, frames: TableFrames, used: Bools) -> tuple[float | None, bool]:
+def _end_of_test(
+    conditions: StatedConditions, frames: TableFrames, used: Bools, name: str
+) -> tuple[float | None, bool]:
     """The rupture time, s, if the test ruptured, and whether it was stopped before; neither where nothing is said.
 
     A test that is said to have ruptured, without a time, did so when its last frame was taken.
     """
-    time, ended = conditions.take_number("rupture"), conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
+    time, ended, is_end = _time_and_end(conditions, frames.table.path, name)
+    if is_end:
+        return None, True
     if time is not None and ended == "stopped":
         raise HistoryError(
             f"{time.location}: the test was stopped, and '{time.key}' says when it ruptured; keep one of them"
         )
-    if time is not None and not ended:
-        _refuse_unbroken(conditions.labels, time)
     if time is not None or ended != "ruptured":
         return None if time is None else time.value, ended == "stopped"
     conditions.record_assumption("rupture at the last frame")

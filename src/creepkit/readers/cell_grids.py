@@ -76,6 +76,14 @@ def grid_of_rows(path: Path, sheet: str, rows: Sequence[TableRow]) -> CellGrid:
     return CellGrid(path, sheet, Dialect("\t"), header, kept, None, comments)
 
 
+def with_stated(grid: CellGrid, stated: Mapping[str, tuple[str, str]]) -> CellGrid:
+    """The grid with what a file of answers states of its tests, {key: text and place}, in its head."""
+    for key, (text, place) in stated.items():
+        if key in grid.header and grid.header[key].text != text:
+            raise HistoryError(f"{place}: {key} is '{quoted(text)}', and {grid.header[key].location} says another one")
+    return replace(grid, header={**grid.header, **{key: SourceText(*one) for key, one in stated.items()}})
+
+
 def without_ignored(grid: CellGrid, names_at: int, ignored: Collection[str]) -> CellGrid:
     """The grid without the columns that its key `ignore` names, all of which must be there, and those in `ignored`.
 

@@ -12,9 +12,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from creepkit.errors import HistoryError, quoted
+from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames, unit_suffix
 from creepkit.readers.text_tables import SourceText, TextTable
-from creepkit.readers.vocabulary import split_unit
+from creepkit.readers.vocabulary import HeaderVocabulary, split_unit
 from creepkit.records.quantities import LENGTH
 
 _NUMBER = r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?"
@@ -88,6 +89,13 @@ def conditions_in_text(text: str, place: str, known: KnownNames) -> list[SourceT
         if quantity:
             found.setdefault(quantity, []).extend([f"{match[1]} {match[2]}"] * (1 + is_range))
     return [SourceText(values[0], place, key=name) for name, values in found.items() if len(values) == 1]
+
+
+def sources_of_names(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[SourceText]:
+    """What the names of sheet and file state of a test."""
+    known, path = KnownNames.of(vocabulary), grid.path
+    sheet = conditions_in_text(grid.sheet, f"{path}, name of sheet '{grid.sheet}'", known) if grid.sheet else []
+    return [*sheet, *conditions_in_text(path.stem, f"{path}, name of the file", known)]
 
 
 def with_weak_sources(

@@ -14,6 +14,7 @@ from typing import TypeVar
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
 from creepkit.readers.column_names import unit_suffix
+from creepkit.readers.ends_of_tests import INTERRUPTED, STOPPED, UNCLEAR, MarkedTime, end_said_by, marked_time
 from creepkit.readers.text_tables import SourceText
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
@@ -90,7 +91,7 @@ class StatedConditions:
         self.default_specimen = vocabulary.default_texts.get("specimen", "")
         self._kinds = self.terms.condition_kinds
         self._text_keys = self.terms.text_keys
-        self._end_of_test_terms = {**{word: word for word in END_OF_TEST_TERMS}, **vocabulary.end_of_test_terms}
+        self.end_terms = {word.casefold(): end for word, end in vocabulary.end_of_test_terms.items()}
         self._numbers: dict[str, StatedNumber] = {}
         self._texts: dict[str, SourceText] = {}
         self._assumptions: list[str] = []
@@ -201,9 +202,10 @@ class StatedConditions:
             _put_once(self.labels, rest.strip(), entry.text, entry.location)
         elif word.casefold() == "geometry" and rest.strip():
             _put_once(self.geometry, *_specimen_dimension(rest.strip(), entry, self.terms), entry.location)
-        elif name == "ended" or (result and result[0] == "rupture" and entry.text in self._end_of_test_terms):
-            ended = replace(entry, text=self._end_of_test_terms.get(entry.text, entry.text))
-            _put_once(self._texts, "ended", ended, entry.location)
+        elif name == "ended":
+            _put_once(self._texts, "ended", replace(entry, text=self._end(entry.text)), entry.location)
+        elif result and result[0] == "rupture" and (mark := marked_time(entry.text, self.end_terms)).said != "":
+            self._put_marked(mark, result[1], entry, entry.key or key)
         elif name == "specimen":
             self._name_specimen(entry)
         elif name == "control":
@@ -223,6 +225,22 @@ class StatedConditions:
             _put_once(self._numbers, result[0], number, entry.location)
             self._locations[result[0]] = entry.location
         return True
+
+    def _end(self, text: str) -> str:
+        """A word for how the test ended as one of END_OF_TEST_TERMS, where it is understood."""
+        said = self.end_terms.get(text.casefold()) or end_said_by(text)
+        return {INTERRUPTED: STOPPED, UNCLEAR: text, "": text}.get(said, said)
+
+    def _put_marked(self, mark: MarkedTime, unit: str, entry: SourceText, key: str) -> None:
+        """Put a rupture time that is marked as a run-out, or a word in its place."""
+        if mark.said == STOPPED or not mark.number:
+            _put_once(self._texts, "ended", replace(entry, text=self._end(mark.said)), entry.location)
+        if mark.number:
+            quantity = "end_time" if mark.said == STOPPED else "rupture"
+            text = mark.number if mark.said != UNCLEAR else entry.text
+            number = self._stated_number((quantity, unit), key, replace(entry, text=text))
+            _put_once(self._numbers, quantity, number, entry.location)
+            self._locations[quantity] = entry.location
 
     def _name_specimen(self, entry: SourceText) -> None:
         """A text that is no name, such as `Round bar, 6 mm`, is a label, unless it is a misspelt name."""

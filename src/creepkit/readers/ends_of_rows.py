@@ -8,18 +8,21 @@ from dataclasses import dataclass, replace
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing
-from creepkit.readers.column_names import split_written_name, unit_suffix
+from creepkit.readers.column_names import split_written_name
 from creepkit.readers.columns_of_tests import TIME_TO_STRAIN, kind_of, quantity_of, unit_of
 from creepkit.readers.ends_of_tests import (
     LABEL,
     RUPTURED,
     STOPPED,
+    TIME_IN_CELL,
     UNCLEAR,
     EndsOfColumn,
+    MarkedTime,
     end_said_by,
     ends_in_column,
     kind_of_column,
     legend_in,
+    marked_time,
 )
 from creepkit.readers.questions import Question
 from creepkit.readers.tables_of_tests import TestRow, TestTable
@@ -29,61 +32,16 @@ from creepkit.records.quantities import TIME
 
 
 @dataclass(frozen=True)
-class MarkedTime:
-    """A time with what its mark says: RUPTURED, STOPPED, UNCLEAR or ""; number : "" where a word takes its place."""
-
-    number: str
-    said: str
-    mark: str = ""
-
-
-@dataclass(frozen=True)
 class RowEnd:
-    """How the test of a row ended, by its columns, "" where none says it, and by the mark of its time."""
+    """How the test of a row ended, by its columns, "" where none says it, and by the mark of its time.
+
+    is_open : whether that is asked for.
+    """
 
     stated: str
     mark: MarkedTime
     assumptions: tuple[str, ...] = ()
-
-
-_TIME = re.compile(
-    r"(?P<before>[^\d+-]*?)\s*(?P<number>[+-]?\d[\d.,]*(?:[eEdD][+-]?\d+)?|[+-]?[.,]\d+)\s*(?P<after>[^\d].*)?",
-    re.DOTALL,
-)
-_LONGER = re.compile(
-    r"[>≥＞⩾]=?|=>|over|above|more than|greater than|longer than|at least|über|ueber|mehr als|länger als|mind\.?"
-    r"|mindestens|plus de|supérieure? à|au moins",
-    re.IGNORECASE,
-)
-_GOES_ON = re.compile(r"[+→⇒➔>]|->|-->|=>|\.\.\.|…|ff\.?")
-
-
-def marked_time(text: str, answers: Mapping[str, str]) -> MarkedTime:
-    """A cell of times: a number, marked as a run-out or not, or a word.
-
-    answers : {sign or text in small letters: end}.
-    """
-    whole = " ".join(text.split())
-    match = _TIME.fullmatch(whole)
-    if match is None:
-        return MarkedTime("", answers.get(whole.casefold()) or end_said_by(whole) or UNCLEAR, whole)
-    before, number, after = match["before"] or "", match["number"], (match["after"] or "").strip()
-    after = after if unit_suffix(after.split(" ")[0].rstrip(".,;()")) not in TIME.units else after.partition(" ")[2]
-    if before.strip("([ ") == "" and before:
-        before, after = "", "()" + after.replace(")", "").replace("]", "").strip()
-    before = before.strip()
-    if not before and not after:
-        return MarkedTime(number, "")
-    mark = before or after
-    if (said := answers.get(mark.casefold()) or answers.get(whole.casefold())) is not None:
-        return MarkedTime(number, "" if said == LABEL else said, mark)
-    if _LONGER.fullmatch(before) and (not after or end_said_by(after) != RUPTURED):
-        return MarkedTime(number, STOPPED, mark)
-    if not before and _GOES_ON.fullmatch(after):
-        return MarkedTime(number, STOPPED, mark)
-    said = {STOPPED: STOPPED, "interrupted": STOPPED, RUPTURED: RUPTURED}.get(end_said_by(after), "")
-    codes = {"ro": STOPPED, "nb": STOPPED, "nr": STOPPED, "nf": STOPPED}
-    return MarkedTime(number, said or codes.get(after.strip("() ").casefold(), UNCLEAR), mark)
+    is_open: bool = False
 
 
 _SAYS_NO_END = (
@@ -140,7 +98,8 @@ def ends_of_rows(
         notes = [f"ended {known} (empty cell)"] * is_open
         if STOPPED in said and mark.said != STOPPED and not firm and named[r] == "":
             notes.append("stopped before rupture by its remark")
-        ends.append(RowEnd("".join(said) if len(said) == 1 else "", mark, tuple(notes)))
+        is_asked = len(said) != 1 and UNCLEAR in (mark.said, *(one.ends[r] for one in found.values()))
+        ends.append(RowEnd("".join(said) if len(said) == 1 else "", mark, tuple(notes), is_asked))
     if time is not None or duration is not None:
         errors += [_asked_of_column(table, k, one, time) for k, one in found.items() if one.asked]
     if time is not None and (doubtful := [r for r, mark in enumerate(marks) if mark.said == UNCLEAR]):
@@ -166,7 +125,7 @@ MOST_ASKED = 6
 def _asked_of_column(table: TestTable, k: int, column: EndsOfColumn, time: int | None) -> Question:
     """The question of what the texts of a column say of the end."""
     rows = [r for r, end in enumerate(column.ends) if end == UNCLEAR]
-    texts = [text.casefold() if len(text) < 4 else text for text in column.asked[:MOST_ASKED]]
+    texts = list(column.asked[:MOST_ASKED])
     more = f" and {len(column.asked) - len(texts)} more" if len(column.asked) > len(texts) else ""
     listed = " and ".join(f"'{quoted(text, 60)}'" if text else "an empty cell" for text in column.asked[:MOST_ASKED])
     flags = [text for text in texts if text]
@@ -192,7 +151,7 @@ def _likely_unbroken(table: TestTable, column: int, texts: Sequence[str], time: 
 
     def times(text: str) -> list[float]:
         rows = [row for row in table.rows if row.cells[column].casefold() == text.casefold()]
-        cells = [_TIME.fullmatch(row.cells[time]) for row in rows] if time is not None else []
+        cells = [TIME_IN_CELL.fullmatch(row.cells[time]) for row in rows] if time is not None else []
         return [float(one["number"].replace(",", ".")) for one in cells if one and one["number"].count(".") < 2]
 
     def rank(text: str) -> tuple[bool, float]:

@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 from creepkit.files.delimited_text import is_missing
+from creepkit.readers.column_names import unit_suffix
+from creepkit.records.quantities import TIME
 
 RUPTURED, STOPPED, INTERRUPTED, UNCLEAR = "ruptured", "stopped", "interrupted", "unclear"
 """What a text says of the end. INTERRUPTED: it stopped, for good or for a while. UNCLEAR: of both, or of neither."""
@@ -319,7 +321,7 @@ def ends_in_column(name: str, cells: Sequence[str], answers: Mapping[str, str], 
     ends, asked = list[str](), dict[str, None]()
     for text in texts:
         end = meanings.get(text.casefold(), UNCLEAR)
-        if end == UNCLEAR and kind == "remark" and others_decide:
+        if end == UNCLEAR and kind in ("remark", "") and others_decide:
             end = ""
         if end == UNCLEAR:
             asked[text] = None
@@ -359,3 +361,58 @@ def _meaning_of_text(kind: str, text: str) -> str:
     if kind == "remark":
         return UNCLEAR if said == INTERRUPTED else said or ("" if is_neutral(text) else UNCLEAR)
     return {STOPPED: STOPPED, INTERRUPTED: UNCLEAR, UNCLEAR: UNCLEAR}.get(said, "")
+
+
+# ---- marks of times ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class MarkedTime:
+    """A time with what its mark says: RUPTURED, STOPPED, UNCLEAR or ""; number : "" where a word takes its place."""
+
+    number: str
+    said: str
+    mark: str = ""
+
+
+TIME_IN_CELL = re.compile(
+    r"(?P<before>[^\d+-]*?)\s*(?P<number>[+-]?\d[\d.,]*(?:[eEdD][+-]?\d+)?|[+-]?[.,]\d+)\s*(?P<after>[^\d].*)?",
+    re.DOTALL,
+)
+"""A number in a cell of times, with what stands before and behind it."""
+
+
+_LONGER = re.compile(
+    r"[>≥＞⩾]=?|=>|over|above|more than|greater than|longer than|at least|über|ueber|mehr als|länger als|mind\.?"
+    r"|mindestens|plus de|supérieure? à|au moins",
+    re.IGNORECASE,
+)
+_ONWARDS = re.compile(r"[+→⇒➔>]|->|-->|=>|\.\.\.|…|ff\.?")
+
+
+def marked_time(text: str, answers: Mapping[str, str]) -> MarkedTime:
+    """A cell of times: a number, marked as a run-out or not, or a word.
+
+    answers : {sign or text in small letters: end}.
+    """
+    whole = " ".join(text.split())
+    match = TIME_IN_CELL.fullmatch(whole)
+    if match is None:
+        return MarkedTime("", answers.get(whole.casefold()) or end_said_by(whole) or UNCLEAR, whole)
+    before, number, after = match["before"] or "", match["number"], (match["after"] or "").strip()
+    after = after if unit_suffix(after.split(" ")[0].rstrip(".,;()")) not in TIME.units else after.partition(" ")[2]
+    if before.strip("([ ") == "" and before:
+        before, after = "", "()" + after.replace(")", "").replace("]", "").strip()
+    before = before.strip()
+    if not before and not after:
+        return MarkedTime(number, "")
+    mark = before or after
+    if (said := answers.get(mark.casefold()) or answers.get(whole.casefold())) is not None:
+        return MarkedTime(number, "" if said == LABEL else said, mark)
+    if _LONGER.fullmatch(before) and (not after or end_said_by(after) != RUPTURED):
+        return MarkedTime(number, STOPPED, mark)
+    if not before and _ONWARDS.fullmatch(after):
+        return MarkedTime(number, STOPPED, mark)
+    said = {STOPPED: STOPPED, "interrupted": STOPPED, RUPTURED: RUPTURED}.get(end_said_by(after), "")
+    codes = {"ro": STOPPED, "nb": STOPPED, "nr": STOPPED, "nf": STOPPED}
+    return MarkedTime(number, said or codes.get(after.strip("() ").casefold(), UNCLEAR), mark)

@@ -34,13 +34,12 @@ from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid
-from creepkit.readers.column_names import KnownNames
-from creepkit.readers.condition_texts import conditions_in_text
+from creepkit.readers.condition_texts import sources_of_names
 from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.noise_correlation import noise_correlation_text
 from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
 from creepkit.readers.text_grids import peek_grid, read_head_alone, read_text_grid
-from creepkit.readers.text_tables import SourceText, TextTable
+from creepkit.readers.text_tables import TextTable
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
     CUT_LABEL,
@@ -137,19 +136,12 @@ def histories_of_tests(
         unique = f"{grid.sheet}/{name}" if len(set(names)) < len(names) and grid.sheet else name
         parts = [f"sheet {grid.sheet}"] * bool(grid.sheet) + [test.name] * bool(test.name)
         source = f"{path} ({', '.join(parts)})" if parts and len(found) > 1 else str(path)
-        table = replace(test.table, sources=(*test.table.sources, *_sources_of_names(path, grid, vocabulary)))
+        table = replace(test.table, sources=(*test.table.sources, *sources_of_names(grid, vocabulary)))
         history = assemble_history(unique, test.entries, table, vocabulary, location=grid.place, source=source)
         if grid.cut is not None and _holds_number(test.table, grid.cut):
             history = history.replace(labels={**history.labels, CUT_LABEL: str(grid.cut)})
         histories.append(history)
     return histories
-
-
-def _sources_of_names(path: Path, grid: CellGrid, vocabulary: HeaderVocabulary) -> list[SourceText]:
-    """What the names of sheet and file state of a test."""
-    known = KnownNames.of(vocabulary)
-    sheet = conditions_in_text(grid.sheet, f"{path}, name of sheet '{grid.sheet}'", known) if grid.sheet else []
-    return [*sheet, *conditions_in_text(path.stem, f"{path}, name of the file", known)]
 
 
 def _holds_number(table: TextTable, number: CutNumber) -> bool:

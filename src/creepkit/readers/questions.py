@@ -47,7 +47,8 @@ class Question(HistoryError):
         self.path, self.place, self.sentence, self.key = path, place, sentence, key
         self.choices, self.is_free = tuple(choices), is_free
         others = " or ".join(self.entry(choice) for choice in self.choices[1:])
-        under = f"rite into {ANSWERS_FILE} beside it: [{toml_key_in_quotes(path.name)}] {self.entry(self.choices[0])}"
+        first = self.entry(self.choices[0]) if self.choices else f"{key} = ..."
+        under = f"rite into {ANSWERS_FILE} beside it: [{toml_key_in_quotes(path.name)}] {first}"
         joined = f"{sentence} W" if sentence.endswith("?") else f"{sentence}; w"
         super().__init__(f"{place}: {joined}{under}{f' (or {others})' if others else ''}")
 

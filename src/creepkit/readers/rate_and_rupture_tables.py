@@ -23,7 +23,7 @@ from pathlib import Path
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
-from creepkit.readers.column_names import split_written_name, unit_suffix, words_of
+from creepkit.readers.column_names import KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.columns_of_tests import (
     NAMES,
     QUANTITIES,
@@ -35,9 +35,11 @@ from creepkit.readers.columns_of_tests import (
     quantity_of,
     unit_of,
 )
-from creepkit.readers.ends_of_rows import MOST_ASKED, RowEnd, assumed_of_empty, ends_of_rows, marked_time, with_end
-from creepkit.readers.ends_of_tests import LABEL, NO, STOPPED, YES, kind_of_column
+from creepkit.readers.condition_texts import with_weak_sources
+from creepkit.readers.ends_of_rows import MOST_ASKED, RowEnd, assumed_of_empty, ends_of_rows, with_end
+from creepkit.readers.ends_of_tests import LABEL, NO, STOPPED, YES, kind_of_column, marked_time
 from creepkit.readers.questions import Question, collected, raise_all
+from creepkit.readers.standard_names import in_standard_keys, specimen_named
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.tables_of_tests import (
     SPREADSHEET_SUFFIXES,
@@ -95,6 +97,8 @@ class RowPerTestReader:
                 table = _without_silent_rows(table, keys)
             ends = ends_of_rows(table, keys, self.vocabulary, errors)
             for row, end in zip(table.rows, ends, strict=True):
+                if end.is_open and errors:
+                    continue
                 history = collected(errors, partial(self._history, table, row, keys, end))
                 if history is not None and history.name in places:
                     errors.append(
@@ -116,8 +120,10 @@ class RowPerTestReader:
         frames, not_reached = _strains_reached(cells)
         cells = {key: entry for key, entry in cells.items() if not key.startswith(TIME_TO_STRAIN)}
         entries = {**table.header, **row.stated, **with_end(cells, end, location)}
+        entries, of_names = self._with_weak_sources(table, entries)
         empty = [quantity_of(keys[k]) for k, cell in enumerate(row.cells) if is_missing(cell)]
         assumptions = [*table.assumptions, *(assumed_of_empty(one, entries) for one in empty), *end.assumptions]
+        assumptions += of_names
         assumptions += [f"{quantity_of(keys[k])} of the row above (empty cell)" for k in row.filled] + not_reached
         if grid.cut is not None and grid.cut.line == row.line:
             assumptions.append(
@@ -137,6 +143,16 @@ class RowPerTestReader:
         rows = [TableRow(row.line, (repr(time), repr(strain))) for time, strain in frames]
         text = TextTable(grid.path, {}, ("time_s", "strain_1"), row.line, rows, sheet=grid.sheet)
         return assemble_history(name, entries, text, self.vocabulary, location=location, source=source)
+
+    def _with_weak_sources(
+        self, table: TestTable, entries: Mapping[str, SourceText]
+    ) -> tuple[dict[str, SourceText], list[str]]:
+        """The entries of a row with what titles and the names of sheet and file state beside them."""
+        known = KnownNames.of(self.vocabulary, specimen_named(entries, self.vocabulary))
+        quantities = {key_of_column(name)[0] for name in table.names}
+        sources = tuple(one for one in table.sources if one.key not in quantities)
+        text = TextTable(table.grid.path, {}, (), table.line, (), sources=sources)
+        return with_weak_sources(in_standard_keys(entries, known), text, known)
 
 
 TEST_TABLE = RowPerTestReader(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import gc
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from glob import glob
 from pathlib import Path
 from typing import Any, cast
@@ -16,8 +17,10 @@ from creepkit.hookspecs import hookimpl
 from creepkit.readers.creep_schema_json import CREEP_SCHEMA
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
+from creepkit.readers.questions import ANSWERS_FILE, collected, raise_all
 from creepkit.readers.rate_and_rupture_tables import TEST_TABLE
 from creepkit.readers.spreadsheets import SPREADSHEET
+from creepkit.readers.tests_file import answers_of
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, Reader, accepts_path, histories_in
 
@@ -50,12 +53,26 @@ def read_histories(
         readers = [_reader_named(reader, readers)]
     readers = [reader_without(ignore, one) for one in readers] if ignore else readers
     read: dict[tuple[str, str], tuple[Path, History]] = {}
+    errors = list[HistoryError]()
     for path in _existing_paths(paths):
         for source in _readable_paths(path, readers):
-            for history in _histories_in(_reader_of(source, readers), source):
+            found = collected(errors, partial(_histories_of, source, readers))
+            for history in found or ():
                 _check_printable(history, source)
                 read.setdefault((history.source or str(source), history.name), (source, history))
+    raise_all(errors)
     return _with_unique_names(list(read.values()))
+
+
+def _histories_of(source: Path, readers: Sequence[Reader]) -> list[History]:
+    answered = _with_answers(source, readers)
+    return _histories_in(_reader_of(source, answered), source)
+
+
+def _with_answers(path: Path, readers: Sequence[Reader]) -> Sequence[Reader]:
+    """The readers with what the file of answers beside a path says of it."""
+    answers = answers_of(path)
+    return [_with_vocabulary(one, answers.added_to) for one in readers] if answers else readers
 
 
 def _check_printable(history: History, path: Path) -> None:
@@ -73,10 +90,14 @@ def reader_without(ignored: Collection[str], reader: Reader) -> Reader:
         raise HistoryError(
             f"ignore is {quoted(repr(ignored), 60)}; give a list of names of columns, such as ['load_kN', 'date']"
         )
+    return _with_vocabulary(reader, lambda vocabulary: replace(vocabulary, ignored=tuple(ignored)))
+
+
+def _with_vocabulary(reader: Reader, changed: Callable[[HeaderVocabulary], HeaderVocabulary]) -> Reader:
     vocabulary = getattr(reader, "vocabulary", None)
     if not hasattr(reader, "__dataclass_fields__") or not isinstance(vocabulary, HeaderVocabulary):
         return reader
-    return cast(Reader, replace(cast(Any, reader), vocabulary=replace(vocabulary, ignored=tuple(ignored))))
+    return cast(Reader, replace(cast(Any, reader), vocabulary=changed(vocabulary)))
 
 
 def _reader_named(name: str, readers: Sequence[Reader]) -> Reader:
@@ -116,7 +137,8 @@ def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
     except OSError as error:
         raise HistoryError(f"{path}: the folder cannot be read ({error.strerror}); name another one") from None
     visible = [file for file in entries if file.is_file() and file.name[0] != "."]
-    files = [file for file in visible if any(accepts_path(reader, file) for reader in readers)]
+    visible = [file for file in visible if file.name != ANSWERS_FILE]
+    files = [file for file in visible if any(accepts_path(reader, file) for reader in _with_answers(file, readers))]
     return files or [path]
 
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing, is_number
-from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
+from creepkit.readers.cell_grids import CellGrid, table_of, with_stated, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, words_of
 from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
 from creepkit.readers.table_heads import (
@@ -74,6 +74,7 @@ class Layout:
 
 def tests_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
     """The tests of a grid; HistoryError, in one sentence, where it cannot be told how it is laid out."""
+    grid = with_stated(grid, vocabulary.stated)
     stated = grid.header.get("specimen")
     known = KnownNames.of(vocabulary, stated.text if stated else "")
     names_at = row_of_names(grid, known)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from creepkit.readers.cell_grids import CellGrid
@@ -13,6 +13,7 @@ from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.rate_and_rupture_tables import TEST_TABLE, columns_of_tests
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
 from creepkit.readers.table_layouts import names_time, tests_in
+from creepkit.readers.tests_file import answers_of
 from creepkit.readers.text_grids import read_text_grid
 from creepkit.readers.vocabulary import HeaderVocabulary
 
@@ -37,8 +38,8 @@ def summarise_tables(path: Path, ignored: Collection[str] = ()) -> list[TableSum
 
     ignored : columns that are left out.
     """
-    vocabulary = HeaderVocabulary(ignored=ignored)
-    if TEST_TABLE.accepts(path):
+    vocabulary = answers_of(path).added_to(HeaderVocabulary(ignored=ignored))
+    if replace(TEST_TABLE, vocabulary=vocabulary).accepts(path):
         return [
             TableSummary(str(path), "", "", {name: key_of_column(name)[0] or name for name in names}, rows)
             for names, rows in columns_of_tests(path, vocabulary)

@@ -13,12 +13,12 @@ from creepkit.files.delimited_text import Dialect, is_missing, is_number
 from creepkit.readers.cell_grids import CellGrid, without_ignored
 from creepkit.readers.column_names import KnownNames, split_written_name
 from creepkit.readers.columns_of_tests import TestTableHead, head_of_tests, is_number_like, only_text
+from creepkit.readers.condition_texts import conditions_in_text, sources_of_names
 from creepkit.readers.questions import Question
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.text_grids import read_text_grid
 from creepkit.readers.text_tables import SourceText
 from creepkit.readers.vocabulary import HeaderVocabulary, plain_name
-from creepkit.records.quantities import TEMPERATURE
 
 TEXT_SUFFIXES, SPREADSHEET_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc"), (".xlsx", ".xlsm")
 
@@ -43,7 +43,7 @@ class TestTable:
 
     names : of the columns, as written, with their units. line : in which they stand. header : what holds for all tests.
     notes : titles and remarks around the table. assumptions : what was assumed of it. positions : of its columns in the
-    file, from 0.
+    file, from 0. sources : conditions in titles and in the names of sheet and file.
     """
 
     grid: CellGrid
@@ -54,6 +54,7 @@ class TestTable:
     notes: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
     positions: tuple[int, ...] = ()
+    sources: tuple[SourceText, ...] = ()
 
     def location(self, line: int) -> str:
         """Where a row stands."""
@@ -122,7 +123,7 @@ def _table(grid: CellGrid, head: TestTableHead, vocabulary: HeaderVocabulary, as
     tests, stated = list[TestRow](), dict[str, SourceText]()
     for row in body:
         if text := only_text(row, grid.dialect):
-            stated = conditions_of_group(text, grid.location(row.line))
+            stated = conditions_of_group(text, grid.location(row.line), known)
         else:
             cells = _cells_of_width(row, width, grid)
             if any(cells[k] for k in range(width) if names[k]):
@@ -136,7 +137,14 @@ def _table(grid: CellGrid, head: TestTableHead, vocabulary: HeaderVocabulary, as
     return TestTable(
         *(grid, columns, line, rows_of_tests, header, tuple(notes), (*grid.remarks, *aside)),
         tuple(positions[k] if k < len(positions) else k for k in kept),
+        (*_sources(rows[: head.first], grid, known), *sources_of_names(grid, vocabulary)),
     )
+
+
+def _sources(above: Sequence[TableRow], grid: CellGrid, known: KnownNames) -> list[SourceText]:
+    """Conditions in titles above a table."""
+    titles = [(row.line, only_text(row, grid.dialect)) for row in above]
+    return [one for line, text in titles for one in conditions_in_text(text, grid.location(line), known)]
 
 
 def _cells_of_width(row: TableRow, width: int, grid: CellGrid) -> tuple[str, ...]:
@@ -188,18 +196,9 @@ def _around(grid: CellGrid, above: Sequence[TableRow], known: KnownNames) -> tup
     return header, notes
 
 
-_VALUE = re.compile(r"([+-]?\d[\d.,]*)\s*(°\s?[CF]|[CFK]|MPa|ksi|psi|N/mm[2²])(?![\w²])")
-
-
-def conditions_of_group(text: str, place: str) -> dict[str, SourceText]:
+def conditions_of_group(text: str, place: str, known: KnownNames) -> dict[str, SourceText]:
     """What a row of its own says of the tests below it: stress and temperature, or else a label of the group."""
-    found: dict[str, SourceText] = {}
-    for number, unit in _VALUE.findall(text):
-        symbol = unit.replace("°", "").strip()
-        quantity = "temperature" if symbol in TEMPERATURE.units else "stress"
-        found[f"{quantity}_{'MPa' if symbol.startswith('N/') else symbol}"] = SourceText(
-            number.replace(",", "."), place
-        )
+    found = {one.key: SourceText(one.text, place) for one in conditions_in_text(text, place, known)}
     return found or {"label group": SourceText(text, place)}
 
 

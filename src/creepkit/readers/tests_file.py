@@ -26,15 +26,14 @@ from typing import Any
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.reading import FileKind, read_text
-from creepkit.readers.column_names import KnownNames
+from creepkit.readers.column_names import KnownNames, NameTable, split_written_name
+from creepkit.readers.columns_of_tests import NAMES
 from creepkit.readers.ends_of_tests import LABEL, RUPTURED, STOPPED
 from creepkit.readers.questions import ANSWERS_FILE, raise_all
+from creepkit.readers.text_tables import UNUSED
 from creepkit.readers.vocabulary import HeaderVocabulary
 
 ANSWERS = FileKind("answers about tests", HistoryError, "correct or remove it", maximum_bytes=1_000_000)
-
-UNUSED = "unused"
-"""What `columns` says of a column that stays unread."""
 
 _ENDS = (RUPTURED, STOPPED, LABEL)
 
@@ -57,7 +56,9 @@ class Answers:
         """The vocabulary of a reader with the answers."""
         ignored = tuple(name for name, meaning in self.columns.items() if meaning == UNUSED)
         labels = tuple(name for name, meaning in self.columns.items() if meaning == LABEL)
-        synonyms = {n: m for n, m in self.columns.items() if m not in (UNUSED, LABEL)}
+        names = NameTable({**KnownNames.of(vocabulary).columns.kinds, **NAMES.kinds})
+        meant = {name: what for name, what in self.columns.items() if what not in (UNUSED, LABEL)}
+        synonyms = {name: names.standard(_with_unit(what, name, names)) for name, what in meant.items()}
         return replace(
             vocabulary,
             synonyms={**vocabulary.synonyms, **synonyms},
@@ -66,6 +67,12 @@ class Answers:
             end_of_test_terms={**vocabulary.end_of_test_terms, **self.ended},
             stated={**vocabulary.stated, **self.stated},
         )
+
+
+def _with_unit(what: str, written: str, names: NameTable) -> str:
+    """What a column is, with the unit that it has as it is written, where the answer has none."""
+    unit = split_written_name(written)[1]
+    return f"{what} ({unit})" if what in names.kinds and unit else what
 
 
 def answers_of(path: Path) -> Answers:
@@ -118,10 +125,9 @@ def _problem(key: str, value: Any, known: KnownNames) -> str:
         values = list(value.values()) if isinstance(value, dict) else [value]
         wrong = [one for one in values if one not in (_ENDS if isinstance(value, dict) else _ENDS[:2])]
         return f"'{quoted(wrong[0])}' is no end; allowed: {', '.join(_ENDS)}" if wrong else ""
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        return "write a number or a text"
     if known.is_condition(key):
-        return ""
+        is_single = isinstance(value, (str, int, float)) and not isinstance(value, bool)
+        return "" if is_single else "write a number or a text"
     near = get_close_matches(key, ["columns", "ended"], 1)
     meant = near[0] if near else known.terms.suggestion(key)
     allowed = "allowed are columns, ended, and conditions as in the head of a file, such as stress_MPa or specimen"

@@ -18,6 +18,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_missing, is_number, parse_number, parse_numbers
 from creepkit.readers.column_names import NameTable, split_written_name
+from creepkit.readers.questions import Question
 from creepkit.readers.table_rows import NumberRows, TableRow, cells_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records.quantities import QuantityKind
@@ -193,9 +194,10 @@ def read_frames(
             written = table.as_written(k)
             quantity, suffix = _parsed_column(table, k, vocabulary.synonyms.get(name, name), kinds)
             if quantity in values:
-                raise HistoryError(
-                    f"{table.location(table.columns_line)}: '{found[quantity]}' and '{written}' both hold the "
-                    f"{quantity}; keep one and leave the other out: {how_to_ignore(written)}"
+                raise column_question(
+                    table,
+                    f"'{found[quantity]}' and '{written}' both hold the {quantity}; which counts?",
+                    *({one: UNUSED} for one in (written, found[quantity])),
                 )
             values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
             if quantity == "used":
@@ -221,9 +223,14 @@ def unknown_text(quantity: str) -> str:
     return f"{quantity} unknown (empty cell)"
 
 
-def how_to_ignore(column: str) -> str:
-    """How to have a column left out."""
-    return f"write '# ignore: {column}' above, or read it with --ignore '{column}'"
+UNUSED = "unused"
+"""What an answer says of a column that stays unread."""
+
+
+def column_question(table: TextTable, sentence: str, *choices: dict[str, str]) -> Question:
+    """The question of what columns of a table are; choices : {column: what it is}, the likely one first."""
+    place = table.location(table.columns_line)
+    return Question(table.path, place, sentence, "columns", choices, is_free=True)
 
 
 def _parsed_column(table: TextTable, k: int, name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:
@@ -234,20 +241,21 @@ def _parsed_column(table: TextTable, k: int, name: str, kinds: Mapping[str, Quan
         unit = split_written_name(written)[1]
         sensor, names = _sensor(written, kinds), table.written or table.columns
         others = [other for other in names if other != written and sensor and _sensor(other, kinds) == sensor]
-        way_out = how_to_ignore(written)
+        measured = f"{sensor} ({unit})" if unit else sensor
         if others:
-            raise HistoryError(
-                f"{location}: '{written}' and '{others[0]}' seem to be several sensors of the {sensor}; name the one "
-                f"that counts '{sensor}{unit and f' ({unit})'}', and leave the others out: {how_to_ignore(others[0])}"
-            )
+            counts = [
+                {one: measured, **{o: UNUSED for o in (written, *others) if o != one}} for one in (written, *others)
+            ]
+            what = f"'{written}' and '{others[0]}' seem to be several sensors of the {sensor}; which counts?"
+            raise column_question(table, what, *counts[:3])
         if sensor and sensor not in {(split_unit(other, kinds) or ("",))[0] for other in table.columns}:
-            raise HistoryError(
-                f"{location}: '{written}' seems to be a sensor of the {sensor}; name it "
-                f"'{sensor}{unit and f' ({unit})'}', or leave it out: {way_out}"
-            )
+            what = f"'{written}' seems to be a sensor of the {sensor}; is it?"
+            raise column_question(table, what, {written: measured}, {written: UNUSED})
         near = get_close_matches(written, kinds, 1, cutoff=0.55)
-        meant = f"did you mean '{near[0]}'? Else" if near else "name it as creepkit does, or"
-        raise HistoryError(f"{location}: column '{written}' is not understood; {meant} leave it out: {way_out}")
+        meant = f"column '{written}' is not understood; " + (
+            f"did you mean '{near[0]}'?" if near else "what does it hold?"
+        )
+        raise column_question(table, meant, *({written: f"{one} ({unit})"} for one in near), {written: UNUSED})
     quantity, suffix = result
     kinds[quantity].unit(suffix, location, written)
     return result

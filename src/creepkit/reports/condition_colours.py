@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-MOST_NAMED_TESTS = 10
-"""Up to this many tests have a colour and a name each; more are coloured by condition, in a panel for each group."""
-
-
 MOST_GROUPS = 12
 """Panels of groups of tests at most."""
 

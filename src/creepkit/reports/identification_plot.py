@@ -11,20 +11,12 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records import is_logarithmic
-from creepkit.reports.condition_colours import (
-    MOST_NAMED_TESTS,
-    condition_groups,
-    distinct_colours,
-    stress_scale,
-    temperature_scale,
-)
+from creepkit.reports.condition_colours import condition_groups, stress_scale, temperature_scale
 from creepkit.reports.curve_of_test import TestCurve, axis_label, curve_of_test, line_style, set_time_range
 from creepkit.reports.figures import empty_figure, save_figure, set_range, wrapped
 from creepkit.reports.identification_text import rupture_rows
-from creepkit.reports.load_programs import label_of
 from creepkit.reports.prediction_bands import FittedCurves, fitted_curves
 from creepkit.reports.rate_panels import draw_rates, draw_ruptures
-from creepkit.reports.residual_panels import draw_titled_residuals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,27 +37,29 @@ DOTS_ABOVE_LINES = 100
 """Up to so many frames lie above the identified curve; more would hide it."""
 
 
+SUMMARY_WIDTH, CURVES_HEIGHT, PANELS_HEIGHT = 8.6, 3.6, 2.9
+"""Inches of the figure of an answer and of its rows."""
+
+
+MOST_IN_ONE_PANEL = 24
+"""Tests."""
+
+
 COLUMNS = (3, 4, 5)
 """Panels of groups of tests side by side, whichever leaves the fewest places empty."""
 
 
 def identification_figure(fit: Identification, path: str | Path | None = None) -> Figure:
-    """Draw the tests over time with bands, their residuals, creep rates over stress, and times to rupture.
+    """Draw the tests over time with bands, creep rates over stress, and times to rupture.
 
-    Up to MOST_NAMED_TESTS tests are named below the panels; more have a panel for each group of conditions, and
-    colours by condition.
+    More tests than MOST_IN_ONE_PANEL have a panel for each group of conditions.
     """
-    curves = fitted_curves(fit)
-    draw = _few_tests if len(fit.histories) <= MOST_NAMED_TESTS else _many_tests
-    figure = draw(fit, curves)
-    headline = f"{fit.law.title or fit.law.name}: {len(fit.histories)} test{'s' if len(fit.histories) > 1 else ''}"
-    adequacy = getattr(fit, "adequacy", None)
-    title = headline if adequacy is None else f"{headline}\n{adequacy}"
-    figure.suptitle(wrapped(title, float(figure.get_size_inches()[0])), fontsize=10)
+    figure = summary_figure(fit) if len(fit.histories) <= MOST_IN_ONE_PANEL else _many_tests(fit, fitted_curves(fit))
+    figure.suptitle(wrapped(fit.headline, float(figure.get_size_inches()[0])), fontsize=10)
     return save_figure(figure, path)
 
 
-def _leading_outputs(fit: Identification) -> dict[str, list[int]]:
+def leading_outputs(fit: Identification) -> dict[str, list[int]]:
     """{output that grows with creep: positions of the tests of which it is the first}."""
     outputs: dict[str, list[int]] = {}
     for k, test in enumerate(fit.tests):
@@ -74,58 +68,32 @@ def _leading_outputs(fit: Identification) -> dict[str, list[int]]:
     return outputs
 
 
-def _few_tests(fit: Identification, curves: FittedCurves) -> Figure:
-    leading, has_ruptures = _leading_outputs(fit), bool(rupture_rows(fit))
-    extras = ["rates", "ruptures"] if has_ruptures else ["rates"]
-    cells = [(kind, name) for name in leading for kind in ("curves", "residuals")]
-    if not leading:
-        rows = [[(e, "") for e in extras]]
-    elif len(leading) == 1 and has_ruptures:
-        rows = [[*cells], [(e, "") for e in extras]]
-    else:
-        count = max(len(leading), len(extras))
-        rows = [[*cells[2 * k : 2 * k + 2], *[(e, "") for e in extras[k : k + 1]]] for k in range(count)]
-    figure = empty_figure(4.9 * max(map(len, rows)), 4.4 * len(rows) + 0.25 * (1 + len(fit.histories) // 3))
-    grid = figure.add_gridspec(len(rows), max(map(len, rows)), width_ratios=None)
-    colours = distinct_colours(len(fit.histories))
-    for i, row in enumerate(rows):
-        for j, (kind, output) in enumerate(row):
-            if kind == "residuals":
-                names = _outputs_of(fit, leading[output])
-                cell = grid[i, j].subgridspec(len(names), 1, hspace=0.05)
-                panels = [figure.add_subplot(cell[k]) for k in range(len(names))]
-                draw_titled_residuals(panels, fit, curves, names, leading[output], colours)
-                for axes in panels[:-1]:
-                    axes.set_xlabel("")
-                    axes.tick_params(labelbottom=False)
-                continue
-            axes = figure.add_subplot(grid[i, j])
-            if kind == "curves":
-                _draw_curves([axes], fit, curves, output, [leading[output]], colours)
-                axes.set_title(_curve_title(fit), fontsize=9)
-            elif kind == "rates":
-                draw_rates(axes, fit, curves.prediction)
-            else:
-                draw_ruptures(axes, fit, colours)
-    _name_below(figure, fit, colours)
+def summary_figure(fit: Identification) -> Figure:
+    """Curves (dots measured, lines by the law) coloured by stress, or by temperature where it varies; rates; lives."""
+    curves, leading = fitted_curves(fit), leading_outputs(fit)
+    by_temperature, by_stress = temperature_scale(fit.histories), stress_scale(fit.histories, fit.predictor)
+    scale = by_temperature if np.ptp(by_temperature.values) > ISOTHERMAL_RANGE else by_stress
+    below = ["rates", "ruptures"] if rupture_rows(fit) else ["rates"]
+    figure = empty_figure(SUMMARY_WIDTH, (CURVES_HEIGHT if leading else 0.0) + PANELS_HEIGHT)
+    lower: Any = figure
+    if leading:
+        heights = (CURVES_HEIGHT, PANELS_HEIGHT)
+        upper, lower = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
+        output, tests = max(leading.items(), key=lambda pair: len(pair[1]))
+        axes = upper.subplots()
+        _draw_curves([axes], fit, curves, output, [tests], scale.colours)
+        axes.set_title("measured (dots) and by the law (lines, 95 % band)", fontsize=9)
+        if np.ptp(scale.values) > 0:
+            scale.add_bar(upper, [axes])
+    panels = np.atleast_1d(lower.subplots(1, len(below)))
+    draw_rates(panels[0], fit, curves.prediction)
+    if len(below) > 1:
+        draw_ruptures(panels[1], fit, scale.colours)
     return figure
 
 
-def _name_below(figure: Figure, fit: Identification, colours: Sequence[Any]) -> None:
-    """Name, load program and temperature of each test below the panels."""
-    from matplotlib.lines import Line2D
-
-    labels = [label_of(history) for history in fit.histories]
-    handles = [Line2D([], [], color=colour, marker=".", lw=1.3) for colour in colours]
-    for handle, test in zip(handles, fit.tests, strict=True):
-        handle.set_linestyle(line_style(test.weight))
-    width = float(figure.get_size_inches()[0])
-    columns = max(1, min(len(labels), int(width / (0.6 + 0.075 * max(map(len, labels))))))
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=8)
-
-
 def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
-    leading, has_ruptures = _leading_outputs(fit), bool(rupture_rows(fit))
+    leading, has_ruptures = leading_outputs(fit), bool(rupture_rows(fit))
     by_stress, by_temperature = stress_scale(fit.histories, fit.predictor), temperature_scale(fit.histories)
     by_condition = by_temperature if np.ptp(by_temperature.values) > ISOTHERMAL_RANGE else by_stress
     groups = {
@@ -139,12 +107,9 @@ def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
     columns = min(COLUMNS, key=lambda count: (-most % count, -(-most // count))) if most > COLUMNS[0] else most
     row_counts = [-(-len(g) // columns) for g in groups.values()]
     width = 15.0
-    figure = empty_figure(width, 2.9 * sum(row_counts) + 4.6 * -(-(len(leading) + 1 + has_ruptures) // 3) + 0.6)
-    bottom = [("residuals", output) for output in leading] + [("rates", "")] + [("ruptures", "")] * has_ruptures
-    bottom_rows = -(-len(bottom) // 3)
-    parts = figure.subfigures(
-        len(groups) + 1, 1, height_ratios=[*(2.9 * n + 0.3 for n in row_counts), 4.6 * bottom_rows], squeeze=False
-    )[:, 0]
+    figure = empty_figure(width, 2.9 * sum(row_counts) + 5.2)
+    heights = [*(2.9 * n + 0.3 for n in row_counts), 4.6]
+    parts = figure.subfigures(len(groups) + 1, 1, height_ratios=heights, squeeze=False)[:, 0]
     for part, (output, of_output), rows in zip(parts, groups.items(), row_counts, strict=False):
         panels = part.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
         used = list(panels.flat)[: len(of_output)]
@@ -160,22 +125,11 @@ def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
             axes.set(ylabel=axis_label(output) if k % columns == 0 else "")
         part.suptitle(_curve_title(fit).replace("\n", " "), fontsize=9)
         by_stress.add_bar(part, used)
-    panels = parts[-1].subplots(bottom_rows, min(len(bottom), 3), squeeze=False)
-    by_panel = list(zip(panels.flat, bottom, strict=False))
-    for axes, (kind, output) in by_panel:
-        if kind == "residuals":
-            draw_titled_residuals([axes], fit, curves, [output], leading[output], by_condition.colours)
-        elif kind == "rates":
-            draw_rates(axes, fit, curves.prediction)
-        else:
-            draw_ruptures(axes, fit, by_condition.colours)
-    for axes in list(panels.flat)[len(bottom) :]:
-        axes.set_visible(False)
+    panels = np.atleast_1d(parts[-1].subplots(1, 1 + has_ruptures))
+    draw_rates(panels[0], fit, curves.prediction)
+    if has_ruptures:
+        draw_ruptures(panels[1], fit, by_condition.colours)
     return figure
-
-
-def _outputs_of(fit: Identification, tests: Sequence[int]) -> list[str]:
-    return list(dict.fromkeys(one.output for k in tests for one in fit.tests[k].outputs))
 
 
 def _curve_title(fit: Identification) -> str:

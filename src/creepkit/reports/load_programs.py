@@ -21,11 +21,6 @@ SHORT_RAMP = 0.025
 """Of the time at its end: a longer ramp has both its ends written, such as a step that lies between two readings."""
 
 
-def label_of(history: History) -> str:
-    """The name of a test, its load program and its temperature."""
-    return f"{history.name}: {program_text(history)}"
-
-
 def program_text(history: History) -> str:
     """Load and temperature over the frames of a test, such as "8 → 10 MPa at 4 h, 793 °C"."""
     return f"{load_text(history)}, {temperature_text(history)}"

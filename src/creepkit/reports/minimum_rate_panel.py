@@ -48,12 +48,18 @@ def compared_minimum_rates(fit: Identification) -> list[MinimumRate]:
     return rates if 2 * len(rates) >= len(fit.tests) else []
 
 
-def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
-    """The apparent stress exponents of measured and of predicted minimum rates; "" where the stresses do not differ."""
+def exponents(rates: Sequence[MinimumRate]) -> tuple[float, float]:
+    """The apparent stress exponents of measured and of predicted minimum rates; NaN of tests at one stress."""
     stresses, temperatures = _column(rates, "stress"), _column(rates, "temperature")
     measured, predicted = (
         apparent_exponent(stresses, _column(rates, name), temperatures) for name in ("measured", "predicted")
     )
+    return measured, predicted
+
+
+def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
+    """Both in words; "" where the stresses do not differ."""
+    measured, predicted = exponents(rates)
     if not np.isfinite([measured, predicted]).all():
         return ""
     return f"apparent stress exponent: measured {measured:.2g}, by the law {predicted:.2g}"

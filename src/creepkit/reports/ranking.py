@@ -69,9 +69,7 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
     ]
     columns = ("law", "parameters", *misfit_columns(ranking.best), "BIC - best", "weight", "by the noise of the tests")
     print_table(f"{test_count} tests", columns, rows)
-    equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
-    failed = [f"- left out: {name}: {reason}" for name, reason in ranking.failed.items()]
-    tell("\n".join([ranking.best.headline, ranking.verdict, *equivalent, *failed]) + f"\n\n{ranking.best}\n")
+    tell(f"{ranking}\n")
     for path in written:
         tell_written(path)
 

@@ -64,13 +64,13 @@ COMMON_RATE_MISFIT = "mean square misfit of each law in each test over noise², 
 
 
 def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
-    """Draw the misfit of each law in each test, the weights, and the curves of the credible laws over the tests.
+    """Draw the misfit of each law in each test, the weights, and the curves of the laws that tests do not tell apart.
 
     The misfit is that of `misfits`; the title is the verdict.
     """
     credible = [r for r in ranking.laws if r.weight > CREDIBLE_WEIGHT][:MOST_LAWS_DRAWN]
     with_tests = all(r.fit.histories and r.fit.predictor is not None for r in credible)
-    curves = [fitted_curves(r.fit) for r in credible] if with_tests else []
+    curves = [fitted_curves(r.fit) for r in credible] if with_tests and len(credible) > 1 else []
     shown = _tests_to_draw([r.fit for r in credible], curves) if curves else []
     columns = min(3, len(shown))
     rows = -(-len(shown) // 3)
@@ -254,7 +254,5 @@ def _name_laws(part: Any, laws: Sequence[RankedLaw], every_test: bool) -> None:
     for k, (ranked, colour) in enumerate(zip(laws, distinct_colours(len(laws)), strict=True)):
         handles.append(Line2D([], [], color=colour, ls="-" if k == 0 else "--"))
         labels.append(f"{_law_name(ranked)}, weight {ranked.weight:.3f}")
-    which = "they differ most" if len(laws) > 1 else "its misfit is largest"
-    laws_text = "credible laws with their 95 % bands" if len(laws) > 1 else "the credible law with its 95 % band"
-    title = laws_text if every_test else f"{laws_text}; the tests in which {which}"
+    title = "credible laws with their 95 % bands" + ("" if every_test else "; the tests in which they differ most")
     part.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, title=title, title_fontsize=8)

@@ -36,10 +36,6 @@ OUTLYING_RATIO = 4.0
 """Tests whose residuals exceed those of the median test by this factor do not set the axis."""
 
 
-RESIDUAL_HEADING = "measured less identified, own rates and offsets\nof tests taken out; grey: ±2 sd of a reading"
-"""Above panels of residuals over noise."""
-
-
 class Series(NamedTuple):
     """The residuals of one test, in the order of time. hours, values : (readings,)."""
 
@@ -91,22 +87,6 @@ def draw_residuals(
     axes.grid(alpha=0.25)
     marked = f"\n▴▾: {beyond} beyond the axis" if beyond else ""
     return f"{_title(readings, output, tests, fit) if judged and readings else _plain_title(fit, output)}{marked}"
-
-
-def draw_titled_residuals(
-    panels: Sequence[Axes],
-    fit: Identification,
-    curves: FittedCurves,
-    outputs: Sequence[str],
-    tests: Sequence[int],
-    colours: Sequence[Any] | Mapping[int, Any],
-) -> None:
-    """The residuals of outputs, a panel each, with what is drawn said above the first."""
-    heading = f"{RESIDUAL_HEADING}\n" if judged_readings(fit) is not None else ""
-    for axes, output in zip(panels, outputs, strict=True):
-        title = draw_residuals(axes, fit, curves, output, tests, colours)
-        axes.set_title(f"{heading}{title}", fontsize=9)
-        heading = ""
 
 
 def residual_caption(fit: Identification) -> str:

@@ -95,7 +95,13 @@ class RuptureQuestion(Options, title="arguments of an assessment", error=FitErro
         None, "larson-miller, orr-sherby-dorn, manson-haferd, wilshire, monkman-grant or isothermal.", flag="method"
     )
     hours: tuple[float, ...] = option(
-        (1e3, 1e4, 1e5), "At which strengths are stated.", numbers(0, 1e12, above=True), key="times_h"
+        (1e3, 1e4, 1e5),
+        "At which strengths are stated.",
+        numbers(0, 1e12, above=True),
+        key="times_h",
+        flag="times",
+        unit="h",
+        example="1e4h,1e5h",
     )
     temperatures: tuple[float, ...] | None = option(
         None, "Of strengths; by default those of the tests.", numbers(-273.15, 1e4), flag="temperature-c", **CELSIUS

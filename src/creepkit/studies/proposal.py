@@ -17,6 +17,7 @@ from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import followed_duration
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
+from creepkit.readers.questions import ANSWERS_FILE
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
 from creepkit.registry.reading import read_those_that_can_be
 from creepkit.studies.camera_proposal import found_cameras
@@ -150,7 +151,8 @@ def _readable(
     """Patterns of the files that hold tests, these tests, a sentence for each other file, and why there are none."""
     import creepkit as ck
 
-    files = [one for one in sorted(folder.iterdir()) if one.is_file() and one.name[0] != "." and one != path]
+    files = [one for one in sorted(folder.iterdir()) if one.is_file() and one.name[0] != "."]
+    files = [one for one in files if one not in (path, folder / ANSWERS_FILE)]
     try:
         whole = ck.read_histories([folder], reader)
     except CreepkitError as error:

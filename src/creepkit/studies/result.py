@@ -81,7 +81,8 @@ class StudyResult:
     def __repr__(self) -> str:
         """Stages by their states, the verdict on each group, and where the report is."""
         counted = ", ".join(f"{n} {state}" for state, n in Counter(one.state for one in self.stages).items()) or "none"
-        verdicts = [f"{name}: {one.verdict}" if name else one.verdict for name, one in self.rankings.items()]
+        found = {name: one.best.headline for name, one in self.rankings.items()}
+        verdicts = [f"{name}: {headline}" if name else headline for name, headline in found.items()]
         if len(verdicts) > MOST_VERDICTS:
             verdicts[MOST_VERDICTS:] = [f"and {len(verdicts) - MOST_VERDICTS} more groups"]
         failed = [f"failed: {one.stage}: {one.sentence}" for one in self.failures]

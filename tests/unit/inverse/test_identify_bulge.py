@@ -93,7 +93,7 @@ def test_an_unknown_spread_is_estimated():
     many = planted(LAW, TRUTH, plans(seed=8), seed=5, frames=24)
     fit = identify(LAW, many, EXACT, settings=replace(QUICK, nuisances=(*BOTH, Nuisance("thickness", mean=MEAN))))
     assert SPREAD / 2 < fit.nuisances[0].prior_sd < 2 * SPREAD
-    assert "spread estimated" in str(fit)
+    assert "spread estimated" in fit.details()
 
 
 def test_one_temperature_error_of_all_tests():
@@ -209,7 +209,7 @@ def test_bars_and_bulges_are_fitted_together(tests):
     assert set(fit.errors) == {"amplitude", "width", "shape", "strain"}
     assert all(inside(fit).values())
     assert len(fit.nuisances) == len(tests)
-    assert "rms of ln strain" in str(fit)
+    assert "rms of ln strain" in fit.details()
     with pytest.raises(FitError, match="of specimen 'uniaxial', for which using= names no predictor"):
         identify(LAW, [*tests, *bars], {"one-degree": EXACT}, settings=QUICK)
 

@@ -41,8 +41,8 @@ def test_time_hardening_has_n_over_one_plus_m_at_constant_strain() -> None:
     reached = (r.strain * (1 + m) / (fit.values["A"] * r.stress**n)) ** (1 / (1 + m))
     assert state.time[0] == pytest.approx(reached, rel=1e-4)
     assert state.rate[0] == pytest.approx((1 + m) * r.strain / reached, rel=1e-4)
-    assert "at constant time is" in str(fit)
-    assert "stress exponent at constant strain" in str(fit)
+    assert "at constant time is" in fit.details()
+    assert "stress exponent at constant strain" in fit.details()
 
 
 def test_a_combination_outside_the_hull_of_the_tests() -> None:

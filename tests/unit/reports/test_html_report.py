@@ -21,9 +21,10 @@ from creepkit.reports.html.elements import with_interval
 from helpers.report_pages import contents, ranking
 
 TAGS = """
-html head meta title style body a header h1 h2 h3 h4 p nav ol ul li main section div table caption thead tbody tr th td
-figure figcaption pre code span footer script math mrow mi mn mo mtext msub msup msubsup mfrac mfenced mtable mtr mtd
-mover mstyle msqrt mroot noscript svg desc g path text tspan use defs clipPath rect image
+html head meta title style body a header h1 h2 h3 h4 p nav ol ul li main section div table caption thead tbody
+tr th td details summary dl dt dd b figure figcaption pre code span footer script math mrow mi mn mo mtext
+msub msup msubsup mfrac mfenced mtable mtr mtd mover mstyle msqrt mroot noscript svg desc g path text tspan
+use defs clipPath rect image
 """
 """Elements that a page may have."""
 
@@ -112,7 +113,7 @@ def test_identifiers_are_unique_and_found(page: str) -> None:
 
 def test_every_figure_has_words_for_those_who_do_not_see_it(page: str) -> None:
     figures = [e for e in elements(parsed(page)) if tag(e) == "svg" and e.get("aria-hidden") is None]
-    assert len(figures) == 5  # curves, two tests, laws tried, forecast
+    assert len(figures) == 4  # the answer, the tests one by one, laws compared, forecast
     for figure in figures:
         title, description = (next(e for e in figure if tag(e) == kind) for kind in ("title", "desc"))
         assert figure.get("role") == "img"
@@ -155,7 +156,7 @@ def test_what_failed_is_said_and_the_rest_is_there() -> None:
     laws_alone = replace(ranking().best, histories=(), predictor=None)  # as from a file: nothing is drawn
     groups = (ReportGroup("good", laws_alone), ReportGroup("bad", None, (), "no frames are left"))
     html = report_html(ReportContents("T", groups, failures=(StageFailure("forecast", "no test 'x'"),)))
-    first = html[: html.index('id="curves"')]
+    first = html[: html.index('id="values"')]
     assert "This report is not complete. Failed: forecast, identification of bad." in first
     last = html[html.index('id="missing"') :]
     assert "No frames are left." in last

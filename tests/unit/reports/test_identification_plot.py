@@ -32,10 +32,11 @@ def many():
     return fitted([(s, T) for T in np.linspace(1023.15, 1173.15, 6) for s in np.geomspace(40, 200, 14)])
 
 
-def test_a_few_tests_have_curves_residuals_and_rates_with_units(few, tmp_path):
+def test_a_few_tests_have_curves_and_rates_with_units(few, tmp_path):
     figure = few.plot(tmp_path / "fit.png")
-    assert [axes.get_ylabel() for axes in figure.axes] == ["strain, %", "strain,\nnoise sd", "creep rate, 1/s"]
-    assert [axes.get_xlabel() for axes in figure.axes] == ["time, h", "time, h", "von Mises stress, MPa"]
+    panels = [axes for axes in figure.axes if axes.get_xlabel()]
+    assert [axes.get_ylabel() for axes in panels] == ["strain, %", "creep rate, 1/s"]
+    assert [axes.get_xlabel() for axes in panels] == ["time, h", "von Mises stress, MPa"]
     assert (tmp_path / "fit.png").stat().st_size > 10_000
 
 

@@ -121,7 +121,7 @@ def test_the_terminal_and_the_report_state_one_chi_square_of_a_test() -> None:
     fit = ck.identify("norton", tests, starts=1)
     readings = judged_readings(fit)
     assert readings is not None
-    rows = [line.split() for line in str(fit).splitlines() if line.startswith("  bar ")]
+    rows = [line.split() for line in fit.details().splitlines() if line.startswith("  bar ")]
     # name in two words, condition in four ("727 °C, strain 0.001"), error, chi2
     assert [float(row[7]) for row in rows] == [
         pytest.approx(readings.chi_square(k), rel=6e-3) for k in range(len(tests))

@@ -147,7 +147,7 @@ def test_a_diameter_is_found_as_a_nuisance_parameter():
     fit = ck.identify("norton", tests, Wire(), starts=1, sobol_points=16, nuisances=[nuisance], weights="likelihood")
     for estimate in fit.estimates:
         assert estimate.low < TRUTH[estimate.name] < estimate.high
-    assert "mm" in str(fit)
+    assert "mm" in fit.details()
     for estimate, truth in zip(fit.nuisances, diameters, strict=True):
         assert abs(estimate.value - truth) < 3.0 * estimate.sd
 

@@ -94,5 +94,5 @@ def test_a_study_and_its_result_are_printed_in_few_lines(study: Path, plain_page
     result = loaded.run()
     first, verdict, report = repr(result).splitlines()
     assert first == "StudyResult 'one law': 2 tests; stages: 3 made"
-    assert verdict.strip().startswith("only norton was fitted; it ")
+    assert verdict.strip().startswith("norton describes strains to ")
     assert report.strip() == f"report: {result.report}"

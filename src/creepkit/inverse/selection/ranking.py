@@ -64,7 +64,7 @@ class RankedLaw:
 
 
 @dataclass(frozen=True)
-class Ranking(Presentable, text="reports.ranking:ranking_text"):
+class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="reports.ranking:ranking_text"):
     """Identified laws, best first.
 
     criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.

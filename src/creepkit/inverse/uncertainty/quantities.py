@@ -16,9 +16,14 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.language.symbols import GAS_CONSTANT
 
 EXPONENT_STRESS_RATIO = 1.0005
 """Ratio of the stresses between which a local exponent is taken, to each side."""
+
+
+ENERGY_TEMPERATURE_RATIO = 1.0005
+"""The same of the temperatures between which an activation energy is taken."""
 
 
 CoordinateFunction = Callable[[Floats], Floats]
@@ -157,6 +162,22 @@ def local_exponent(
         for f in (EXPONENT_STRESS_RATIO, 1 / EXPONENT_STRESS_RATIO)
     )
     return lambda u: (above(u) - below(u)) / (2 * np.log(EXPONENT_STRESS_RATIO))
+
+
+def activation_energy(
+    coordinates: Coordinates,
+    stress: ArrayLike,
+    temperature: float,
+    strain: ArrayLike | None = None,
+    time: ArrayLike | None = None,
+) -> CoordinateFunction:
+    """The activation energy -R d ln rate / d(1/T), J/mol, at points.
+
+    stress, strain, time : as in `log_rate`, they broadcast to (points,); temperature : one, K.
+    """
+    ends = (temperature / ENERGY_TEMPERATURE_RATIO, temperature * ENERGY_TEMPERATURE_RATIO)
+    colder, hotter = (log_rate(coordinates, stress, end, strain, time) for end in ends)
+    return lambda u: GAS_CONSTANT * (hotter(u) - colder(u)) / (1 / ends[0] - 1 / ends[1])
 
 
 def quantity_of(coordinates: Coordinates, quantity_or_name: str | DerivedQuantity) -> DerivedQuantity:

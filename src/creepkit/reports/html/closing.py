@@ -37,10 +37,17 @@ def closing_sections(
 ) -> list[PageSection]:
     """Exports, methods, what stands before provenance, provenance, and what is missing."""
     return [
-        PageSection("exports", "Files to download", _export_blocks([*contents.exports, *_covariances(found)])),
-        PageSection("methods", "Methods text", _methods_blocks(contents, found) if found or contents.rupture else []),
+        _exports_section(contents, found),
+        PageSection(
+            "methods",
+            "Methods text",
+            _methods_blocks(contents, found) if found or contents.rupture else [],
+            result="for a paper, with equations and references",
+        ),
         *before_provenance,
-        PageSection("provenance", "Provenance, and how to repeat", _provenance_blocks(contents)),
+        PageSection(
+            "provenance", "How to repeat", _provenance_blocks(contents), result="commands, settings, versions, inputs"
+        ),
         PageSection("missing", "What is missing", _missing_blocks(contents)),
     ]
 
@@ -70,13 +77,19 @@ def _covariances(found: Sequence[GroupFindings]) -> list[ExportedFile]:
     ]
 
 
-def _export_blocks(exports: Sequence[ExportedFile]) -> list[Block]:
-    if not exports:
-        return []
-    files = [
-        (file_name(one.name), _address(one.text), f"{printable(one.target, 80)}, {_size(one.text)}") for one in exports
+def files_to_download(contents: ReportContents, found: Sequence[GroupFindings]) -> list[tuple[str, str, str]]:
+    """(name, address, what it is) of exports and covariances; the address holds the content."""
+    return [
+        (file_name(one.name), _address(one.text), f"{printable(one.target, 80)}, {_size(one.text)}")
+        for one in [*contents.exports, *_covariances(found)]
     ]
-    return [Paragraph("The page holds these files itself."), Downloads(files)]
+
+
+def _exports_section(contents: ReportContents, found: Sequence[GroupFindings]) -> PageSection:
+    """The files of several materials; those of one stand on the first screen."""
+    files = [] if len(found) == 1 else files_to_download(contents, found)
+    blocks = [Downloads(files)] if files else []
+    return PageSection("exports", "Files to download", blocks, result=plural(len(files), "file"))
 
 
 def file_name(name: str) -> str:

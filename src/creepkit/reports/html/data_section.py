@@ -13,7 +13,7 @@ from creepkit.reports.html.compared_values import frame_counts, selection_senten
 from creepkit.reports.html.elements import Block, PageSection, Paragraph, Table, number, plural, printable, sentence
 from creepkit.reports.html.findings import findings_of
 from creepkit.reports.html.minimum_rates import minimum_rate_table
-from creepkit.reports.html.test_details import NOT_STATED, table_of_details
+from creepkit.reports.html.test_details import NOT_STATED, details_of_tests
 
 if TYPE_CHECKING:
     from creepkit.quality.flags import DataQuality
@@ -31,7 +31,7 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
     blocks: list[Block] = []
     if histories:
         more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
-        blocks += [_table_of_histories(histories, more), table_of_details(histories[:MOST_LISTED], more)]
+        blocks += [_table_of_histories(histories, more), *details_of_tests(histories[:MOST_LISTED], more)]
         blocks += minimum_rate_table(histories[:MOST_LISTED])
     blocks += [Paragraph(sentence(f"Source of the data: {text}")) for text in contents.data_citations]
     if contents.quality is not None:
@@ -40,7 +40,10 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
     texts = [(name, adequacy.explanation_text) for name, adequacy in in_tests if adequacy.lies_in_tests]
     blocks += [Paragraph(sentence(f"{name}: {text}" if name else text), "warning") for name, text in texts]
     left_out = _exclusion_blocks(contents) if histories or contents.exclusions else []
-    return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)])
+    flags = 0 if contents.quality is None else len(contents.quality.flags)
+    result = f"{plural(len(histories), 'test')} as measured; {plural(flags, 'flag') if flags else 'nothing suspect'}"
+    result += f"; {len(contents.exclusions)} left out" if contents.exclusions else ""
+    return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)], result)
 
 
 def _table_of_histories(histories: Sequence[History], more: str) -> Table:

@@ -96,17 +96,39 @@ class Fragment:
     markup: Markup
 
 
-Block: TypeAlias = Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads | Fragment
+@dataclass(frozen=True)
+class Answer:
+    """The first screen: headline, picture, and a card with the law, its key figures, cautions and files.
+
+    figures : (name, where it holds, value with interval, remark).
+    """
+
+    kind: ClassVar[str] = "answer"
+    headline: str
+    picture: Picture | Paragraph | None
+    law: str
+    equations: Sequence[Markup]
+    figures: Sequence[tuple[str, str, str, str]]
+    cautions: Sequence[str]
+    next_step: str
+    files: Sequence[tuple[str, str, str]] = ()
+
+
+Block: TypeAlias = Answer | Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads | Fragment
 
 
 @dataclass(frozen=True)
 class PageSection:
-    """A part of the page with its heading; identifier : letters, digits and hyphens, of its own in the page."""
+    """A part of the page with its heading; identifier : letters, digits and hyphens, of its own in the page.
+
+    result : what it says, on the line of its heading, behind which it is folded; "" for a section that stands open.
+    """
 
     identifier: str
     title: str
     blocks: Sequence[Block] = ()
     sections: Sequence[PageSection] = field(default=())
+    result: str = ""
 
     @property
     def empty(self) -> bool:

@@ -11,29 +11,37 @@ from creepkit.exporters.mathml import expression_mathml, law_equations
 from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration_known
 from creepkit.inverse.perturbation import NOT_INCLUDED
 from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
+from creepkit.reports.answer import MOST_CAUTIONS, KeyFigure, cautions, key_figures, next_step, tests_text
 from creepkit.reports.html.elements import (
+    Answer,
     Block,
-    Formula,
     Items,
+    PageSection,
     Paragraph,
     Table,
     number,
     plural,
+    printable,
     sentence,
     with_interval,
 )
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import credible_values, titled_law, verdict_given_law
 from creepkit.reports.html.single_values import single_value_blocks
-from creepkit.reports.identification_text import rejected
+from creepkit.reports.identification_plot import summary_figure
+from creepkit.reports.identification_text import rejected, rupture_rows
 from creepkit.reports.interval_basis import interval_basis
 from creepkit.reports.ranking import equivalents_among_remaining
 from creepkit.reports.stress_exponents import reference_sentences
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.quality.flags import DataQuality
     from creepkit.reports.contents import ReportGroup
+    from creepkit.reports.html.page_figures import PageFigures
 
 
 REJECTED = (
@@ -109,22 +117,54 @@ def with_histories(group: ReportGroup) -> ReportGroup:
     return group if group.histories or found is None else replace(group, histories=found.fit.histories)
 
 
-# ---- verdict and values ----------------------------------------------------------------------------------------------
+# ---- the answer ------------------------------------------------------------------------------------------------------
 
 
-def verdict_blocks(found: GroupFindings) -> list[Block]:
-    """The verdict, the law as a formula, its values with intervals, adequacy, and what is not determined."""
+def answer_block(
+    found: GroupFindings,
+    figures: PageFigures,
+    *,
+    asked: Sequence[KeyFigure] = (),
+    quality: DataQuality | None = None,
+    files: Sequence[tuple[str, str, str]] = (),
+) -> Answer:
+    """The first screen of one material. asked : what forecasts say, quality : of its data, files : to download."""
+    fit, in_text = found.fit, LawNames.of(found.fits).in_text
+    picture = None
+    if fit.histories and fit.predictor is not None:
+        rupture = ", and times to rupture, identified over measured" if rupture_rows(fit) else ""
+        title = f"The law over the tests{f' of {printable(found.name, 80)}' if found.name else ''}"
+        description = f"Curves of {plural(len(fit.tests), 'test')} over time, creep rate over stress{rupture}."
+        picture = figures.picture(lambda: summary_figure(fit), title, description, f"{title}: {tests_text(fit)}.")
+    rows = [
+        (one.name, printable(one.where, 160), one.text(number), one.remark) for one in [*asked[:2], *key_figures(fit)]
+    ]
+    said = [sentence(in_text(text)) for text in cautions(fit, found.ranking, quality)[:MOST_CAUTIONS]]
+    equations = [Markup(equation) for equation in law_equations(fit.law)]
+    headline = sentence(in_text(fit.headline))
+    step = sentence(next_step(fit, found.ranking))
+    return Answer(headline, picture, titled_law(fit.law), equations, rows, said, step, files)
+
+
+# ---- values and verdict ----------------------------------------------------------------------------------------------
+
+
+def values_section(found: GroupFindings, prefix: str = "") -> PageSection:
+    """The values with intervals, what they rest on, what is not determined, and the verdict by the noise."""
     fit = found.fit
-    blocks: list[Block] = [Paragraph(sentence(fit.headline), "lead"), Paragraph(sentence(found.verdict))]
+    determined = sum(e.verdict == "determined" for e in fit.estimates)
+    result = f"{determined} of {plural(len(fit.estimates), 'value')} determined by these tests"
+    return PageSection(f"{prefix}values", "Values and verdict", _value_blocks(found), result=result)
+
+
+def _value_blocks(found: GroupFindings) -> list[Block]:
+    fit = found.fit
+    misfit = rejected(fit)
+    blocks: list[Block] = [_values(fit), Paragraph(sentence(found.verdict))]
     if found.equivalents:
         blocks.append(Items([sentence(text) for text in found.equivalents]))
-    which = "The best law" if found.ranking else "The law"
-    blocks.append(Paragraph(Markup("{}: {}.").format(which, titled_law(fit.law))))
-    blocks += [Formula(Markup(equation)) for equation in law_equations(fit.law)]
-    misfit = rejected(fit)
     if fit.adequacy is not None and (found.ranking is not None or misfit) and str(fit.adequacy) not in found.verdict:
         blocks.append(Paragraph(sentence(f"the law {fit.adequacy}")))
-    blocks.append(_values(fit))
     blocks += [] if misfit else [_point(fit)]
     blocks += single_value_blocks(fit)
     blocks += [Paragraph(sentence(text)) for text in interval_basis(fit)]
@@ -133,8 +173,6 @@ def verdict_blocks(found: GroupFindings) -> list[Block]:
         blocks.append(Paragraph(REJECTED))
     elif undetermined:
         blocks += [Paragraph("What these tests do not determine, or poorly, given this law:"), Items(undetermined)]
-    else:
-        blocks.append(Paragraph("The tests determine every parameter, given this law."))
     blocks += credible_values(found.ranking)
     unmodelled = [sentence(effect.sentence) for effect in fit.unmodelled]
     if unmodelled:

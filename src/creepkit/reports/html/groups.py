@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ from creepkit.errors import CreepkitError
 from creepkit.inverse.nuisance_parameters import nuisance_unit
 from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, chi_square_by_test
 from creepkit.records import output_unit
+from creepkit.reports.answer import tests_text
 from creepkit.reports.html.compared_values import compared_values
 from creepkit.reports.html.elements import (
     Block,
@@ -24,93 +24,59 @@ from creepkit.reports.html.elements import (
     printable,
     sentence,
 )
-from creepkit.reports.html.findings import GroupFindings
+from creepkit.reports.html.findings import GroupFindings, values_section
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import correlation_table, titled_law
 from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.html.page_figures import PageFigures
-from creepkit.reports.identification_plot import identification_figure
-from creepkit.reports.identification_text import rupture_rows
+from creepkit.reports.identification_text import rupture_rows, scatter_of_rates
 from creepkit.reports.judged_readings import LAW_RATE_MEANING, OWN_RATE_CHI_SQUARE, judged_readings
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
-from creepkit.reports.minimum_rate_panel import compared_minimum_rates, exponent_sentence
-from creepkit.reports.prediction_bands import fitted_curves
 from creepkit.reports.ranking import explanation, misfit_cells, misfit_columns
 from creepkit.reports.ranking_plot import misfit_name, misfit_of, ranking_figure
 from creepkit.reports.residual_panels import residual_caption
-from creepkit.reports.test_figure import fitted_test_figure, fitted_test_text
+from creepkit.reports.test_figure import small_multiples
 
 if TYPE_CHECKING:
     from creepkit.inverse.goodness_of_fit import TestFit
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.nuisance_parameters import NuisanceEstimate
     from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.single_values import SingleValue
 
 
 MOST_NAMED = 12
 """Tests that are named in a sentence."""
 
 
-# ---- curves and tests ------------------------------------------------------------------------------------------------
-
-
-def curve_blocks(found: GroupFindings, figures: PageFigures) -> list[Block]:
-    """All tests in one figure: measured over identified, residuals, rates over stress, rupture."""
-    fit = found.fit
-    if not fit.histories or fit.predictor is None:
-        return [Paragraph("No curves are drawn: the tests were not given with this identification.", "note")]
-    minimum_rates = compared_minimum_rates(fit)
-    panels = ["minimum creep rate over stress" if minimum_rates else "creep rate of the law over stress"]
-    panels += ["time to rupture, identified over measured"] if rupture_rows(fit) else []
-    exponents = exponent_sentence(minimum_rates) if minimum_rates else ""
-    exponents = f" Minimum creep rates, {exponents}." if exponents else ""
-    return [
-        figures.picture(
-            lambda: identification_figure(fit),
-            f"Identified law and tests{_of(found)}",
-            f"Curves of {plural(len(fit.histories), 'test')} over time with the law's 95 % bands, residuals, "
-            f"{', '.join(panels)}.{exponents} The table of tests holds the numbers.",
-            f"Measured (dots) and identified (lines with 95 % band); {residual_caption(fit)}; {'; '.join(panels)}.",
-        )
-    ]
+# ---- tests -----------------------------------------------------------------------------------------------------------
 
 
 def test_blocks(found: GroupFindings, figures: PageFigures, most: int) -> list[Block]:
-    """A table of all tests, and a figure for each of those whose misfit is largest, at most so many."""
+    """A table of all tests, and small multiples of those whose misfit is largest, at most so many."""
     fit = found.fit
     blocks: list[Block] = [_table_of_tests(fit), *[Paragraph(text, "note") for text in _without_misfit(fit)]]
-    if rupture_rows(fit):
-        blocks.append(_table_of_ruptures(fit))
-    with_frames = [k for k, test in enumerate(fit.tests) if test.outputs]
-    if not fit.histories or fit.predictor is None or not with_frames:
+    worst = _worst_tests(fit)[:most]
+    if not fit.histories or fit.predictor is None or not worst:
         return blocks
-    curves = fitted_curves(fit)
+    which = "" if len(worst) == len(fit.tests) else f"; the {len(worst)} of {len(fit.tests)} of largest misfit"
+    caption = f"Tests one by one{_of(found)}: measured, by the law, and {residual_caption(fit)}{which}."
+    description = f"Curves and residuals of {plural(len(worst), 'test')}; the table of tests holds the numbers."
+    title = f"Tests one by one{_of(found)}"
+    blocks.append(figures.picture(lambda: small_multiples(fit, sorted(worst)), title, description, caption))
+    return blocks
+
+
+def _worst_tests(fit: Identification) -> list[int]:
+    """Positions of tests with frames, the largest misfit first."""
     readings = judged_readings(fit)
     misfits = [misfit_of(test) if readings is None else readings.chi_square(k) for k, test in enumerate(fit.tests)]
-    worst = sorted(with_frames, key=lambda k: -np.nan_to_num(misfits[k]))[:most]
-    if len(worst) < len(with_frames):
-        blocks.append(
-            Paragraph(f"Drawn are the {len(worst)} of {len(with_frames)} tests whose misfit is largest.", "note")
-        )
-    blocks.append(
-        Paragraph(f"Figures of tests: measured (dots), identified with 95 % band, and {residual_caption(fit)}.")
-    )
-    for k in sorted(worst):
-        name = printable(fit.tests[k].name, 120)
-        blocks.append(
-            figures.picture(
-                partial(fitted_test_figure, fit, curves, k),
-                f"Test {name}",
-                fitted_test_text(fit, curves, k),
-                f"{name}: measured, identified and residuals.",
-            )
-        )
-    return blocks
+    return sorted((k for k, t in enumerate(fit.tests) if t.outputs), key=lambda k: -np.nan_to_num(misfits[k]))
 
 
 def _table_of_tests(fit: Identification) -> Table:
     rows = []
-    compared, readings = compared_values(fit), judged_readings(fit)
+    compared, readings, ruptures = compared_values(fit), judged_readings(fit), bool(rupture_rows(fit))
     for k, test in enumerate(fit.tests):
         first = test.outputs[0] if test.outputs else None
         unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
@@ -125,20 +91,33 @@ def _table_of_tests(fit: Identification) -> Table:
                 "–" if first is None else f"{number(first.offset, 2)}{unit}",
                 number(test.rate_factor, 3),
                 number(test.weight, 2),
+                *(_life_cells(test.rupture) if ruptures else ()),
             )
         )
-    columns = (
-        *("test", "condition", "values compared", "reduced chi-square, own rate", "misfit, the law's rate"),
+    columns = [
+        *("test", "condition", "values", "reduced chi-square, own rate", "misfit, the law's rate"),
         *("relative squared error", "offset", "rate × law", "weight"),
-    )
+        *(("lasted, h", "by the law, h") if ruptures else ()),
+    ]
     caption = (
-        f"Tests: {OWN_RATE_CHI_SQUARE}. Beside it the {LAW_RATE_MEANING}. Relative squared error of the first output "
-        "with the law's rate (sum of squared "
-        "differences over that about the mean of the test; a dash: the law predicts no value at some of the readings, "
-        "as after a rupture that it puts too early), and its offset; the test's own factor on the rate; weight of the "
-        "test in the fit (1: as any other, less for one far from the others)"
+        f"{OWN_RATE_CHI_SQUARE[:1].upper()}{OWN_RATE_CHI_SQUARE[1:]}. Beside it the {LAW_RATE_MEANING}. Relative "
+        "squared error and offset of the first output with the law's rate; a dash: no value is predicted at some "
+        "readings, as after a rupture. Weight in the fit: 1 as any other, less for one far from the others"
     )
-    return Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6, 7, 8))
+    if ruptures:
+        rejected = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
+        right = "which the tests contradict" if rejected else "if the law is right"
+        caption += f". Lives: > marks tests that were stopped; 95 % intervals of a single test, {right}"
+    return Table(caption, columns, rows, numeric=tuple(range(2, len(columns))))
+
+
+def _life_cells(life: SingleValue | None) -> tuple[str, str]:
+    """How long a test lasted, and how long by the law with the interval of a single test."""
+    if life is None or not life.used:
+        return "", ""
+    low, predicted, high = (number(v / SECONDS_PER_HOUR) for v in (life.low, life.predicted, life.high))
+    measured = f"{'> ' if life.censored else ''}{number(life.measured / SECONDS_PER_HOUR)}"
+    return measured, f"{predicted} [{low}, {high}]"
 
 
 def _without_misfit(fit: Identification) -> list[str]:
@@ -155,30 +134,6 @@ def _without_misfit(fit: Identification) -> list[str]:
 def _listed_tests(tests: Sequence[TestFit]) -> str:
     named = ", ".join(printable(test.name, 120) for test in tests[:MOST_NAMED])
     return f"{named} and {len(tests) - MOST_NAMED} more" if len(tests) > MOST_NAMED else named
-
-
-def _table_of_ruptures(fit: Identification) -> Table:
-    rows = [
-        (
-            printable(name, 120),
-            printable(condition, 200),
-            f"{'> ' if r.censored else ''}{number(r.measured / SECONDS_PER_HOUR)}",
-            number(r.predicted / SECONDS_PER_HOUR),
-            f"{number(r.low / SECONDS_PER_HOUR)} to {number(r.high / SECONDS_PER_HOUR)}",
-        )
-        for name, condition, r in rupture_rows(fit)
-    ]
-    columns = (
-        "test",
-        "condition",
-        "lasted, h",
-        "by the law, h",
-        "95 % interval of a single test if the law is right, h",
-    )
-    rejected = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
-    doubt = ". The tests contradict the law: the intervals do not have this probability" if rejected else ""
-    caption = f"Rupture times; > marks tests that were stopped before{doubt}"
-    return Table(caption, columns, rows, numeric=(2, 3, 4))
 
 
 def _of(found: GroupFindings) -> str:
@@ -332,10 +287,16 @@ def _nuisance_unit(nuisance: NuisanceEstimate, fit: Identification) -> str:
 def group_sections(
     found: GroupFindings, figures: PageFigures, prefix: str, *, most_tests: int, ranking_drawn: bool
 ) -> Sequence[PageSection]:
-    """The sections on what was found, but for the verdict."""
+    """The sections on what was found behind the answer."""
+    fit, ranking = found.fit, found.ranking
+    worst = _worst_tests(fit)[:1]
+    far = f"; farthest from the law: {printable(fit.tests[worst[0]].name, 60)}" if len(fit.tests) > 1 and worst else ""
+    laws = "" if ranking is None else f"best of {plural(len(ranking.laws), 'law')}: weight {ranking.laws[0].weight:.2f}"
+    noise = f"rates of tests scatter by {scatter_of_rates(fit)}"
+    tests, ranked = test_blocks(found, figures, most_tests), ranking_blocks(found, figures, drawn=ranking_drawn)
     return [
-        PageSection(f"{prefix}curves", "The law over the tests", curve_blocks(found, figures)),
-        PageSection(f"{prefix}tests", "Tests", test_blocks(found, figures, most_tests)),
-        PageSection(f"{prefix}ranking", "Laws tried", ranking_blocks(found, figures, drawn=ranking_drawn)),
-        PageSection(f"{prefix}nuisances", "Noise, nuisance parameters and correlations", nuisance_blocks(found)),
+        values_section(found, prefix),
+        PageSection(f"{prefix}tests", "Tests", tests, result=f"{tests_text(fit)}{far}"),
+        PageSection(f"{prefix}ranking", "Laws compared", ranked, result=laws),
+        PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", nuisance_blocks(found), result=noise),
     ]

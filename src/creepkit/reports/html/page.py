@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections import Counter
 from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import version
@@ -11,8 +13,9 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from creepkit.inverse.perturbation import combined_change_text
+from creepkit.reports.answer import asked_figures
 from creepkit.reports.attachments import embed
-from creepkit.reports.html.closing import closing_sections
+from creepkit.reports.html.closing import closing_sections, files_to_download
 from creepkit.reports.html.data_section import data_section
 from creepkit.reports.html.elements import (
     Block,
@@ -24,7 +27,7 @@ from creepkit.reports.html.elements import (
     printable,
     printable_lines,
 )
-from creepkit.reports.html.findings import GroupFindings, findings_of, verdict_blocks, with_histories
+from creepkit.reports.html.findings import GroupFindings, answer_block, findings_of, with_histories
 from creepkit.reports.html.groups import group_sections
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import law_title
@@ -32,6 +35,7 @@ from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
 from creepkit.reports.html.stage_sections import stage_sections, strength_blocks
 from creepkit.reports.identification_text import rejected
+from creepkit.reports.plate_figure import plate_figure
 from creepkit.reports.ranking import explanation
 from creepkit.reports.stress_exponents import interval_digits, rate_and_exponent
 
@@ -49,18 +53,16 @@ MOST_RANKINGS_DRAWN = 12
 
 
 def report_html(contents: ReportContents) -> str:
-    """The page: findings first, then curves, tests, laws tried, data, other stages, files, methods and provenance.
+    """The page: the answer on one screen, and folded behind it values, tests, laws, data, other stages and methods.
 
     It holds everything itself, loads nothing, and is the same text for the same contents. Only the sliders need
     scripts, and no others run.
     """
-    import dataclasses
-
     contents = dataclasses.replace(contents, groups=tuple(map(with_histories, contents.groups)))
     figures = PageFigures()
     found = [one for one in map(findings_of, contents.groups) if one is not None]
     sections = [
-        _findings_section(contents, found),
+        _findings_section(contents, found, figures),
         *_group_sections(found, figures),
         data_section(contents, found),
         *stage_sections(contents, figures, LawNames.of(fit for one in found for fit in one.fits)),
@@ -95,7 +97,7 @@ def _resource(name: str) -> str:
 
 def _without_empty(section: PageSection) -> PageSection:
     inner = [one for one in map(_without_empty, section.sections) if not one.empty]
-    return PageSection(section.identifier, section.title, section.blocks, inner)
+    return dataclasses.replace(section, sections=inner)
 
 
 def _summary(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
@@ -112,8 +114,8 @@ def _summary(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
 # ---- findings --------------------------------------------------------------------------------------------------------
 
 
-def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) -> PageSection:
-    """The verdict of each group; of several groups a table, and their verdicts in sections of their own."""
+def _findings_section(contents: ReportContents, found: Sequence[GroupFindings], figures: PageFigures) -> PageSection:
+    """The answer of one group; of several groups a map, and their answers in sections of their own."""
     missing = [printable(one.stage, 80) for one in contents.failures]
     missing += [f"identification of {printable(g.name, 80)}" for g in contents.groups if g.failure]
     warning: list[Block] = []
@@ -124,7 +126,10 @@ def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) 
         )
         warning.append(Paragraph(reasons.format(listed), "warning"))
     if len(found) == 1:
-        return PageSection("findings", "Findings", [*warning, *verdict_blocks(found[0])])
+        questions = [figure for forecast in contents.forecasts.values() for figure in asked_figures(forecast)]
+        files = files_to_download(contents, found)
+        answer = answer_block(found[0], figures, asked=questions, quality=contents.quality, files=files)
+        return PageSection("findings", "Findings", [*warning, answer])
     if not found:
         asked = any(group.failure or group.result is not None for group in contents.groups)
         alone = bool(contents.groups) and (asked or not contents.rupture)
@@ -138,8 +143,22 @@ def _findings_section(contents: ReportContents, found: Sequence[GroupFindings]) 
             )
         ]
         return PageSection("findings", "Findings", [*warning, *law, *rupture])
-    blocks = [*warning, Paragraph(_overview(contents, found), "lead"), _table_of_groups(found)]
-    return PageSection("findings", "Findings", blocks)
+    lead, by_law = Paragraph(_overview(contents, found), "lead"), _by_law(found)
+    title = f"Creep rates of {plural(len(found), 'material')}"
+    caption = f"{title}, by law, with 95 % intervals; open marks: the tests contradict the law."
+    picture = figures.picture(
+        lambda: plate_figure([(one.name, one.fit) for one in by_law]),
+        title,
+        f"{title}; the table holds the numbers.",
+        caption,
+    )
+    return PageSection("findings", "Findings", [*warning, lead, picture])
+
+
+def _by_law(found: Sequence[GroupFindings]) -> list[GroupFindings]:
+    """Groups of one law together, the commonest law first, then by name."""
+    counts = Counter(one.fit.law.name for one in found)
+    return sorted(found, key=lambda one: (-counts[one.fit.law.name], one.fit.law.name, one.name))
 
 
 def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
@@ -207,11 +226,14 @@ def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> lis
     most = _figures_of_tests(found)
     if len(found) == 1:
         return [*group_sections(found[0], figures, "", most_tests=most, ranking_drawn=drawn)]
-    sections = []
-    for k, one in enumerate(found, start=1):
+    if not found:
+        return []
+    sections = [PageSection("materials", "Materials", [_table_of_groups(found)], result="rates and exponents, a table")]
+    for k, one in enumerate(_by_law(found), start=1):
         inner = group_sections(one, figures, f"m{k}-", most_tests=most, ranking_drawn=drawn)
         title = printable(one.name, 120) or f"Material {k}"
-        sections.append(PageSection(f"m{k}", title, verdict_blocks(one), inner))
+        answer = answer_block(one, figures)
+        sections.append(PageSection(f"m{k}", title, [answer], inner, answer.headline))
     return sections
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from creepkit.errors import CreepkitError
-from creepkit.reports.html.elements import Fragment, PageSection, Paragraph
+from creepkit.reports.html.elements import Fragment, PageSection
 
 if TYPE_CHECKING:
     from creepkit.reports.html.findings import GroupFindings
@@ -38,8 +38,8 @@ def slider_sections(found: Sequence[GroupFindings]) -> list[PageSection]:
         return []
     if len(fragment.encode()) > LARGEST_FRAGMENT:
         return []
-    text = "What the law does when its parameters are changed, over the tests; curves are computed in the browser."
-    return [PageSection("sliders", "The law with sliders", [Paragraph(text), Fragment(Markup(fragment))])]
+    said = "change its parameters over the tests; computed in the browser"
+    return [PageSection("sliders", "The law with sliders", [Fragment(Markup(fragment))], result=said)]
 
 
 def fragment_style(sections: Sequence[PageSection]) -> str:

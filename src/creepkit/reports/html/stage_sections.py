@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from creepkit.inverse.uncertainty.laplace_approximation import bound_marks
 from creepkit.records.units import celsius_text
+from creepkit.reports.answer import asked_figures
 from creepkit.reports.design import MACHINE_TIME, cells_text, cheapest_text, design_figure, direction_lines, order_text
 from creepkit.reports.extraction_plot import extraction_figure
 from creepkit.reports.extraction_text import extraction_text
@@ -94,15 +95,34 @@ def _sections(
 ) -> Iterator[PageSection]:
     """The section of a stage: of several results each has a section of its own. head : identifier and title."""
     identifier, title = head
+    said = RESULTS[identifier]
     if len(results) == 1:
         (name, result), *_ = results.items()
-        yield PageSection(identifier, title, blocks_of(name, result))
+        yield PageSection(identifier, title, blocks_of(name, result), result=said(result))
     elif results:
         inner = [
             PageSection(f"{identifier}-{k}", printable(name, 120) or "All tests", blocks_of(name, result))
             for k, (name, result) in enumerate(results.items(), start=1)
         ]
-        yield PageSection(identifier, title, (), inner)
+        yield PageSection(identifier, title, (), inner, result=f"{len(results)} results")
+
+
+def _asked_text(forecast: Forecast) -> str:
+    """What the first test of a forecast shows."""
+    figures = asked_figures(forecast)
+    more = f"; {len(forecast.tests) - 1} more" if len(forecast.tests) > 1 else ""
+    return f"{figures[0].name} {figures[0].text(number)}, {figures[0].where}{more}" if figures else "nothing predicted"
+
+
+RESULTS: dict[str, Callable[[Any], str]] = {
+    "extraction": lambda one: f"{', '.join(one.outputs)} of {plural(int(one.used.sum()), 'frame')}".replace("_", " "),
+    "imposed": lambda one: f"lag of the clocks {number(one.alignment.lag, 4)} s",
+    "temperature": lambda one: "how the values change with temperature",
+    "rupture": lambda one: f"{plural(len(one.ranked), 'method')} compared",
+    "forecasts": _asked_text,
+    "design": lambda one: f"{plural(len(one.tests), 'planned test')} compared",
+}
+"""{section: the line that says its result}."""
 
 
 def _of(name: str) -> str:

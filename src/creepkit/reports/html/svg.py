@@ -1,7 +1,6 @@
 """Figures as SVG within a page: thinned, with text as text, with identifiers of their own, always the same bytes.
 
-A figure of several panels is followed by one picture of each, cut out of the whole, for narrow screens. The ground of a
-figure is transparent; its colours are those of a figure on white.
+The ground of a figure is transparent; its colours are those of a figure on white. A narrow screen scrolls it.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from xml.etree import ElementTree
 from creepkit.reports.figures import POWER_OF_TEN, save_figure
 from creepkit.reports.html.compact_svg import compact
 from creepkit.reports.html.elements import printable
-from creepkit.reports.html.panels import Place, stacked_panels
 from creepkit.reports.html.thinning import thin_figure
 
 if TYPE_CHECKING:
@@ -39,7 +37,7 @@ _FONTS = "system-ui, 'DejaVu Sans', Verdana, sans-serif"
 
 
 def svg_text(figure: Figure, identifier: str, title: str, description: str) -> str:
-    """A figure as an <svg> element, with its title and description for those who do not see it, and its panels.
+    """A figure as an <svg> element, with its title and description for those who do not see it.
 
     identifier : letters and digits, of its own in the page: all identifiers of the figure begin with it.
     """
@@ -59,7 +57,6 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
             engine.execute(figure)  # axes have their places and ranges from here on
             figure.set_layout_engine("none")
         letters = _smallest_text(figure)
-        panels = stacked_panels(figure)
         thin_figure(figure)
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(buffer, metadata={"Date": None})
@@ -67,10 +64,6 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
     width = float(str(root.get("viewBox")).split()[2])
     compact(root, identifier)
     view_box = str(root.get("viewBox"))
-    if len(panels) > 1:
-        whole = ElementTree.Element("g", {"id": f"{identifier}-w"})
-        whole.extend(list(root))
-        root[:] = [whole]
     root.attrib.clear()
     root.attrib.update(
         {
@@ -81,18 +74,15 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
             "style": _widths(width, letters),
         }
     )
-    if len(panels) > 1:
-        root.set("class", "whole")
     for position, (tag, text) in enumerate((("title", title), ("desc", description))):
         element = ElementTree.Element(tag, {"id": f"{identifier}-{tag[0]}"})
         element.text = printable(text)
         root.insert(position, element)
-    parts = [_part(place, identifier, letters) for place in panels] if len(panels) > 1 else []
-    return "".join(ElementTree.tostring(one, encoding="unicode") for one in (root, *parts))
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _widths(points: float, letters: float) -> str:
-    """The width that a part of a figure was drawn for, and the least at which it can be read, pixels of 1/96 inch.
+    """The width that a figure was drawn for, and the least at which it can be read, pixels of 1/96 inch.
 
     points : its width, letters : its smallest text, both in points of 1/72 inch.
     """
@@ -107,23 +97,6 @@ def _smallest_text(figure: Figure) -> float:
 
     sizes = [float(text.get_fontsize()) for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
     return min(sizes, default=10.0)
-
-
-def _part(place: Place, identifier: str, letters: float) -> ElementTree.Element:
-    """A panel cut out of the whole figure, which has the words for those who do not see it."""
-    width, height = place.right - place.left, place.bottom - place.top
-    part = ElementTree.Element(
-        "svg",
-        {
-            "viewBox": f"{place.left:.1f} {place.top:.1f} {width:.1f} {height:.1f}",
-            "class": "part",
-            "aria-hidden": "true",
-            "font-family": _FONTS,
-            "style": _widths(width, letters),
-        },
-    )
-    ElementTree.SubElement(part, "use", {"href": f"#{identifier}-w"})
-    return part
 
 
 def _shorten_texts(figure: Figure) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from creepkit.reports.html.elements import Table, number, printable
+from creepkit.reports.html.elements import Block, Paragraph, Table, number, printable, sentence
 from creepkit.reports.load_programs import temperature_text
 
 if TYPE_CHECKING:
@@ -20,11 +20,14 @@ HEAT_LABELS = ("heat", "batch", "cast")
 CONTROLS = {"load": "load held", "stress": "true stress held"}
 
 
-def table_of_details(histories: Sequence[History], more: str) -> Table:
-    """A row for each test. more : what the caption says of tests that are not listed."""
+def details_of_tests(histories: Sequence[History], more: str) -> list[Block]:
+    """What tests have in common in a sentence, and a row for each of what differs.
+
+    more : what the caption says of tests that are not listed.
+    """
+    columns = ("specimen", "control", "temperature", "strain", "elastic strain", "heat", "dimensions, mm")
     rows = [
         (
-            printable(h.name, 120),
             printable(h.specimen, 80),
             CONTROLS.get(str(getattr(h.loading, "control", "")), f"{h.loading.quantity} imposed"),
             temperature_text(h),
@@ -34,8 +37,13 @@ def table_of_details(histories: Sequence[History], more: str) -> Table:
         )
         for h in histories
     ]
-    columns = ("test", "specimen", "control", "temperature", "strain", "elastic strain", "heat", "dimensions, mm")
-    return Table(f"How the tests were made{more}", columns, rows)
+    differing = [k for k in range(len(columns)) if len({row[k] for row in rows}) > 1]
+    shared = [f"{name} {rows[0][k]}" for k, name in enumerate(columns) if k not in differing]
+    blocks: list[Block] = [Paragraph(sentence(f"all tests: {', '.join(shared)}"))] if shared else []
+    if differing:
+        named = [(printable(h.name, 120), *(row[k] for k in differing)) for h, row in zip(histories, rows, strict=True)]
+        blocks.append(Table(f"How the tests were made{more}", ("test", *(columns[k] for k in differing)), named))
+    return blocks
 
 
 def _strain(history: History) -> tuple[str, str]:

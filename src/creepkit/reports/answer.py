@@ -1,0 +1,310 @@
+"""The answer to an identification in few words: what the law is, how far to trust it, and what to do next.
+
+Terminal, notebook and page take their first lines from here. A sentence has 25 words at most, and two numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from textwrap import wrap
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.inverse.adequacy import SHAPE_MISFIT
+from creepkit.inverse.perturbation import combined_change_text
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
+from creepkit.language import temperature
+from creepkit.language.printing import expression_text, state_equations
+from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
+from creepkit.records.units import celsius_text, time_text
+from creepkit.reports.minimum_rate_panel import compared_minimum_rates, exponents
+from creepkit.reports.stress_exponents import interval_digits, plain_number, rate_and_exponent
+
+if TYPE_CHECKING:
+    from creepkit.forecasts.forecast import Forecast
+    from creepkit.forecasts.results import TestForecast
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.uncertainty.laplace_approximation import Estimate
+    from creepkit.quality.flags import DataQuality
+
+MOST_CAUTIONS = 3
+"""On the first screen and in a terminal; the others stand in the details."""
+
+
+MOST_NAMED = 4
+"""Parameters, tests or laws in a sentence."""
+
+
+NOTEWORTHY_EXPONENT = 0.15
+"""Of the stress exponent, by which leaving out one test changes it, from which on this is said."""
+
+
+NumberText = Callable[[float, int], str]
+"""A number with so many digits, as the place where it stands writes it."""
+
+
+@dataclass(frozen=True)
+class KeyFigure:
+    """One number that a laboratory asks for.
+
+    name : such as "stress exponent". where : the condition that it holds at. value, low, high : with a 95 % interval,
+    whose ends are NaN where there is none. unit : "" for none. remark : what to compare it with.
+    """
+
+    name: str
+    where: str
+    value: float
+    low: float = float("nan")
+    high: float = float("nan")
+    unit: str = ""
+    remark: str = ""
+
+    def text(self, number: NumberText) -> str:
+        """Value, interval and unit."""
+        unit = f" {self.unit}" if self.unit else ""
+        if math.isnan(self.low):
+            return f"{self.value:#.2g}".rstrip(".") + unit
+        digits = interval_digits(self.value, self.low, self.high)
+        low, high = (number(end, digits) for end in (self.low, self.high))
+        return f"{number(self.value, digits)}{unit} [{low}, {high}]"
+
+
+# ---- key figures -----------------------------------------------------------------------------------------------------
+
+
+def key_figures(fit: Identification) -> list[KeyFigure]:
+    """Stress exponent, activation energy and creep rate at the tests; of a rejected law those that were measured."""
+    return [*_exponents(fit), *_of_the_law(fit)]
+
+
+def _exponents(fit: Identification) -> Iterator[KeyFigure]:
+    """The apparent stress exponent of the minimum rates that tests show, beside that of the law for the same tests."""
+    rates = compared_minimum_rates(fit)
+    measured, predicted = exponents(rates) if rates else (math.nan, math.nan)
+    if math.isfinite(measured):
+        by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
+        yield KeyFigure("stress exponent of measured minimum rates", _range(fit), measured, remark=by_law)
+
+
+def _of_the_law(fit: Identification) -> Iterator[KeyFigure]:
+    if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
+        return
+    r = fit.reference
+    at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}"
+    rate, exponent = rate_and_exponent(fit)
+    yield _with_interval("stress exponent", at, exponent)
+    low, high = fit.ranges["temperature"]
+    if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
+        yield _with_interval("activation energy", at, fit.activation_energy(), 1e-3, "kJ/mol")
+    yield _with_interval("creep rate", at, rate, 100.0 * SECONDS_PER_HOUR, "%/h")
+
+
+def _with_interval(name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "") -> KeyFigure:
+    """Of (value, low, high), each times a factor."""
+    value, low, high = (factor * float(v) for v in values)
+    return KeyFigure(name, where, value, low, high, unit)
+
+
+def asked_figures(forecast: Forecast) -> list[KeyFigure]:
+    """What a forecast says of each test: its life, or what it shows at the end, with the interval of a single test."""
+    return [figure for test in forecast.tests if (figure := _of_test(test)) is not None]
+
+
+def _of_test(test: TestForecast) -> KeyFigure | None:
+    condition = test.history.condition
+    where = condition if test.name in condition else f"{test.name}: {condition}"
+    for one in test.times:
+        if math.isfinite(one.median):
+            of_strain = is_logarithmic(one.output) if one.output else False
+            event = f"{100 * one.target:g} % {one.output}" if of_strain else one.event
+            return _with_interval(f"time to {event}", where, (one.median, one.low, one.high), 1 / SECONDS_PER_HOUR, "h")
+    for name, output in test.outputs.items():
+        alive = np.flatnonzero(np.isfinite(output.value))
+        if alive.size:
+            k = int(alive[-1])
+            unit, factor = ("%", 100.0) if is_logarithmic(name) else (output_unit(name), 1.0)
+            values = (output.value[k], output.band.low[k], output.band.high[k])
+            label = f"{name.replace('_', ' ')} at {time_text(float(output.times[k]))}"
+            return _with_interval(label, where, values, factor, unit)
+    return None
+
+
+def _range(fit: Identification) -> str:
+    """Stresses and temperatures of the tests."""
+    low, high = fit.ranges["stress"]
+    stresses = f"{low:.3g} MPa" if f"{low:.3g}" == f"{high:.3g}" else f"{low:.3g} to {high:.3g} MPa"
+    return f"{stresses}, {celsius_text(*fit.ranges['temperature'], digits=0)}"
+
+
+def tests_text(fit: Identification) -> str:
+    """How many tests, and under which conditions."""
+    count = len(fit.tests)
+    return f"{count} test{'' if count == 1 else 's'}, {_range(fit)}"
+
+
+# ---- cautions --------------------------------------------------------------------------------------------------------
+
+
+def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQuality | None = None) -> list[str]:
+    """What to mind, the most serious first, a sentence each without a full stop."""
+    return list(dict.fromkeys([*_contradictions(fit), *_choice(ranking), *_precision(fit), *_data(quality)]))
+
+
+def _contradictions(fit: Identification) -> Iterator[str]:
+    """What keeps the law from describing the tests."""
+    adequacy = fit.adequacy
+    if not fit.converged:
+        yield "the search did not converge: repeat it with more starts"
+    if adequacy is None:
+        yield "whether the tests contradict the law is not known"
+        return
+    if adequacy.unpredicted:
+        yield f"it does not predict every reading of {_named(adequacy.unpredicted, 'test')}"
+    if adequacy.contradicting is not None:
+        yield "minimum rates and rupture times of the tests contradict one another by this law"
+    if adequacy.is_explained:
+        yield adequacy.explanations[0].headline
+    if adequacy.rejects and adequacy.discrepancy_in_noises > SHAPE_MISFIT and adequacy.largest is not None:
+        worst = adequacy.largest
+        percent = is_logarithmic(worst.output)
+        unit = "%" if percent else output_unit(worst.output)
+        size = abs(worst.deviation) * (100.0 if percent else 1.0)
+        side = "above" if worst.deviation > 0 else "below"
+        what = worst.output.replace("_", " ")
+        yield f"worst in {what} of '{worst.test}': {size:.2g} {unit} {side} at {time_text(worst.time)}".replace(
+            "  ", " "
+        )
+    if adequacy.remedies and not adequacy.explanations:
+        yield f"it would explain the tests with {adequacy.remedies[0]}, which nobody modelled"
+    yield from (f"it takes {one.description}, far from what was stated" for one in adequacy.implausible[:1])
+    if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
+        yield "the noise of the readings is not known: the law cannot be judged by it"
+
+
+def _choice(ranking: Ranking | None) -> Iterator[str]:
+    """What else the tests allow."""
+    if ranking is None or len(ranking.laws) < 2 or ranking.decisive or ranking.adequacy is None:
+        return
+    others = [one.fit.law.name for one in ranking.credible[1:]]
+    if others:
+        yield f"the tests cannot tell it apart from {_named(others, 'law')}"
+    for challenge in (ranking.challenges or ())[:1]:
+        yield str(challenge)
+    if ranking.challenges is None and not others and not ranking.adequacy.rejects:
+        yield "what else the tests allow was not examined"
+
+
+def _precision(fit: Identification) -> Iterator[str]:
+    """What the tests do not determine, and what intervals leave out."""
+    for verdict, words in ((NOT_DETERMINED, "do not determine"), (POORLY_DETERMINED, "hardly determine")):
+        names = [e.name for e in fit.estimates if e.verdict == verdict]
+        if names:
+            yield f"the tests {words} {_named(names, 'parameter', quoted=False)}"
+    far = max(fit.left_out, key=lambda one: abs(one.exponent - fit_exponent(fit)), default=None)
+    if far is not None and abs(far.exponent - fit_exponent(fit)) > NOTEWORTHY_EXPONENT * fit_exponent(fit):
+        yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
+    change = combined_change_text(fit.unmodelled)
+    if change:
+        kinds = " and ".join(dict.fromkeys(f"{one.kind} ({one.amount})" for one in fit.unmodelled[:2]))
+        yield f"intervals do not include usual errors of {kinds}, which move rates by {change}"
+
+
+def fit_exponent(fit: Identification) -> float:
+    """The stress exponent of the law's formula amid the tests."""
+    return float(fit.local_exponent(fit.reference.stress, warn=False)[0])
+
+
+def _data(quality: DataQuality | None) -> Iterator[str]:
+    if quality is not None and quality.flags:
+        tests = list(dict.fromkeys(name for flag in quality.flags for name in flag.tests))
+        yield f"readings of {_named(tests, 'test')} are suspect; nothing was dropped"
+
+
+def _named(names: Sequence[str], noun: str, *, quoted: bool = True) -> str:
+    """Some names, and how many more there are."""
+    marks = "'" if quoted and noun == "test" else ""
+    listed = [f"{marks}{name}{marks}" for name in names[:MOST_NAMED]]
+    more = len(names) - len(listed)
+    listed += [f"{more} more {noun}{'s' * (more > 1)}"] if more > 0 else []
+    return listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])} and {listed[-1]}"
+
+
+# ---- next ------------------------------------------------------------------------------------------------------------
+
+
+def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
+    """What to do now, in one sentence without a full stop."""
+    adequacy = fit.adequacy
+    if adequacy is not None and adequacy.lies_in_tests:
+        first = adequacy.explanations[0]
+        what = "the two groups apart" if first.kind == "two groups" else f"{_named(first.tests, 'test')} again"
+        return f"check {what} (label, unit, thermocouple), then identify without"
+    if adequacy is not None and (adequacy.rejects or adequacy.verdict == "cannot be judged"):
+        if ranking is None:
+            return "compare laws: select(candidates(tests), tests)"
+        return "use it within the tests, by the factors above; try other laws for more"
+    if ranking is not None and len(ranking.laws) > 1 and not ranking.decisive:
+        return "plan a test that tells the laws apart: design(ranking)"
+    if any(e.verdict in (NOT_DETERMINED, POORLY_DETERMINED) for e in fit.estimates):
+        return "plan a test that determines more: design(fit)"
+    return "forecast, or write the law for your code: fit.forecast(test), export(fit, target)"
+
+
+# ---- as text ---------------------------------------------------------------------------------------------------------
+
+WIDTH = 100
+"""Characters of a line in a terminal."""
+
+
+def answer_text(fit: Identification) -> str:
+    """The answer of one law: headline, equations, values, key figures, cautions and what to do next."""
+    return _text(fit, None)
+
+
+def ranking_answer_text(ranking: Ranking) -> str:
+    """The same of the best law of a ranking, behind the weights of all."""
+    return _text(ranking.best, ranking)
+
+
+def _text(fit: Identification, ranking: Ranking | None) -> str:
+    lines = wrap(fit.headline, WIDTH)
+    failed = {} if ranking is None else ranking.failed
+    lines += [line for law, why in failed.items() for line in _indented(f"left out: {law}: {why}", "    ")]
+    if ranking is not None and len(ranking.laws) > 1:
+        weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED])
+        more = len(ranking.laws) - MOST_NAMED
+        decided = "decisive" if ranking.decisive else "not decisive"
+        lines += _indented(f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}")
+    summands = " + ".join(expression_text(term) for term in fit.law.terms.values())
+    lines += [f"  rate = {summands}", *(f"  {equation}" for equation in state_equations(fit.law))]
+    lines += _indented("   ".join(_value(fit, e) for e in fit.estimates), "    ")
+    lines += _indented(fit.sparsity.verdict, "    ") if fit.sparsity is not None else []
+    lines += [_figure_line(one) for one in key_figures(fit)]
+    lines += [line for text in cautions(fit, ranking)[:MOST_CAUTIONS] for line in _indented(f"- {text}", "    ")]
+    return "\n".join([*lines, *_indented(f"next: {next_step(fit, ranking)}; all numbers: .details()")])
+
+
+def _value(fit: Identification, estimate: Estimate) -> str:
+    """One value with its interval on a line of its own piece: its blanks do not break."""
+    low, high = interval_ends(fit.law, estimate)
+    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+    text = f"{estimate.name} = {estimate.value:.4g} [{low}, {high}]{unit}"
+    return text.replace(" ", "\u00a0")
+
+
+def _figure_line(figure: KeyFigure) -> str:
+    remark = f", {figure.remark}" if figure.remark else ""
+    return f"  {figure.name} at {figure.where}: {figure.text(plain_number)}{remark}"
+
+
+def _indented(text: str, hanging: str = "  ") -> list[str]:
+    """Lines of a text, the first indented by two."""
+    return [
+        line.replace("\u00a0", " ")
+        for line in wrap(text, WIDTH, initial_indent="  ", subsequent_indent=hanging, break_long_words=False)
+    ]

@@ -1,0 +1,102 @@
+"""tests.toml beside the files of a laboratory: what they leave open is answered there, and every question names it."""
+
+import pytest
+
+import creepkit as ck
+from creepkit.errors import HistoryError
+from creepkit.readers.questions import Question, SeveralErrors
+from creepkit.readers.tests_file import answers_of, with_answer
+
+TABLE = "Temp (C);Stress (MPa);tr (h);Status\n600;320;4454;A\n600;260;23220;B\n650;320;233;A\n"
+CURVE = "# stress_MPa: 120\nZeit (h);Dehnung (%);Kanal 7\n0;0;4\n10;0.1;4\n20;0.18;4\n"
+
+
+def written(folder, **files):
+    for name, text in files.items():
+        (folder / name.replace("__", ".")).write_text(text, encoding="utf-8")
+    return folder
+
+
+def test_an_answer_decides_how_tests_ended(tmp_path):
+    written(tmp_path, rates__csv=TABLE)
+    with pytest.raises(Question, match="'Status' says 'A' and 'B': did these tests break") as caught:
+        ck.read_histories(tmp_path)
+    (line,) = [caught.value.entry(choice) for choice in caught.value.choices[:1]]
+    assert line == 'ended = {B = "stopped", A = "ruptured"}'  # the one that lasted longest is the likely run-out
+    written(tmp_path, tests__toml=f'["rates.csv"]\n{line}\n')
+    tests = ck.read_histories(tmp_path)
+    assert [one.unruptured for one in tests] == [False, True, False]
+    written(tmp_path, tests__toml='["*.csv"]\nended = {a = "label", b = "label"}\n')
+    assert [one.unruptured for one in ck.read_histories(tmp_path)] == [False] * 3
+
+
+def test_conditions_and_columns(tmp_path):
+    written(tmp_path, a__csv=CURVE, b__csv=CURVE)
+    with pytest.raises(HistoryError, match="Kanal 7") as caught:
+        ck.read_histories(tmp_path)
+    assert isinstance(caught.value, SeveralErrors)
+    assert len(caught.value.errors) == 2
+    written(
+        tmp_path,
+        tests__toml='["*.csv"]\ntemperature_C = 600\ncolumns = {"Kanal 7" = "unused"}\n'
+        '["b.csv"]\ntemperature_C = 650\n',
+    )
+    first, second = ck.read_histories(tmp_path)
+    assert (first.temperature, second.temperature) == (873.15, 923.15)
+    assert ck.read_histories(tmp_path / "b.csv")[0].temperature == 923.15
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == CURVE
+
+
+def test_a_table_is_found_by_the_answers_alone(tmp_path):
+    text = "Pr;Last (MPa);Ofen (°C);Dauer bis Ende (h)\nA;120;600;900\nB;100;600;>5000\n"
+    written(tmp_path, x__csv=text)
+    columns = '"Last (MPa)" = "stress", "Ofen (°C)" = "temperature_C", "Dauer bis Ende (h)" = "rupture", Pr = "test"'
+    written(tmp_path, tests__toml=f'["x.csv"]\ncolumns = {{{columns}}}\n')
+    first, second = ck.read_histories(tmp_path)
+    assert (first.name, first.rupture_time, second.unruptured) == ("A", 900 * 3600.0, True)
+
+
+def test_a_test_is_named(tmp_path):
+    written(tmp_path, r__csv="test,T (C),stress_MPa,tr (h)\nA,600,100,900\nB,600,90,2000\n")
+    written(tmp_path, tests__toml='["r.csv"]\nended = {B = "stopped"}\n')
+    assert [one.unruptured for one in ck.read_histories(tmp_path)] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('["a.csv"]\nstres_MPa = 5\n', "stres_MPa: is no key; did you mean 'stress_MPa'?"),
+        ('["a.csv"]\ncolums = {x = "y"}\n', "colums: is no key; did you mean 'columns'?"),
+        ('["a.csv"]\nwhatever = 1\n', "is no key; allowed are columns, ended, and conditions"),
+        ('["a.csv"]\nended = {x = "broke"}\n', "'broke' is no end; allowed: ruptured, stopped, label"),
+        ('["a.csv"]\ncolumns = "x"\n', "write {name of a column = what it is}"),
+        ("stress_MPa = 5\n", 'stands in no table; begin with the files that it is about, such as ["*.csv"]'),
+        ("[a\n", "is no TOML"),
+    ],
+)
+def test_a_wrong_key_is_one_sentence(tmp_path, text, said):
+    written(tmp_path, a__csv=CURVE, tests__toml=text)
+    with pytest.raises(HistoryError) as caught:
+        ck.read_histories(tmp_path)
+    assert said in str(caught.value)
+    assert "tests.toml" in str(caught.value)
+
+
+def test_answers_are_added_to_what_is_there(tmp_path):
+    text = with_answer("", "a.csv", "temperature_C", "600")
+    text = with_answer(text, "b.csv", "columns", '{x = "unused"}')
+    text = with_answer(text, "b.csv", "columns", '{y = "label"}')
+    text = with_answer(text, "a.csv", "temperature_C", "650")
+    assert text == '["a.csv"]\ntemperature_C = 650\n\n["b.csv"]\ncolumns = {x = "unused", y = "label"}\n'
+    written(tmp_path, tests__toml=text)
+    assert answers_of(tmp_path / "b.csv").columns == {"x": "unused", "y": "label"}
+
+
+def test_all_errors_of_a_table_come_at_once(tmp_path):
+    table = "test,T (C),stress_MPa,tr (h)\nA,600,x,900\nB,600,90,slow pokes\nB2,600,90,5000*\nC,600,-5,20\n"
+    written(tmp_path, r__csv=table)
+    with pytest.raises(SeveralErrors) as caught:
+        ck.read_histories(tmp_path)
+    lines = [str(one) for one in caught.value.errors]
+    assert [next(k for k in "2345" if f"r.csv:{k}" in line) for line in lines] == ["3", "4", "2", "5"]
+    assert "ignore" not in "".join(lines)
