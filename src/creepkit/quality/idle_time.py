@@ -18,8 +18,8 @@ from creepkit.records import History, growing_output
 from creepkit.records.recorded_programs import noise_of_readings
 from creepkit.records.units import time_text, times_text
 
-FRAMES_BESIDE = 5
-"""Intervals before and after over which the rates are found."""
+FRAMES_BESIDE, SHORTEST_BESIDE = 5, 0.2
+"""Intervals before and after over which the rates are found at least, and their duration over that of the part."""
 
 
 WIDTHS = (*range(1, 40), *(int(40 * 1.2**k) for k in range(20)))
@@ -65,32 +65,41 @@ def idle_flags(history: History) -> Iterator[QualityFlag]:
             )
 
 
+def _rates(times: Floats, values: Floats, count: int, sigma: float) -> tuple[Floats, Floats]:
+    """Rates of lines through `count` frames from each on, and their standard deviations.
+
+    times, values : (frames,) s, and the unit of the output, in which sigma is.
+    """
+    windows = [np.lib.stride_tricks.sliding_window_view(one, count) for one in (times, values)]
+    x, y = (one - one.mean(axis=1, keepdims=True) for one in windows)
+    variation = (x**2).sum(axis=1)
+    return (x * y).sum(axis=1) / variation, sigma / np.sqrt(variation)
+
+
 def idle_parts(times: Floats, values: Floats) -> list[IdlePart]:
     """The idle parts of a curve under one load, the longest first; none overlaps another.
 
     times, values : (frames,) s, and the unit of the output.
     """
-    count = FRAMES_BESIDE + 1
-    if times.size < 2 * count + 1:
-        return []
     steps = np.abs(np.diff(values))
-    resolution = float(steps[steps > 0.0].min(initial=np.inf)) if (steps == 0.0).mean() > TIES else 0.0
-    sigma = max(noise_of_readings(values), resolution)
-    windows = [np.lib.stride_tricks.sliding_window_view(one, count) for one in (times, values)]
-    x, y = (one - one.mean(axis=1, keepdims=True) for one in windows)
-    variation = (x**2).sum(axis=1)
-    rates, errors = (x * y).sum(axis=1) / variation, sigma / np.sqrt(variation)
+    is_rounded = steps.size > 0 and (steps == 0.0).mean() > TIES
+    sigma = max(noise_of_readings(values), float(steps[steps > 0.0].min(initial=np.inf)) if is_rounded else 0.0)
     found: list[tuple[float, IdlePart]] = []
-    for width in (one for one in WIDTHS if times.size > 2 * FRAMES_BESIDE + one):
-        first = np.arange(FRAMES_BESIDE, times.size - FRAMES_BESIDE - width)
-        before, after, span = first - FRAMES_BESIDE, first + width, times[first + width] - times[first]
-        least = np.minimum(rates[before], rates[after])
-        growth, error = values[first + width] - values[first], np.maximum(errors[before], errors[after])
+    for width in WIDTHS:
+        beside = max(FRAMES_BESIDE, width // 2)
+        first = np.arange(beside, times.size - beside - width)
+        if not first.size:
+            break
+        rates, errors = _rates(times, values, beside + 1, sigma)
+        before, after, span = first - beside, first + width, times[first + width] - times[first]
+        least, error = np.minimum(rates[before], rates[after]), np.maximum(errors[before], errors[after])
+        growth = values[after] - values[first]
         lacking = least * span - growth
         is_idle = (least > RATE_THRESHOLD * error) & (np.maximum(rates[before], rates[after]) < RATE_RATIO * least)
-        is_idle &= (growth < LARGEST_GROWTH * least * span) & (
-            lacking > THRESHOLD * np.hypot(1.5 * sigma, span * error)
-        )
+        is_idle &= growth < LARGEST_GROWTH * least * span
+        is_idle &= lacking > THRESHOLD * np.hypot(1.5 * sigma, span * error)
+        shorter = np.minimum(times[first] - times[before], times[after + beside] - times[after])
+        is_idle &= shorter > SHORTEST_BESIDE * span
         for k in np.flatnonzero(is_idle):
             rate = float(np.sqrt(rates[before[k]] * rates[after[k]]))
             idle = float(span[k] - max(growth[k], 0.0) / rate)

@@ -37,6 +37,7 @@ from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.condition_texts import sources_of_names
 from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.noise_correlation import noise_correlation_text
+from creepkit.readers.table_heads import is_frame
 from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
 from creepkit.readers.text_grids import peek_grid, read_head_alone, read_text_grid
 from creepkit.readers.text_tables import TextTable
@@ -89,7 +90,7 @@ class HistoryCsvReader:
         grid = peek_grid(path)
         if self.columns:
             return grid is not None and set(self.columns) <= set(grid.rows[0].cells)
-        return grid is not None and names_time(grid, self.vocabulary)
+        return grid is not None and _has_numbers(grid) and names_time(grid, self.vocabulary)
 
     def read(self, path: Path) -> list[History]:
         """Return the histories in the file; a head without frames is that of a test known by rate or end alone."""
@@ -99,6 +100,12 @@ class HistoryCsvReader:
         grid = read_text_grid(path)
         with _errors_of_format(grid):
             return histories_of_tests([(grid, test) for test in tests_in(grid, self.vocabulary)], path, self.vocabulary)
+
+
+def _has_numbers(grid: CellGrid) -> bool:
+    """Whether some row holds numbers alone, with either decimal sign."""
+    signs = [replace(grid, dialect=replace(grid.dialect, decimal=sign)) for sign in ".,"]
+    return any(is_frame(row, one) for one in signs for row in grid.rows)
 
 
 @contextmanager
