@@ -31,12 +31,12 @@ SHOTS = {
     "spreadsheet_findings": ("spreadsheet_to_abaqus/report", "#findings", 900),
     "spreadsheet_forecast": ("spreadsheet_to_abaqus/report", "#forecasts", 1100),
     "plate_findings": ("plate_of_dimples/report", "#findings", 1100),
-    "plate_alloy": ("plate_of_dimples/report", "#m1-curves", 1100),
+    "plate_alloy": ("plate_of_dimples/report", "#m1", 1100),
 }
 """{picture: (report, element, the most of its height in pixels)}."""
 
 
-WIDTH, MARGIN, COLOURS, MOST_BYTES = 860, 16, 128, 150_000
+WIDTH, MARGIN, COLOURS, MOST_BYTES = 1100, 16, 128, 150_000
 """Pixels of the window and around an element; colours of a picture; bytes of the largest."""
 
 WIDE = {"plate_findings": 1280}
@@ -71,6 +71,8 @@ def main() -> None:
             width = WIDE.get(name, WIDTH)
             page.set_viewport_size({"width": width, "height": WIDTH})
             page.goto((REPORTS / f"{report}.html").as_uri())
+            opened = "name => document.querySelectorAll(`${name}, ${name} *`).forEach(part => part.open = true)"
+            page.evaluate(opened, element.split()[0])
             place = page.locator(element).first.bounding_box()
             clip = {
                 "x": max(place["x"] - MARGIN, 0),

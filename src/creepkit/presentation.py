@@ -38,6 +38,10 @@ class Presentable:
     def __str__(self) -> str:
         return present(self._text, self)
 
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        return present("reports.html.notebook:notebook_html", self)
+
 
 def present(name: str, record: object, /, *arguments: Any, **options: Any) -> Result:  # type: ignore[type-var]
     """What the function "module:function" of creepkit makes of a record; a test compares its type with the method's."""

@@ -14,43 +14,43 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 270,
+    "api": 340,
     "app": 630,
     "cameras": 1170,
-    "cli": 2380,
-    "core": 100,
+    "cli": 2365,
+    "core": 70,
     "dataset": 820,
     "discovery": 1490,
     "experiments": 1710,
     "exporters": 2690,
-    "extraction": 1145,
+    "extraction": 1360,
     "fem": 1900,
     "files": 1425,
     "forecasts": 1490,
-    "instruments": 1380,
-    "integration": 1100,
-    "inverse": 12015,
+    "instruments": 1440,
+    "integration": 930,
+    "inverse": 11975,
     "jobs": 260,
     "kernels": 1710,
     "language": 1590,
     "laws": 140,
-    "modules": 780,
-    "quality": 1540,
-    "readers": 5760,
-    "records": 1950,
+    "modules": 785,
+    "quality": 1545,
+    "readers": 6000,
+    "records": 1985,
     "registry": 620,
-    "reports": 8250,
+    "reports": 8345,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
-    "specimens": 4050,
-    "studies": 2590,
+    "specimens": 3985,
+    "studies": 3075,
     "surrogates": 1790,
     "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34400
+TESTS = 35150
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

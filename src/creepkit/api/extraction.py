@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,14 +11,21 @@ import numpy as np
 from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import HistoryError
 from creepkit.extraction.domes import Centers
+from creepkit.extraction.options import ClockOptions
+from creepkit.instruments.imposed import channel_names
 from creepkit.records import Loading, Program, RecordedLoading, Specimen, SupportsSurfaceObservation
 from creepkit.registry.arguments import resolve_predictor
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
     from creepkit.extraction.options import ExtractionOptions
+    from creepkit.extraction.temperature_fields import InfraredField
     from creepkit.instruments.imposed import Imposed
     from creepkit.records import Frames, History, InstrumentRecord
+
+FEWEST_AT_REST = 3
+"""Frames whose level shows that there is no load: a single one is the reference, whatever it was taken under."""
+
 
 WATCHED = "bulge"
 """The specimen that cameras are taken to watch where none is named."""
@@ -67,14 +74,23 @@ def extract_as_described(
     described: ExtractionOptions,
     operator: str,
     progress: Callable[[str, int, int], None],
+    failed: dict[str, str] | None = None,
 ) -> list[Extraction]:
     """Extract what a command or a study describes: its frames' interval, centres, names and frames at rest.
 
-    progress : called as progress("frames", done, total) for each frame that is read. HistoryError for another number of
-    names than of test pieces.
+    progress : called as progress("frames", done, total) for each frame that is read. failed : takes {test piece: why
+    nothing is extracted of it}, so that the others are; None: HistoryError for the first. HistoryError for another
+    number of names than of test pieces, and where none of these is left.
     """
+    from creepkit.extraction import extract_surfaces
+
     if described.interval is not None:
         frames = replace(frames, times=described.interval * np.arange(len(frames), dtype=float))
+    if np.isnan(frames.times).any():
+        raise HistoryError(
+            f"frames '{frames.name}': their files hold no times; give times, a file with a row for each of the "
+            f"{len(frames)} frames, or interval, s between two of them"
+        )
     names = described.names or tuple(f"D{k + 1}" for k in range(len(described.centers)))
     done: set[int] = set()
 
@@ -84,69 +100,147 @@ def extract_as_described(
         return frames.read_frame(index)
 
     centers = {name: (x, y) for name, (x, y) in zip(names, described.centers, strict=False)}
-    found = extract(
+    found = extract_surfaces(
         replace(frames, read_frame=read),
-        specimen,
+        _watched(specimen),
         operator=operator,
         centers=centers or None,
         rest=described.frames_at_rest,
         subset=described.subset,
+        failed=failed,
     )
     if not names or centers:
         return found
-    if len(names) != len(found):
+    lost = {} if failed is None else dict(failed)
+    if len(names) != len(found) + len(lost):
         raise HistoryError(
-            f"{len(found)} test pieces were found, and {len(names)} names are given: {', '.join(names)}; give as many "
-            "names, or the centres of those that have them"
+            f"{len(found) + len(lost)} test pieces were found, and {len(names)} names are given: {', '.join(names)}; "
+            "give as many names, or the centres of those that have them"
         )
-    return [one.replace(name=name) for one, name in zip(found, names, strict=True)]
+    given = {f"D{k}": name for k, name in enumerate(names, 1)}
+    if failed is not None:
+        failed.clear()
+        failed.update({given[name]: reason for name, reason in lost.items()})
+    return [one.replace(name=given[one.name]) for one in found]
 
 
 def operator_of(specimen: Specimen | str, described: ExtractionOptions) -> str:
     """The text of the operator of a specimen within the window or on the rings described; by default its own."""
-    if described.window is not None and described.rings:
-        raise HistoryError("a window and rings were given: means on rings have no window; leave one of them out")
     return _watched(specimen).surface_operator(described.window, described.rings)
 
 
-def imposed_on(
-    extraction: Extraction,
-    record: InstrumentRecord,
-    channels: Sequence[str] | None = None,
-    *,
-    lag: float | None = None,
-    search: tuple[float, float] | None = None,
-    camera_start: float | None = None,
-) -> Imposed:
-    """What an instrument recorded of a test piece, over the time of its frames, after the clocks were aligned.
+@dataclass(frozen=True)
+class ImposedChannels:
+    """What is known of load and temperature of the test pieces of one camera.
 
-    channels : of load and temperature; None: those that the record's format has for the name of the extraction.
-    lag : s by which the record's clock is known to be ahead; None to find it, as ck.align_clocks does with search and
-    camera_start.
+    channels : {test piece: load, then thermocouples}, "" for all; {} for those that the record's format has for their
+    names. places : {thermocouple: (x, y)} mm in the axes of the frames. infrared : mean temperatures there.
+    """
+
+    channels: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    places: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    infrared: InfraredField | None = None
+
+    def names_for(self, piece: str, record: InstrumentRecord) -> tuple[str, list[str]]:
+        """Channels of the load of a test piece and of its thermocouples; HistoryError where they are not known."""
+        given = self.channels.get(piece, self.channels.get(""))
+        names = [record.channel(name).name for name in given or channel_names(record, piece)]
+        if len(names) < 2 and self.infrared is None:
+            raise HistoryError(f"{record.origin}: no channel of the temperature of '{piece}' is named; name one")
+        return names[0], names[1:]
+
+
+def imposed_on(
+    extractions: Sequence[Extraction],
+    record: InstrumentRecord,
+    known: ImposedChannels | None = None,
+    clock: ClockOptions | None = None,
+    failed: dict[str, str] | None = None,
+) -> list[Imposed]:
+    """What an instrument recorded of the test pieces of one camera, over the time of its frames, on one clock.
+
+    The lag is estimated from all of them at once, as ck.align_clocks does; none of them has another. failed : takes
+    {test piece: why it has no result}; None: HistoryError for the first of them.
     """
     import creepkit as ck
     from creepkit.instruments.clock_alignment import nominal_zero
     from creepkit.records import ClockAlignment
 
-    times = extraction.times + extraction.first_time
-    names = None if channels is None else (channels[0], channels[1])
-    if lag is not None:
-        alignment = ClockAlignment.stated(lag, zero=nominal_zero(record, times, camera_start))
+    known, clock, failed_here = known or ImposedChannels(), clock or ClockOptions(), dict[str, str]()
+    times = extractions[0].times + extractions[0].first_time
+    names: dict[str, tuple[str, list[str]]] = {}
+    for one in extractions:
+        try:
+            names[one.name] = known.names_for(one.name, record)
+        except HistoryError as error:
+            failed_here[one.name] = str(error)
+    pieces = [one for one in extractions if one.name in names]
+    if failed is None and failed_here:
+        raise HistoryError("; ".join(failed_here.values()))
+    found: list[Imposed] = []
+    if clock.lag is not None:
+        alignment = ClockAlignment.stated(clock.lag, zero=nominal_zero(record, times, clock.start))
+    elif pieces:
+        signals = [np.where(one.used, next(iter(one.outputs.values())), np.nan) for one in pieces]
+        loads = [names[one.name][0] for one in pieces]
+        still = max((one.rest.tolist() for one in pieces), key=len)
+        alignment = ck.align_clocks(
+            record,
+            loads,
+            times,
+            signals,
+            search=clock.bounds,
+            camera_start=clock.start,
+            unloaded=still if len(still) >= FEWEST_AT_REST else (),
+        )
+    for one in pieces:
+        load, warm = names[one.name]
+        try:
+            with_its, channel, sd = _with_temperature(record, one, warm, known)
+            found.append(
+                replace(ck.imposed(with_its, (load, channel), times, alignment), specimen=one.name, temperature_sd=sd)
+            )
+        except HistoryError as error:
+            if failed is None:
+                raise
+            failed_here[one.name] = str(error)
+    if failed is not None:
+        failed.update(failed_here)
+    return found
+
+
+def _with_temperature(
+    record: InstrumentRecord, one: Extraction, names: Sequence[str], known: ImposedChannels
+) -> tuple[InstrumentRecord, str, float]:
+    """A record with a channel of the temperature at a test piece, its name, and its standard deviation, K."""
+    from creepkit.extraction.temperature_fields import TemperatureAt, temperature_between
+    from creepkit.records import Channel
+
+    x, y = (float(value) for value in one.center)
+    if known.infrared is None:
+        if len(names) == 1:
+            return record, names[0], 0.0
+        found = temperature_between(record, names, known.places, (x, y))
+        name = f"temperature at {one.name} between {', '.join(names)}"
     else:
-        signal = np.where(extraction.used, next(iter(extraction.outputs.values())), np.nan)
-        pattern = record.channel_patterns.get(extraction.load_name, "{}")
-        channel = pattern.replace("{}", extraction.name) if names is None else names[0]
-        alignment = ck.align_clocks(record, channel, times, signal, search=search, camera_start=camera_start)
-    return ck.imposed(record, extraction.name if names is None else names, times, alignment)
+        mean, sd = known.infrared.at((x, y), 0.5 * one.region.moving)
+        course = record.channel(names[0]).values if names else np.zeros(record.times.size)
+        found = TemperatureAt(mean + course - np.nanmean(course), sd)
+        name = f"infrared temperature at {one.name}"
+    channel = Channel(name, "temperature", found.values)
+    return replace(record, channels={**record.channels, name: channel}), name, found.sd
 
 
 def history_of(extraction: Extraction, under: Imposed) -> History:
     """The test as a history, under what was imposed."""
-    return extraction.history_under(
+    history = extraction.history_under(
         RecordedLoading(under.load, extraction.load_name),
         under.temperature,
         time_zero=float(under.time_zero) - extraction.first_time,
     )
+    if not under.temperature_sd:
+        return history
+    return history.replace(labels={**history.labels, "temperature_sd_K": f"{under.temperature_sd:.2g}"})
 
 
 def _watched(specimen: Specimen | str) -> SupportsSurfaceObservation:

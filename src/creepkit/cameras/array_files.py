@@ -137,7 +137,7 @@ def _hdf5_table(path: Path) -> ArrayTable:
 
     with open_hdf5(path, FRAME_FILE) as file:
         shapes = {
-            name: item.shape
+            name: item.shape[::-1]
             for name, item in file.items()
             if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and 0 < item.size <= raised(LARGEST_FRAME)
         }

@@ -23,6 +23,7 @@ def command(
     """The files are read as 'creepkit read' reads them; candidate laws and stages follow from what the tests hold."""
     from creepkit.errors import StudyError
     from creepkit.files.writing import check_target, write_text
+    from creepkit.studies.camera_proposal import ALLOYS_FILE
     from creepkit.studies.proposal import propose_study
 
     if not folder.is_dir():
@@ -30,7 +31,12 @@ def command(
     path = folder / "study.toml" if to is None else to
     check_target(path, StudyError)
     proposal = propose_study(folder, path, reader)
+    table = path.parent / ALLOYS_FILE
+    if proposal.alloys:
+        write_text(proposal.alloys, table, StudyError)
     write_text(proposal.text, path, StudyError)
     for line in proposal.summary:
         tell(line)
+    if proposal.alloys:
+        tell_written(table, "; fill in alloy and modulus of each test piece")
     tell_written(path, f"; look through it, then: creepkit run {path}")

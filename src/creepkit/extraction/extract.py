@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -79,13 +81,15 @@ def extract_surfaces(
     rest: slice | None = None,
     subset: float = 0.0,
     load: Floats | None = None,
+    failed: dict[str, str] | None = None,
 ) -> list[Extraction]:
-    """Extract every test piece in the field of view.
+    """Extract every test piece in the field of view, in one pass through the frames.
 
     specimen : says how cameras see it. operator : text of the observation operator; None for the specimen's own.
     centers : {name: (x, y)} or [(x, y), ...], mm in the axes of the frames; None to find domes and fit their centres.
     rest : slice of the frames that are at rest; None to find them. subset : mm, side of the square that the camera
     system averages over, whose smoothing is taken out; 0 leaves it in. load : (frames,) imposed, any unit.
+    failed : takes {test piece: why nothing is extracted of it}; None: the first such is a HistoryError.
     """
     _check(frames, subset)
     region = specimen.surface_region
@@ -93,13 +97,34 @@ def extract_surfaces(
     plate, found = (
         find_domes(frames, plate, region) if centers is None else place_centers(frames, plate, region, centers)
     )
-    groups = [_group(plate, center, region, list(found.values()), name) for name, center in found.items()]
-    read = read_series(frames, plate, groups)
+    problems: dict[str, str] = {}
+    groups: dict[str, Ints] = {}
+    for name, center in found.items():
+        with _kept(problems, name, failed):
+            groups[name] = _group(plate, center, region, list(found.values()), name)
+    read = read_series(frames, plate, list(groups.values()))
     request = ExtractionRequest(operator or region.operator, rest, subset, load, centers is not None)
-    return [
-        _extract_one(frames, specimen, request, _Piece(name, center, plate, read, series))
-        for (name, center), series in zip(found.items(), read.series, strict=True)
-    ]
+    extracted = []
+    for name, series in zip(groups, read.series, strict=True):
+        with _kept(problems, name, failed):
+            piece = _Piece(name, found[name], plate, read, series)
+            extracted.append(_extract_one(frames, specimen, request, piece))
+    if not extracted:
+        raise HistoryError("; ".join(dict.fromkeys(problems.values())))
+    if failed is not None:
+        failed.update(problems)
+    return extracted
+
+
+@contextmanager
+def _kept(problems: dict[str, str], name: str, failed: object) -> Iterator[None]:
+    """What is wrong with one test piece is kept beside the others, where someone asks for it."""
+    try:
+        yield
+    except HistoryError as error:
+        if failed is None:
+            raise
+        problems[name] = str(error)
 
 
 class _Piece(NamedTuple):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
@@ -37,6 +39,24 @@ class ExtractionOptions(Options, title="options of an extraction", error=History
     rest: str | None = option(None, "Frames at rest, where they are not to be found.", key="rest_frames", flag="rest")
     subset: float = option(0.0, "Side of a subset, taken out.", MILLIMETRE, unit="mm", flag="subset")
 
+    def check(self) -> None:
+        """HistoryError for what contradicts itself, before frames are read."""
+        for first, second in (("columns", "format"), ("interval", "times"), ("window", "rings")):
+            if getattr(self, first) and getattr(self, second):
+                raise HistoryError(f"{first} and {second} were given, of which one is enough; leave one of them out")
+        named = ", ".join(self.names)
+        if len({*self.names}) < len(self.names):
+            raise HistoryError(f"names {named}: stand there twice; each test piece has its own")
+        if any("/" in name or name[:1] == "." for name in self.names):
+            raise HistoryError(f"names {named}: give them without a folder")
+        if self.names and self.centers and len(self.names) != len(self.centers):
+            raise HistoryError(
+                f"names {named}: are {len(self.names)}, and centers {len(self.centers)}; give one of each"
+            )
+        if any(len(center) != 2 for center in self.centers):
+            raise HistoryError("a center has two numbers, x and y in mm, as in 12.5,-3")
+        _ = self.frames_at_rest
+
     @property
     def frames_at_rest(self) -> slice | None:
         """The frames at rest; HistoryError for a text that is not as 0-39."""
@@ -52,6 +72,40 @@ class ExtractionOptions(Options, title="options of an extraction", error=History
 
 
 @dataclass(frozen=True)
+class ClockOptions(Options, title="options of the clocks of camera and record", error=HistoryError):
+    """What is known of the lag of a record's clock on the camera's; s. camera_start : of the camera's time zero."""
+
+    lag: float | None = option(None, "By which the record's clock is ahead, where it is known.", unit="s", flag="lag")
+    search: tuple[float, ...] = option(
+        (), "Least and largest lag, where several fit.", unit="s", flag="search", example="-10,10"
+    )
+    camera_start: str | None = option(None, "The camera's time zero, as 2025-08-18T18:51:53-05:00.")
+
+    @property
+    def bounds(self) -> tuple[float, float] | None:
+        """Of the search; HistoryError for another number of them, or beside a lag."""
+        if not self.search:
+            return None
+        if self.lag is not None:
+            raise HistoryError("search contradicts lag: a lag that is known is not sought; leave one of them out")
+        if len(self.search) != 2:
+            raise HistoryError(f"search has {len(self.search)} numbers; give the least and the largest lag, as -10,10")
+        return self.search[0], self.search[1]
+
+    @property
+    def start(self) -> float | None:
+        """Unix time of the camera's time zero, s."""
+        text, start = self.camera_start, None
+        if text is None:
+            return None
+        with suppress(ValueError):
+            start = datetime.fromisoformat(text)
+        if start is None or start.tzinfo is None:
+            raise HistoryError(f"camera_start '{quoted(text)}' is not known; write \"2025-08-18T18:51:53-05:00\"")
+        return start.timestamp()
+
+
+@dataclass(frozen=True)
 class ImposedOptions(Options, title="options of a test under a camera", error=HistoryError):
     """What was imposed on a test piece: by an instrument's record, or constant; MPa, K. modulus : of the history."""
 
@@ -59,7 +113,7 @@ class ImposedOptions(Options, title="options of a test under a camera", error=Hi
     time_zone: str = option("", "Of the record's times, as America/Chicago.")
     date_order: str = option("", "Of its dates: 'month first' or 'day first'.")
     pressure_reference: Literal["gauge", "absolute"] | None = option(None, "Of its pressures.")
-    channels: tuple[str, ...] = option((), "Load and temperature, where its format names none.", example="P1,T1")
+    channels: tuple[str, ...] = option((), "Load, then thermocouples, for no known format.", example="P1,T1")
     load: float | None = option(None, "Constant load, for no record.", MEGAPASCAL, unit="MPa")
     temperature: float | None = option(None, "Constant temperature, for no record.", CELSIUS_LIMITS, **CELSIUS)
     modulus: float | None = option(None, "Young's modulus, for the history.", GIGAPASCAL_LIMITS, **GIGAPASCAL)

@@ -28,6 +28,7 @@ from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 DRAWS, COSTLY_DRAWS = 4000, 800
 """Of the law, of each test's own rate, and of its dimensions; and where each is a simulation by finite elements."""
@@ -59,6 +60,13 @@ class Forecast(Presentable, text="reports.forecast:forecast_text"):
     left_out: int = 0
     rejected: bool = False
     draws: int = 0
+
+    def __repr__(self) -> str:
+        return f"<Forecast of {', '.join(test.name for test in self.tests)} by {', '.join(self.laws)}>"
+
+    def to_dataframe(self) -> DataFrame:
+        """(tests, outputs, times) rows of pandas: value and ends of the band, in s and units of the outputs."""
+        return present("reports.dataframes:to_dataframe", self)
 
     def __getitem__(self, test: str) -> TestForecast:
         """The forecast of one test, by name."""

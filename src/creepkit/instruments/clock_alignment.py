@@ -52,6 +52,10 @@ RAMP_SHARE = 0.3
 """Share of the time in which the load would change by its whole range at its fastest, see _Task.reach."""
 
 
+LOAD_AT_REST, NOT_AT_REST = 0.05, 1e-4
+"""Share of the range of a load that a frame without load has, and the probability that one which seems so is not."""
+
+
 SPIKE = 8.0
 """Standard deviations by which a single frame that falls back at once is off."""
 
@@ -76,7 +80,11 @@ the fall of a log likelihood beyond which nothing counts."""
 
 @dataclass(frozen=True)
 class _Task:
-    """times, displacements : (frames,) s from the nominal zero, and mm. noise : mm. interval : s, median of frames."""
+    """One test piece.
+
+    times, displacements : (frames,) s from the nominal zero, and mm. noise : mm. interval : s, median of frames.
+    unloaded : (frames,) s, of those that seem to be without load.
+    """
 
     driving: DrivingRecord
     times: Floats
@@ -84,6 +92,8 @@ class _Task:
     noise: float
     interval: float
     name: str
+    channel: str
+    unloaded: Floats
 
     def terms(self, lags: Floats, model: ResponseModel, width: float = 0.0) -> Floats:
         """(frames - 1, lags) terms of the logarithm of the likelihood; width : s, between the lags."""
@@ -104,10 +114,22 @@ class _Task:
         looser = replace(first, compliance_walk=LOOSER * first.compliance_walk, rate_walk=LOOSER * first.rate_walk)
         return [*chosen, looser]
 
+    def log_at_rest(self, lags: Floats) -> Floats:
+        """(lags,) logarithm of how likely it is that frames that seem to be without load are under what they are."""
+        if not self.unloaded.size:
+            return np.zeros(lags.shape)
+        loads = np.interp(self.unloaded[:, None] + lags, self.driving.times, self.driving.loads)
+        size = (loads.mean(axis=0) - self.driving.loads.min()) / LOAD_AT_REST
+        return np.asarray(np.log((1.0 - NOT_AT_REST) * np.exp(-0.5 * size**2) + NOT_AT_REST))
+
     @property
     def reach(self) -> float:
         """s about a candidate within which its posterior lies: frames do not tell lags apart, nor do slow ramps."""
         return max(1.5 * self.interval, RAMP_SHARE / self.driving.steepest)
+
+    def warped(self, gain: float, middle: float) -> _Task:
+        """The same with the gain of a clock about a time, s, taken into its times."""
+        return replace(self, times=self.times + gain * (self.times - middle))
 
     def subset(self, kept: Ints) -> _Task:
         """The same with some of its frames."""
@@ -117,47 +139,81 @@ class _Task:
 @checked_with_own_words("record", "channel", "frame_times", "displacement", "search", "drift", "camera_start")
 def align_clocks(
     record: InstrumentRecord,
-    channel: str,
+    channel: str | Sequence[str],
     frame_times: ArrayLike,
     displacement: ArrayLike,
     *,
     camera_start: float | None = None,
     search: tuple[float, float] | None = None,
     drift: float = DRIFT_SD,
+    unloaded: Sequence[int] = (),
 ) -> ClockAlignment:
     """The lag of an instrument's clock on a camera's, at which displacements jump where the pressure does.
 
     channel : of the pressure, or of another load, that the displacement follows. frame_times : (frames,) s on the
     camera's clock; above 1e8 they are unix times. displacement : (frames,) mm of the apex, or of any point; NaN where
-    it is lost. camera_start : unix time, s, of the camera's time zero. search : s, least and largest lag; by default
-    all at which frames and record meet. drift : standard deviation that is expected of it; 0 where both clocks run
-    alike.
+    it is lost; or (test pieces, frames) of all that one camera sees, which have one lag, with the channel of all of
+    them or one each. camera_start : unix time, s, of the camera's time zero. search : s, least and largest lag; by
+    default all at which frames and record meet. drift : standard deviation that is expected of it; 0 where both clocks
+    run alike. unloaded : numbers of frames that seem to be without load, which tells a first loading from later steps.
 
     Every lag is equally likely beforehand; intervals hold 95 % of the posterior probability. Creep and plastic flow
-    do not bias it, see response_likelihood. HistoryError where no change of load decides, or where several lags fit
-    about as well.
+    do not bias it, see response_likelihood. A test piece whose channel does not change, or that does not follow it, is
+    left aside where others decide. HistoryError where no change of load decides, or where several lags fit about as
+    well.
     """
-    search = _checked_arguments(record, channel, search, (drift, camera_start))
-    times, displacements = _checked_frames(record, frame_times, displacement)
-    zero = nominal_zero(record, times, camera_start)
-    task = _Task(
-        driving_record(record, channel),
-        times - zero,
-        displacements,
-        max(noise_of_readings(displacements), 1e-4 * float(np.ptp(displacements))),
-        float(np.median(np.diff(times))),
-        f"{record.origin}: channel '{channel}'",
+    pieces = _pieces(channel, displacement)
+    search = _checked_arguments(record, pieces[0][0], search, (drift, camera_start))
+    zero, tasks, problem = 0.0, list[_Task](), HistoryError("")
+    for name, values in pieces:
+        try:
+            times, displacements = _checked_frames(record, frame_times, values)
+            zero = nominal_zero(record, np.asarray(frame_times, dtype=float), camera_start)
+            still = np.asarray(frame_times, dtype=float)[np.asarray(unloaded, dtype=int)] - zero
+            tasks.append(_task(record, name, times - zero, displacements, still))
+        except HistoryError as error:
+            problem = error
+    if not tasks:
+        raise problem
+    low, high = search or (
+        record.times[0] - max(task.times[-1] for task in tasks),
+        record.times[-1] - min(task.times[0] for task in tasks),
     )
-    _check_range(task, record.readings(channel)[1])
-    low, high = search or (record.times[0] - task.times[-1], record.times[-1] - task.times[0])
     if not (np.isfinite([low, high]).all() and low < high):
         raise HistoryError(f"search from {low:g} to {high:g} s of lag; give two finite numbers, the smaller one first")
     if not (np.isfinite(drift) and 0.0 <= drift <= 0.01):
         raise HistoryError(f"an expected drift of {drift:g}; give a standard deviation from 0 to 0.01, such as 1e-4")
-    candidates = _candidates(_thinned(task, None), low, high)
-    task = _thinned(task, candidates[0])
-    lag = _checked_best(task, candidates, (low, high))
-    return _posterior(task, lag, drift, (low, high), ClockAlignment(zero=zero, channel=channel, frames=times.size))
+    candidates = _candidates([_thinned(task, None) for task in tasks], low, high)
+    lag, tasks = _checked_best([_thinned(task, candidates[0]) for task in tasks], candidates, (low, high))
+    frames = max(task.times.size for task in tasks)
+    channels = ", ".join(dict.fromkeys(task.channel for task in tasks))
+    return _posterior(tasks, lag, drift, (low, high), ClockAlignment(zero=zero, channel=channels, frames=frames))
+
+
+def _pieces(channel: object, displacement: ArrayLike) -> list[tuple[str, ArrayLike]]:
+    """Channel and displacements (frames,) of each test piece."""
+    if np.ndim(displacement) != 2:
+        return [(channel, displacement)]  # type: ignore[list-item]
+    rows: list[ArrayLike] = list(np.asarray(displacement))
+    names = [channel] * len(rows) if isinstance(channel, str) else list(channel)  # type: ignore[call-overload]
+    if len(names) != len(rows) or not rows:
+        raise HistoryError(f"{len(names)} channels and displacements of {len(rows)} test pieces; give one of each")
+    return list(zip(names, rows, strict=True))
+
+
+def _task(record: InstrumentRecord, channel: str, times: Floats, displacements: Floats, unloaded: Floats) -> _Task:
+    task = _Task(
+        driving_record(record, channel),
+        times,
+        displacements,
+        max(noise_of_readings(displacements), 1e-4 * float(np.ptp(displacements))),
+        float(np.median(np.diff(times))),
+        f"{record.origin}: channel '{channel}'",
+        channel,
+        unloaded,
+    )
+    _check_range(task, record.readings(channel)[1])
+    return task
 
 
 def _checked_arguments(
@@ -244,38 +300,65 @@ def _thinned(task: _Task, lag: float | None) -> _Task:
     return task.subset(np.union1d(even, near))
 
 
-def _candidates(task: _Task, low: float, high: float) -> list[float]:
+def _total(tasks: Sequence[_Task], lags: Floats, width: float) -> Floats:
+    """(lags,) logarithm of the likelihood of all test pieces, each by its most likely trial model."""
+    return np.asarray(
+        sum(
+            np.max(
+                [task.terms(lags, m, width).sum(axis=0) for m in trial_models(task.displacements, task.noise)], axis=0
+            )
+            + task.log_at_rest(lags)
+            for task in tasks
+        )
+    )
+
+
+def _coarse_step(tasks: Sequence[_Task], low: float, high: float) -> float:
+    return max(min(task.interval for task in tasks) / 3.0, (high - low) / COARSE_LAGS)
+
+
+def _candidates(tasks: Sequence[_Task], low: float, high: float) -> list[float]:
     """The most likely lags, apart from each other by two reaches at least; the most likely one first."""
-    step = max(task.interval / 3.0, (high - low) / COARSE_LAGS)
+    step, reach = _coarse_step(tasks, low, high), max(task.reach for task in tasks)
     lags = np.linspace(low, high, int((high - low) / step) + 2)
-    models = trial_models(task.displacements, task.noise)
-    totals = np.max([task.terms(lags, model, step).sum(axis=0) for model in models], axis=0)
+    totals = _total(tasks, lags, step)
     chosen: list[float] = []
     for k in np.argsort(-totals):
-        if all(abs(lags[k] - one) > 2.0 * max(task.reach, 1.5 * step) for one in chosen):
+        if all(abs(lags[k] - one) > 2.0 * max(reach, 1.5 * step) for one in chosen):
             chosen.append(float(lags[k]))
         if len(chosen) == CANDIDATES:
             break
     return chosen
 
 
-def _checked_best(task: _Task, candidates: Sequence[float], search: tuple[float, float]) -> float:
-    """The most likely lag; HistoryError where none beats a displacement without a load, or another one is as likely."""
-    step = max(task.interval / 3.0, (search[1] - search[0]) / COARSE_LAGS)
+def _checked_best(
+    tasks: list[_Task], candidates: Sequence[float], search: tuple[float, float]
+) -> tuple[float, list[_Task]]:
+    """The most likely lag, and the test pieces that respond; HistoryError where none does, or another lag fits too."""
+    step = _coarse_step(tasks, *search)
+    steepest, reach = max(t.driving.steepest for t in tasks), max(*(t.reach for t in tasks), 1.5 * step)
     found: list[tuple[float, float]] = []
-    models = trial_models(task.displacements, task.noise)
     for lag in candidates:
-        fine, reach = min(step / 100.0, 0.2 / task.driving.steepest), max(task.reach, 1.5 * step)
+        fine = min(step / 100.0, 0.2 / steepest)
         lags = np.linspace(lag - reach, lag + reach, min(FINE_LAGS, int(2.0 * reach / fine) + 2))
         lags = lags[(lags >= search[0]) & (lags <= search[1])]
-        totals = np.max([task.terms(lags, m, lags[1] - lags[0]).sum(axis=0) for m in models], axis=0)
-        best = float(lags[np.argmax(totals)])
-        model = task.best_model(best)
-        totals = task.terms(lags, model).sum(axis=0)
+        best = float(lags[np.argmax(_total(tasks, lags, lags[1] - lags[0]))])
+        models = [task.best_model(best) for task in tasks]
+        each = np.array([task.terms(lags, model).sum(axis=0) for task, model in zip(tasks, models, strict=True)])
+        if lag == candidates[0]:
+            peaks = zip(tasks, models, each.max(axis=1), strict=True)
+            responding = [task for task, model, peak in peaks if _responds(task, model, float(peak))]
+            if not responding:
+                raise HistoryError(
+                    f"{tasks[0].name}: the displacement does not follow it at any lag; choose the channel of this "
+                    "specimen, give frames from a time in which it changes, or state the lag by "
+                    "ck.ClockAlignment.stated(lag)"
+                )
+            if len(responding) < len(tasks):
+                return _checked_best(responding, candidates, search)
+        totals = each.sum(axis=0) + sum(task.log_at_rest(lags) for task in tasks)
         peak = float(totals.max())
         found.append((peak + float(np.log(np.exp(totals - peak).sum() * (lags[1] - lags[0]))), best))
-        if lag == candidates[0]:
-            _check_response(task, model, peak)
     found.sort(reverse=True)
     weights = np.exp([evidence - found[0][0] for evidence, _ in found])
     others = [
@@ -283,41 +366,42 @@ def _checked_best(task: _Task, candidates: Sequence[float], search: tuple[float,
     ]
     if others:
         raise HistoryError(
-            f"{task.name}: lags of {found[0][1]:.3g} s and {' and '.join(others)} s fit about as well; say between "
+            f"{tasks[0].name}: lags of {found[0][1]:.3g} s and {' and '.join(others)} s fit about as well; say between "
             "which the lag lies, search=(least, largest)"
         )
-    return found[0][1]
+    return found[0][1], tasks
 
 
-def _check_response(task: _Task, model: ResponseModel, peak: float) -> None:
+def _responds(task: _Task, model: ResponseModel, peak: float) -> bool:
+    """Whether the displacement follows the load at the best lag better than one without a load would be."""
     nothing = np.zeros((task.times.size, 1))
     silent = Response(nothing, nothing, np.diff(task.times) / np.ptp(task.times))
     alone = log_likelihoods(silent, task.displacements, best_model(silent, task.displacements, task.noise)).sum()
-    if not peak - alone > LEAST_GAIN:
-        raise HistoryError(
-            f"{task.name}: the displacement does not follow it at any lag; choose the channel of this specimen, give "
-            "frames from a time in which it changes, or state the lag by ck.ClockAlignment.stated(lag)"
-        )
+    return bool(peak - alone > LEAST_GAIN)
 
 
 def _posterior(
-    task: _Task, lag: float, drift: float, search: tuple[float, float], alignment: ClockAlignment
+    tasks: Sequence[_Task], lag: float, drift: float, search: tuple[float, float], alignment: ClockAlignment
 ) -> ClockAlignment:
-    """Posterior of lag and drift on a grid that closes in on them."""
-    span = float(task.times[-1] - task.times[0])
-    middle, gain = float(task.times.mean()), 0.0
-    half, gain_half = task.reach, 3.5 * drift
-    models: list[ResponseModel] = []
+    """Posterior of lag and drift on a grid that closes in on them, of all test pieces together."""
+    span = float(max(task.times[-1] for task in tasks) - min(task.times[0] for task in tasks))
+    middle, gain = float(np.mean([task.times.mean() for task in tasks])), 0.0
+    half, gain_half = max(task.reach for task in tasks), 3.5 * drift
+    models: list[list[ResponseModel]] = []
     for iteration in range(ITERATIONS):
-        warped = replace(task, times=task.times + gain * (task.times - middle))
+        warped = [task.warped(gain, middle) for task in tasks]
         if iteration < MODEL_ITERATIONS:
-            models = warped.models(lag + half * np.linspace(-0.9, 0.9, MODEL_LAGS))
+            models = [task.models(lag + half * np.linspace(-0.9, 0.9, MODEL_LAGS)) for task in warped]
         reach = half + 0.5 * gain_half * span
         lags = lag + np.linspace(-reach, reach, FINE_LAGS)
         inner = lags[np.abs(lags - lag) <= half]
         gains = gain + np.linspace(-gain_half, gain_half, DRIFTS if drift else 1)
-        terms = [warped.terms(lags, model, lags[1] - lags[0]) for model in models]
-        logs = np.logaddexp.reduce([_joint(one, lags, inner, task.times[1:] - middle, gains - gain) for one in terms])
+        logs = np.zeros((gains.size, inner.size))
+        for task, own in zip(warped, models, strict=True):
+            terms = [task.terms(lags, model, lags[1] - lags[0]) for model in own]
+            logs += np.logaddexp.reduce(
+                [_joint(one, lags, inner, task.times[1:] - middle, gains - gain) for one in terms]
+            )
         if drift:
             logs -= 0.5 * (gains[:, None] / drift) ** 2
         logs[:, (inner < search[0]) | (inner > search[1])] = -np.inf
@@ -342,8 +426,9 @@ def _posterior(
         lag = 0.5 * float(inner[lag_range[0]] + inner[lag_range[-1]]) + shift * (mean[1])
         middle += shift
         gain = 0.5 * float(gains[gain_range[0]] + gains[gain_range[-1]])
-    warped = replace(task, times=task.times + mean[1] * (task.times - middle))
-    residual, _ = innovations(warped.driving.response(warped.times, mean[:1]), task.displacements, models[0])
+    residuals = []
+    for task, own in zip([task.warped(mean[1], middle) for task in tasks], models, strict=True):
+        residuals.append(innovations(task.driving.response(task.times, mean[:1]), task.displacements, own[0])[0])
     by_lag, by_gain = weights.sum(axis=0), weights.sum(axis=1)
     return replace(
         alignment,
@@ -354,8 +439,8 @@ def _posterior(
         drift_interval=_interval(gains, by_gain) if drift else (0.0, 0.0),
         lags=inner,
         probability=by_lag,
-        residual=float(np.sqrt(np.mean(residual**2))),
-        noise=float(models[0].noise),
+        residual=float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))),
+        noise=float(np.median([own[0].noise for own in models])),
     )
 
 

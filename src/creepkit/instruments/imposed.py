@@ -38,7 +38,8 @@ class Imposed(Presentable, text="reports.instrument_records:imposed_text"):
     load : MPa (or the load's unit), the difference to the ambient pressure. temperature : K.
     load_error, temperature_error : largest distance of the program from the record's running median of five.
     load_noise, temperature_noise : standard deviations of one reading. alignment : of the clocks.
-    notes : one sentence each on what was assumed.
+    notes : one sentence each on what was assumed. temperature_sd : K, standard deviation of the temperature of the
+    specimen, where it lies between thermocouples or was seen in the infrared; 0 of one that was measured at it.
     """
 
     specimen: str
@@ -52,6 +53,7 @@ class Imposed(Presentable, text="reports.instrument_records:imposed_text"):
     temperature_noise: float
     alignment: ClockAlignment
     notes: tuple[str, ...] = ()
+    temperature_sd: float = 0.0
 
 
 @checked
@@ -77,7 +79,7 @@ def imposed(
         raise HistoryError(f"{record.origin}: the times of the frames must be finite and increase; give at least two")
     if alignment is None:
         alignment = _agreeing(record, times)
-    names = _channel_names(record, specimen)
+    names = channel_names(record, specimen) if isinstance(specimen, str) else specimen
     load, temperature = (record.channel(name) for name in names)
     notes = _checked_channels(record, load, temperature)
     _check_overlap(record, alignment, times)
@@ -111,15 +113,17 @@ def _agreeing(record: InstrumentRecord, times: Floats) -> ClockAlignment:
     return ClockAlignment.stated(0.0, zero=record.start)
 
 
-def _channel_names(record: InstrumentRecord, specimen: str | tuple[str, str]) -> tuple[str, str]:
-    if not isinstance(specimen, str):
-        load, temperature = specimen
-        return record.channel(load).name, record.channel(temperature).name
+def channel_names(record: InstrumentRecord, specimen: str) -> tuple[str, str]:
+    """Channels of load and temperature of a specimen, by the format of the record; HistoryError where there are none.
+
+    >>> channel_names(record, "D1")  # doctest: +SKIP
+    ('D1: Press.', 'D1: Temp.')
+    """
     patterns = record.channel_patterns
     if not {"pressure", "temperature"} <= {*patterns}:
         raise HistoryError(
-            f"{record.origin}: its format does not say which channels belong to '{specimen}'; name both: "
-            f"(load, temperature), out of {quoted(', '.join(record.channels), 300)}"
+            f"{record.origin}: its format does not say which channels belong to '{specimen}'; name them: load, then "
+            f"temperature, out of {quoted(', '.join(record.channels), 300)}"
         )
     wanted = (patterns["pressure"].replace("{}", specimen), patterns["temperature"].replace("{}", specimen))
     for name, pattern in zip(wanted, (patterns["pressure"], patterns["temperature"]), strict=True):

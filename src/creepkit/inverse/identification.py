@@ -38,8 +38,10 @@ from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from creepkit.inverse.search.global_search import SearchTrace
+    from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.sparsity.result import Sparsity
     from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity
     from creepkit.inverse.variance_components import LinearisedProblem
@@ -112,6 +114,14 @@ class Identification(
     problem: LeastSquaresProblem | None = field(default=None, repr=False)
     predictor_documents: Mapping[str, PredictorDocument] = field(default_factory=dict, repr=False)
 
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} = {value:.4g}" for name, value in self.values.items())
+        return f"<Identification of {self.law.name} from {len(self.tests)} tests: {values}>"
+
+    def to_dataframe(self) -> DataFrame:
+        """(parameters,) rows of pandas: value, ends of the 95 % interval, unit and verdict."""
+        return present("reports.dataframes:to_dataframe", self)
+
     @property
     def headline(self) -> str:
         """How well the law describes the tests, then whether it could be the true one, in one sentence."""
@@ -127,9 +137,9 @@ class Identification(
         """The law with its numbers, intervals and range of validity: what every exporter takes."""
         return LawWithValues(self.law, self.values, tuple(self.comments()), ranges=self.ranges)
 
-    def comments(self, verdict: str = "") -> list[str]:
-        """Intervals, validity and provenance as lines, with the verdict of a comparison of laws where there was one."""
-        return present("reports.identification_text:identification_comments", self, verdict)
+    def comments(self, ranking: Ranking | None = None) -> list[str]:
+        """What an exported law says of itself, a line each; ranking : that it is the best of, where there was one."""
+        return present("reports.identification_text:identification_comments", self, ranking)
 
     @property
     def coordinates(self) -> Coordinates:

@@ -112,6 +112,14 @@ class NuisanceParameters:
                     "give its sd="
                 )
             parameters += [(nuisance, owner) for owner in owners]
+        for key, index in test_index.items():
+            if is_length_nuisance(key) and (index >= 0).any():  # which is no deviation: a test cannot be without one
+                for test in map(int, np.flatnonzero(index < 0)):
+                    if supports_nuisance(predictor_for(predictor, histories[test]), key):
+                        raise FitError(
+                            f"test '{histories[test].name}' has no nuisance '{key}', which other tests have; give it "
+                            "one, or leave out tests="
+                        )
         by_name = {h.name: h for h in histories}
         means = [prior_mean(n, by_name.get(owner), predictor) for n, owner in parameters]
         priors = [

@@ -153,7 +153,7 @@ def _check_nuisance(nuisance: Nuisance) -> None:
     n, finite = nuisance, nuisance.sd is None or np.isfinite(nuisance.sd)
     if n.output and n.kind != "offset":
         raise FitError(f"nuisance '{n.kind}' acts on a whole test: it has no output, found output='{n.output}'")
-    if n.tests and (n.is_length or not n.is_simulated):
+    if n.tests and not n.is_simulated:
         raise FitError(f"nuisance '{n.kind}' belongs to every test; leave out tests=, which deviations alone can have")
     if not n.is_simulated:
         if n.mean != 0 or np.isfinite(n.bounds).any() or n.scope != "test" or not finite:

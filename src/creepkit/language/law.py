@@ -12,6 +12,7 @@ from creepkit.language.law_record import LawRecord
 from creepkit.language.primary_creep import with_primary
 from creepkit.language.printing import law_latex, law_text
 from creepkit.language.temperature_factors import times
+from creepkit.presentation import present
 
 
 @checked
@@ -87,5 +88,6 @@ class CreepLaw(LawRecord):
     def __repr__(self) -> str:
         return f"<CreepLaw {self.name}: {len(self.terms)} term(s), parameters {', '.join(self.names) or 'none'}>"
 
-    def _repr_latex_(self) -> str:
-        return f"$\\displaystyle {self.latex()}$"
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        return present("reports.html.notebook:notebook_html", self)

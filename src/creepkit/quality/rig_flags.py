@@ -102,8 +102,8 @@ def jump_flags(histories: Sequence[History], jumps: Sequence[Jump]) -> Iterator[
             earliest=max(j.previous_time for j in together),
             latest=first.time,
             jumps=sizes,
-            proposal=f"cut the frames from {time_text(first.time)} on, take the step off them if the observation "
-            "moved (a bumped camera or extensometer), or ignore it",
+            proposal=f"take the step off if the observation moved (a bumped camera or extensometer): "
+            f"'steps_taken_off = \"{time_text(first.time)}\"' in tests.toml; cut the frames from then on, or ignore it",
         )
 
 

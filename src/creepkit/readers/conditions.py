@@ -10,11 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from pathlib import Path
 from typing import TypeVar
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
 from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.ends_of_tests import INTERRUPTED, STOPPED, UNCLEAR, MarkedTime, end_said_by, marked_time
+from creepkit.readers.questions import Question
 from creepkit.readers.text_tables import SourceText
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
@@ -166,10 +168,19 @@ class StatedConditions:
         """The place of the first of these numbers and texts that was given, else that of the test."""
         return next((self._locations[key] for key in keys if key in self._locations), self.location)
 
-    def missing_error(self, what: str, advice: str) -> HistoryError:
-        """The error that says what is missing, and what was kept as labels."""
+    def missing_error(self, what: str, advice: str, key: str = "") -> HistoryError:
+        """The error that says what is missing, and what was kept as labels; a question where a key states it."""
         label_note = f" (kept as labels: {', '.join(self.labels)})" if self.labels else ""
-        return HistoryError(f"{self.location}: no {what}{label_note}; {advice}")
+        sentence = f"no {what}{label_note}; {advice}"
+        return self.question(sentence, key) if key else HistoryError(f"{self.location}: {sentence}")
+
+    def question(
+        self, sentence: str, key: str, *choices: str | float, location: str = "", is_free: bool = True
+    ) -> Question:
+        """The question of a condition, which the key states; choices : likely values."""
+        place = location or self.location
+        path = Path(re.sub(r"(?:, sheet '.*|:\d+)$", "", place))
+        return Question(path, place, sentence, key, choices, is_free=is_free)
 
     def all_labels(self) -> dict[str, str]:
         """The labels, with what was assumed; refuses numbers and texts that nothing has used."""

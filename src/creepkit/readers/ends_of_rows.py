@@ -11,6 +11,7 @@ from creepkit.files.delimited_text import is_missing
 from creepkit.readers.column_names import split_written_name
 from creepkit.readers.columns_of_tests import TIME_TO_STRAIN, kind_of, quantity_of, unit_of
 from creepkit.readers.ends_of_tests import (
+    FIRM,
     LABEL,
     RUPTURED,
     STOPPED,
@@ -70,7 +71,7 @@ def ends_of_rows(
     named = ["" if name is None else answers.get(row.cells[name].casefold(), "") for row in table.rows]
     columns = [k for k, key in enumerate(keys) if kind_of(quantity_of(key)) is None and key not in _SAYS_NO_END]
     columns = [k for k in columns if table.names[k] not in vocabulary.labels]
-    columns.sort(key=lambda k: kind_of_column(table.names[k]) in ("", "remark"))
+    columns.sort(key=lambda k: kind_of_column(table.names[k]) not in FIRM)
     decided = any(mark.said == STOPPED for mark in marks)
     found = dict[int, EndsOfColumn]()
     for k in columns:
@@ -78,9 +79,9 @@ def ends_of_rows(
             continue  # a quantity
         cells = [row.cells[k] for row in table.rows]
         found[k] = ends_in_column(table.names[k], cells, answers, decided)
-        decided |= kind_of_column(table.names[k]) not in ("", "remark") and any(found[k].ends)
+        decided |= kind_of_column(table.names[k]) in FIRM and any(found[k].ends)
     if time is None and duration is None:
-        found = {k: one for k, one in found.items() if kind_of_column(table.names[k]) not in ("", "remark")}
+        found = {k: one for k, one in found.items() if kind_of_column(table.names[k]) in FIRM}
     ends = list[RowEnd]()
     for r, (row, mark) in enumerate(zip(table.rows, marks, strict=True)):
         stated = {table.names[k]: one.ends[r] for k, one in found.items() if one.ends[r] in (RUPTURED, STOPPED)}
@@ -100,6 +101,8 @@ def ends_of_rows(
             notes.append("stopped before rupture by its remark")
         is_asked = len(said) != 1 and UNCLEAR in (mark.said, *(one.ends[r] for one in found.values()))
         ends.append(RowEnd("".join(said) if len(said) == 1 else "", mark, tuple(notes), is_asked))
+    if time is not None and not any(STOPPED in (end.stated, end.mark.said) for end in ends):
+        errors += _asked_of_notes(table, keys, answers)
     if time is not None or duration is not None:
         errors += [_asked_of_column(table, k, one, time) for k, one in found.items() if one.asked]
     if time is not None and (doubtful := [r for r, mark in enumerate(marks) if mark.said == UNCLEAR]):
@@ -111,6 +114,27 @@ def _mark_of(table: TestTable, row: TestRow, time: int | None, answers: Mapping[
     if time is None or is_missing(row.cells[time]):
         return MarkedTime("", "")
     return marked_time(table.entry(row, time).text, answers)
+
+
+def _asked_of_notes(table: TestTable, keys: Sequence[str], answers: Mapping[str, str]) -> list[HistoryError]:
+    """Questions of notes that speak of tests which did not break, while the table has none."""
+    doubtful = [n for n in table.notes if end_said_by(n) not in ("", RUPTURED) and not legend_in(n)]
+    last = table.rows[-1].cells[keys.index("name")] if "name" in keys else ""
+    return [
+        Question(
+            table.grid.path,
+            table.location(table.line),
+            f"the note '{quoted(note, 80)}' may speak of tests that did not break; which are they?",
+            "ended",
+            ({last or "NAME OF A TEST": STOPPED}, {note: LABEL}),
+        )
+        for note in doubtful
+        if note.casefold() not in answers and not any(cell.casefold() in answers for cell in _names(table, keys))
+    ]
+
+
+def _names(table: TestTable, keys: Sequence[str]) -> list[str]:
+    return [row.cells[keys.index("name")] for row in table.rows] if "name" in keys else []
 
 
 def _contradiction(table: TestTable, row: TestRow, stated: Mapping[str, str]) -> HistoryError:

@@ -59,7 +59,8 @@ def read_temperature(
     """The temperature, K; marked : lines of frames at which a load or temperature changed."""
     result = _stated_loading(conditions, frames, "temperature", marked)
     if result is None:
-        raise conditions.missing_error("temperature", "write temperature_C or temperature_K, or a column of that name")
+        advice = "write temperature_C or temperature_K, or a column of that name"
+        raise conditions.missing_error("temperature", advice, "temperature_C")
     return Program.steps(result) if isinstance(result, tuple) else result
 
 
@@ -82,7 +83,8 @@ def read_loading(conditions: StatedConditions, frames: TableFrames, marked: Coll
     if loading is None:
         stated = sorted(likely) or [*load_kinds]
         wanted = " or ".join(name for name in stated if name in load_kinds)
-        raise conditions.missing_error(f"loading (no {wanted})", _loading_advice(terms, stated))
+        key = "stress_MPa" if "stress" in stated else ""
+        raise conditions.missing_error(f"loading (no {wanted})", _loading_advice(terms, stated), key)
     return loading
 
 
@@ -285,9 +287,13 @@ def _imposed_of(conditions: StatedConditions, frames: TableFrames, first: str, s
     if _grows_steadily(frames.times, columns[other]):
         conditions.record_assumption(f"{other} imposed, for its rate is constant")
         return other
-    raise HistoryError(
-        f"{frames.table.location(frames.table.columns_line)}: {load} and {other} both change, and nothing says which "
-        "was imposed; write 'specimen: uniaxial' for an imposed stress, 'specimen: relaxation' for an imposed strain"
+    raise conditions.question(
+        f"{load} and {other} both change, and nothing says which was imposed; write 'specimen: uniaxial' for an "
+        "imposed stress, 'specimen: relaxation' for an imposed strain",
+        "specimen",
+        *("uniaxial", "relaxation"),
+        location=frames.table.location(frames.table.columns_line),
+        is_free=False,
     )
 
 

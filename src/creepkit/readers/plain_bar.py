@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import HistoryError
 from creepkit.readers.conditions import StatedConditions
 from creepkit.readers.text_tables import TableFrames
 
@@ -63,9 +62,11 @@ def _with_strain(conditions: StatedConditions, frames: TableFrames, values: dict
     if "strain" in values:
         return ["the extension beside the strain not used"]
     if length is None:
-        raise HistoryError(
-            f"{frames.table.location(frames.table.columns_line)}: an extension is a strain by its gauge length, which "
-            "is not stated; write gauge_length_mm (or 'specimen: notched-bar' with its lengths)"
+        raise conditions.question(
+            "an extension is a strain by its gauge length, which is not stated; write gauge_length_mm (or 'specimen: "
+            "notched-bar' with its lengths)",
+            "gauge_length_mm",
+            location=frames.table.location(frames.table.columns_line),
         )
     values["strain"] = elongation / length
     return [f"strain = extension / gauge length {length:g} mm"]
@@ -80,9 +81,11 @@ def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict
         return ["the load beside the stress not used"]
     if area is None:
         where = stated.location if stated is not None else frames.table.location(frames.table.columns_line)
-        raise HistoryError(
-            f"{where}: a load is a stress by the cross-section, which is not stated; write diameter_mm, or width_mm "
-            "and thickness_mm, or area_mm2, or the stress itself"
+        raise conditions.question(
+            "a load is a stress by the cross-section, which is not stated; write diameter_mm, or width_mm and "
+            "thickness_mm, or area_mm2, or the stress itself",
+            "diameter_mm",
+            location=where,
         )
     if column is not None:
         values["stress"] = np.where((column < 0.0) & (column >= -0.01 * column.max()), 0.0, column) / area

@@ -66,7 +66,7 @@ def toml_value(value: object) -> str:
     """A text, a number, or {name: text} as TOML."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{toml_key(k)} = {toml_value(v)}" for k, v in value.items()) + "}"
-    return json.dumps(value, ensure_ascii=False)
+    return f"{value:g}" if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
 
 
 class SeveralErrors(HistoryError):

@@ -97,7 +97,7 @@ class RowPerTestReader:
                 table = _without_silent_rows(table, keys)
             ends = ends_of_rows(table, keys, self.vocabulary, errors)
             for row, end in zip(table.rows, ends, strict=True):
-                if end.is_open and errors:
+                if (end.is_open or row.is_open) and errors:
                     continue
                 history = collected(errors, partial(self._history, table, row, keys, end))
                 if history is not None and history.name in places:
@@ -184,6 +184,7 @@ def _keys(table: TestTable, vocabulary: HeaderVocabulary, errors: list[HistoryEr
         elif not quantity:
             if meant == written and not is_label:
                 collected(errors, partial(_refuse_misspelt, table, written))
+                collected(errors, partial(_ask_of_time, table, written))
             quantity = meant if meant.startswith(("label ", "geometry ")) else f"label {meant}"
         first = next((k for k, key in enumerate(keys) if quantity_of(key) == quantity_of(quantity)), None)
         if first is not None:
@@ -255,6 +256,28 @@ def _refuse_misspelt(table: TestTable, written: str) -> None:
             "columns",
             ({written: f"{near[0]} ({unit})" if unit else near[0]}, {written: LABEL}),
         )
+
+
+_OF_TREATMENT = re.compile(
+    r"anneal|ag(?:e?ing|ed)|temper|heat ?treat|soak|solution|glüh|auslager|anlass|recuit|revenu", re.I
+)
+
+
+def _ask_of_time(table: TestTable, written: str) -> None:
+    """Ask of a time that is not understood: `t0.2 (h)` may be one to a strain."""
+    name, unit = split_written_name(written)
+    if unit_suffix(unit) not in TIME.units or _OF_TREATMENT.search(name):
+        return
+    number = re.search(r"\d+(?:[.,]\d+)?", name)
+    meanings = [f"time to {number[0].replace(',', '.')} % ({unit})"] if number else [f"duration ({unit})"]
+    raise Question(
+        table.grid.path,
+        table.location(table.line),
+        f"column '{quoted(written, 60)}' is a time that is not understood; is it a time to a strain?",
+        "columns",
+        [{written: meaning} for meaning in (*meanings, LABEL)],
+        is_free=True,
+    )
 
 
 def _includes_elastic(names: Sequence[str], keys: Sequence[str]) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 from creepkit.errors import HistoryError, quoted
 from creepkit.readers.clock_times import with_elapsed_times
 from creepkit.readers.column_names import STATED_BY_NAME, KnownNames, split_written_name, unit_suffix, words_of
+from creepkit.readers.questions import Question
 from creepkit.readers.table_rows import NumberRows, TableRow
 from creepkit.readers.text_tables import SourceText, TextTable
 from creepkit.readers.vocabulary import HeaderVocabulary, plain_name, split_unit
@@ -176,16 +177,24 @@ def _decided_by_table(name: str, table: TextTable, written: Mapping[str, SourceT
     largest = float(np.abs(table.numbers(name)).max())
     if largest > LARGEST_PER_CENT:
         place = table.location(table.columns_line, table.column(name))
-        raise HistoryError(
-            f"{place}: '{name}' has no unit, and values up to {largest:g} are no fractions and hardly per cent; name "
-            f"it {name}_microstrain or {name}_pct, or write '# strain_unit: microstrain' or '# strain_unit: %' above"
+        raise Question(
+            table.path,
+            place,
+            f"'{name}' has no unit, and values up to {largest:g} are no fractions and hardly per cent; name it "
+            f"{name}_microstrain or {name}_pct, or write '# strain_unit: microstrain' or '# strain_unit: %' above",
+            "strain_unit",
+            ("microstrain", "%"),
         )
     if largest > SURELY_PER_CENT:
         return "pct", f"{name} in per cent (up to {largest:g})"
     if largest < SURELY_FRACTION:
         return "1", f"{name} a fraction (up to {largest:g})"
     place = table.location(table.columns_line, table.column(name))
-    raise HistoryError(
-        f"{place}: '{name}' has no unit, and values up to {largest:g} may be fractions or per cent; name it "
-        f"{name}_1 or {name}_pct, or write '# strain_unit: 1' or '# strain_unit: %' above"
+    raise Question(
+        table.path,
+        place,
+        f"'{name}' has no unit, and values up to {largest:g} may be fractions or per cent; name it {name}_1 or "
+        f"{name}_pct, or write '# strain_unit: 1' or '# strain_unit: %' above",
+        "strain_unit",
+        ("%", "1"),
     )

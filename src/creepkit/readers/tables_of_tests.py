@@ -28,13 +28,14 @@ class TestRow:
     """The row of one test.
 
     cells : of the columns. stated : what a row above says of its group. filled : columns whose cell is that of a row
-    above.
+    above. is_open : whether a cell is asked for.
     """
 
     line: int
     cells: tuple[str, ...]
     stated: Mapping[str, SourceText] = field(default_factory=dict)
     filled: tuple[int, ...] = ()
+    is_open: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,22 +63,26 @@ class TestTable:
 
     def entry(self, row: TestRow, column: int) -> SourceText:
         """A cell of a row; of a number without separators between thousands, with a decimal point."""
-        decimal = self.grid.dialect.decimal
-        text = plain_number(row.cells[column], decimal)
-        if decimal == "," and "," in text and is_number(text, Dialect("\t", ",")):
-            text, decimal = text.replace(",", "."), "."
+        text, decimal = plain_number(row.cells[column], self.grid.dialect.decimal)
         return SourceText(text, self.location(row.line), decimal, self.names[column])
 
 
-_GROUPED = {
-    ",": re.compile(r"\d{1,3}(?:\.\d{3})+(?=,\d)|\d{1,3}(?:[\s'’]\d{3})+(?![\d.])"),
-    ".": re.compile(r"\d{1,3}(?:,\d{3})+(?=\.\d)|\d{1,3}(?:[\s'’]\d{3})+(?![\d,])"),
-}
+_GROUPED = re.compile(r"\d{1,3}(?:\.\d{3})+,\d+|\d{1,3}(?:,\d{3})+\.\d+|\d{1,3}(?:[\s'’]\d{3})+(?:[.,]\d+)?(?![\d.,])")
+"""A number with separators between thousands that cannot be a decimal sign."""
 
 
-def plain_number(text: str, decimal: str) -> str:
-    """A text with a number without separators between thousands, where these cannot be a decimal sign."""
-    return _GROUPED[decimal].sub(lambda found: re.sub(r"[.,\s'’]", "", found[0]), text)
+def plain_number(text: str, decimal: str) -> tuple[str, str]:
+    """A text with a number without separators between thousands, and the decimal sign of that: a point if it may be."""
+
+    def plain(found: re.Match[str]) -> str:
+        sign = max(".,", key=found[0].rfind)
+        whole, _, part = found[0].rpartition(sign) if found[0].count(sign) == 1 else (found[0], "", "")
+        return re.sub(r"[.,\s'’]", "", whole) + (f".{part}" if part else "")
+
+    changed, count = _GROUPED.subn(plain, text)
+    if not count and decimal == "," and re.fullmatch(r"\D*\d*,\d+(?:[eE][+-]?\d+)?\D*", text):
+        changed, count = text.replace(",", "."), 1
+    return changed, "." if count else decimal
 
 
 def grids_of(path: Path) -> list[CellGrid]:
@@ -208,6 +213,10 @@ _GROUP_SIZE = 1.5
 """Rows of a group, on average, above which empty cells below a filled one are a way of writing, and no lost values."""
 
 
+_DITTO = frozenset(('"', "''", "″", "〃", "”", "ditto", "idem", "do.", "dto", "dto.", "s.o.", "id."))
+"""Marks that repeat the cell above, in small letters."""
+
+
 def with_groups(table: TestTable, keys: Sequence[str], errors: list[HistoryError]) -> TestTable:
     """The table with conditions that stand once for a group in all of its rows; a lost value is an error.
 
@@ -215,25 +224,30 @@ def with_groups(table: TestTable, keys: Sequence[str], errors: list[HistoryError
     value is written twice below itself, and groups have more than one row; in merged cells they are in any case.
     """
     cells = [list(row.cells) for row in table.rows]
-    filled = [list[int]() for _ in cells]
+    filled, asked = [list[int]() for _ in cells], set[int]()
     for k, key in enumerate(keys):
         if key not in ("stress", "temperature", "label heat", "alloy", "label laboratory"):
             continue
         column = [row[k] for row in cells]
-        gaps = [r for r, cell in enumerate(column) if is_missing(cell)]
+        ditto = {r for r, cell in enumerate(column) if cell.casefold() in _DITTO}
+        gaps = [r for r, cell in enumerate(column) if is_missing(cell) or r in ditto]
         if not gaps or len(gaps) == len(column):
             continue
-        values = [cell for cell in column if not is_missing(cell)]
+        values = len(column) - len(gaps)
         is_repeated = any(a == b and not is_missing(a) for a, b in pairwise(column))
-        is_grouped = not is_repeated and len(column) > _GROUP_SIZE * len(values) and gaps[0] > 0
+        is_grouped = not is_repeated and len(column) > _GROUP_SIZE * values and gaps[0] > 0
         for r in gaps:
-            if r > 0 and (is_grouped or (table.rows[r].line, table.positions[k]) in table.grid.merged):
+            if r > 0 and (is_grouped or r in ditto or (table.rows[r].line, table.positions[k]) in table.grid.merged):
                 cells[r][k] = cells[r - 1][k]
                 filled[r].append(k)
         missing = [r for r in gaps if is_missing(cells[r][k])]
         if missing and key in ("stress", "temperature") and not _is_stated(key, table, missing):
             errors.append(_empty_cell(table, k, key, missing))
-    rows = [replace(row, cells=tuple(c), filled=tuple(f)) for row, c, f in zip(table.rows, cells, filled, strict=True)]
+            asked.update(missing)
+    rows = [
+        replace(row, cells=tuple(cells[r]), filled=tuple(filled[r]), is_open=r in asked)
+        for r, row in enumerate(table.rows)
+    ]
     return replace(table, rows=tuple(rows))
 
 
@@ -250,11 +264,13 @@ def _empty_cell(table: TestTable, column: int, key: str, rows: Sequence[int]) ->
     unit = split_written_name(name)[1]
     suffix = unit.replace("°", "").strip() or ("C" if key == "temperature" else "MPa")
     likely = above[-1] if above else next(r.cells[column] for r in table.rows if not is_missing(r.cells[column]))
+    plain = likely.replace(",", ".")
+    number = float(plain) if is_number(plain, Dialect()) else likely
     return Question(
         table.grid.path,
         place,
         f"the cell of '{quoted(name, 60)}' is empty{others}; which {key} is it?",
         f"{key}_{suffix}",
-        (float(likely.replace(",", ".")) if is_number(likely.replace(",", "."), Dialect()) else likely,),
+        (number,),
         is_free=True,
     )

@@ -89,7 +89,7 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 
 TEXT_KEYS = (
     *("name", "alloy", "specimen", "operator", "control", "strain_measure", "stress_measure"),
-    *("includes_elastic", "includes_loading", "ended", "noise_correlation"),
+    *("includes_elastic", "includes_loading", "ended", "noise_correlation", "steps_taken_off"),
     *("decimal", "columns", "ignore", "strain_unit", "date_order", "time_zone"),
 )
 """Words that stand once for a whole test, beside steps and programs; the last line says how its table is written."""

@@ -16,6 +16,11 @@ NOISE_FACTOR = 3.0
 """Standard deviations of the noise of a record that its program does not follow."""
 
 
+LARGEST_NOISE = 10.0
+"""Standard deviations by which the line between two readings may miss a third one: below a tenth of the tolerance noise
+makes no breakpoints."""
+
+
 _MEDIAN_FRAMES = 5
 
 
@@ -31,7 +36,7 @@ def recorded_program(times: Floats, values: Floats, tolerance: float) -> Program
     decides their values are the least-squares ones of all frames.
     """
     noise = noise_of_readings(values)
-    noisy = NOISE_FACTOR * noise > tolerance and values.size > _MEDIAN_FRAMES
+    noisy = LARGEST_NOISE * noise > tolerance and values.size > _MEDIAN_FRAMES
     followed = running_median(values) if noisy else values
     kept = _breakpoints(times, followed, max(tolerance, NOISE_FACTOR * noise) if noisy else tolerance)
     at_breakpoints: Floats = values[kept]

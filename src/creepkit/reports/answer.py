@@ -245,7 +245,7 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
         what = "the two groups apart" if first.kind == "two groups" else f"{_named(first.tests, 'test')} again"
         return f"check {what} (label, unit, thermocouple), then identify without"
     if adequacy is not None and (adequacy.rejects or adequacy.verdict == "cannot be judged"):
-        if ranking is None:
+        if ranking is None or len(ranking.laws) < 2:
             return "compare laws: select(candidates(tests), tests)"
         return "use it within the tests, by the factors above; try other laws for more"
     if ranking is not None and len(ranking.laws) > 1 and not ranking.decisive:
@@ -276,10 +276,7 @@ def _text(fit: Identification, ranking: Ranking | None) -> str:
     failed = {} if ranking is None else ranking.failed
     lines += [line for law, why in failed.items() for line in _indented(f"left out: {law}: {why}", "    ")]
     if ranking is not None and len(ranking.laws) > 1:
-        weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED])
-        more = len(ranking.laws) - MOST_NAMED
-        decided = "decisive" if ranking.decisive else "not decisive"
-        lines += _indented(f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}")
+        lines += _indented(chosen_text(ranking))
     summands = " + ".join(expression_text(term) for term in fit.law.terms.values())
     lines += [f"  rate = {summands}", *(f"  {equation}" for equation in state_equations(fit.law))]
     lines += _indented("   ".join(_value(fit, e) for e in fit.estimates), "    ")
@@ -287,6 +284,14 @@ def _text(fit: Identification, ranking: Ranking | None) -> str:
     lines += [_figure_line(one) for one in key_figures(fit)]
     lines += [line for text in cautions(fit, ranking)[:MOST_CAUTIONS] for line in _indented(f"- {text}", "    ")]
     return "\n".join([*lines, *_indented(f"next: {next_step(fit, ranking)}; all numbers: .details()")])
+
+
+def chosen_text(ranking: Ranking) -> str:
+    """Whether the choice of the law is decisive, and the weights of the laws."""
+    weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED])
+    more = len(ranking.laws) - MOST_NAMED
+    decided = "decisive" if ranking.decisive else "not decisive"
+    return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}"
 
 
 def _value(fit: Identification, estimate: Estimate) -> str:

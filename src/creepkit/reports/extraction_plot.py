@@ -90,6 +90,7 @@ def _draw_maps(figure: Any, axes: Any, e: Extraction, shown: tuple[FieldMap, ...
                 vmin=limits[0],
                 vmax=limits[1],
                 lw=0,
+                rasterized=True,
             )
             images.append(image)
             lost = ~np.isfinite(one.heights)

@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, FitError
-from creepkit.files.writing import check_target, replace_on_success
+from creepkit.files.writing import replace_on_success
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,12 +42,6 @@ def make_folder(folder: Path, error_type: type[CreepkitError] = FitError) -> Non
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise error_type(f"{folder}: no plots can be written there ({error.strerror}); name another folder") from None
-
-
-def check_figure_target(path: Path, error_type: type[CreepkitError] = FitError) -> None:
-    """Raise an error of `error_type` where a figure could not be written to `path`; for before the work it shows."""
-    check_picture_format(path, error_type)
-    check_target(path, error_type)
 
 
 def check_picture_format(path: Path, error_type: type[CreepkitError] = FitError) -> None:

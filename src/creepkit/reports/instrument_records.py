@@ -146,6 +146,7 @@ def imposed_text(imposed: Imposed) -> str:
         f"  load: {load.times.size} points, off its record by {imposed.load_error:.2g} MPa at most, noise "
         f"{imposed.load_noise:.2g} MPa",
         f"  temperature: {warm.times.size} points, off its record by {imposed.temperature_error:.2g} K at most, noise "
-        f"{imposed.temperature_noise:.2g} K",
+        f"{imposed.temperature_noise:.2g} K"
+        + (f"; at the specimen known to {imposed.temperature_sd:.2g} K" if imposed.temperature_sd else ""),
     ]
     return "\n".join([*lines, *(f"  note: {note}" for note in imposed.notes)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,7 @@ from creepkit.studies.tables import NuisanceTable, Step
 if TYPE_CHECKING:
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.language import CreepLaw
+    from creepkit.records import History
 
 
 # ---- numbers with units --------------------------------------------------------------------------------------------
@@ -201,6 +203,41 @@ def settings_of(file: StudyFile) -> IdentificationSettings:
                 changes["nuisances"] = default_nuisances(*further, without=part.without_nuisances)
     with file.at("identification"):
         return base.changed(changes)
+
+
+def settings_of_group(
+    file: StudyFile, tests: Sequence[History], everywhere: Sequence[str], priors: Sequence[Nuisance], *, warm: bool
+) -> IdentificationSettings:
+    """Settings of the identifications of some tests: their own nuisance parameters, and what is known of each of them.
+
+    everywhere : names of all tests. priors : of single tests. warm : whether a law uses the temperature. The scatter of
+    rates between tests is not sought in a single test, unless the study states it.
+    """
+    settings, names = settings_of(file), [test.name for test in tests]
+    part = file.model.identification
+    kept = []
+    for k, one in enumerate(part.nuisances if part is not None else ()):
+        for test in one.tests:
+            if test not in everywhere:
+                place = ("identification", "nuisances", k, "tests")
+                raise file.error(place, f"there is no test '{test}'; {nearest(test, everywhere)}")
+    stated = {one.kind for one in part.nuisances} if part is not None else set()
+    for nuisance in settings.nuisances:
+        own = [test for test in nuisance.tests if test in names]
+        if nuisance.tests and not own:
+            continue
+        if nuisance.kind == "rate" and len(tests) == 1 and "rate" not in stated:
+            continue
+        kept.append(replace(nuisance, tests=() if len(own) == len(names) else tuple(own)))
+    taken = {one.key for one in kept}
+    own_priors = [prior for prior in priors if prior.tests[0] in names and prior.key not in taken]
+    for kind in dict.fromkeys(prior.kind for prior in own_priors if warm or prior.kind != "temperature"):
+        of_kind = [prior for prior in own_priors if prior.kind == kind]
+        if is_length_nuisance(kind):  # of all tests of a group, which lengths are: with the largest of the tolerances
+            kept.append(Nuisance(kind, sd=max(prior.sd or 0.0 for prior in of_kind)))
+        else:
+            kept += of_kind
+    return replace(settings, nuisances=tuple(kept))
 
 
 def _nuisance(file: StudyFile, number: int, part: NuisanceTable) -> Nuisance:

@@ -1,7 +1,13 @@
-"""What a folder holds of cameras for a proposed study: frames, and the records and times of frames beside them."""
+"""What a folder holds of cameras for a proposed study: frames, and the records and times of frames beside them.
+
+Files go together by name first (`run1/`, `run1_times.csv`, `run1_log.csv`), then by number of rows and by time. Where
+several would do none is taken: the study file names them as a question.
+"""
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -10,66 +16,149 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from creepkit.api.extraction import WATCHED
+from creepkit.arrays import Floats
 from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import CreepkitError
+from creepkit.extraction.domes import find_domes
+from creepkit.extraction.series import reference_plate
+from creepkit.instruments.clock_alignment import UNIX_TIME
+from creepkit.registry.arguments import specimen_by_name
 from creepkit.registry.reading import frame_files, read_frames, read_record
+from creepkit.studies.alloy_table import empty_table, looks_like_alloys
 
 if TYPE_CHECKING:
     from creepkit.records import Frames, InstrumentRecord
 
-MOST_FOLDERS, MOST_FILES = 20, 40
+MOST_FOLDERS, MOST_FILES = 60, 300
 """Folders that are looked into for frames, and files beside them that are tried as records or times."""
 
 
 FEWEST_FRAMES = 2
 
 
+ALLOYS_FILE = "alloys.csv"
+"""Of the table of alloys that is written to be filled in."""
+
+
 LOADS = ("pressure", "force")
 """Quantities of channels that make a table a record of what was imposed."""
 
 
+COVERED = 0.9
+"""Share of the duration of the frames that their record has at least."""
+
+
+LIKE_TEMPERATURES = 40.0
+"""K from the hottest within which thermocouples of one plate are; those of a room or of a cold junction are not."""
+
+
+ISOTHERMAL, FEWEST_TEMPERATURES = 5.0, 3
+"""K within which tests are at one temperature, and temperatures for which forms are sought."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A file that goes with frames. file : None where it is not known; why : in words; open : those that would do."""
+
+    file: Path | None = None
+    why: str = ""
+    open: tuple[Path, ...] = ()
+
+
 @dataclass(frozen=True)
 class FoundCamera:
-    """A folder of frames. source : it as the study file names it. times : a file with a row for each frame."""
+    """A folder of frames.
+
+    source : it as the study file names it. times : a file with a row for each frame. record : of what was imposed.
+    dimples : names of the test pieces that it shows, () where none was found. unseen : why not.
+    """
 
     folder: Path
     source: str
     frames: Frames
-    times: Path | None
+    times: Choice
+    record: Choice
+    dimples: tuple[str, ...] = ()
+    unseen: str = ""
+
+    @property
+    def name(self) -> str:
+        """As the study calls it."""
+        return self.folder.absolute().name or "camera"
 
     @property
     def untimed(self) -> bool:
         """Whether its files hold no times."""
         return bool(np.isnan(self.frames.times).any())
 
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """What only who made the test knows, one sentence each."""
+        asked = []
+        for choice, what in ((self.times, "times") if self.untimed else (Choice(), ""), (self.record, "record")):
+            if choice.open:
+                asked.append(f"which of {', '.join(one.name for one in choice.open)} is the {what} of {self.name}?")
+        if self.untimed and self.times == Choice():
+            asked.append(f"when were the frames of {self.name} taken? give times = a file, or interval_s")
+        return tuple(asked)
+
 
 @dataclass(frozen=True)
 class FoundCameras:
-    """Cameras and records of a folder. place : of files in it, relative to the study file; files : that are named."""
+    """Cameras and records of a folder.
 
-    place: str = ""
+    names : {file: it as the study names it}. alloys : the file of the table of alloys as the study names it, "" for
+    none; empty_alloys : the text of one that is to be written beside the study and filled in.
+    """
+
+    names: Mapping[Path, str] = field(default_factory=dict)
     cameras: tuple[FoundCamera, ...] = ()
     records: Mapping[Path, InstrumentRecord] = field(default_factory=dict)
-    files: tuple[Path, ...] = ()
+    alloys: str = ""
+    empty_alloys: str = ""
 
     @property
     def summary(self) -> tuple[str, ...]:
         """What was found, in sentences."""
-        seen = (f"{one.folder}: {len(one.frames)} frames of {one.frames.system or 'a camera'}" for one in self.cameras)
-        recorded = (f"{file}: an instrument record with {len(r.channels)} channels" for file, r in self.records.items())
-        return (*seen, *recorded)
+        lines = []
+        for one in self.cameras:
+            parts = [f"{one.folder}: {len(one.frames)} frames of {one.frames.system or 'a camera'}"]
+            parts += [f"test pieces {one.dimples[0]} to {one.dimples[-1]}"] if len(one.dimples) > 1 else []
+            choices = ((one.times, "times"), (one.record, "record"))
+            parts += [f"{what} of {choice.file.name}" for choice, what in choices if choice.file]
+            lines.append(", ".join(parts))
+        lines += [f"{file}: an instrument record with {len(r.channels)} channels" for file, r in self.records.items()]
+        return (*lines, *(f"question: {text}" for one in self.cameras for text in one.questions))
 
-    @property
-    def other_records(self) -> str:
-        """Records beside the one that is proposed, as a remark."""
-        others = ", ".join(one.stem for one in [*self.records][1:])
-        return f"  # assumed; there are also {others}" if others else ""
+    def listed(self, files: Sequence[Path]) -> str:
+        """Files as the study names them, one or the other."""
+        return " or ".join(json.dumps(self.names[one], ensure_ascii=False) for one in files)
+
+    def record_name(self, file: Path) -> str:
+        """What the study calls a record."""
+        alike = [one for one in self.records if one.stem == file.stem]
+        return file.stem if len(alike) == 1 else f"{file.parent.name} {file.stem}"
 
     def channels_of(self, record: InstrumentRecord) -> list[str]:
-        """The first load and the first temperature of a record."""
+        """The first load, and the thermocouples of a plate: those that are about as hot as the hottest."""
         load = next(name for name, one in record.channels.items() if one.quantity in LOADS)
-        warm = (name for name, one in record.channels.items() if one.quantity == "temperature")
-        return [load, next(warm, "temperature")]
+        means = {name: float(np.nanmean(one.values)) for name, one in _warm(record).items()}
+        hottest = max(means.values(), default=0.0)
+        return [load, *(name for name, mean in means.items() if mean > hottest - LIKE_TEMPERATURES)]
+
+    @property
+    def several_temperatures(self) -> bool:
+        """Whether cameras of one test piece each were at enough temperatures for forms of it."""
+        levels: list[float] = []
+        for one in self.cameras:
+            record = None if one.record.file is None else self.records[one.record.file]
+            if len(one.dimples) > 1 or record is None or not (names := self.channels_of(record)[1:]):
+                continue
+            mean = float(np.mean([np.nanmean(record.channel(name).values) for name in names]))
+            if all(abs(mean - other) > ISOTHERMAL for other in levels):
+                levels.append(mean)
+        return len(levels) >= FEWEST_TEMPERATURES
 
 
 def found_cameras(folder: Path, path: Path, others: Sequence[Path], base: str) -> FoundCameras:
@@ -78,26 +167,103 @@ def found_cameras(folder: Path, path: Path, others: Sequence[Path], base: str) -
     path : the study file. others : files that hold tests. base : of the folder, relative to the study file.
     """
     place, visible = "" if base == "." else f"{base}/", sorted(folder.iterdir())
-    below = [one for one in visible if one.is_dir() and one.name[0] != "."]
+    below = [one for one in visible if one.is_dir() and one.name[0] != "." and not one.name.endswith(".results")]
     tried = {one: _of(read_frames, one) for one in (folder, *below)[:MOST_FOLDERS]}
     frames = {one: found for one, found in tried.items() if found is not None and len(found) >= FEWEST_FRAMES}
     if not frames:
         return FoundCameras()
     named = {file for one in frames for file in frame_files(one)}
-    beside = [one for one in visible if one.is_file() and one not in {path, *named, *others}][:MOST_FILES]
-    read = {one: _of(read_record, one) for one in beside}
+    inside = [file for one in frames if one != folder for file in sorted(one.iterdir()) if file not in named]
+    beside = [one for one in visible if one not in {path, *named, *others}]
+    files = [one for one in (*beside, *inside) if one.is_file() and one.name[0] != "."][:MOST_FILES]
+    watched = specimen_by_name(WATCHED)
+    tables = [one for one in files if looks_like_alloys(one, watched)]
+    files = [one for one in files if one not in tables]
+    read = {one: _of(read_record, one) for one in files}
     records = {
         one: record
         for one, record in read.items()
         if record is not None and any(channel.quantity in LOADS for channel in record.channels.values())
     }
-    times = {one: _of(read_frame_times, one) for one in beside if one not in records}
+    times = {one: rows for one in files if one not in records and (rows := _of(read_frame_times, one)) is not None}
+    owners = {one: _owner(one, list(frames)) for one in files}
     cameras = []
     for one, found in frames.items():
-        own = next((file for file, rows in times.items() if rows is not None and rows.size == len(found)), None)
-        cameras.append(FoundCamera(one, base if one == folder else f"{place}{one.name}", found, own))
-    named |= {*records, *(one.times for one in cameras if one.times is not None)}
-    return FoundCameras(place, tuple(cameras), records, tuple(sorted(named)))
+        right = {file: rows for file, rows in times.items() if rows.size == len(found)}
+        own = _chosen({file: owners[file] for file in right}, one, "it has as many rows as there are frames")
+        clock = found.times if own.file is None or not np.isnan(found.times).any() else times[own.file]
+        covering = {file: owners[file] for file, record in records.items() if _covers(record, clock)}
+        by_name = [file for file in records if owners[file] == one]
+        under = _chosen(covering | dict.fromkeys(by_name, one), one, "it is the only one that lasts as long")
+        dimples, unseen = _dimples(found)
+        source = base if one == folder else f"{place}{one.name}"
+        cameras.append(FoundCamera(one, source, found, own, under, dimples, unseen))
+    used = {c.file for camera in cameras for c in (camera.times, camera.record)} - {None}
+    offered = {file for camera in cameras for c in (camera.times, camera.record) for file in c.open}
+    kept = {file: record for file, record in records.items() if file in used | offered}
+    names = {camera.name: camera.dimples or ("D1",) for camera in cameras}
+    file_names = {file: place + file.relative_to(folder).as_posix() for file in (*named, *files, *tables)}
+    if tables or (path.parent / ALLOYS_FILE).exists():
+        return FoundCameras(file_names, tuple(cameras), kept, file_names[tables[0]] if len(tables) == 1 else "")
+    return FoundCameras(file_names, tuple(cameras), kept, ALLOYS_FILE, empty_table(names))
+
+
+def _warm(record: InstrumentRecord) -> dict[str, Any]:
+    return {
+        name: one
+        for name, one in record.channels.items()
+        if one.quantity == "temperature" and one.missing < one.values.size
+    }
+
+
+def _words(text: str) -> list[str]:
+    """Letters and numbers of a name, each by itself: run and 1 of run1 and of Run_01."""
+    return [word.lstrip("0") or "0" for word in re.findall(r"[^\W\d_]+|\d+", text.casefold())]
+
+
+def _owner(file: Path, folders: Sequence[Path]) -> Path | None:
+    """The folder of frames in which a file lies, or of which it has the name, the longest where it has several."""
+    if file.parent in folders and len(folders) > 1 and all(file.parent != one.parent for one in folders):
+        return file.parent
+    words, found = _words(file.stem), list[tuple[int, Path]]()
+    for folder in folders:
+        name = _words(folder.absolute().name)
+        if name and any(words[k : k + len(name)] == name for k in range(len(words))):
+            found.append((len(name), folder))
+    longest = max((size for size, _ in found), default=0)
+    best = [folder for size, folder in found if size == longest]
+    return best[0] if len(best) == 1 else None
+
+
+def _chosen(owners: Mapping[Path, Path | None], folder: Path, reason: str) -> Choice:
+    """The file of these that goes with a folder of frames, each of a folder or of none."""
+    own = [file for file, owner in owners.items() if owner == folder]
+    if len(own) == 1:
+        return Choice(own[0], "by its name")
+    common = own or [file for file, owner in owners.items() if owner is None]
+    if len(common) == 1:
+        return Choice(common[0], reason)
+    return Choice(open=tuple(common))
+
+
+def _covers(record: InstrumentRecord, times: Floats) -> bool:
+    """Whether a record may be of the time of frames, as far as both clocks say."""
+    if np.isnan(times).any():
+        return True
+    start, end = (float(one) for one in times[[0, -1]])
+    if record.start is not None and start > UNIX_TIME:
+        first, last = (record.start + float(one) for one in record.times[[0, -1]])
+        return min(last, end) - max(first, start) > 0.5 * COVERED * (end - start)
+    return float(np.ptp(record.times)) >= COVERED * (end - start)
+
+
+def _dimples(frames: Frames) -> tuple[tuple[str, ...], str]:
+    """The test pieces that frames show, or why none is seen."""
+    try:
+        region = specimen_by_name(WATCHED).surface_region  # type: ignore[attr-defined]
+        return tuple(find_domes(frames, reference_plate(frames), region).centers), ""
+    except (CreepkitError, OSError) as error:
+        return (), " ".join(str(error).split())
 
 
 def _of(read: Callable[[Path], Any], path: Path) -> Any:

@@ -7,28 +7,37 @@ that another time zone of a record, or another channel, leaves the frames alone.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
-from datetime import datetime
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from creepkit.api.extraction import WATCHED, extract_as_described, history_of, imposed_on, operator_of
+from creepkit.api.extraction import WATCHED, ImposedChannels, extract_as_described, history_of, imposed_on, operator_of
 from creepkit.api.options import elastic_of
 from creepkit.cameras.sequences import in_order
-from creepkit.errors import CreepkitError, HistoryError, StudyError, nearest
+from creepkit.errors import HistoryError, StudyError, nearest
 from creepkit.extraction import Extraction
-from creepkit.extraction.options import ExtractionOptions
+from creepkit.extraction.options import ClockOptions, ExtractionOptions
+from creepkit.extraction.temperature_fields import IMAGE_FILE, InfraredCamera, InfraredField
 from creepkit.files.record_codec import record_to_json
 from creepkit.forecasts.planned_tests import stepped_load
 from creepkit.instruments.imposed import Imposed
 from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.options import values_of_table
-from creepkit.records import History, Loading, Specimen, SupportsSurfaceObservation, loads_of
+from creepkit.records import (
+    ZERO_CELSIUS,
+    History,
+    Loading,
+    Nuisance,
+    Specimen,
+    SupportsSurfaceObservation,
+    dimensions_of,
+    loads_of,
+)
 from creepkit.registry.reading import frame_files
 from creepkit.reports.contents import Exclusion
 from creepkit.studies import arguments
+from creepkit.studies.alloy_table import AlloyTable, Dimple, read_alloy_table
 from creepkit.studies.inputs import InputFile
 from creepkit.studies.stage import Results, Stage, Tick
 from creepkit.studies.study_file import KeyPath, StudyFile
@@ -41,22 +50,26 @@ MOST_REASON = 300
 CONTRADICTIONS = (
     *(("format", "columns"), ("times", "interval_s"), ("operator", "window_mm"), ("operator", "rings_mm")),
     *(("window_mm", "rings_mm"), ("lag_s", "search_s"), ("record", "load"), ("record", "temperature_C")),
+    ("infrared", "temperature_C"),
+    ("infrared", "thermocouples_mm"),
 )
 """Keys of a [[camera]] of which one may be given."""
 
 
 @dataclass(frozen=True)
 class ExtractedTests:
-    """What the frames of one camera gave, one extraction for each test piece."""
+    """What the frames of one camera gave, one extraction for each test piece; failed : {test piece: why not}."""
 
     tests: tuple[Extraction, ...]
+    failed: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class ImposedOnTests:
-    """What an instrument recorded of the test pieces of one camera, in their order."""
+    """What an instrument recorded of the test pieces of one camera; failed : {test piece: why nothing}."""
 
     tests: tuple[Imposed, ...]
+    failed: Mapping[str, str] = field(default_factory=dict)
 
 
 def cameras_of(file: StudyFile) -> list[StudyCamera]:
@@ -64,16 +77,18 @@ def cameras_of(file: StudyFile) -> list[StudyCamera]:
     import creepkit as ck
 
     model = file.model
-    for table, parts in (("camera", model.camera), ("record", model.record)):
-        names = [one.name for one in parts]
+    cameras = [StudyCamera(file, k) for k in range(len(model.camera))]
+    named = {"camera": [one.label for one in cameras], "record": [one.name for one in model.record]}
+    for table, names in named.items():
         for k, name in enumerate(names):
             if name in names[:k]:
                 raise file.error((table, k, "name"), f"two of them are called '{name}'; rename one of them")
-    cameras = [StudyCamera(file, k) for k in range(len(model.camera))]
     for camera in cameras:
         camera.check()
+    if model.alloys is not None and not cameras:
+        raise file.error(("alloys",), "says what cameras show, and there is no [[camera]]; leave it out")
     for k, record in enumerate(model.record):
-        if record.name not in [part.record for part in model.camera]:
+        if k not in [camera.record_number for camera in cameras]:
             what = f"no [[camera]] says record = '{record.name}'; add that, or leave it out"
             raise file.error(("record", k, "name"), what)
         file.check_name(("record", k, "format"), "format", record.format, ck.available("instruments"))
@@ -93,14 +108,21 @@ class StudyCamera:
         return self.file.model.camera[self.number]
 
     @property
+    def label(self) -> str:
+        """Its name, by default that of its folder."""
+        place = Path(self.part.frames[0])
+        folder = place.parent if "*" in place.name or place.suffix else place
+        return self.part.name or folder.name or "camera"
+
+    @property
     def name(self) -> str:
         """Of its extraction."""
-        return f"extraction of {self.part.name}"
+        return f"extraction of {self.label}"
 
     @property
     def record_name(self) -> str:
         """Of what its instrument recorded."""
-        return f"record of {self.part.name}"
+        return f"record of {self.label}"
 
     def key(self, *names: str) -> KeyPath:
         """The place of a key in the file."""
@@ -116,27 +138,24 @@ class StudyCamera:
         for first, second in CONTRADICTIONS:
             if {first, second} <= given:
                 raise self.file.error(self.key(second), f"contradicts {first}; leave one of them out")
-        for name in ("channels", "lag_s", "search_s", "camera_start"):
-            if part.record is None and name in given:
+        for name in ("channels", "thermocouples_mm", "lag_s", "search_s", "camera_start"):
+            if self.record_number is None and name in given:
                 raise self.file.error(self.key(name), "belongs to a record; say record = its name")
-        if part.record is None and (len(part.load) != 1 or part.temperature_C is None):
+        warm = part.temperature_C is not None or part.infrared is not None
+        if self.record_number is None and (len(part.load) != 1 or not warm):
             what = "does not say what was imposed; give record, or load and temperature_C, as load = { ... = 5 }"
             raise self.file.error(self.key(), what)
-        names, centers = self.said.names, self.said.centers
-        if names and centers and len(names) != len(centers):
-            what = f"are {len(names)}, and centers_mm {len(centers)}; give one name of each"
-            raise self.file.error(self.key("names"), what)
-        if len(set(names)) < len(names):
-            raise self.file.error(self.key("names"), "stand there twice; each test piece has its own")
-        for name in ("record_number", "operator", "camera_start", "stated_loading", "lengths", "files"):
+        for name in ("operator", "clock", "stated_loading", "lengths", "files", "images", "alloys"):
             getattr(self, name)  # each says what is wrong with its keys
 
     # ---- its table as arguments ------------------------------------------------------------------------------------
 
     @cached_property
     def record_number(self) -> int | None:
-        """Which [[record]] it names; None where it names none."""
+        """Which [[record]] it names, the only one where it says nothing of what was imposed; None for no record."""
         names, name = [one.name for one in self.file.model.record], self.part.record
+        if name is None and len(names) == 1 and not self.part.load and self.part.temperature_C is None:
+            return 0
         if name is not None and name not in names:
             known = nearest(name, names) if names else "add a table [[record]] with name and file"
             raise self.file.error(self.key("record"), f"there is no record '{name}'; {known}")
@@ -167,7 +186,8 @@ class StudyCamera:
     def all_files(self) -> list[Path]:
         """Every file that it reads."""
         frames, times, record = self.files
-        return [*frames, *(path for path in (times, record) if path is not None)]
+        table = None if self.alloys is None else self.alloys.path
+        return [*frames, *self.images, *(path for path in (times, record, table) if path is not None)]
 
     @property
     def format(self) -> Any:
@@ -200,28 +220,66 @@ class StudyCamera:
     @cached_property
     def said(self) -> ExtractionOptions:
         """What is said of the frames."""
-        with self.file.at(*self.key("rest_frames")):
+        with self.file.at(*self.key("rest_frames" if self.part.rest_frames else "names")):
             said = ExtractionOptions().changed({**values_of_table(ExtractionOptions, self.part), "times": None})
-            _ = said.frames_at_rest  # which a text that is no range of frames has not
+            said.check()
             return said
 
     @cached_property
-    def camera_start(self) -> float | None:
-        """Unix time of the camera's time zero, s."""
-        text, start = self.part.camera_start, None
-        if text is None:
+    def clock(self) -> ClockOptions:
+        """What is known of the clocks of frames and record."""
+        stated = values_of_table(ClockOptions, self.part)
+        with self.file.at(*self.key("search_s" if self.part.search_s else "camera_start")):
+            clock = ClockOptions().changed(stated)
+            _ = clock.bounds, clock.start  # which texts and numbers of other kinds have not
+            return clock
+
+    @cached_property
+    def images(self) -> list[Path]:
+        """Of the temperature."""
+        if self.part.infrared is None:
+            return []
+        paths = self.file.paths(self.key("infrared", "images"), self.part.infrared.images)
+        if len(paths) == 1 and paths[0].is_dir():
+            paths = sorted(one for one in paths[0].iterdir() if one.suffix.lower() in (".csv", ".npy", ".mat", ".txt"))
+        if not paths or any(path.is_dir() for path in paths):
+            raise self.file.error(self.key("infrared", "images"), f"name {IMAGE_FILE.noun}, or a folder of them")
+        return paths
+
+    @cached_property
+    def infrared(self) -> InfraredField | None:
+        """Temperatures of the plate, where it was seen in the infrared."""
+        part = self.part.infrared
+        if part is None:
             return None
-        with suppress(ValueError):
-            start = datetime.fromisoformat(text)
-        if start is None or start.tzinfo is None:
-            what = f"'{text}' is not known; write \"2025-08-18T18:51:53-05:00\""
-            raise self.file.error(self.key("camera_start"), what)
-        return start.timestamp()
+        camera = InfraredCamera(
+            (part.center_mm[0], part.center_mm[1]),
+            part.mm_per_pixel,
+            part.emissivity,
+            part.emissivity_sd,
+            part.camera_emissivity,
+            part.surroundings_C + ZERO_CELSIUS,
+            part.wavelength_um,
+            part.unit,
+        )
+        with self.file.at(*self.key("infrared")):
+            return camera.read(self.images)
+
+    @cached_property
+    def alloys(self) -> AlloyTable | None:
+        """The table of alloys of the study."""
+        table = self.file.model.alloys
+        if table is None:
+            return None
+        path = self._file(("alloys", "file"), table.file)
+        assert path is not None
+        with self.file.at("alloys", "file"):
+            return read_alloy_table(path, self.specimen)
 
     @cached_property
     def stated_loading(self) -> tuple[Loading | float, Any] | None:
-        """Load and temperature, K, where there is no record."""
-        if self.part.record is not None:
+        """Load and temperature, K, where there is no record; None of a temperature that infrared images show."""
+        if self.record_number is not None:
             return None
         loads = {load.name: load for load in loads_of(self.specimen)}
         ((key, steps),) = self.part.load.items()
@@ -230,7 +288,8 @@ class StudyCamera:
         end = max(2.0 * levels[-1][0], 1e9)
         with self.file.at(*self.key("load", key)):
             loading = stepped_load(name, loads[name], levels, control=None, ramp=self.part.ramp_s, end=end)
-        assert self.part.temperature_C is not None
+        if self.part.temperature_C is None:
+            return loading, None
         return loading, arguments.temperature_of(self.file, self.key("temperature_C"), self.part.temperature_C)
 
     @cached_property
@@ -243,22 +302,23 @@ class StudyCamera:
     def stages(self, files: Sequence[InputFile]) -> list[Stage]:
         """The extraction, and what its record imposed. files : with their hashes."""
         hashes = {one.path: [one.name, one.sha256] for one in files}
-        return [self._extraction(hashes), *([] if self.part.record is None else [self._imposed(hashes)])]
+        return [self._extraction(hashes), *([] if self.record_number is None else [self._imposed(hashes)])]
 
     def _extraction(self, hashes: Mapping[Path, list[str]]) -> Stage:
         import creepkit as ck
 
-        part, said, (paths, times, _) = self.part, self.said, self.files
+        said, (paths, times, _) = self.said, self.files
 
         def make(results: Results, tick: Tick) -> ExtractedTests:
-            frames = replace(ck.read_frames(list(paths), self.format, times), name=part.name)
-            found = extract_as_described(frames, self.specimen, said, self.operator, tick)
-            return ExtractedTests(tuple(_without_folders(one, paths[0].parent) for one in found))
+            frames = replace(ck.read_frames(list(paths), self.format, times), name=self.label)
+            failed: dict[str, str] = {}
+            found = extract_as_described(frames, self.specimen, said, self.operator, tick, failed)
+            return ExtractedTests(tuple(_without_folders(one, paths[0].parent) for one in found), failed)
 
         settings = [
             {"frames": [hashes[path] for path in paths], "times": times and hashes[times]},
             record_to_json(asdict(said)),
-            [part.name, self.operator, predictor_fingerprint(self.specimen)],
+            [self.label, self.operator, predictor_fingerprint(self.specimen)],
         ]
         return Stage("extraction", "", settings, make, ExtractedTests, _numbers_of_frames, name=self.name)
 
@@ -269,25 +329,25 @@ class StudyCamera:
         assert index is not None
         assert path is not None
         record = self.file.model.record[index]
-        search = None if part.search_s is None else (part.search_s[0], part.search_s[1])
 
         def make(results: Results, tick: Tick) -> ImposedOnTests:
             read = ck.read_record(path, record.format, **_record_options(record))
-            found = []
+            places = {name: (x, y) for name, (x, y) in part.thermocouples_mm.items()}
+            known, failed = ImposedChannels(part.channels, places, self.infrared), dict[str, str]()
             tests: tuple[Extraction, ...] = results[self.name].tests
-            for k, one in enumerate(tests):
-                tick("align clocks", k, len(tests))
-                channels = part.channels.get(one.name, part.channels.get(""))
-                try:
-                    under = imposed_on(
-                        one, read, channels, lag=part.lag_s, search=search, camera_start=self.camera_start
-                    )
-                except CreepkitError as error:
-                    raise StudyError(f"{one.name}: {error}") from None
-                found.append(under)
-            return ImposedOnTests(tuple(found))
+            tick("align clocks", 0, len(tests))
+            found = imposed_on(tests, read, known, self.clock, failed)
+            if not found:
+                raise StudyError("; ".join(f"{name}: {reason}" for name, reason in failed.items()))
+            return ImposedOnTests(tuple(found), failed)
 
-        settings = [hashes[path], record.model_dump(), part.channels, [part.lag_s, part.search_s, part.camera_start]]
+        settings = [
+            hashes[path],
+            record.model_dump(),
+            [part.channels, part.thermocouples_mm],
+            record_to_json(asdict(self.clock)),
+            [part.infrared and part.infrared.model_dump(), [hashes[one] for one in self.images]],
+        ]
         numbers, needs = _numbers_of_records, (self.name,)
         return Stage("record", "", settings, make, ImposedOnTests, numbers, needs, name=self.record_name)
 
@@ -296,31 +356,88 @@ class StudyCamera:
     def tests(self, results: Any) -> Iterator[tuple[str, Extraction, Imposed | None]]:
         """Name, extraction, and what its record says was imposed, of each test; none where the extraction failed."""
         extracted = results[self.name].tests if self.name in results else ()
-        imposed = results[self.record_name].tests if self.record_name in results else [None] * len(extracted)
-        for one, under in zip(extracted, imposed, strict=True):
-            yield f"{self.part.name} {one.name}", one, under
+        imposed = results[self.record_name].tests if self.record_name in results else ()
+        by_name = {one.specimen: one for one in imposed}
+        for one in extracted:
+            yield f"{self.label} {one.name}", one, by_name.get(one.name)
+
+    def failed(self, results: Any) -> list[Exclusion]:
+        """Test pieces of which nothing could be extracted, or is known what was imposed; those the table excludes."""
+        reasons = {
+            piece: reason
+            for stage in (self.name, self.record_name)
+            if stage in results
+            for piece, reason in results[stage].failed.items()
+        }
+        rows = {} if self.alloys is None else self.alloys.of_camera(self.label)
+        reasons |= {piece: row.excluded for piece, row in rows.items() if row.excluded and self.name in results}
+        return [Exclusion(f"{self.label} {piece}", (), reason[:MOST_REASON]) for piece, reason in reasons.items()]
 
     def histories(self, results: Any) -> list[History]:
-        """The tests, where no stage failed."""
+        """The tests, where no stage failed, without those that the table of alloys excludes."""
+        tests = [
+            (name, one, under)
+            for name, one, under in self.tests(results)
+            if under is not None or self.record_number is None
+        ]
+        rows: Mapping[str, Dimple] = {}
+        if self.alloys is not None and self.name in results:
+            rows = self.alloys.of_camera(self.label)
+            shown = [*(one.name for one in results[self.name].tests), *results[self.name].failed]
+            with self.file.at("alloys", "file"):
+                self.alloys.check(self.label, shown, [one.label for one in self._all])
         with self.file.at(*self.key()):
-            return [
-                self._history(name, one, under)
-                for name, one, under in self.tests(results)
-                if under is not None or self.part.record is None
-            ]
+            kept = [test for test in tests if (row := rows.get(test[1].name)) is None or not row.excluded]
+            return [self._history(name, one, under, rows.get(one.name)) for name, one, under in kept]
 
-    def _history(self, name: str, one: Extraction, under: Imposed | None) -> History:
+    @property
+    def _all(self) -> list[StudyCamera]:
+        return [StudyCamera(self.file, k) for k in range(len(self.file.model.camera))]
+
+    def _history(self, name: str, one: Extraction, under: Imposed | None, row: Dimple | None) -> History:
         part, stated = self.part, self.stated_loading
-        history = one.history_under(*stated) if stated is not None else history_of(one, under)  # type: ignore[arg-type]
-        modulus = None if part.modulus_GPa is None else 1e3 * part.modulus_GPa
+        row = row or Dimple("", self.label, one.name)
+        if stated is None:
+            assert under is not None
+            history = history_of(one, under)
+        else:
+            loading, kelvin = stated
+            labels = {}
+            if kelvin is None:
+                assert self.infrared is not None
+                kelvin, sd = self.infrared.at((float(one.center[0]), float(one.center[1])), 0.5 * one.region.moving)
+                labels = {"temperature_sd_K": f"{sd:.2g}"}
+            history = one.history_under(loading, kelvin)
+            history = history.replace(labels={**history.labels, **labels})
+        modulus = row.modulus or (None if part.modulus_GPa is None else 1e3 * part.modulus_GPa)
+        several = self.alloys is not None and len(self.alloys.of_camera(self.label)) > 1
+        alloy = row.alloy or part.alloy or (name if several else "")
+        assumed = "an alloy of its own, for the table of alloys names none" if several and alloy == name else ""
+        labels = {**history.labels, **part.labels, **row.labels}
+        if assumed:
+            labels["assumed"] = "; ".join(filter(None, (labels.get("assumed"), assumed)))
         return history.replace(
             name=name,
-            alloy=part.alloy or "",
+            alloy=alloy,
             elastic=elastic_of(modulus, part.poisson),
-            geometry={**history.geometry, **self.lengths},
-            labels={**history.labels, **part.labels},
+            geometry={**history.geometry, **self.lengths, **row.lengths},
+            labels=labels,
             source=f"{part.frames[0]} ({one.name})",
         )
+
+    def priors(self, histories: Sequence[History]) -> list[Nuisance]:
+        """What is known of single test pieces but for an error: their lengths and their temperatures."""
+        rows = {} if self.alloys is None else self.alloys.of_camera(self.label)
+        found = []
+        for history in histories:
+            row = rows.get(history.labels.get("place", ""))
+            if row is not None and history.name == f"{self.label} {row.name}":
+                kinds = {one.name: one.alias or one.name for one in dimensions_of(self.specimen)}
+                found += [Nuisance(kinds[name], sd=sd, tests=(history.name,)) for name, sd in row.tolerances.items()]
+            if "temperature_sd_K" in history.labels and history.name.startswith(f"{self.label} "):
+                sd = float(history.labels["temperature_sd_K"])
+                found.append(Nuisance("temperature", sd=sd, tests=(history.name,)))
+        return found
 
 
 def flagged_frames(extractions: Mapping[str, Extraction]) -> list[Exclusion]:
@@ -345,10 +462,19 @@ def _numbers_of_frames(extracted: ExtractedTests) -> dict[str, Any]:
 
 
 def _numbers_of_records(imposed: ImposedOnTests) -> dict[str, Any]:
-    """The alignment of the clocks of each test piece."""
+    """The alignment of the clocks, and when the load began and how warm it was at each test piece."""
+    clock = imposed.tests[0].alignment
     return {
-        f"{k + 1}": {"lag_s": one.alignment.lag, "interval_s": one.alignment.lag_interval, "zero_s": one.time_zero}
-        for k, one in enumerate(imposed.tests)
+        "lag_s": clock.lag,
+        "interval_s": clock.lag_interval,
+        **{
+            one.specimen: {
+                "zero_s": one.time_zero,
+                "temperature_C": float(one.temperature.values.mean()) - ZERO_CELSIUS,
+                "temperature_sd_K": one.temperature_sd,
+            }
+            for one in imposed.tests
+        },
     }
 
 

@@ -17,15 +17,15 @@ from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import followed_duration
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
-from creepkit.readers.questions import ANSWERS_FILE
+from creepkit.readers.questions import ANSWERS_FILE, Question, single_errors
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
 from creepkit.registry.reading import read_those_that_can_be
 from creepkit.studies.camera_proposal import found_cameras
 from creepkit.studies.data_summary import FEWEST_RUPTURES, DataSummary
 from creepkit.studies.study_file import parse_study
 
-PLANNED_LAWS = ["norton", "strain-hardening", "time-hardening"]
-"""Of tests that cameras are still to be read of."""
+PLANNED_LAWS = ["norton", "strain-hardening", "time-hardening", "hyperbolic-sine"]
+"""Of tests that cameras are still to be read of: those of Table 1 of Chen et al."""
 
 
 FEWEST_TEMPERATURES = 3
@@ -42,10 +42,11 @@ MOST_FOLDERS, MOST_FILES_TRIED, MOST_FOLDERS_NAMED = 40, 3, 4
 
 @dataclass(frozen=True)
 class StudyProposal:
-    """The text of a study file, and what the files were found to hold, in lines."""
+    """The text of a study file, and what the files were found to hold, in lines; alloys : of a table beside it."""
 
     text: str
     summary: tuple[str, ...]
+    alloys: str = ""
 
 
 def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyProposal:
@@ -61,8 +62,10 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
     known["report"] = "report.html" if path.stem == "study" else f"{path.stem}.html"
     lines = cameras.summary
     if tests:
-        named = {str(one) for one in cameras.files}
+        named = {str(one) for one in cameras.names}
         problems = [f"not read: {one}" for one in problems if one.split(":")[0] not in named][:MOST_REMARKS]
+        if any(ANSWERS_FILE in one for one in problems):
+            problems.append(f"'creepkit read {folder} --ask' puts what is open as questions")
         quality = ck.check_data_quality([history for history in tests if history.outputs])
         summary, left_out = DataSummary.of(tests), left_out_lines(quality)
         lines = (*summary.lines, *left_out, *cameras.summary, *problems)
@@ -81,7 +84,7 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
         raise failure or StudyError(f"{folder}: none of its files holds a test")
     text = rendered(known)
     parse_study(path, text)  # what is written must be valid
-    return StudyProposal(text, lines)
+    return StudyProposal(text, lines, cameras.empty_alloys)
 
 
 def one_line(text: str, length: int = 200) -> str:
@@ -156,7 +159,7 @@ def _readable(
     try:
         whole = ck.read_histories([folder], reader)
     except CreepkitError as error:
-        reason = str(error)
+        reason, single = str(error), single_errors(error)
     else:
         sources = {Path(history.source.partition(" (")[0]).name for history in whole}
         endings = {Path(name).suffix for name in sources}
@@ -164,7 +167,7 @@ def _readable(
         complete = suffix and all(file.name in sources for file in files if file.suffix == suffix)
         return [f"*{suffix}" if complete else "."], whole, [], None
     read, tests, errors = read_those_that_can_be(files, reader)
-    problems = [" ".join(str(error).split()) for error in errors]
+    problems = [" ".join(str(one).split()) for error in errors for one in single_errors(error)]
     if not tests:
         below = _folders_with_tests(folder, reader)
         what = f"holds a test that can be read: {reason}"
@@ -174,7 +177,11 @@ def _readable(
                 f"holds a test, but those of {named} do: run 'creepkit init {below[0]}', or 'creepkit init {below[0]} "
                 f"--to {path}' to keep the study file here"
             )
-        return [], [], problems, StudyError(f"{folder}: none of its files {what}")
+        failure = StudyError(f"{folder}: none of its files {what}")
+        if not below and any(isinstance(one, Question) for one in single):
+            hint = f"{folder}: no test can be read yet; 'creepkit read {folder} --ask' puts what is open as questions"
+            failure.errors = (*single, StudyError(hint))  # type: ignore[attr-defined]
+        return [], [], problems, failure
     return [file.name for file in read], tests, problems, None
 
 

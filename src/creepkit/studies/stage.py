@@ -13,6 +13,7 @@ StageKind = Literal[
     "record",
     "quality",
     "identification",
+    "confirmation",
     "temperature",
     "rupture",
     "forecast",

@@ -19,9 +19,10 @@ from creepkit.inverse.kept_fits import history_digest
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.search_options import SearchOptions
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.language import temperature
 from creepkit.options import values_of_table
 from creepkit.quality import DataQuality
-from creepkit.records import ZERO_CELSIUS, History
+from creepkit.records import ZERO_CELSIUS, History, Nuisance
 from creepkit.registry import default_registry
 from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
@@ -34,6 +35,7 @@ from creepkit.studies.study_file import KeyPath, StudyFile
 if TYPE_CHECKING:
     from creepkit.experiments.planned_design import Design
     from creepkit.forecasts.forecast import Forecast
+    from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.language import CreepLaw
@@ -42,10 +44,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StageInputs:
-    """What stages are made from: the study file and its tests, and what several of them need."""
+    """What stages are made from: the study file and its tests, and what several of them need.
+
+    priors : nuisance parameters of single tests, which say how well lengths and temperatures are known.
+    """
 
     file: StudyFile
     inputs: StudyInputs
+    priors: Sequence[Nuisance] = ()
 
     def groups_of(self, place: KeyPath, name: str | None) -> list[TestGroup]:
         """The group of a name, or all."""
@@ -69,10 +75,11 @@ class StageInputs:
         """Of what predicts the tests."""
         return None if self.using is None else predictor_fingerprint(self.using)
 
-    @cached_property
-    def settings(self) -> Any:
-        """Of every identification."""
-        return arguments.settings_of(self.file)
+    def settings(self, group: TestGroup, laws: Sequence[CreepLaw] = ()) -> IdentificationSettings:
+        """Of the identifications of a group, of these laws."""
+        everywhere = [history.name for history in self.inputs.histories]
+        warm = any(law.uses(temperature) for law in laws)
+        return arguments.settings_of_group(self.file, group.histories, everywhere, self.priors, warm=warm)
 
     def laws(self, group: TestGroup) -> list[tuple[CreepLaw, CreepLaw]]:
         """Pairs of a candidate at one temperature, and as it is fitted to a group."""
@@ -100,6 +107,9 @@ def stages_of(study: StageInputs) -> list[Stage]:
         part = getattr(model, kind)
         groups = [] if part is None else study.groups_of((kind,), getattr(part, "group", None))
         made[kind] = [make(study, group) for group in groups]
+    part = model.identification
+    if part is not None and (part.confirm if part.confirm is not None else bool(model.camera)):
+        made["confirmation"] = [_confirmation_stage(study, group) for group in study.inputs.groups]
     made["forecast"] = [_forecast_stage(study, k) for k in range(len(model.forecast))]
     made["export"] = [
         _export_stage(study, k, group)
@@ -125,10 +135,11 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
     """The identification of the laws of a group, and their ranking."""
     from creepkit.inverse.selection.ranking import Ranking
 
-    model, using, settings = study.file.model, study.using, study.settings
+    model, using = study.file.model, study.using
     part, selection = model.identification, model.selection
     assert part is not None
     laws, tests = [fitted for _, fitted in study.laws(group)], list(group.histories)
+    settings = study.settings(group, laws)
     how = {} if selection is None else values_of_table(SearchOptions, selection)
     asked = SearchOptions().changed({**values_of_table(SearchOptions, part), **how})
     changes = values_of_table(IdentificationSettings, part) | {"nuisances": None}  # which the settings have
@@ -174,10 +185,11 @@ def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
     elif study.file.model.identification is None:
         raise study.file.error(("temperature",), "needs a law: give law, or the table [identification]")
     need = "" if law is not None else study.needed(("temperature",), "identification", group)
+    usual = study.settings(group)
 
     def make(results: Results, tick: Tick) -> Any:
         chosen, fit = (law, None) if law is not None else _best_candidate(study, results[need], group)
-        settings = study.settings if fit is None else fit.settings
+        settings = usual if fit is None else fit.settings
         found = ck.temperature_study(chosen, tests, using, settings=settings, progress=tick, **options)
         if found.temperature_law is None:
             raise StudyError(found.notes[-1])
@@ -191,7 +203,7 @@ def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
         return None
 
     law_fingerprint = None if law is None else law.fingerprint
-    described = [part.model_dump(), record_to_json(asdict(study.settings)), study.using_fingerprint, law_fingerprint]
+    described = [part.model_dump(), record_to_json(asdict(usual)), study.using_fingerprint, law_fingerprint]
 
     def numbers(found: Any) -> dict[str, Any]:
         return {"forms": found.temperature_law.forms, "values": found.temperature_law.values}
@@ -209,6 +221,22 @@ def _best_candidate(study: StageInputs, ranking: Ranking, group: TestGroup) -> t
     named = {fitted.name: law for law, fitted in study.laws(group)}
     fit = next((one.fit for one in ranking.laws if one.fit.law.name in named), None)
     return (next(iter(named.values())) if fit is None else named[fit.law.name]), fit
+
+
+def _confirmation_stage(study: StageInputs, group: TestGroup) -> Stage:
+    """The best law of a group, simulated by the specimen itself for each of its tests."""
+    from creepkit.reports.confirmation_text import confirmation_to_json
+
+    need = stage_name("identification", group.name)
+
+    def make(results: Results, tick: Tick) -> Confirmation:
+        return ck.confirm(results[need].best)
+
+    def numbers(found: Confirmation) -> dict[str, Any]:
+        return {"confirmed": found.confirmed, "distance over the noise": found.noise_ratio}
+
+    described = _digests(group.histories)
+    return Stage("confirmation", group.name, described, make, None, numbers, (need,), document=confirmation_to_json)
 
 
 # ---- what follows from tests and laws ------------------------------------------------------------------------------

@@ -175,9 +175,10 @@ class _Run:
         watched = [stage for camera in cameras for stage in camera.stages(files)]
         execution.run(watched, [stage.name for stage in watched])  # whatever is asked for is made of their tests
         tests = [test for camera in cameras for test in camera.histories(execution.results)]
+        priors = tuple(prior for camera in cameras for prior in camera.priors(tests))
         inputs = read_inputs(file, self.study.paths, tests, complete=not execution.failures)
         self.progress("reading", 1, 1, f"{len(inputs.histories)} tests in {len(files)} files")
-        stages, execution.histories = stages_of(StageInputs(file, inputs)), inputs.histories
+        stages, execution.histories = stages_of(StageInputs(file, inputs, priors)), inputs.histories
         wanted = needed_stages(stages, kinds)
         self.check_exports([stage for stage in stages if stage.name in wanted], force=force)
         execution.run(stages, wanted, read_others="report" in kinds)
@@ -188,12 +189,13 @@ class _Run:
         write_lock(lock_of(file, files, execution.records, before), self.lock_path)
         of_cameras = [test for camera in cameras for test in camera.tests(execution.results)]
         extractions = {name: one for name, one, _ in of_cameras}
+        failed = [one for camera in cameras for one in camera.failed(execution.results)]
         result = StudyResult(
             file,
             self.lock_path,
             inputs,
             tuple(files),
-            (*flagged_frames(extractions), *inputs.exclusions),
+            (*flagged_frames(extractions), *failed, *inputs.exclusions),
             tuple(execution.records),
             tuple(changes),
             results=execution.results,

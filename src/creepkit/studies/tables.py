@@ -15,7 +15,7 @@ from creepkit.api.options import ExportOptions, ForecastOptions, PlannedTestOpti
 from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.experiments.design_options import GoalOptions
 from creepkit.experiments.rig import Rig
-from creepkit.extraction.options import ExtractionOptions
+from creepkit.extraction.options import ClockOptions, ExtractionOptions
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.search_options import SearchOptions
 from creepkit.inverse.settings import IdentificationSettings, OutputWeights
@@ -94,14 +94,14 @@ def _output_weights(value: Any) -> Any:
 
 
 def _channels(value: Any) -> Any:
-    """Load and temperature of all test pieces as those of the name ""; else by name."""
+    """Channels of all test pieces as those of the name ""; else by name."""
     return {"": value} if isinstance(value, list) else value
 
 
 LevelOrSteps = Annotated[list[Step], BeforeValidator(_level_or_steps), Field(min_length=1, max_length=MOST_ITEMS)]
 Labels = Annotated[list[Any], BeforeValidator(_label_values)]
 OneOrMore = Annotated[SomeTexts, BeforeValidator(_one_or_more)]
-ChannelPair = Annotated[list[Text], Field(min_length=2, max_length=2)]
+ChannelNames = Annotated[list[Text], Field(min_length=1, max_length=100)]
 Bounds = Annotated[list[Annotated[float, Field(ge=-1e100, le=1e100)]], Field(min_length=2, max_length=2)]
 
 
@@ -167,24 +167,48 @@ class RecordTable(TableModel):
     missing: Texts = []
 
 
-class CameraTable(_keys(ExtractionOptions), TableModel):  # type: ignore[misc]
-    """[[camera]]: frames of a surface, what is made of them as in ck.extract, and what was imposed meanwhile.
+class AlloysTable(TableModel):
+    """[alloys]: the table that says which test piece of the cameras is of which alloy, with lengths and modulus."""
 
-    frames : a folder, a pattern or files in their order. names, centers_mm : of the test pieces in the field of view.
-    record, channels : a [[record]], and load and temperature of all test pieces or of each by its name. lag_s : of the
-    record's clock, where it is known and not to be found; search_s, camera_start : as in ck.align_clocks. load,
-    temperature_C : where there is no record, counted from the first load.
+    file: Text
+
+
+class InfraredTable(TableModel):
+    """infrared of a [[camera]]: images of temperatures, and where they lie in the axes of the frames.
+
+    images : a folder, a pattern or files. center_mm : of the middle of an image. emissivity : of the surface;
+    camera_emissivity : with which the infrared camera made its temperatures.
     """
 
-    name: Text
+    images: OneOrMore
+    center_mm: Bounds
+    mm_per_pixel: Positive
+    emissivity: Annotated[float, Field(gt=0.0, le=1.0)]
+    emissivity_sd: Annotated[float, Field(ge=0.0, lt=0.5)] = 0.02
+    camera_emissivity: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    surroundings_C: Annotated[float, Field(gt=-273.0, lt=3000.0)] = 25.0
+    wavelength_um: Annotated[float, Field(ge=0.4, le=20.0)] = 10.0
+    unit: Literal["C", "K"] = "C"
+
+
+class CameraTable(_keys(ExtractionOptions, ClockOptions), TableModel):  # type: ignore[misc]
+    """[[camera]]: frames of a surface, what is made of them as in ck.extract, and what was imposed meanwhile.
+
+    frames : a folder, a pattern or files in their order. name : by default that of the folder. names, centers_mm : of
+    the test pieces in the field of view. record : a [[record]], by default the only one. channels : load, then
+    thermocouples, of all test pieces or of each by its name. thermocouples_mm : {channel: its x and y in the axes of
+    the frames}, between which the temperature of each test piece is interpolated. load, temperature_C : where there is
+    no record, counted from the first load.
+    """
+
+    name: Text | None = None
     frames: OneOrMore
     specimen: Text | None = None
     operator: Text | None = None
     record: Text | None = None
-    channels: Annotated[dict[str, ChannelPair], BeforeValidator(_channels)] = {}
-    lag_s: float | None = None
-    search_s: Bounds | None = None
-    camera_start: Text | None = None
+    channels: Annotated[dict[str, ChannelNames], BeforeValidator(_channels)] = {}
+    thermocouples_mm: dict[Text, Bounds] = {}
+    infrared: InfraredTable | None = None
     load: dict[Text, LevelOrSteps] = {}
     ramp_s: Annotated[float, Field(ge=0.0)] | None = None
     temperature_C: LevelOrSteps | None = None
@@ -236,9 +260,13 @@ _OF_IDENTIFICATION: Any = _keys(IdentificationSettings, LawChanges, SearchOption
 
 
 class IdentificationTable(_OF_IDENTIFICATION, TableModel):  # type: ignore[misc]
-    """[identification]: candidate laws and how each is fitted, for every group of tests."""
+    """[identification]: candidate laws and how each is fitted, for every group of tests.
+
+    confirm : whether the best law is simulated by the specimen itself; by default where cameras gave the tests.
+    """
 
     laws: OneOrMore
+    confirm: bool | None = None
     group_by: Text | None = None
     predictor: Text | None = None
     bounds: dict[Text, Bounds] = {}
@@ -321,6 +349,7 @@ class StudyTables(TableModel):
     study: StudyTable = StudyTable()
     record: Annotated[list[RecordTable], Field(max_length=100)] = []
     camera: Annotated[list[CameraTable], Field(max_length=100)] = []
+    alloys: AlloysTable | None = None
     data: DataTable = DataTable()
     exclude: Annotated[list[ExcludeTable], Field(max_length=MOST_ITEMS)] = []
     specimen: SpecimenTable | None = None

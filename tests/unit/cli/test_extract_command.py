@@ -74,14 +74,16 @@ def test_rings_about_a_given_centre(exports):
 
 REFUSED = {
     "--to x": "a history needs what was imposed: give --record FILE, or --load-mpa and --temperature-c",
-    "--window 5 --rings 0,2": "a window and rings were given",
+    "--window 5 --rings 0,2": "window and rings were given, of which one is enough",
     "--rings '0;2'": "--rings 0;2 is not known; write NUMBER,...",
     "--rest 5": "rest is 5: write the first and the last frame at rest, counted from 0, as in 0-39",
-    "--center 5": "--center 5.0: write X,Y in mm",
+    "--center 5": "a center has two numbers, x and y in mm, as in 12.5,-3",
     "--interval-s -1": "--interval-s is -1.0; allowed are numbers above 0 up to",
     "--specimen uniaxial": "specimen 'uniaxial' does not say how cameras see its surface",
     "--plot sheet.txt": "'.txt' is no format of pictures",
-    "": "their times are not known, or do not rise",
+    "--lag 5": "are about the clock of a record; give --record FILE",
+    "--names D1,D1": "names D1, D1: stand there twice",
+    "": "their files hold no times; give times, a file with a row for each of the 20 frames",
 }
 
 

@@ -100,3 +100,49 @@ def test_the_alignment_by_hand_of_dimple_d1_is_met() -> None:
     found = ck.align_clocks(record, "D1: Press.", frames / 1e3, apex, drift=0.0, search=(-20.0, 40.0))
     assert found.lag == pytest.approx(9.99, abs=0.2)
     assert found.lag_interval[1] - found.lag_interval[0] < 0.4
+
+
+def several(lag: float, count: int, interval: float, seed: int):
+    """Test pieces of one camera that creep and bulge differently under one pressure."""
+    random = np.random.default_rng(seed)
+    record, frames, _ = planted(lag, interval=interval)
+    fine = np.arange(0.0, 260.0, 0.05)
+    rows = []
+    for _ in range(count):
+        crept = np.cumsum(0.05 * (STEPS.at(fine) / 8.0) ** random.uniform(2.0, 7.0)) / np.sqrt(40.0 + fine)
+        bulge = random.uniform(0.005, 0.02) * STEPS.at(frames)
+        apex = bulge + np.interp(frames, fine, crept) * random.uniform(0.01, 0.2)
+        rows.append(apex + 0.001 * random.standard_normal(frames.size))
+    return record, frames, np.array(rows)
+
+
+def test_the_test_pieces_of_one_camera_have_one_lag() -> None:
+    """Its interval is no wider than that of each, and holds; a dead one and one that is ambiguous follow the others."""
+    held = 0
+    for seed in range(5):
+        lag = -7.0 + 3.3 * seed
+        record, frames, rows = several(lag, 4, 4.0, seed)
+        rows[3] = 0.001 * np.random.default_rng(seed).standard_normal(frames.size)
+        found = ck.align_clocks(record, "P", frames, rows, drift=0.0)
+        low, high = found.lag_interval
+        held += low <= lag <= high
+        single = ck.align_clocks(record, "P", frames, rows[0], drift=0.0).lag_interval
+        assert high - low <= 1.05 * (single[1] - single[0])
+    assert held >= 4
+
+
+def test_frames_without_load_tell_the_first_loading_from_a_later_step() -> None:
+    """Two steps of one size: a part of the test fits at both, unless its first frames are known to be at rest."""
+    program = Program(np.array([0.0, 40, 45, 240, 245]), np.array([0.0, 0, 4, 4, 8]))
+    record, frames, apex = planted(3.0, program=program, creep=0.0)
+    part = slice(0, 40)
+    with pytest.raises(HistoryError, match="fit about as well"):
+        ck.align_clocks(record, "P", frames[part], apex[part], drift=0.0)
+    found = ck.align_clocks(record, "P", frames[part], apex[part], drift=0.0, unloaded=range(9))
+    assert found.lag_interval[0] <= 3.0 <= found.lag_interval[1]
+
+
+def test_a_test_piece_each_needs_a_channel_each() -> None:
+    record, frames, rows = several(0.0, 2, 4.0, 1)
+    with pytest.raises(HistoryError, match="3 channels and displacements of 2 test pieces"):
+        ck.align_clocks(record, ["P"] * 3, frames, rows)

@@ -11,6 +11,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import CreepkitError
 from creepkit.inverse.identify import identify
+from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
@@ -72,6 +73,11 @@ DIMPLES = [
     for name in "abc"
 ]
 
+
+def lengths_of_one(tests, fit):
+    NuisanceParameters.from_histories([Nuisance("thickness", sd=0.01, tests=("a",))], DIMPLES, ck.specimen("bulge"))
+
+
 MISTAKES = [
     (settings(starts=0), "starts is 0"),
     (settings(loss="cubic"), "loss 'cubic'"),
@@ -85,7 +91,8 @@ MISTAKES = [
     (nuisances(Nuisance("thickness", mean=0.5, bounds=(0.6, 0.7))), "its mean 0.5 lies outside its bounds"),
     (nuisances(Nuisance("offset"), Nuisance("offset")), "nuisance 'offset' is given twice"),
     (nuisances(Nuisance("temperature", output="width")), "it has no output"),
-    (nuisances(Nuisance("thickness", tests=("bar_3",))), "'thickness' belongs to every test; leave out tests="),
+    (nuisances(Nuisance("rate", tests=("bar_3",))), "'rate' belongs to every test; leave out tests="),
+    (lengths_of_one, "test 'b' has no nuisance 'thickness', which other tests have"),
     (identified(change=lambda tests: []), "no histories"),
     (identified(change=lambda tests: [tests[0], tests[0]]), "two histories are called"),
     (identified(change=lambda tests: [tests[0].replace(used=np.zeros(40, bool))]), "fewer than two usable frames"),

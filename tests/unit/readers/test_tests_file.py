@@ -1,5 +1,6 @@
 """tests.toml beside the files of a laboratory: what they leave open is answered there, and every question names it."""
 
+import numpy as np
 import pytest
 
 import creepkit as ck
@@ -60,6 +61,21 @@ def test_a_test_is_named(tmp_path):
     written(tmp_path, r__csv="test,T (C),stress_MPa,tr (h)\nA,600,100,900\nB,600,90,2000\n")
     written(tmp_path, tests__toml='["r.csv"]\nended = {B = "stopped"}\n')
     assert [one.unruptured for one in ck.read_histories(tmp_path)] == [False, True]
+
+
+def test_a_step_after_an_interruption_is_taken_off(tmp_path):
+    hours = np.concatenate([np.linspace(0, 35, 36), np.linspace(80, 120, 41)])
+    strain = 0.002 * (hours / 10) ** 0.4 + 2e-5 * hours
+    moved = strain + np.where(hours > 50, 0.0022, 0.0)
+    rows = [f"{t!r},{100 * e!r}" for t, e in zip(hours.tolist(), moved.tolist(), strict=True)]
+    written(tmp_path, x__csv="\n".join(["# stress_MPa: 120", "# temperature_C: 600", "time_h,strain_pct", *rows]))
+    written(tmp_path, tests__toml='["x.csv"]\nsteps_taken_off = "80 h"\n')
+    (one,) = ck.read_histories(tmp_path)
+    assert one.outputs["strain"] == pytest.approx(strain, abs=2e-4)
+    assert "of strain at 80 h taken off" in one.labels["assumed"]
+    written(tmp_path, tests__toml='["x.csv"]\nsteps_taken_off = "80"\n')
+    with pytest.raises(HistoryError, match="write times such as 36.75 h; 120 h"):
+        ck.read_histories(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,9 @@ def loaded(folder: Path, text: str) -> ck.Study:
         ("interval_s = 10", "load = { pressure_bar = 5 }", 9, "contradicts record"),
         ("interval_s = 10", 'names = ["A", "A"]', 9, "stand there twice"),
         ("interval_s = 10", "lag_s = 3\nsearch_s = [-1, 1]", 10, "contradicts lag_s"),
-        ("interval_s = 10", 'channels = ["P1"]', 9, "needs 2 or more entries"),
+        ("interval_s = 10", "channels = []", 9, "needs 1 or more entries"),
+        ("interval_s = 10", 'infrared = { images = "frames" }', 9, "infrared has no 'center_mm'"),
+        ("interval_s = 10", "thermocouples_mm = { T1 = [1] }", 9, "needs 2 or more entries"),
         ("interval_s = 10", "lengths = { apex_thicknes_mm = 0.5 }", 9, "did you mean 'apex_thickness_mm'?"),
         ("interval_s = 10", 'labels = { heat = "7" }\nlagg_s = 3', 10, "did you mean 'lag_s'?"),
     ],
@@ -178,6 +180,7 @@ def test_a_proposal_names_frames_records_and_times(folder: Path) -> None:
     assert (camera.frames, camera.times, camera.record) == (["frames"], "times.csv", record.name)
     assert record.file == "record.csv"
     assert "assumed" in proposal.text
+    (folder / "alloys.csv").write_text(proposal.alloys)
     loaded(folder, proposal.text)
 
 

@@ -37,6 +37,7 @@ from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from creepkit.inverse.adequacy import Adequacy
     from creepkit.inverse.selection.discrimination import EquivalentLaws
@@ -79,6 +80,13 @@ class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="r
     further: tuple[str, ...] = ()
     challenges: tuple[Challenge, ...] | None = None
 
+    def __repr__(self) -> str:
+        return f"<Ranking: {', '.join(f'{one.fit.law.name} {one.weight:.3f}' for one in self.laws)}>"
+
+    def to_dataframe(self) -> DataFrame:
+        """(laws,) rows of pandas: weight, criterion less that of the best, chi-square and verdict."""
+        return present("reports.dataframes:to_dataframe", self)
+
     @property
     def best(self) -> Identification:
         """The law of lowest criterion."""
@@ -87,8 +95,7 @@ class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="r
     @property
     def valued(self) -> LawWithValues:
         """The best law with its numbers, intervals, range of validity and the verdict: what every exporter takes."""
-        verdict = self.verdict if len(self.laws) > 1 else ""
-        return self.best.valued.replace(notes=tuple(self.best.comments(verdict)))
+        return self.best.valued.replace(notes=tuple(self.best.comments(self)))
 
     @property
     def decisive(self) -> bool:

@@ -12,7 +12,6 @@ from creepkit.records import SECONDS_PER_HOUR
 from creepkit.reports.html.compared_values import frame_counts, selection_sentence
 from creepkit.reports.html.elements import Block, PageSection, Paragraph, Table, number, plural, printable, sentence
 from creepkit.reports.html.findings import findings_of
-from creepkit.reports.html.minimum_rates import minimum_rate_table
 from creepkit.reports.html.test_details import NOT_STATED, details_of_tests
 
 if TYPE_CHECKING:
@@ -32,7 +31,6 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
     if histories:
         more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
         blocks += [_table_of_histories(histories, more), *details_of_tests(histories[:MOST_LISTED], more)]
-        blocks += minimum_rate_table(histories[:MOST_LISTED])
     blocks += [Paragraph(sentence(f"Source of the data: {text}")) for text in contents.data_citations]
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from collections.abc import Sequence
-from functools import cache
 from importlib.metadata import version
-from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
@@ -17,16 +15,7 @@ from creepkit.reports.answer import asked_figures
 from creepkit.reports.attachments import embed
 from creepkit.reports.html.closing import closing_sections, files_to_download
 from creepkit.reports.html.data_section import data_section
-from creepkit.reports.html.elements import (
-    Block,
-    PageSection,
-    Paragraph,
-    Table,
-    number,
-    plural,
-    printable,
-    printable_lines,
-)
+from creepkit.reports.html.elements import Block, PageSection, Paragraph, Table, number, plural, printable
 from creepkit.reports.html.findings import GroupFindings, answer_block, findings_of, with_histories
 from creepkit.reports.html.groups import group_sections
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
@@ -34,14 +23,13 @@ from creepkit.reports.html.law_tables import law_title
 from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
 from creepkit.reports.html.stage_sections import stage_sections, strength_blocks
+from creepkit.reports.html.templates import resource, template
 from creepkit.reports.identification_text import rejected
 from creepkit.reports.plate_figure import plate_figure
 from creepkit.reports.ranking import explanation
 from creepkit.reports.stress_exponents import interval_digits, rate_and_exponent
 
 if TYPE_CHECKING:
-    from jinja2 import Template
-
     from creepkit.reports.contents import ReportContents
 
 MOST_TEST_FIGURES = 160
@@ -69,30 +57,16 @@ def report_html(contents: ReportContents) -> str:
         *closing_sections(contents, found, slider_sections(found)),
     ]
     shown = [section for section in map(_without_empty, sections) if not section.empty]
-    return _template().render(
+    return template("page.html").render(
         title=printable(contents.title, 200) or "Report",
         summary=_summary(contents, found),
         script_policy=Markup(script_policy(shown)),
         sections=shown,
-        style=Markup(_resource("style.css")),
+        style=Markup(resource("style.css")),
         fragment_style=Markup(fragment_style(shown)),
         attachments=Markup(embed(contents.attachments)),
         version=version("creepkit"),
     )
-
-
-@cache
-def _template() -> Template:
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=False)
-    environment.filters["lines"] = printable_lines
-    return environment.from_string(_resource("page.html"))
-
-
-@cache
-def _resource(name: str) -> str:
-    return files("creepkit.reports.html").joinpath("templates", name).read_text("utf-8")
 
 
 def _without_empty(section: PageSection) -> PageSection:

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 class PageFigures:
     """Turns figures into pictures of a page, and counts them."""
 
-    def __init__(self) -> None:
-        self.count = 0
+    def __init__(self, prefix: str = "f") -> None:
+        self.count, self.prefix = 0, prefix
 
     def picture(
         self, draw: Callable[[], Figure], title: str, description: str, caption: str, *, shows_values: bool = False
@@ -35,5 +35,5 @@ class PageFigures:
             return Paragraph(f"{title}: no figure, for {error}", "note")
         self.count += 1
         figure.suptitle("")
-        svg = svg_text(figure, f"f{self.count}", title, description)
+        svg = svg_text(figure, f"{self.prefix}{self.count}", title, description)
         return Picture(Markup(svg), f"Figure {self.count}. {caption}", shows_values)

@@ -80,7 +80,7 @@ def stage_sections(contents: ReportContents, figures: PageFigures, names: LawNam
     yield from _sections(
         ("forecasts", "Forecasts"),
         contents.forecasts,
-        lambda name, one: _forecast_blocks(name, one, figures, names=names),
+        lambda name, one: forecast_blocks(name, one, figures, names=names),
     )
     yield from _sections(
         ("design", "Further tests"), contents.design, lambda name, one: _design_blocks(name, one, figures, names=names)
@@ -238,7 +238,11 @@ def _rupture_blocks(name: str, assessment: RuptureAssessment, figures: PageFigur
     return [*(strength_blocks(assessment) if strengths else []), picture, text]
 
 
-def _forecast_blocks(name: str, forecast: Forecast, figures: PageFigures, *, names: LawNames) -> list[Block]:
+def forecast_blocks(
+    name: str, forecast: Forecast, figures: PageFigures, *, names: LawNames | None = None
+) -> list[Block]:
+    """A table and curves of forecasts. names : of laws in its sentences; by default as commands know them."""
+    names = names or LawNames(())
     laws = ", ".join(f"{names.in_text(law)} ({weight:.2g})" for law, weight in forecast.laws.items())
     blocks: list[Block] = [
         Paragraph(

@@ -1,0 +1,79 @@
+"""Records as pandas DataFrames; needs pandas (`pip install 'creepkit[notebook]'`)."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import TYPE_CHECKING, Any
+
+from creepkit.errors import ReportError
+from creepkit.forecasts.forecast import Forecast
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.selection.ranking import Ranking
+from creepkit.records import History, output_unit
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+def to_dataframe(record: object) -> DataFrame:
+    """A record as a table: readings, values with intervals, laws with weights, or forecast curves."""
+    try:
+        from pandas import DataFrame
+    except ImportError:
+        raise ReportError("a table needs pandas, which is not installed: pip install 'creepkit[notebook]'") from None
+    rows, index = _rows(record)
+    frame = DataFrame(rows)
+    return frame.set_index(index) if index else frame
+
+
+@singledispatch
+def _rows(record: Any) -> tuple[Any, str]:
+    """Columns or rows, and which of them is the index, "" for none."""
+    raise TypeError(f"{type(record).__name__} has no table")
+
+
+@_rows.register
+def _(history: History) -> tuple[Any, str]:
+    outputs = {_column(name): values for name, values in history.outputs.items()}
+    return {"time_s": history.times, **outputs, "used": history.used}, ""
+
+
+def _column(output: str) -> str:
+    """The name of an output with its unit, as files have it."""
+    return f"{output}_{output_unit(output)}" if output_unit(output) else output
+
+
+@_rows.register
+def _(fit: Identification) -> tuple[Any, str]:
+    rows = [
+        {"parameter": e.name, "value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
+        for e in fit.estimates
+    ]
+    return rows, "parameter"
+
+
+@_rows.register
+def _(ranking: Ranking) -> tuple[Any, str]:
+    rows = [
+        {
+            "law": one.fit.law.name,
+            "weight": one.weight,
+            "criterion_less_best": one.excess,
+            "chi_square": one.chi_square,
+            "parameters": len(one.fit.law.params),
+            "verdict": "" if one.fit.adequacy is None else one.fit.adequacy.verdict,
+        }
+        for one in ranking.laws
+    ]
+    return rows, "law"
+
+
+@_rows.register
+def _(forecast: Forecast) -> tuple[Any, str]:
+    rows = [
+        {"test": test.name, "output": name, "time_s": time, "value": value, "low": low, "high": high}
+        for test in forecast.tests
+        for name, one in test.outputs.items()
+        for time, value, low, high in zip(one.times, one.value, one.band.low, one.band.high, strict=True)
+    ]
+    return rows, ""

@@ -1,0 +1,98 @@
+"""What a notebook shows of a record: the blocks of the report page that say it, in one cell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import singledispatch
+from itertools import count
+
+from markupsafe import Markup
+
+from creepkit.exporters.mathml import expression_mathml, law_equations
+from creepkit.forecasts.forecast import Forecast
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.selection.ranking import Ranking
+from creepkit.language import CreepLaw
+from creepkit.records import SECONDS_PER_HOUR, History
+from creepkit.reports.contents import ReportGroup
+from creepkit.reports.html.elements import Block, Formula, Paragraph, Table, Verbatim, number
+from creepkit.reports.html.findings import answer_block, findings_of
+from creepkit.reports.html.groups import ranking_blocks
+from creepkit.reports.html.page_figures import PageFigures
+from creepkit.reports.html.stage_sections import forecast_blocks
+from creepkit.reports.html.templates import template
+
+STYLE = (
+    ".creepkit .answer{display:grid;grid-template-columns:minmax(0,1.75fr) minmax(16rem,1fr);gap:0 2rem}"
+    ".creepkit .lead{font-weight:600}.creepkit dd{margin:0 0 .4rem;font-weight:600}"
+    ".creepkit dl span{display:block;font-weight:400;opacity:.7}.creepkit .drawing svg{width:100%;height:auto}"
+)
+"""Of what stands in a cell."""
+
+
+_CELLS = count(1)
+
+
+def notebook_html(record: object) -> str:
+    """A record as HTML for one cell; identifiers of its figures are those of no other cell."""
+    block = template("blocks.html").module.block  # type: ignore[attr-defined]
+    return f'<div class="creepkit"><style>{STYLE}</style>{"".join(block(one) for one in _blocks(record))}</div>'
+
+
+def _figures() -> PageFigures:
+    return PageFigures(f"cell{next(_CELLS)}f")
+
+
+@singledispatch
+def _blocks(record: object) -> Sequence[Block]:
+    """The text of a terminal, of records that have nothing else."""
+    return [Verbatim(type(record).__name__, str(record))]
+
+
+@_blocks.register
+def _(fit: Identification) -> Sequence[Block]:
+    found = findings_of(ReportGroup("", fit))
+    return [] if found is None else [answer_block(found, _figures())]
+
+
+@_blocks.register
+def _(ranking: Ranking) -> Sequence[Block]:
+    found, figures = findings_of(ReportGroup("", ranking)), _figures()
+    return [] if found is None else [answer_block(found, figures), *ranking_blocks(found, figures, drawn=False)]
+
+
+@_blocks.register
+def _(forecast: Forecast) -> Sequence[Block]:
+    return forecast_blocks("", forecast, _figures())
+
+
+@_blocks.register
+def _(law: CreepLaw) -> Sequence[Block]:
+    symbols = {str(symbol): symbol for symbol in law.params}
+    rows = [
+        (
+            Markup(expression_mathml(symbols[name])),
+            one.meaning,
+            f"{number(one.bounds[0])} to {number(one.bounds[1])}",
+            "" if one.unit == "1" else one.unit,
+        )
+        for name, one in law.table.items()
+    ]
+    table = Table("Stress as a ratio to 1 MPa, time to 1 s", ("parameter", "meaning", "bounds", "unit"), rows)
+    equations = [Formula(Markup(equation)) for equation in law_equations(law)]
+    return [Paragraph(law.title or law.name, "lead"), *equations, table]
+
+
+@_blocks.register
+def _(history: History) -> Sequence[Block]:
+    end = "" if history.rupture_time is None else f"ruptured at {number(history.rupture_time / SECONDS_PER_HOUR)} h"
+    end = end or ("stopped unruptured" if history.unruptured else "")
+    rows = [
+        ("specimen", history.specimen),
+        ("condition", history.condition),
+        ("readings", f"{history.times.size} to {number(float(history.times[-1]) / SECONDS_PER_HOUR)} h"),
+        *((name.replace("_", " "), f"to {number(float(v[-1]))}") for name, v in history.outputs.items()),
+        *([("end", end)] if end else []),
+        *history.labels.items(),
+    ]
+    return [Table(history.name, ("of the test", "value"), rows)]

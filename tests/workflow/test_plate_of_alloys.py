@@ -1,0 +1,116 @@
+"""The paper's own experiment from its folder: dimples of several alloys in two views, one edited table, laws."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from helpers.command_line import creepkit
+from helpers.plates import PlannedDimple, write_lab, write_runs
+
+WEST = (
+    PlannedDimple("A1", "norton", {"A": 1e-15, "n": 5.2}, thickness=0.50),
+    PlannedDimple("A2", "norton", {"A": 2e-13, "n": 4.0}, thickness=0.47, modulus=170e3),
+)
+EAST = (PlannedDimple("A3", "norton", {"A": 5e-16, "n": 5.2}, thickness=0.52),)
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("lab")
+    write_lab(folder, WEST, EAST, columns=2)
+    return folder
+
+
+def run(*words) -> str:
+    result = creepkit(*words)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def fill_in(path: Path, planned: dict[tuple[str, str], PlannedDimple]) -> None:
+    """What a person does: alloys, thicknesses and moduli into the empty cells of the table."""
+    with path.open() as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        one = planned[row["camera"], row["dimple"]]
+        row |= {"alloy": one.alloy, "thickness [mm]": f"{one.thickness}", "thickness tolerance [%]": "2"}
+        row["modulus [GPa]"] = f"{one.modulus / 1e3:g}"
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def test_init_one_edit_and_run_give_a_law_of_every_alloy(lab: Path) -> None:
+    said = run("init", lab)
+    assert "question" not in said
+    fill_in(lab / "alloys.csv", {("west", "D1"): WEST[0], ("west", "D2"): WEST[1], ("east", "D1"): EAST[0]})
+    study = lab / "study.toml"
+    text = study.read_text().replace("subset_mm = 0 ", "subset_mm = 1 ")
+    text = re.sub(r"laws = \[.*?\]", 'laws = ["norton"]\nstarts = 1\nframes = 12', text).replace(
+        '[selection]\nby = "bic"', ""
+    )
+    study.write_text(text)
+    run("run", study)
+    result = ck.Study.load(study).run()  # kept
+    assert {one.state for one in result.stages} == {"kept"}
+    assert [(h.name, h.alloy, h.elastic.E) for h in result.histories] == [
+        ("east D1", "A3", 150e3),
+        ("west D1", "A1", 150e3),
+        ("west D2", "A2", 170e3),
+    ]
+    for one in (*WEST, *EAST):
+        found = {e.name: e for e in result.rankings[one.alloy].best.estimates}
+        for name, value in one.values.items():
+            assert found[name].low < value < found[name].high
+        assert result.confirmations[one.alloy].confirmed
+    west, east = (result.imposed[f"{view} D1"].alignment for view in ("west", "east"))
+    assert result.imposed["west D2"].alignment.lag == west.lag  # one clock a camera
+    assert west.lag_interval[0] < 623.4 < west.lag_interval[1]
+    assert east.lag_interval[0] < 512.4 < east.lag_interval[1]
+    page = result.report.read_text()
+    assert all(one.alloy in page for one in (*WEST, *EAST))
+
+
+def test_what_succeeded_is_written_whatever_failed(lab: Path, tmp_path: Path) -> None:
+    """A centre beside the dimples, whose ring lies outside of the field of view."""
+    frames = ck.read_frames(lab / "west", None, lab / "west_times.csv")
+    first = ck.extract(frames, subset=1.0)[0].center
+    words = ["extract", lab / "west", "--times", lab / "west_times.csv", "--record", lab / "logger.csv", "--channels"]
+    words += ["P,TC1", "--center", f"{first[0]},{first[1]}", "--center", f"{first[0] - 60},{first[1]}"]
+    words += ["--names", "good,outside", "--modulus-gpa", "150", "--to", tmp_path / "out", "--search", "400,800"]
+    result = creepkit(*words)
+    assert result.exit_code == 1
+    assert "outside: " in result.stderr
+    (history,) = ck.read_histories(tmp_path / "out")
+    assert history.labels["place"] == "good"
+    known = creepkit(*words[:-2], "--lag", "623.4", "--to", tmp_path / "known")
+    assert "623.4 s, drift 0 (stated)" in known.output
+
+
+def test_one_alloy_at_four_temperatures_gives_its_temperature_form(tmp_path: Path) -> None:
+    """From cameras alone: each run is under its own record."""
+    values = {"A": 1e-16, "n": 5.2, "Q": 400e3}
+    write_runs(tmp_path, (730, 757, 784, 811), values)
+    run("init", tmp_path)
+    planned = {(f"run{k}", "D1"): PlannedDimple("X", "norton", {}) for k in range(1, 5)}
+    fill_in(tmp_path / "alloys.csv", planned)
+    study = tmp_path / "study.toml"
+    text = study.read_text().replace("subset_mm = 0 ", "subset_mm = 1 ")
+    text = re.sub(r"laws = \[.*?\]", 'laws = ["norton"]\nstarts = 1\nframes = 12', text).replace(
+        '[selection]\nby = "bic"', ""
+    )
+    study.write_text(text)
+    result = ck.Study.load(study).run()
+    assert [round(h.mean_temperature - 273.15) for h in result.histories] == [730, 757, 784, 811]
+    assert result.failures == ()
+    found = next(iter(result.temperature.values())).temperature_law
+    activation = next(value for name, value in found.values.items() if name.startswith("Q"))
+    assert activation == pytest.approx(400e3, rel=0.05)
+    assert np.isfinite(list(found.values.values())).all()
