@@ -17,7 +17,7 @@ BUDGET = {
     "api": 340,
     "app": 630,
     "cameras": 1170,
-    "cli": 2380,
+    "cli": 2365,
     "core": 70,
     "dataset": 820,
     "discovery": 1490,
@@ -25,9 +25,9 @@ BUDGET = {
     "exporters": 2690,
     "extraction": 1360,
     "fem": 1900,
-    "files": 1315,
-    "forecasts": 1508,
-    "instruments": 1430,
+    "files": 1425,
+    "forecasts": 1506,
+    "instruments": 1440,
     "integration": 930,
     "inverse": 12300,
     "jobs": 260,
@@ -35,22 +35,22 @@ BUDGET = {
     "language": 1590,
     "laws": 140,
     "modules": 785,
-    "quality": 1470,
-    "readers": 5870,
-    "records": 1975,
+    "quality": 1545,
+    "readers": 6000,
+    "records": 1985,
     "registry": 620,
-    "reports": 8345,
+    "reports": 8390,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
     "specimens": 3985,
-    "studies": 3070,
+    "studies": 3075,
     "surrogates": 1790,
     "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35125
+TESTS = 35245
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

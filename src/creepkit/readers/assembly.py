@@ -16,7 +16,17 @@ from creepkit.errors import HistoryError, SolveError, quoted
 from creepkit.readers.column_names import KnownNames
 from creepkit.readers.condition_texts import with_weak_sources
 from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, StatedNumber, errors_located_at
-from creepkit.readers.ends_of_tests import LABEL, NO, RUPTURED, STOPPED, UNCLEAR, YES, ends_in_column, kind_of_column
+from creepkit.readers.ends_of_tests import (
+    FIRM,
+    LABEL,
+    NO,
+    RUPTURED,
+    STOPPED,
+    UNCLEAR,
+    YES,
+    ends_in_column,
+    kind_of_column,
+)
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.loading_strain import without_loading
 from creepkit.readers.noise_correlation import read_noise_correlation
@@ -211,7 +221,7 @@ def _time_and_end(conditions: StatedConditions, path: Path, name: str) -> tuple[
         if label in ("assumed", "heat", "laboratory", "operator") or (not kind and text.casefold() in YES | NO):
             continue
         (end,) = ends_in_column(label, [text], conditions.end_terms, False).ends
-        firmness = firm if kind not in ("", "remark") else remarks
+        firmness = firm if kind in FIRM else remarks
         (unclear if end == UNCLEAR else firmness)[label] = text if end == UNCLEAR else end
     said = {end for end in firm.values() if end} or {STOPPED}.intersection(remarks.values())
     label = next((name for name, end in (firm | remarks).items() if end in said), "")

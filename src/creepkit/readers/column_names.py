@@ -36,7 +36,7 @@ UNIT_SPELLINGS: Mapping[str, str] = {spelling.lower(): symbol for spelling, symb
 """{spelling in small letters: creepkit's suffix}. Capitals do not matter but where they tell units apart."""
 
 
-_NAMES_OF: Mapping[str, tuple[str, ...]] = {
+NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("elapsed time", "time elapsed", "test time", "creep time", "time under load", "zeit", "prüfzeit", "laufzeit"),
         *("belastungszeit", "beanspruchungsdauer", "versuchszeit", "temps", "durée", "temps écoulé", "x_value"),
@@ -94,7 +94,7 @@ _NAMES_OF: Mapping[str, tuple[str, ...]] = {
 """{quantity or text key: its names in small letters}."""
 
 
-NAME_SYNONYMS: Mapping[str, str] = {name: meaning for meaning, names in _NAMES_OF.items() for name in names}
+NAME_SYNONYMS: Mapping[str, str] = {name: meaning for meaning, names in NAMES_OF.items() for name in names}
 """{name in small letters: quantity or text key}."""
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from creepkit.files.delimited_text import Dialect, is_number
-from creepkit.readers.column_names import NameTable, split_written_name, unit_suffix, words_of
+from creepkit.readers.column_names import NAMES_OF, NameTable, split_written_name, unit_suffix, words_of
 from creepkit.readers.ends_of_tests import plain_words
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.vocabulary import CONDITION_KINDS, plain_name, split_unit
@@ -28,53 +28,37 @@ TIME_TO_STRAIN = "time_to_strain"
 
 
 QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
-    "stress": (
-        STRESS,
-        (
-            *("stress", "sigma", "nominal stress", "applied stress", "initial stress", "creep stress", "test stress"),
-            *("spannung", "prüfspannung", "nennspannung", "anfangsspannung", "contrainte", "contrainte appliquée"),
-            *("contrainte initiale", "contrainte nominale", "contrainte d essai"),
-        ),
-    ),
-    "temperature": (
-        TEMPERATURE,
-        (
-            *("temperature", "temp", "t", "test temperature", "test temp", "creep temperature", "temperatur"),
-            *("prüftemperatur", "versuchstemperatur", "température", "température d essai", "temp d essai"),
-        ),
-    ),
-    "minimum_rate": (
-        RATE,
-        (
-            *("minimum rate", "min rate", "minimum creep rate", "min creep rate", "minimum strain rate", "mcr"),
-            *("steady state creep rate", "steady state rate", "secondary creep rate", "steady creep rate"),
-            *("kriechrate", "minimale kriechrate", "min kriechrate", "kriechgeschwindigkeit"),
-            *("minimale kriechgeschwindigkeit", "min kriechgeschwindigkeit", "stationäre kriechgeschwindigkeit"),
-            *("stationäre kriechrate", "sekundäre kriechrate", "sekundäre kriechgeschwindigkeit"),
-            *("vitesse minimale", "vitesse minimale de fluage", "vitesse de fluage minimale", "vitesse de fluage"),
-            *("vitesse de fluage secondaire", "vitesse de fluage stationnaire", "vitesse min"),
-        ),
-    ),
+    "stress": (STRESS, (*NAMES_OF["stress"], "stress", "sigma", "contrainte appliquée", "contrainte nominale")),
+    "temperature": (TEMPERATURE, (*NAMES_OF["temperature"], "temperature", "t", "temp d essai")),
+    "minimum_rate": (RATE, ("minimum rate", "minimum creep rate", "mcr", "minimale kriechrate")),
     "minimum_rate_sd": (RATE, ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd")),
     "rupture": (
         TIME,
         (
-            *("rupture", "rupture time", "time to rupture", "creep rupture time", "rupture life", "creep life"),
-            *("t r", "tr", "t rupture", "time to failure", "failure time", "life", "bruchzeit", "standzeit", "tb"),
-            *("t f", "tf", "ttr", "ttf", "t u", "tu", "zeit bis bruch", "zeitstand", "temps à rupture", "durée de vie"),
-            *("temps de rupture", "temps jusqu à rupture"),
+            *(
+                "rupture",
+                "rupture time",
+                "creep life",
+                "t r",
+                "tr",
+                "t rupture",
+                "life",
+                "bruchzeit",
+                "standzeit",
+                "tb",
+            ),
+            *("t f", "tf", "ttr", "ttf", "t u", "tu", "zeitstand", "durée de vie"),
         ),
     ),
     "end_time": (
         TIME,
         (
-            *("end time", "duration", "test duration", "time", "test time", "time on test", "t", "hours on test"),
-            *("prüfdauer", "versuchsdauer", "laufzeit", "prüfzeit", "zeit", "beanspruchungsdauer", "durée"),
-            *("durée d essai", "temps", "temps d essai", "durée de l essai"),
+            *(*NAMES_OF["time"], "end time", "duration", "test duration", "time", "time on test", "t", "hours on test"),
+            *("prüfdauer", "versuchsdauer", "durée d essai", "temps d essai", "durée de l essai"),
         ),
     ),
 }
-"""{quantity: its kind, and the names of a column of it in small letters}."""
+"""{quantity: its kind, and names of a column of it in small letters, beside those that its words tell."""
 
 
 TEXTS: Mapping[str, tuple[str, ...]] = {
@@ -83,7 +67,7 @@ TEXTS: Mapping[str, tuple[str, ...]] = {
         *("specimen id", "specimen no", "specimen name", "probennummer", "versuch", "probe", "proben nr", "nr"),
         *("essai", "éprouvette", "n° essai", "repère", "probenbezeichnung", "test piece", "bar"),
     ),
-    "alloy": ("alloy", "material", "werkstoff", "nuance", "matériau", "alliage", "legierung", "steel", "grade"),
+    "alloy": (*NAMES_OF["alloy"], "alloy", "nuance", "steel", "grade"),
     "control": ("control",),
     "specimen": ("specimen",),
     "label heat": ("heat", "cast", "batch", "charge", "schmelze", "heat number", "heat no", "coulée", "heat id"),
@@ -163,12 +147,8 @@ def _meaning(name: str, is_per_cent: bool = True) -> str:
 def _quantity_by_words(name: str, unit: str) -> str:
     """The quantity of which the words of a name speak, whatever else they say of it."""
     plain = plain_words(name)
-    if (
-        _RATES.search(plain)
-        and _OF_CREEP.search(plain)
-        and unit in RATE.units
-        and not re.search(r"sd\b|std|err", plain)
-    ):
+    is_rate = _RATES.search(plain) and _OF_CREEP.search(plain) and not re.search(r"sd\b|std|err", plain)
+    if is_rate and (unit in RATE.units or unit in ("", "pct")):
         return "minimum_rate"
     if _OF_OTHERS.search(plain):
         return ""

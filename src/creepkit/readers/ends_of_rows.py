@@ -11,6 +11,7 @@ from creepkit.files.delimited_text import is_missing
 from creepkit.readers.column_names import split_written_name
 from creepkit.readers.columns_of_tests import TIME_TO_STRAIN, kind_of, quantity_of, unit_of
 from creepkit.readers.ends_of_tests import (
+    FIRM,
     LABEL,
     RUPTURED,
     STOPPED,
@@ -70,7 +71,7 @@ def ends_of_rows(
     named = ["" if name is None else answers.get(row.cells[name].casefold(), "") for row in table.rows]
     columns = [k for k, key in enumerate(keys) if kind_of(quantity_of(key)) is None and key not in _SAYS_NO_END]
     columns = [k for k in columns if table.names[k] not in vocabulary.labels]
-    columns.sort(key=lambda k: kind_of_column(table.names[k]) in ("", "remark"))
+    columns.sort(key=lambda k: kind_of_column(table.names[k]) not in FIRM)
     decided = any(mark.said == STOPPED for mark in marks)
     found = dict[int, EndsOfColumn]()
     for k in columns:
@@ -78,9 +79,9 @@ def ends_of_rows(
             continue  # a quantity
         cells = [row.cells[k] for row in table.rows]
         found[k] = ends_in_column(table.names[k], cells, answers, decided)
-        decided |= kind_of_column(table.names[k]) not in ("", "remark") and any(found[k].ends)
+        decided |= kind_of_column(table.names[k]) in FIRM and any(found[k].ends)
     if time is None and duration is None:
-        found = {k: one for k, one in found.items() if kind_of_column(table.names[k]) not in ("", "remark")}
+        found = {k: one for k, one in found.items() if kind_of_column(table.names[k]) in FIRM}
     ends = list[RowEnd]()
     for r, (row, mark) in enumerate(zip(table.rows, marks, strict=True)):
         stated = {table.names[k]: one.ends[r] for k, one in found.items() if one.ends[r] in (RUPTURED, STOPPED)}

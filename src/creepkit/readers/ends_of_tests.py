@@ -24,25 +24,28 @@ RUPTURED, STOPPED, INTERRUPTED, UNCLEAR = "ruptured", "stopped", "interrupted", 
 LABEL = "label"
 """An answer: the text says nothing of the end."""
 
+FIRM = (RUPTURED, STOPPED, "status")
+"""Kinds of columns that are about the end."""
+
 
 def _words(*alternatives: str) -> re.Pattern[str]:
     return re.compile(rf"(?<![\w])(?:{'|'.join(alternatives)})(?![\w])")
 
 
 _RUPTURE = (
-    r"rupt(?:ur\w*|ed|s)?|broken?|brk|breaks?|breaking|breakage|fail(?:s|ed|ing|ures?)?|fractur\w*|snapped|parted"
+    r"rupt(?:ur\w*|ed|s)?|frac|gebr|ausfall\w*|broken?|brk|breaks?|breaking|breakage|fail(?:s|ed|ing|ures?)?|fractur\w*|snapped|parted"
     r"|(?:zer)?gebrochen\w*|zerbrochen\w*|(?:kriech|zeitstand|dauer|proben|gewalt|sprod|rest)?br[uü]che?|bricht"
     r"|(?:ab|durch)?gerissen\w*|zerrissen\w*|versag\w*|romp(?:u|us|ues?|t|re)|cass(?:e|ee|es|ees|er|ure)"
     r"|bris(?:e|ee|es|ees|er|ure)|defaillance"
 )
-_CENSORED = r"(?:right |left )?censor\w*|censur\w*|zensi?er\w*|suspen[sd]\w*"
+_CENSORED = r"(?:right |left )?cens(?:or\w*)?|censur\w*|zensi?er\w*|suspen[sd]\w*"
 _GOES_ON = (
     rf"run ?outs?|{_CENSORED}|unbroken|unfailed|unruptured|unfractured|discontinu\w+|surviv\w*|survecu\w*|running"
     r"|on ?going|in progress|(?:in|on|under) test|test continu\w*|(?:durch)?lauf(?:er|end\w*|t(?: noch| weiter)?)"
-    r"|ungebroch\w*|bruchfrei\w*|bruchlos\w*|uberleb\w*|im versuch|en cours|en essai|essai continu\w*"
+    r"|un(?:ge|zer)broch\w*|disc|bruchfrei\w*|bruchlos\w*|uberleb\w*|im versuch|en cours|en essai|essai continu\w*"
 )
 _INTERRUPTED = (
-    r"stopp?(?:ed|s)?|halted|aborted|interrupt\w*|removed|withdrawn|unloaded|truncated|intact|active|gestoppt\w*"
+    r"interr|aktiv\w*|intactes?|stopp?(?:ed|s)?|halted|aborted|interrupt\w*|removed|withdrawn|unloaded|truncated|intact|active|gestoppt\w*"
     r"|abgebroch\w*|angehalten|ausgebaut\w*|entlastet\w*|unterbroch\w*|unterbruch|abbruch|intakt\w*|arret\w*|stoppe\w*"
     r"|interromp\w*|interruption|demont\w*|decharg\w*|retire\w*"
 )
@@ -57,10 +60,12 @@ _FILLERS = (
 _AHEAD = r"before|prior to|short of|vor|vor dem|avant|avant la|bevor"
 _EXPECTED = _words(
     *("near", "close to", "nearly", "almost", "imminent", "expected", "likely", "will", "soon", "kurz vor", "fast"),
+    *("still", "noch", "yet", "encore", "toujours", "pending", "outstanding", "aus"),
     *("beinahe", "erwartet", "bald", "wird", "soll", "presque", "proche", "prevue?", "attendue?", "bientot", "if"),
 )
 _REACHED = (
-    r"(?: (?:reached|observed|occurred|seen|yet|noch|erreicht|eingetreten|aufgetreten|atteinte?|observee?|survenue?))*"
+    r"(?: (?:reached|attained|obtained|obtenue?|observed|occurred|seen|yet|noch|erreicht|eingetreten|aufgetreten"
+    r"|atteinte?|observee?|survenue?))*"
 )
 _UNBROKEN = re.compile(
     rf"(?<!\w)(?:(?:{_NOT}){_FILLERS} (?:{_RUPTURE})|(?:{_AHEAD}){_FILLERS} (?:{_RUPTURE})"
@@ -86,7 +91,7 @@ def plain_words(text: str) -> str:
     plain = "".join(sign for sign in plain if not unicodedata.combining(sign))
     for pair in ("ae", "oe", "ue"):  # also how umlauts are written without them
         plain = re.sub(rf"(?<!q){pair}(?=[a-z])", pair[0], plain)
-    plain = re.sub(r"(?<=\d)[.,](?=\d)", "_", plain)
+    plain = re.sub(r"(?<=\d)[.,](?=\d)", "_", re.sub(r"\bo\.\s*(?=b)", "ohne ", plain))
     plain = re.sub(r"[;:,.!()\[\]/|]+", " | ", plain)
     return " ".join(re.sub(r"[^\w|?]+", " ", plain).split()).strip(" |")
 
@@ -116,7 +121,9 @@ def end_said_by(text: str) -> str:
     return said.pop() if len(said) == 1 else UNCLEAR if said or _ENDED.search(plain) else ""
 
 
-YES = frozenset(("1", "1.0", "1,0", "yes", "y", "ja", "j", "oui", "o", "true", "wahr", "vrai", "t", "x", "✓", "✔", "✗"))
+YES = frozenset(
+    ("1", "1.0", "1,0", "yes", "y", "ja", "j", "oui", "o", "true", "wahr", "vrai", "t", "x", "*", "+", "✓", "✔", "✗")
+)
 NO = frozenset(("0", "0.0", "0,0", "no", "n", "nein", "non", "false", "falsch", "faux"))
 """Values of a column that says yes or no, in small letters."""
 
@@ -139,6 +146,7 @@ _STATUS_WORDS = frozenset(
         *("status", "statut", "state", "etat", "zustand", "result", "resultat", "ergebnis", "outcome", "ende", "end"),
         *("ended", "ending", "fin", "issue", "termination", "versuchsende", "prufende", "prufstatus", "abbruchgrund"),
         *("versuchsstatus", "code", "versuchsausgang", "ausgang", "endart", "motif"),
+        *("abschaltgrund", "stoppgrund", "endgrund", "reason", "grund"),
     )
 )
 _STATUS_FILLERS = frozenset(
@@ -188,6 +196,15 @@ _OTHER_USES = _words(
     *("stunden", "heures", "location", "position", "lage", "mode", "type", "typ", "ort", "appearance", "allongement"),
 )
 """Words beside one of rupture that make the name of a column that of a quantity or a description."""
+
+
+_EVENT = frozenset(("event", "evenement", "ereignis"))
+_DESCRIPTION = re.compile(
+    rf"(?<!\w)(?:(?:{_RUPTURE}).* (?:location|position|mode|type|appearance|site)"
+    rf"|(?:location|mode|type|position|lieu|zone|site) .*(?:{_RUPTURE})"
+    r"|bruch(?:lage|art|ort|stelle|form|typ|bild|flache))(?!\w)"
+)
+"""Names of columns that say where or how a test broke, and are empty where it did not."""
 
 
 _NEUTRAL = _words(
@@ -263,7 +280,8 @@ _NEUTRAL = _words(
 
 def is_neutral(text: str) -> bool:
     """Whether a remark speaks of nothing but what a specimen looks like, or where it stems from."""
-    return not _NEUTRAL.sub(" ", plain_words(text)).replace("|", " ").strip()
+    plain = plain_words(text)
+    return bool(plain) and not _NEUTRAL.sub(" ", plain).replace("|", " ").strip()
 
 
 def legend_in(text: str) -> dict[str, str]:
@@ -300,8 +318,14 @@ def kind_of_column(name: str) -> str:
     if words & _REMARK_WORDS:
         return "remark"
     said = end_said_by(plain)
-    if not said and words & {"event", "evenement", "ereignis"} and len(words) == 1:
+    if words & _EVENT and words <= _EVENT | {"indicator", "observed", "occurred"}:
         return RUPTURED
+    if len(words) == 1 and _CODES.get(frozenset(words), {}).get(next(iter(words))) == STOPPED:
+        return STOPPED
+    if "/" in name and (said == UNCLEAR or frozenset(re.split(r"\W+", name.casefold())) in _CODES):
+        return "status"
+    if _DESCRIPTION.search(plain):
+        return "description"
     if said in (RUPTURED, STOPPED, INTERRUPTED) and not _OTHER_USES.search(plain) and len(words) <= 4:
         return RUPTURED if said == RUPTURED else STOPPED
     return "status" if words & _STATUS_WORDS and words <= _STATUS_WORDS | _STATUS_FILLERS else ""
@@ -321,7 +345,7 @@ def ends_in_column(name: str, cells: Sequence[str], answers: Mapping[str, str], 
     ends, asked = list[str](), dict[str, None]()
     for text in texts:
         end = meanings.get(text.casefold(), UNCLEAR)
-        if end == UNCLEAR and kind in ("remark", "") and others_decide:
+        if end == UNCLEAR and kind not in FIRM and others_decide:
             end = ""
         if end == UNCLEAR:
             asked[text] = None
@@ -331,20 +355,30 @@ def ends_in_column(name: str, cells: Sequence[str], answers: Mapping[str, str], 
 
 def _meanings(kind: str, plain: Set[str]) -> dict[str, str]:
     """{text in small letters: end} of the distinct texts of a column, and of an empty cell."""
+    if plain == {"t", "f"} and kind in (RUPTURED, STOPPED):
+        return {**_meanings_of_flags(kind, {"t", "n"}), "f": STOPPED if kind == RUPTURED else RUPTURED}
     if kind != "remark" and plain and plain <= YES | NO:
         return _meanings_of_flags(kind, plain)
-    if kind in ("status", RUPTURED, STOPPED) and (codes := _CODES.get(frozenset(plain))):
+    if kind in FIRM and (codes := _CODES.get(frozenset(plain))):
         found: dict[str, str] = dict(codes)
     else:
         found = {text: _meaning_of_text(kind, text) for text in plain}
+    if kind == "description" and plain:
+        return {text: UNCLEAR if _is_nothing(text) else end for text, end in found.items()} | {"": UNCLEAR}
+    if kind == "" and len(plain) == 2 and frozenset(plain) in _CODES:
+        return {**dict.fromkeys(plain, UNCLEAR), "": ""}
     says = set(found.values())
     # Beside texts that all say that a test broke, an empty cell may say that this one did not.
-    found[""] = UNCLEAR if kind in ("status", RUPTURED, STOPPED) and RUPTURED in says else ""
+    found[""] = UNCLEAR if kind in FIRM and RUPTURED in says else ""
     return found
 
 
+def _is_nothing(text: str) -> bool:
+    return text in NO or re.fullmatch(r"none|nil|kein\w*|ohne|aucun\w*|sans", text) is not None
+
+
 def _meanings_of_flags(kind: str, plain: Set[str]) -> dict[str, str]:
-    if kind == "" and len(plain) == 1 and not plain <= {"x", "yes", "ja", "oui", "✓", "✔"}:
+    if kind == "" and len(plain) == 1 and not plain <= {"x", "*", "+", "yes", "ja", "oui", "✓", "✔"}:
         return {**dict.fromkeys(plain, ""), "": ""}
     if kind not in (RUPTURED, STOPPED):
         return {**dict.fromkeys(plain, UNCLEAR), "": ""}
@@ -356,7 +390,7 @@ def _meanings_of_flags(kind: str, plain: Set[str]) -> dict[str, str]:
 
 def _meaning_of_text(kind: str, text: str) -> str:
     said = end_said_by(text)
-    if kind in ("status", RUPTURED, STOPPED):
+    if kind in FIRM:
         return STOPPED if said == INTERRUPTED else said or UNCLEAR
     if kind == "remark":
         return UNCLEAR if said == INTERRUPTED else said or ("" if is_neutral(text) else UNCLEAR)

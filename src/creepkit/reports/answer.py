@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -70,8 +70,15 @@ class KeyFigure:
         if math.isnan(self.low):
             return f"{self.value:#.2g}".rstrip(".") + unit
         digits = interval_digits(self.value, self.low, self.high)
-        low, high = (number(end, digits) for end in (self.low, self.high))
-        return f"{number(self.value, digits)}{unit} [{low}, {high}]"
+        value, low, high = (_written_out(v, digits, number) for v in (self.value, self.low, self.high))
+        return f"{value}{unit} [{low}, {high}]"
+
+
+def _written_out(value: float, digits: int, number: NumberText) -> str:
+    """A number without a power of ten where it has a usual size, such as 2930 h."""
+    if not 1e3 <= abs(value) < 1e5:
+        return number(value, digits)
+    return f"{float(f'{value:.{digits}g}'):.0f}"
 
 
 # ---- key figures -----------------------------------------------------------------------------------------------------
@@ -101,7 +108,9 @@ def _of_the_law(fit: Identification) -> Iterator[KeyFigure]:
     low, high = fit.ranges["temperature"]
     if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
         yield _with_interval("activation energy", at, fit.activation_energy(), 1e-3, "kJ/mol")
-    yield _with_interval("creep rate", at, rate, 100.0 * SECONDS_PER_HOUR, "%/h")
+    errors = ", ".join(dict.fromkeys(f"{one.kind} {one.amount}" for one in fit.unmodelled if one.included))
+    rate_figure = _with_interval("creep rate", at, rate, 100.0 * SECONDS_PER_HOUR, "%/h")
+    yield replace(rate_figure, remark=f"usual errors included: {errors}") if errors else rate_figure
 
 
 def _with_interval(name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "") -> KeyFigure:
@@ -210,7 +219,8 @@ def _precision(fit: Identification) -> Iterator[str]:
         yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
     change = combined_change_text(fit.unmodelled)
     if change:
-        kinds = " and ".join(dict.fromkeys(f"{one.kind} ({one.amount})" for one in fit.unmodelled[:2]))
+        beyond = [one for one in fit.unmodelled if not one.included]
+        kinds = " and ".join(dict.fromkeys(f"{one.kind} ({one.amount})" for one in beyond[:2]))
         yield f"intervals do not include usual errors of {kinds}, which move rates by {change}"
 
 
@@ -276,10 +286,7 @@ def _text(fit: Identification, ranking: Ranking | None) -> str:
     failed = {} if ranking is None else ranking.failed
     lines += [line for law, why in failed.items() for line in _indented(f"left out: {law}: {why}", "    ")]
     if ranking is not None and len(ranking.laws) > 1:
-        weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED])
-        more = len(ranking.laws) - MOST_NAMED
-        decided = "decisive" if ranking.decisive else "not decisive"
-        lines += _indented(f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}")
+        lines += _indented(chosen_text(ranking))
     summands = " + ".join(expression_text(term) for term in fit.law.terms.values())
     lines += [f"  rate = {summands}", *(f"  {equation}" for equation in state_equations(fit.law))]
     lines += _indented("   ".join(_value(fit, e) for e in fit.estimates), "    ")
@@ -287,6 +294,14 @@ def _text(fit: Identification, ranking: Ranking | None) -> str:
     lines += [_figure_line(one) for one in key_figures(fit)]
     lines += [line for text in cautions(fit, ranking)[:MOST_CAUTIONS] for line in _indented(f"- {text}", "    ")]
     return "\n".join([*lines, *_indented(f"next: {next_step(fit, ranking)}; all numbers: .details()")])
+
+
+def chosen_text(ranking: Ranking) -> str:
+    """Whether the choice of the law is decisive, and the weights of the laws."""
+    weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED])
+    more = len(ranking.laws) - MOST_NAMED
+    decided = "decisive" if ranking.decisive else "not decisive"
+    return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}"
 
 
 def _value(fit: Identification, estimate: Estimate) -> str:

@@ -22,6 +22,7 @@ from creepkit.reports.stress_exponents import reference_sentences
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.nuisance_parameters import NuisanceEstimate
+    from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.single_values import SingleValue
 
 
@@ -280,31 +281,19 @@ def _unit(key: str) -> str:
     return f", {unit}" if unit else ""
 
 
-def identification_comments(fit: Identification, verdict: str = "") -> list[str]:
-    """Intervals, validity and provenance as lines, as comments of an exported law.
+def identification_comments(fit: Identification, ranking: Ranking | None = None) -> list[str]:
+    """What an exported law says of itself, a line each: how well it describes its tests, intervals, range, cautions.
 
-    verdict : of the comparison of laws that it is the best of, where there was one.
+    ranking : the comparison of laws that it is the best of, where there was one. All else is in the identification.
     """
-    lines = [f"identified with creepkit {fit.provenance.get('creepkit', '')} from {_tests(len(fit.tests))}"]
-    lines += [f"verdict on the law: {verdict}"] if verdict else []
-    if_held = "if the law held, which the tests reject"
-    for e in fit.estimates:
-        unit = "" if e.unit == "1" else f" {e.unit}"
-        interval = " to ".join(interval_ends(fit.law, e))
-        own_verdict = [] if rejected(fit) and e.verdict == "determined" else [e.verdict]
-        said = " ".join([*own_verdict, *([if_held] if rejected(fit) else [])])
-        lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {interval}, {said}")
-    lines += _range_lines(fit)
-    rate_scatter = f"scatter of rates between tests (one sd) {scatter_of_rates(fit)}"
-    logarithmic = logarithmic_output(fit)
-    errors_text = [f"rms of ln {logarithmic} {fit.rms:.3g}"] if logarithmic in fit.errors else []
-    errors_text += [
-        f"relative squared error of {name} {e.relative_squared_error:.3g}"
-        for name, e in fit.errors.items()
-        if name != logarithmic
-    ]
-    adequacy_text = [] if fit.adequacy is None else [f"the law {fit.adequacy}"]
-    lines += ["; ".join([*errors_text, rate_scatter]), *adequacy_text, *fit.notes]
+    from creepkit.reports.answer import MOST_CAUTIONS, cautions, chosen_text
+
+    origin = f"identified with creepkit {fit.provenance.get('creepkit', '')} from {_tests(len(fit.tests))}"
+    chosen = f"; {chosen_text(ranking)}" if ranking is not None and len(ranking.laws) > 1 else ""
+    intervals = [f"{e.name} {' to '.join(interval_ends(fit.law, e))}" for e in fit.estimates]
+    held = " (if the law held, which the tests reject)" if rejected(fit) else ""
+    lines = [fit.headline, f"{origin}{chosen}", f"95 % intervals{held}: {', '.join(intervals)}"]
+    lines += [*_range_lines(fit), *cautions(fit, ranking)[:MOST_CAUTIONS]]
     return [line.replace("°C", "C") for line in lines]  # sources in Fortran hold ASCII alone
 
 

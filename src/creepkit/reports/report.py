@@ -17,7 +17,7 @@ from creepkit.discovery.discover import TemperatureStudy
 from creepkit.discovery.temperature_law import TemperatureLaw
 from creepkit.errors import CreepkitError, ReportError
 from creepkit.experiments.planned_design import Design
-from creepkit.exporters.exporting import export, law_with_values
+from creepkit.exporters.exporting import export
 from creepkit.extraction.extraction import Extraction
 from creepkit.files.json_documents import json_text
 from creepkit.files.reading import FileKind, read_bytes
@@ -236,11 +236,10 @@ def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], t
         if one.ranking is None:
             document = json_text(identification_to_json(one.fit))
             files.append(ExportedFile(f"{stem}_identification.json", "identification, read by ck.load", document))
-        verdict = () if one.ranking is None else (f"verdict on the law: {one.verdict}",)
         for target in EXPORT_TARGETS:
             exporter = default_registry().exporter(target)
             try:
-                text = export(law_with_values(one.fit, notes=verdict), target)
+                text = export(one.ranking or one.fit, target)
             except CreepkitError as error:
                 notes.append(f"the law {one.fit.law.name} is not written as {target}: {error}")
             else:

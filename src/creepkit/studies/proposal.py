@@ -17,7 +17,7 @@ from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import followed_duration
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.flags import frame_ranges_text
-from creepkit.readers.questions import ANSWERS_FILE
+from creepkit.readers.questions import ANSWERS_FILE, Question, single_errors
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
 from creepkit.registry.reading import read_those_that_can_be
 from creepkit.studies.camera_proposal import found_cameras
@@ -64,6 +64,8 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
     if tests:
         named = {str(one) for one in cameras.names}
         problems = [f"not read: {one}" for one in problems if one.split(":")[0] not in named][:MOST_REMARKS]
+        if any(ANSWERS_FILE in one for one in problems):
+            problems.append(f"'creepkit read {folder} --ask' puts what is open as questions")
         quality = ck.check_data_quality([history for history in tests if history.outputs])
         summary, left_out = DataSummary.of(tests), left_out_lines(quality)
         lines = (*summary.lines, *left_out, *cameras.summary, *problems)
@@ -157,7 +159,7 @@ def _readable(
     try:
         whole = ck.read_histories([folder], reader)
     except CreepkitError as error:
-        reason = str(error)
+        reason, single = str(error), single_errors(error)
     else:
         sources = {Path(history.source.partition(" (")[0]).name for history in whole}
         endings = {Path(name).suffix for name in sources}
@@ -165,7 +167,7 @@ def _readable(
         complete = suffix and all(file.name in sources for file in files if file.suffix == suffix)
         return [f"*{suffix}" if complete else "."], whole, [], None
     read, tests, errors = read_those_that_can_be(files, reader)
-    problems = [" ".join(str(error).split()) for error in errors]
+    problems = [" ".join(str(one).split()) for error in errors for one in single_errors(error)]
     if not tests:
         below = _folders_with_tests(folder, reader)
         what = f"holds a test that can be read: {reason}"
@@ -175,7 +177,11 @@ def _readable(
                 f"holds a test, but those of {named} do: run 'creepkit init {below[0]}', or 'creepkit init {below[0]} "
                 f"--to {path}' to keep the study file here"
             )
-        return [], [], problems, StudyError(f"{folder}: none of its files {what}")
+        failure = StudyError(f"{folder}: none of its files {what}")
+        if not below and any(isinstance(one, Question) for one in single):
+            hint = f"{folder}: no test can be read yet; 'creepkit read {folder} --ask' puts what is open as questions"
+            failure.errors = (*single, StudyError(hint))  # type: ignore[attr-defined]
+        return [], [], problems, failure
     return [file.name for file in read], tests, problems, None
 
 

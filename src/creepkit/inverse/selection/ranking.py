@@ -95,8 +95,7 @@ class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="r
     @property
     def valued(self) -> LawWithValues:
         """The best law with its numbers, intervals, range of validity and the verdict: what every exporter takes."""
-        verdict = self.verdict if len(self.laws) > 1 else ""
-        return self.best.valued.replace(notes=tuple(self.best.comments(verdict)))
+        return self.best.valued.replace(notes=tuple(self.best.comments(self)))
 
     @property
     def decisive(self) -> bool:
