@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from creepkit.inverse.search.global_search import SearchTrace
-    from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.sparsity.result import Sparsity
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit, LawMisfits
     from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity
@@ -147,7 +146,7 @@ class Identification(
         """The law with its numbers, intervals and range of validity: what every exporter takes."""
         return LawWithValues(self.law, self.values, tuple(self.comments()), ranges=self.ranges)
 
-    def comments(self, ranking: Ranking | None = None) -> list[str]:
+    def comments(self, ranking: Any = None) -> list[str]:
         """What an exported law says of itself, a line each; ranking : that it is the best of, where there was one."""
         return present("reports.identification_text:identification_comments", self, ranking)
 

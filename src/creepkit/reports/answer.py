@@ -108,9 +108,9 @@ def _of_the_law(fit: Identification) -> Iterator[KeyFigure]:
     low, high = fit.ranges["temperature"]
     if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
         yield _with_interval("activation energy", at, fit.activation_energy(), 1e-3, "kJ/mol")
-    errors = ", ".join(dict.fromkeys(f"{one.kind} {one.amount}" for one in fit.unmodelled if one.included))
     rate_figure = _with_interval("creep rate", at, rate, 100.0 * SECONDS_PER_HOUR, "%/h")
-    yield replace(rate_figure, remark=f"usual errors included: {errors}") if errors else rate_figure
+    included = any(one.included for one in fit.unmodelled)
+    yield replace(rate_figure, remark="usual errors of tests included") if included else rate_figure
 
 
 def _with_interval(name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "") -> KeyFigure:
@@ -220,8 +220,8 @@ def _precision(fit: Identification) -> Iterator[str]:
     change = combined_change_text(fit.unmodelled)
     if change:
         beyond = [one for one in fit.unmodelled if not one.included]
-        kinds = " and ".join(dict.fromkeys(f"{one.kind} ({one.amount})" for one in beyond[:2]))
-        yield f"intervals do not include usual errors of {kinds}, which move rates by {change}"
+        kinds = " and ".join(dict.fromkeys(one.description for one in beyond[:2]))
+        yield f"intervals do not include {kinds}: rates move by {change}"
 
 
 def fit_exponent(fit: Identification) -> float:
