@@ -25,21 +25,21 @@ BUDGET = {
     "exporters": 2690,
     "extraction": 1360,
     "fem": 1900,
-    "files": 1315,
+    "files": 1425,
     "forecasts": 1490,
-    "instruments": 1430,
+    "instruments": 1440,
     "integration": 930,
-    "inverse": 11965,
+    "inverse": 11975,
     "jobs": 260,
     "kernels": 1710,
     "language": 1590,
     "laws": 140,
     "modules": 785,
-    "quality": 1470,
-    "readers": 5890,
-    "records": 1975,
+    "quality": 1545,
+    "readers": 6000,
+    "records": 1985,
     "registry": 620,
-    "reports": 8315,
+    "reports": 8345,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34950
+TESTS = 35150
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

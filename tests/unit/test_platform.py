@@ -220,12 +220,6 @@ def extras() -> dict[str, list[str]]:
     return {name: [one.partition(">")[0] for one in wanted[name]] for name in wanted if name != "dev"}
 
 
-def spreadsheet(tmp_path):
-    path = tmp_path / "curves.xlsx"
-    path.write_bytes(b"PK\x03\x04")
-    return lambda: ck.read_histories(path)
-
-
 def posterior(tmp_path):
     from creepkit.inverse.uncertainty.posterior import sample_posterior
 
@@ -238,7 +232,7 @@ def cluster(tmp_path):
     return lambda: cluster_workers(None, "tcp://127.0.0.1:1").__enter__()  # type: ignore[arg-type]
 
 
-USES = {"excel": spreadsheet, "mcmc": posterior, "cluster": cluster}
+USES = {"mcmc": posterior, "cluster": cluster}
 
 
 @pytest.mark.parametrize("extra", sorted(USES))

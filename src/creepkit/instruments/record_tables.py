@@ -19,6 +19,7 @@ from creepkit.files.delimited_text import (
     parse_numbers,
     split_line,
 )
+from creepkit.files.labview import is_labview, table_of_labview
 from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import FileKind, open_binary, read_range
 from creepkit.files.time_stamps import ClockColumn, is_clock_time
@@ -90,6 +91,9 @@ def numbered_lines(path: Path) -> Iterator[list[tuple[int, str]]]:
                 if stream.read(1):
                     raise HistoryError(f"{path}: larger than 500 MB in UTF-16; save it in UTF-8")
             content = rest + part
+            if number == 1 and is_labview(content[:200].decode("latin-1")):
+                yield _lines_of_labview(content + stream.read(500_000_000), path)
+                return
             cut = len(content) if not part or content[:2] in (b"\xff\xfe", b"\xfe\xff") else _last_line_end(content)
             if cut == 0 and len(content) > LONGEST_LINE:
                 raise HistoryError(
@@ -104,6 +108,12 @@ def numbered_lines(path: Path) -> Iterator[list[tuple[int, str]]]:
             rest = content[cut:]
             if not part:
                 return
+
+
+def _lines_of_labview(content: bytes, path: Path) -> list[tuple[int, str]]:
+    """The numbered lines of a LabVIEW measurement as a table."""
+    text = "\n".join(_decoded_lines(content, path, 1))
+    return list(enumerate(table_of_labview(text).split("\n"), 1))
 
 
 def ends_with_line_end(path: Path) -> bool:

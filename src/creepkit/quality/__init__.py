@@ -4,7 +4,8 @@ Of frames: unloading, a creep output that decreases though its load does not, si
 readings of another, one far from its replicates or from the trend of the others, a modulus off the trend, a first
 frame that is not elastic, strain of loading that nothing states, a strain above 100 %, a record of load or temperature
 that contradicts the stated program, a last number in which the file may have been cut.
-Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load.
+Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load,
+idle time in which nothing crept.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from creepkit.quality.comparison import (
 from creepkit.quality.copies import copied_tests, repeated_rows
 from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ranges_text
 from creepkit.quality.frames import FlaggedFrames, decreasing_frames, outlier_frames, unloading_frames
+from creepkit.quality.idle_time import idle_flags
 from creepkit.quality.loading_strain import unstated_loading_strain
 from creepkit.quality.rig_flags import ACTIVATION_ENERGY, jump_flags, rate_change_flag, record_flags
 from creepkit.records import CUT_LABEL, History, Predictor
@@ -153,6 +155,7 @@ def check_rig(histories: Sequence[History], *, activation_energy: float = ACTIVA
     histories : without suspect frames, see exclude_suspect_frames. activation_energy : J/mol.
     """
     flags = [flag for history in histories for flag in record_flags(history, activation_energy)]
+    flags += [flag for history in histories for flag in idle_flags(history)]
     jumps = find_jumps(histories)
     flags += jump_flags(histories, jumps)
     changes = common_rate_changes(histories, jumps)

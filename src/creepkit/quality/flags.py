@@ -22,6 +22,7 @@ FlagKind = Literal[
     "unit",
     "record",
     "jump",
+    "idle",
     "rate change",
     "unreadable",
     "few points",

@@ -22,6 +22,7 @@ error.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -33,12 +34,12 @@ from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid
-from creepkit.readers.column_names import KnownNames
 from creepkit.readers.condition_texts import sources_of_names
 from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.noise_correlation import noise_correlation_text
-from creepkit.readers.table_layouts import TabulatedTest, tests_in
-from creepkit.readers.text_grids import peek_columns, read_head_alone, read_text_grid
+from creepkit.readers.table_heads import is_frame
+from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
+from creepkit.readers.text_grids import peek_grid, read_head_alone, read_text_grid
 from creepkit.readers.text_tables import TextTable
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
@@ -86,11 +87,10 @@ class HistoryCsvReader:
             return False
         if not self.columns and path.suffix.lower() in TABLE_SUFFIXES:
             return True
-        present = peek_columns(path)
+        grid = peek_grid(path)
         if self.columns:
-            return set(self.columns) <= set(present)
-        known = KnownNames.of(self.vocabulary)
-        return len(present) > 1 and any(known.quantity(name) == "time" for name in present)
+            return grid is not None and set(self.columns) <= set(grid.rows[0].cells)
+        return grid is not None and _has_numbers(grid) and names_time(grid, self.vocabulary)
 
     def read(self, path: Path) -> list[History]:
         """Return the histories in the file; a head without frames is that of a test known by rate or end alone."""
@@ -98,7 +98,26 @@ class HistoryCsvReader:
         if head and any(key.startswith(("minimum_rate", "rupture", "ended")) for key in head):
             return [assemble_without_frames(path.stem, head, self.vocabulary, location=str(path), source=str(path))]
         grid = read_text_grid(path)
-        return histories_of_tests([(grid, test) for test in tests_in(grid, self.vocabulary)], path, self.vocabulary)
+        with _errors_of_format(grid):
+            return histories_of_tests([(grid, test) for test in tests_in(grid, self.vocabulary)], path, self.vocabulary)
+
+
+def _has_numbers(grid: CellGrid) -> bool:
+    """Whether some row holds numbers alone, with either decimal sign."""
+    signs = [replace(grid, dialect=replace(grid.dialect, decimal=sign)) for sign in ".,"]
+    return any(is_frame(row, one) for one in signs for row in grid.rows)
+
+
+@contextmanager
+def _errors_of_format(grid: CellGrid) -> Iterator[None]:
+    """Say of errors about a LabVIEW measurement where its names and units stand."""
+    try:
+        yield
+    except HistoryError as error:
+        if type(error) is not HistoryError or "label format" not in grid.header:
+            raise
+        where = "names are those of its line X_Value, units those of Y_Unit_Label"
+        raise HistoryError(f"{error} (a LabVIEW measurement: {where})") from None
 
 
 def _listed(columns: object) -> Sequence[object]:
@@ -106,7 +125,7 @@ def _listed(columns: object) -> Sequence[object]:
     return columns if isinstance(columns, Sequence) and not isinstance(columns, str) else [None]
 
 
-TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv"), (".txt", ".dat", ".asc")
+TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv"), (".txt", ".dat", ".asc", ".lvm")
 """Endings of files that are taken for tables, and of those that are where a column of time is among the first names."""
 
 

@@ -1,6 +1,6 @@
 """Spreadsheets (.xlsx): their sheets as grids of cells, with the values that were last computed; nothing is evaluated.
 
-Needs openpyxl (`pip install 'creepkit[excel]'`). A sheet of frames has a column of time; a sheet with a column of tests
+A sheet of frames has a column of time; a sheet with a column of tests
 and none of time states conditions, one row a test; other sheets are left aside, which the label "assumed" says.
 """
 
@@ -54,10 +54,8 @@ _DAY_ZERO, _FIRST_DATE = datetime(1899, 12, 31), datetime(1902, 1, 1)
 def read_sheets(path: Path) -> list[CellGrid]:
     """The sheets that hold something; HistoryError for a file that is no spreadsheet, or too large unpacked."""
     content = read_bytes(path, SPREADSHEET_FILE)
-    try:
-        from openpyxl import load_workbook
-    except ImportError:
-        raise HistoryError(f"{path}: to read spreadsheets, install openpyxl: pip install 'creepkit[excel]'") from None
+    from openpyxl import load_workbook
+
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of what a workbook holds beside its cells

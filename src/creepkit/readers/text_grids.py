@@ -25,6 +25,7 @@ from creepkit.files.delimited_text import (
     table_of_numbers,
     text_lines,
 )
+from creepkit.files.labview import is_labview, table_of_labview
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.cell_grids import CellGrid, table_of, without_ignored
@@ -70,10 +71,24 @@ _HEAD_LINES = 1000
 
 def read_text_grid(path: Path) -> CellGrid:
     """Read a text table of any delimiter, decimal sign and encoding; HistoryError where it holds no table."""
-    text = decode_text(read_bytes(path, TABLE_FILE), path)
+    return _grid_of(path, decode_text(read_bytes(path, TABLE_FILE), path))
+
+
+def peek_grid(path: Path) -> CellGrid | None:
+    """The beginning of a text as a grid; None where it is no table; never raises for what it holds."""
+    try:
+        return _grid_of(path, decode_text(_beginning(path), path), decimal=".")
+    except HistoryError:
+        return None
+
+
+def _grid_of(path: Path, text: str, decimal: str | None = None) -> CellGrid:
+    """The grid of a text; decimal : its sign, where it does not matter or is known."""
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     refuse_long_lines(text, path)
+    if is_labview(text):
+        text = table_of_labview(text)
     head, offset = _head_of(path, text)
     text, head, offset = _with_names_behind_marks(text, head, offset)
     if offset == len(text):
@@ -83,7 +98,7 @@ def read_text_grid(path: Path) -> CellGrid:
     if len(text) > _LARGE_TEXT and len(head) < _HEAD_LINES:
         grid = _grid_of_numbers(path, text, head, offset)
     if grid is None:
-        grid = _grid_of_texts(path, text, head, offset)
+        grid = _grid_of_texts(path, text, head, offset, decimal)
     return replace(grid, cut=cut_number(text, grid.dialect))
 
 
@@ -185,11 +200,11 @@ class _TableLines:
             number += len(lines)
 
 
-def _grid_of_texts(path: Path, text: str, head: Sequence[str], offset: int) -> CellGrid:
+def _grid_of_texts(path: Path, text: str, head: Sequence[str], offset: int, decimal: str | None) -> CellGrid:
     """The grid of a table that holds not numbers alone, whose first row begins at character `offset`."""
     first = len(head) + 1
     lines = _TableLines(path, text, offset, first)
-    dialect = detect_dialect((line for _, line in lines.numbered()), str(path), stated_decimal(path, head))
+    dialect = detect_dialect((line for _, line in lines.numbered()), str(path), decimal or stated_decimal(path, head))
     width = len(split_line(next(lines.numbered())[1], dialect, f"{path}:{first}"))
     refuse_many_texts(path, text.count("\n", offset) * max(width, 2))  # a table has two columns or more
     rows = list(_rows(lines.numbered(), dialect, path))
@@ -258,16 +273,6 @@ def read_table(path: Path, ignored: Collection[str] = ()) -> TextTable:
     return table_of(without_ignored(read_text_grid(path), 0, ignored))
 
 
-def peek_grid(path: Path) -> CellGrid | None:
-    """The beginning of a text as a grid; None where it is no table; never raises for what it holds."""
-    try:
-        text = decode_text(_beginning(path), path).replace("\r\n", "\n").replace("\r", "\n")
-        text, head, offset = _with_names_behind_marks(text, *_head_of(path, text))
-        return None if offset == len(text) else _grid_of_texts(path, text, head, offset)
-    except HistoryError:
-        return None
-
-
 def _beginning(path: Path, byte_limit: int = _LARGE_TEXT) -> bytes:
     """The whole lines with which a file begins."""
     content = read_bytes(path, TABLE_FILE, first=byte_limit)
@@ -279,9 +284,5 @@ def _beginning(path: Path, byte_limit: int = _LARGE_TEXT) -> bytes:
 
 def peek_columns(path: Path) -> tuple[str, ...]:
     """The columns of a file as far as its beginning shows them, () when it has none; never raises for what it holds."""
-    try:
-        lines = text_lines(decode_text(_beginning(path), path))
-        lines = [line for line in lines if line.strip() and not is_comment(line)]
-        return tuple(split_line(lines[0], detect_dialect(lines, decimal="."))) if lines else ()
-    except HistoryError:
-        return ()
+    grid = peek_grid(path)
+    return () if grid is None else tuple(grid.rows[0].cells)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,23 +19,59 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-MOST_NAMED = 12
-"""Tests that a plot names."""
+MOST_NAMED, MOST_VALUES = 12, 4
+"""Tests that a plot names, and values of a label that are told."""
 
 
 def tables_text(tables: Sequence[TableSummary]) -> str:
-    """One line for each table: where it stands, how it is written, and which column means what."""
-    lines = []
+    """Where tables stand, how they are written, and which column means what; one line for those that are alike."""
+    groups: dict[str, list[TableSummary]] = {}
     for table in tables:
         renamed = [f"{new} ('{old}')" if old != new else new for old, new in table.columns.items()]
-        how = ", ".join(part for part in (table.test and f"test {table.test}", table.dialect) if part)
-        lines.append(f"{table.place}{how and f' ({how})'}: {', '.join(renamed)}; rows {table.rows}")
+        groups.setdefault(", ".join(renamed), []).append(table)
+    lines = []
+    for columns, group in groups.items():
+        first, rows = group[0], sorted({table.rows for table in group})
+        how = ", ".join(part for part in (first.test and f"test {first.test}", first.dialect) if part)
+        count = f" and {len(group) - 1} more" if len(group) > 1 else ""
+        span = f"{rows[0]}" if len(rows) == 1 else f"{rows[0]} to {rows[-1]}"
+        lines.append(f"{first.place}{how and f' ({how})'}{count}: {columns}; rows {span}")
     return "\n".join(lines)
 
 
 def histories_text(histories: Sequence[History]) -> str:
-    """A paragraph for each test: its conditions, what was measured, how it ended, what was assumed, its labels."""
-    return "\n".join(line for history in histories for line in _lines(history))
+    """A paragraph for one test; for several a row each, then what was assumed of all, and their labels."""
+    if len(histories) < 2:
+        return "\n".join(line for history in histories for line in _lines(history))
+    rows = [("test: specimen, conditions", "end", "frames", "outputs"), *map(_row, histories)]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    lines = ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+    measures = Counter(_strain_text(history) for history in histories if "strain" in history.outputs)
+    lines += [f"{text} ({_count_text(count, len(histories))})" for text, count in measures.items()]
+    return "\n".join([*lines, *filter(None, (assumptions_text(histories), _labels_text(histories)))])
+
+
+def _row(history: History) -> tuple[str, ...]:
+    """Name, specimen and conditions; end; frames; outputs of a test."""
+    count, unused = history.times.size, int((~np.asarray(history.used)).sum())
+    frames = f"{count} to {history.times[-1] / SECONDS_PER_HOUR:.4g} h{f', {unused} not used' if unused else ''}"
+    outputs = [_output_text(history, name) for name in history.outputs]
+    if "strain" in history.outputs:
+        outputs[0] = f"largest strain {100 * float(np.nanmax(np.abs(history.outputs['strain']))):.4g} %"
+    return (
+        f"{history.name}: {history.specimen}{history.alloy and f', {history.alloy}'}, {program_text(history)}",
+        _end_text(history) or "end not stated",
+        frames if history.outputs else "none",
+        "; ".join(outputs) or _rate_text(history),
+    )
+
+
+def _count_text(count: int, total: int) -> str:
+    return f"all {total} tests" if count == total else f"{count} of {total} tests"
+
+
+def _strain_text(history: History) -> str:
+    return f"strain is {history.strain_measure}, {'with' if history.includes_elastic else 'without'} its elastic part"
 
 
 def assumptions_text(histories: Sequence[History]) -> str:
@@ -44,9 +81,24 @@ def assumptions_text(histories: Sequence[History]) -> str:
         for text in filter(None, history.labels.get("assumed", "").split(", ")):
             groups.setdefault(re.sub(r"\d[\w.:+-]*", "0", text), []).append(text)
     return "\n".join(
-        f"assumed of {len(texts)} of {len(histories)} tests: {texts[0]}{' or the like' * (len(set(texts)) > 1)}"
+        f"assumed: {texts[0]}{' or the like' * (len(set(texts)) > 1)} ({_count_text(len(texts), len(histories))})"
         for texts in groups.values()
     )
+
+
+def _labels_text(histories: Sequence[History]) -> str:
+    """One line for each label, with its values and how many tests have each."""
+    labels: dict[str, Counter[str]] = {}
+    for history in histories:
+        for key, value in history.labels.items():
+            if key != "assumed":
+                labels.setdefault(key, Counter())[value] += 1
+    lines = []
+    for key, values in labels.items():
+        shown = [f"{value} ({_count_text(count, len(histories))})" for value, count in values.most_common(MOST_VALUES)]
+        more = f" and {len(values) - MOST_VALUES} more" if len(values) > MOST_VALUES else ""
+        lines.append(f"label {key}: {'; '.join(shown)}{more}")
+    return "\n".join(lines)
 
 
 def _lines(history: History) -> list[str]:
@@ -54,8 +106,7 @@ def _lines(history: History) -> list[str]:
     lines += [f"  {_output_text(history, name)}" for name in history.outputs]
     lines += [f"  {text}" for text in (_frames_text(history), _end_text(history)) if text]
     if "strain" in history.outputs:
-        elastic = "with" if history.includes_elastic else "without"
-        lines.append(f"  strain is {history.strain_measure}, {elastic} its elastic part")
+        lines.append(f"  {_strain_text(history)}")
     for name, length in history.geometry.items():
         lines.append(f"  {name} {length:g}")
     if assumed := history.labels.get("assumed"):

@@ -14,8 +14,6 @@ from creepkit.readers.spreadsheets import SPREADSHEET
 from creepkit.records import History
 from helpers.workbooks import workbook
 
-pytest.importorskip("openpyxl")
-
 FRAMES = [["Time (h)", "Strain (%)"], [0, 0], [0.1, 0.012], [1 / 3, 0.025]]
 CONDITIONS = [["Stress (MPa)", 60], ["Temperature (°C)", 850]]
 
