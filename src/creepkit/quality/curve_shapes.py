@@ -7,7 +7,7 @@ therefore has Student's distribution at most. Noise is what a polynomial of the 
 mean to mean of neighbouring frames as an AR(1) process, whose correlation is corrected for the fit. Noise that is
 correlated over a large part of the test cannot be told from creep, and a rate that rises and falls within a quarter of
 a test is missed where that polynomial does not follow it: tests/unit/quality/test_curve_shapes.py says what was
-measured. A rate that falls is one that rises where time runs backwards.
+measured. Where the rate falls, time is convex over strain, which is judged alike.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ PARTS = ((0.0, 1.0), (0.25, 1.0), (0.5, 1.0), (0.7, 1.0), (0.0, 0.6), (0.2, 0.8)
 """Parts of a curve in which its rate is judged, over its duration: a rate that rises may fall again later."""
 
 
-PARTS_FROM_THE_END = ((0.0, 1.0), (0.5, 1.0), (0.7, 1.0))
-"""Parts in which a rate may fall, over the duration from the end: primary creep comes first."""
+PARTS_OF_STRAIN = ((0.0, 1.0), (0.0, 0.5), (0.0, 0.3))
+"""Parts in which a rate may fall, over the growth of the output: primary creep comes first, and is short in time."""
 
 
 FEWEST_FRAMES = 12
@@ -64,16 +64,17 @@ def shows_primary_creep(history: History) -> bool:
         return False
     frames = segments[0].frames
     times, values = history.times[frames], history.outputs[growing_output(history)][frames]
-    if np.ptp(times) <= 0 or values[-1] < values[0]:
+    if np.ptp(times) <= 0 or not values[-1] > values[0]:
         return False
-    return _rises_in_a_part(times[-1] - times[::-1], values[-1] - values[::-1], PARTS_FROM_THE_END)
+    return _rises_in_a_part(values, times, PARTS_OF_STRAIN)
 
 
-def _rises_in_a_part(times: Floats, values: Floats, parts_of_time: Sequence[tuple[float, float]]) -> bool:
-    places = (times - times[0]) / np.ptp(times)
-    masks = [(places >= start) & (places <= end) for start, end in parts_of_time]
-    parts = [(places[mask], values[mask]) for mask in masks if mask.sum() >= FEWEST_FRAMES]
-    return any(_rises(x, y, SIGNIFICANCE / len(parts)) for x, y in parts)
+def _rises_in_a_part(x: Floats, y: Floats, parts: Sequence[tuple[float, float]]) -> bool:
+    """Whether the slope of y over x rises in some of the parts of the range of x."""
+    places = (x - x[0]) / np.ptp(x)
+    masks = [(places >= start) & (places <= end) for start, end in parts]
+    known = [(places[mask], y[mask]) for mask in masks if mask.sum() >= FEWEST_FRAMES]
+    return any(_rises(x, y, SIGNIFICANCE / len(known)) for x, y in known)
 
 
 def _rises(x: Floats, y: Floats, significance: float) -> bool:

@@ -70,8 +70,15 @@ class KeyFigure:
         if math.isnan(self.low):
             return f"{self.value:#.2g}".rstrip(".") + unit
         digits = interval_digits(self.value, self.low, self.high)
-        low, high = (number(end, digits) for end in (self.low, self.high))
-        return f"{number(self.value, digits)}{unit} [{low}, {high}]"
+        value, low, high = (_written_out(v, digits, number) for v in (self.value, self.low, self.high))
+        return f"{value}{unit} [{low}, {high}]"
+
+
+def _written_out(value: float, digits: int, number: NumberText) -> str:
+    """A number without a power of ten where it has a usual size, such as 2930 h."""
+    if not 1e3 <= abs(value) < 1e5:
+        return number(value, digits)
+    return f"{float(f'{value:.{digits}g}'):.0f}"
 
 
 # ---- key figures -----------------------------------------------------------------------------------------------------

@@ -98,3 +98,19 @@ def test_primary_creep_is_seen_where_the_rate_falls_and_not_in_noise():
             for _ in range(5)
         ]
         assert np.mean(found) >= 0.9 if name in primary else np.mean(found) <= 0.1, name
+
+
+def test_primary_creep_that_is_short_in_time_is_seen():
+    """Rate r (1 + 10 exp(-e/0.002)) to 3 %: it falls to a tenth within 5 % of the time, under a rising true stress."""
+    strains = np.linspace(0.0, 0.03, 3001)
+    rate = 1e-7 * np.exp(9.0 * strains) * (1.0 + 10.0 * np.exp(-strains / 0.002))
+    times = np.concatenate([[0.0], np.cumsum(np.diff(strains) * 0.5 * (1 / rate[1:] + 1 / rate[:-1]))])
+    shown = np.concatenate(
+        [times[-1] * np.array([1e-3, 3e-3, 0.01, 0.03, 0.06]), np.linspace(0.1, 1.0, 55) * times[-1]]
+    )
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        strain = np.round(np.interp(shown, times, strains) + 3e-5 * rng.standard_normal(shown.size), 5)
+        test = ck.History("short", shown, {"strain": strain}, ck.constant_stress(150.0), 873.15)
+        assert shows_primary_creep(test)
+        assert not shows_primary_creep(test.replace(outputs={"strain": 0.03 * shown / shown[-1] + 3e-5}))

@@ -22,6 +22,7 @@ from creepkit.reports.html.elements import (
     printable_lines,
     sentence,
 )
+from creepkit.reports.html.findings import MOST_FILES
 from creepkit.reports.html.law_definitions import definition_blocks
 from creepkit.reports.html.law_tables import covariance_file
 from creepkit.reports.html.methods import methods_text
@@ -78,18 +79,23 @@ def _covariances(found: Sequence[GroupFindings]) -> list[ExportedFile]:
 
 
 def files_to_download(contents: ReportContents, found: Sequence[GroupFindings]) -> list[tuple[str, str, str]]:
-    """(name, address, what it is) of exports and covariances; the address holds the content."""
+    """(name, address, what it is) of exports and covariances; the address holds the content.
+
+    Laws as text come first, then what is kept of single identifications.
+    """
+    files = [*contents.exports, *_covariances(found)]
     return [
         (file_name(one.name), _address(one.text), f"{printable(one.target, 80)}, {_size(one.text)}")
-        for one in [*contents.exports, *_covariances(found)]
+        for one in sorted(files, key=lambda one: one.name.endswith(".json"))
     ]
 
 
 def _exports_section(contents: ReportContents, found: Sequence[GroupFindings]) -> PageSection:
-    """The files of several materials; those of one stand on the first screen."""
-    files = [] if len(found) == 1 else files_to_download(contents, found)
+    """The files that do not stand on the first screen."""
+    files = files_to_download(contents, found)
+    files = files[MOST_FILES:] if len(found) == 1 else files
     blocks = [Downloads(files)] if files else []
-    return PageSection("exports", "Files to download", blocks, result=plural(len(files), "file"))
+    return PageSection("exports", "Files to download", blocks, result=plural(len(files), "further file"))
 
 
 def file_name(name: str) -> str:

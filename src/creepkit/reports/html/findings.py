@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -48,6 +49,14 @@ REJECTED = (
     "This law does not fit the tests. Its values only bring it as near to them as it comes: what the tests determine, "
     "and the creep rate and the stress exponent amid them, are not derived from it."
 )
+
+
+_DEPENDENCE = re.compile(r" with [\w-]+ temperature dependence")
+"""Of titles in a headline, which the equation shows."""
+
+
+MOST_FILES = 6
+"""On the first screen."""
 
 
 @dataclass(frozen=True)
@@ -141,9 +150,9 @@ def answer_block(
     ]
     said = [sentence(in_text(text)) for text in cautions(fit, found.ranking, quality)[:MOST_CAUTIONS]]
     equations = [Markup(equation) for equation in law_equations(fit.law)]
-    headline = sentence(in_text(fit.headline))
+    headline = sentence(_DEPENDENCE.sub("", in_text(fit.headline)))
     step = sentence(next_step(fit, found.ranking))
-    return Answer(headline, picture, titled_law(fit.law), equations, rows, said, step, files)
+    return Answer(headline, picture, titled_law(fit.law), equations, rows, said, step, files[:MOST_FILES])
 
 
 # ---- values and verdict ----------------------------------------------------------------------------------------------
