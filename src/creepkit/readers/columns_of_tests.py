@@ -14,7 +14,7 @@ from functools import lru_cache
 
 from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.column_names import NAMES_OF, NameTable, split_written_name, unit_suffix, words_of
-from creepkit.readers.ends_of_tests import plain_words
+from creepkit.readers.ends_of_tests import FIRM, kind_of_column, plain_words
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.vocabulary import CONDITION_KINDS, plain_name, split_unit
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
@@ -28,7 +28,7 @@ TIME_TO_STRAIN = "time_to_strain"
 
 
 QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
-    "stress": (STRESS, (*NAMES_OF["stress"], "stress", "sigma", "contrainte appliquée", "contrainte nominale")),
+    "stress": (STRESS, (*NAMES_OF["stress"], "stress", "sigma", "σ", "contrainte appliquée", "contrainte nominale")),
     "temperature": (TEMPERATURE, (*NAMES_OF["temperature"], "temperature", "t", "temp d essai")),
     "minimum_rate": (RATE, ("minimum rate", "minimum creep rate", "mcr", "minimale kriechrate")),
     "minimum_rate_sd": (RATE, ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd")),
@@ -126,7 +126,7 @@ def key_of_column(written: str) -> tuple[str, str]:
         return "", ""  # (yes/no), (1 = failed): no unit but the values of the column
     unit = unit_suffix(unit) or unit
     if plain_name(name) == "t":
-        return "temperature" if unit in TEMPERATURE.units else "end_time", unit
+        return "temperature" if unit in TEMPERATURE.units or (name == "T" and not unit) else "end_time", unit
     meant = _meaning(name, unit == "pct")
     if meant in QUANTITIES:
         return meant, unit or (_unit_of_time(written) if QUANTITIES[meant][0] is TIME else "")
@@ -225,6 +225,13 @@ def is_number_like(cell: str, dialect: Dialect) -> bool:
     return is_number(cell, dialect) or _NUMBER_LIKE.fullmatch(cell) is not None
 
 
+def _is_measured(cell: str, dialect: Dialect) -> bool:
+    """Whether a cell holds a number, perhaps with a unit behind it."""
+    with_unit = re.fullmatch(r"[<>≥]?\s*[\d.,]+(?:[eE][+-]?\d+)?\s*(\S{1,6})", cell)
+    has_unit = with_unit is not None and unit_suffix(with_unit[1]) not in (None, "pct")
+    return has_unit or is_number_like(cell, dialect)
+
+
 def only_text(row: TableRow, dialect: Dialect) -> str:
     """The one text of a row that holds nothing else, in one cell or merged ones; "" of any other row."""
     filled = [cell for cell in row.cells if cell]
@@ -239,8 +246,7 @@ def head_of_tests(rows: Sequence[TableRow], dialect: Dialect, meant: Mapping[str
     meant : {name as written: what it is} of columns that were named otherwise.
     """
     body = next(
-        (k for k, row in enumerate(rows[:_SEARCHED]) if sum(is_number_like(c, dialect) for c in row.cells if c) > 1),
-        None,
+        (k for k, row in enumerate(rows[:_SEARCHED]) if sum(_is_measured(c, dialect) for c in row.cells if c) > 1), None
     )
     if not body:
         return None
@@ -254,6 +260,8 @@ def head_of_tests(rows: Sequence[TableRow], dialect: Dialect, meant: Mapping[str
         if is_test_table([meant.get(name, name) for name in names]):
             # A further row above may hold units, or what stands above several columns.
             for higher in range(first, start):
+                if sum(bool(key_of_column(cell)[0]) for cell in rows[higher].cells if cell) > 1:
+                    return TestTableHead(tuple(names), higher, start, body)  # the same names in another language
                 wider = _joined([row.cells for row in rows[higher:body]], meant)
                 if _understood(wider, meant) > _understood(names, meant):
                     return TestTableHead(tuple(wider), higher, start, body)
@@ -264,7 +272,7 @@ def head_of_tests(rows: Sequence[TableRow], dialect: Dialect, meant: Mapping[str
 def _may_name(row: TableRow, dialect: Dialect) -> bool:
     filled = [cell for cell in row.cells if cell]
     return (len(set(filled)) > 1 or bool(unit_suffix(filled[0]))) and not any(
-        is_number_like(cell, dialect) for cell in filled
+        _is_measured(cell, dialect) for cell in filled
     )
 
 
@@ -310,6 +318,7 @@ def is_test_table(names: Sequence[str]) -> bool:
     """Whether names are those of tests: a stress or a temperature, and a rate, a rupture time or a time to a strain."""
     keys = [key_of_column(name)[0] for name in names if name]
     measured = any(key in MEASURED or key.startswith(TIME_TO_STRAIN) for key in keys)
+    measured |= "end_time" in keys and any(kind_of_column(name) in FIRM for name in names)
     return measured and not {"stress", "temperature"}.isdisjoint(keys) and not has_frames(names)
 
 

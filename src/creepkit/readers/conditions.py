@@ -15,7 +15,16 @@ from typing import TypeVar
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
 from creepkit.readers.column_names import unit_suffix
-from creepkit.readers.ends_of_tests import INTERRUPTED, STOPPED, UNCLEAR, MarkedTime, end_said_by, marked_time
+from creepkit.readers.ends_of_tests import (
+    FIRM,
+    INTERRUPTED,
+    STOPPED,
+    UNCLEAR,
+    MarkedTime,
+    end_said_by,
+    kind_of_column,
+    marked_time,
+)
 from creepkit.readers.questions import Question
 from creepkit.readers.text_tables import SourceText
 from creepkit.readers.vocabulary import (
@@ -99,7 +108,12 @@ class StatedConditions:
         self._assumptions: list[str] = []
         self._locations: dict[str, str] = {}
         unknown = {key: entry for key, entry in entries.items() if not self._classify(key, entry)}
-        refused = [key for key in unknown if not columns_as_labels or not key.strip() or self._misspelt(key)]
+        refused = [
+            key
+            for key in unknown
+            if not (key.strip() and kind_of_column(key) in (*FIRM, "remark"))
+            and (not columns_as_labels or not key.strip() or self._misspelt(key))
+        ]
         if refused:
             raise _unknown_key(refused, unknown, self._misspelt(refused[0]) or self.terms.suggestion(refused[0]))
         for key, entry in unknown.items():

@@ -23,6 +23,7 @@ from pathlib import Path
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
+from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.columns_of_tests import (
     NAMES,
@@ -48,6 +49,7 @@ from creepkit.readers.tables_of_tests import (
     TestTable,
     grids_of,
     head_in,
+    stands_in_columns,
     tables_in,
     with_groups,
 )
@@ -76,13 +78,16 @@ class RowPerTestReader:
             return False
         if suffix in TEXT_SUFFIXES:
             grid = peek_grid(path)
-            return grid is not None and head_in(grid, self.vocabulary) is not None
+            return grid is not None and self._is_table(grid)
         try:
             grids = grids_of(path)
         except HistoryError:
             return False
         framed = any(has_frames(row.cells) for grid in grids for row in grid.rows[:_TITLES])
-        return not framed and any(head_in(grid, self.vocabulary) for grid in grids)
+        return not framed and any(self._is_table(grid) for grid in grids)
+
+    def _is_table(self, grid: CellGrid) -> bool:
+        return head_in(grid, self.vocabulary) is not None or stands_in_columns(grid, self.vocabulary)
 
     def read(self, path: Path) -> list[History]:
         """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""
@@ -116,7 +121,11 @@ class RowPerTestReader:
     def _history(self, table: TestTable, row: TestRow, keys: Sequence[str], end: RowEnd) -> History:
         """The test of a row."""
         location, grid = table.location(row.line), table.grid
-        cells = {key: table.entry(row, k) for k, key in enumerate(keys) if not is_missing(row.cells[k])}
+        cells = {
+            key: table.entry(row, k, kind_of(quantity_of(key)) is not None)
+            for k, key in enumerate(keys)
+            if not is_missing(row.cells[k])
+        }
         frames, not_reached = _strains_reached(cells)
         cells = {key: entry for key, entry in cells.items() if not key.startswith(TIME_TO_STRAIN)}
         entries = {**table.header, **row.stated, **with_end(cells, end, location)}
@@ -178,6 +187,7 @@ def _keys(table: TestTable, vocabulary: HeaderVocabulary, errors: list[HistoryEr
         if quantity == "rupture" and not unit and _says_yes_or_no(table, written):
             quantity = ""
         if kind := kind_of(quantity):
+            unit = unit or _unit_of_cells(table, written)
             if unit not in kind.units:
                 errors.append(_wrong_unit(table, quantity, unit, written, kind))
             quantity = f"{quantity}_{unit}"
@@ -189,8 +199,12 @@ def _keys(table: TestTable, vocabulary: HeaderVocabulary, errors: list[HistoryEr
         first = next((k for k, key in enumerate(keys) if quantity_of(key) == quantity_of(quantity)), None)
         if first is not None:
             names = f"'{quoted(table.names[first], 60)}' and '{quoted(written, 60)}'"
+            what = f"{names} mean the same; keep one of them"
             choices = ({written: LABEL}, {table.names[first]: LABEL})
-            errors.append(Question(path, location, f"{names} mean the same; keep one of them", "columns", choices))
+            if written == table.names[first]:
+                errors.append(HistoryError(f"{location}: {what}, or put tables side by side below one another"))
+            else:
+                errors.append(Question(path, location, what, "columns", choices))
         in_header = next((key for key in table.header if quantity_of(key) == quantity_of(quantity)), None)
         if in_header is not None:
             place, names = table.header[in_header].location, f"'{quoted(in_header, 60)}' is also a column"
@@ -219,17 +233,28 @@ def _named_by_specimen(table: TestTable, keys: list[str]) -> list[str]:
     return ["name" if k == column else key for k, key in enumerate(keys)]
 
 
-def _wrong_unit(table: TestTable, quantity: str, unit: str, written: str, kind: QuantityKind) -> Question:
+def _wrong_unit(table: TestTable, quantity: str, unit: str, written: str, kind: QuantityKind) -> HistoryError:
     found = f"the unit '{quoted(unit)}', which is not understood" if unit else "no unit"
+    what = f"column '{quoted(written.strip(), 60)}' has {found}; allowed: {', '.join(kind.units)}"
+    if unit:
+        return HistoryError(f"{table.location(table.line)}: {what}; convert it")
     own = quantity.replace(" ", "_")
     return Question(
         table.grid.path,
         table.location(table.line),
-        f"column '{quoted(written.strip(), 60)}' has {found}; allowed: {', '.join(kind.units)}",
+        what,
         "columns",
         [{written: f"{own}_{one}"} for one in _likely_units(table, written, quantity, kind)],
         is_free=True,
     )
+
+
+def _unit_of_cells(table: TestTable, written: str) -> str:
+    """The unit behind the numbers of a column, as in `600 °C`; "" where not all cells that hold something have it."""
+    column = table.names.index(written)
+    texts = [row.cells[column] for row in table.rows if not is_missing(row.cells[column])]
+    found = {unit_suffix(re.sub(r"^[<>≥]?\s*[\d.,]+(?:[eE][+-]?\d+)?\s*", "", text)) or "" for text in texts}
+    return found.pop() if len(found) == 1 else ""
 
 
 def _likely_units(table: TestTable, written: str, quantity: str, kind: QuantityKind) -> list[str]:

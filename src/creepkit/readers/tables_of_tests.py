@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -12,7 +13,14 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_missing, is_number
 from creepkit.readers.cell_grids import CellGrid, without_ignored
 from creepkit.readers.column_names import KnownNames, split_written_name
-from creepkit.readers.columns_of_tests import TestTableHead, head_of_tests, is_number_like, only_text
+from creepkit.readers.columns_of_tests import (
+    TestTableHead,
+    head_of_tests,
+    is_number_like,
+    is_test_table,
+    key_of_column,
+    only_text,
+)
 from creepkit.readers.condition_texts import conditions_in_text, sources_of_names
 from creepkit.readers.questions import Question
 from creepkit.readers.table_rows import TableRow
@@ -61,14 +69,19 @@ class TestTable:
         """Where a row stands."""
         return self.grid.location(line)
 
-    def entry(self, row: TestRow, column: int) -> SourceText:
+    def entry(self, row: TestRow, column: int, is_number: bool = True) -> SourceText:
         """A cell of a row; of a number without separators between thousands, with a decimal point."""
-        text, decimal = plain_number(row.cells[column], self.grid.dialect.decimal)
+        text, decimal = row.cells[column], self.grid.dialect.decimal
+        if is_number or re.fullmatch(r"[+-]?\d*,\d+", text):
+            text, decimal = plain_number(text, decimal)
         return SourceText(text, self.location(row.line), decimal, self.names[column])
 
 
 _GROUPED = re.compile(r"\d{1,3}(?:\.\d{3})+,\d+|\d{1,3}(?:,\d{3})+\.\d+|\d{1,3}(?:[\s'’]\d{3})+(?:[.,]\d+)?(?![\d.,])")
 """A number with separators between thousands that cannot be a decimal sign."""
+
+_POWER = re.compile(r"(?<=[\d.,])\s*(?:[x×·*∙]\s*)10\s*\^?\s*\(?([+-]?\d+|[⁻⁺⁰¹²³⁴-⁹]+)\)?")
+"""A power of ten, written as such."""
 
 
 def plain_number(text: str, decimal: str) -> tuple[str, str]:
@@ -79,6 +92,7 @@ def plain_number(text: str, decimal: str) -> tuple[str, str]:
         whole, _, part = found[0].rpartition(sign) if found[0].count(sign) == 1 else (found[0], "", "")
         return re.sub(r"[.,\s'’]", "", whole) + (f".{part}" if part else "")
 
+    text = _POWER.sub(lambda found: f"e{unicodedata.normalize('NFKC', found[1]).replace('−', '-')}", text)
     changed, count = _GROUPED.subn(plain, text)
     if not count and decimal == "," and re.fullmatch(r"\D*\d*,\d+(?:[eE][+-]?\d+)?\D*", text):
         changed, count = text.replace(",", "."), 1
@@ -104,12 +118,29 @@ def tables_in(path: Path, vocabulary: HeaderVocabulary) -> list[TestTable]:
     """The tables of tests in a file, without columns that are left out; HistoryError where there is none."""
     found = [(grid, head_in(grid, vocabulary)) for grid in grids_of(path)]
     if not any(head for _, head in found):
+        turned = next((grid for grid, _ in found if stands_in_columns(grid, vocabulary)), None)
+        if turned is not None:
+            what = "each test stands in a column; transpose the table, so that each stands in a row"
+            raise HistoryError(f"{turned.place}: {what}")
         raise HistoryError(
             f"{path}: no row names the columns of tests; name a stress or temperature, and a rate or a time, such as "
             "stress_MPa,temperature_C,rupture_h"
         )
     aside = tuple(f"sheet '{grid.sheet}' not read as it is no table of tests" for grid, head in found if head is None)
-    return [_table(grid, head, vocabulary, aside) for grid, head in found if head is not None]
+    texts = tuple(only_text(row, grid.dialect) for grid, head in found if head is None for row in grid.rows)
+    tables = [_table(grid, head, vocabulary, aside) for grid, head in found if head is not None]
+    return [replace(table, notes=(*table.notes, *filter(None, texts))) for table in tables]
+
+
+_MOST_ROWS_OF_COLUMNS = 30
+
+
+def stands_in_columns(grid: CellGrid, vocabulary: HeaderVocabulary) -> bool:
+    """Whether the first cells of the rows name what is known of tests, each of which stands in a column."""
+    names = [row.cells[0] for row in grid.rows[:_MOST_ROWS_OF_COLUMNS] if row.cells[0]]
+    known = [bool(key_of_column(vocabulary.synonyms.get(name, name))[0]) for name in names]
+    filled = [sum(map(bool, row.cells)) for row in grid.rows[:_MOST_ROWS_OF_COLUMNS]]
+    return 2 * sum(known) > len(known) and min(filled) > 2 and is_test_table(names)
 
 
 def _table(grid: CellGrid, head: TestTableHead, vocabulary: HeaderVocabulary, aside: tuple[str, ...]) -> TestTable:

@@ -16,6 +16,7 @@ from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.experiments.design_options import GoalOptions
 from creepkit.experiments.rig import Rig
 from creepkit.extraction.options import ClockOptions, ExtractionOptions
+from creepkit.instruments.reading_options import RecordOptions
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.search_options import SearchOptions
 from creepkit.inverse.settings import IdentificationSettings, OutputWeights, UsualErrors
@@ -148,7 +149,7 @@ class DataTable(TableModel):
     citation: Annotated[Texts, BeforeValidator(_one_or_more)] = []
 
 
-class RecordTable(TableModel):
+class RecordTable(_keys(RecordOptions), TableModel):  # type: ignore[misc]
     """[[record]]: what an instrument recorded of loads and temperatures, and what its file does not say, as in
     ck.read_record.
     """
@@ -156,16 +157,6 @@ class RecordTable(TableModel):
     name: Text
     file: Text
     format: Text | None = None
-    time: Text = ""
-    date: Text = ""
-    time_unit: Text = ""
-    date_order: Text = ""
-    time_zone: Text = ""
-    every: Annotated[int, Field(ge=1, le=100_000)] = 1
-    units: dict[Text, Text] = {}
-    pressure_reference: Literal["gauge", "absolute"] | None = None
-    ambient_pressure_MPa: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
-    missing: Texts = []
 
 
 class AlloysTable(TableModel):
