@@ -36,10 +36,10 @@ BUDGET = {
     "laws": 140,
     "modules": 785,
     "quality": 1545,
-    "readers": 6000,
+    "readers": 6080,
     "records": 1985,
     "registry": 620,
-    "reports": 8345,
+    "reports": 8360,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35150
+TESTS = 35250
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
