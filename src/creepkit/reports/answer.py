@@ -101,7 +101,9 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     low, high = fit.ranges["temperature"]
     if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
         figures.append(_with_interval("activation energy", at, fit.activation_energy(), 1e-3, "kJ/mol"))
-    return [*figures, _with_interval("creep rate", at, rate, 100.0 * SECONDS_PER_HOUR, "%/h")]
+    rate_figure = _with_interval("creep rate", at, rate, 100.0 * SECONDS_PER_HOUR, "%/h")
+    included = any(one.included for one in fit.unmodelled)
+    return [*figures, replace(rate_figure, remark="usual errors of tests included") if included else rate_figure]
 
 
 def _with_interval(name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "") -> KeyFigure:
@@ -210,8 +212,9 @@ def _precision(fit: Identification) -> Iterator[str]:
         yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
     change = combined_change_text(fit.unmodelled)
     if change:
-        kinds = " and ".join(dict.fromkeys(f"{one.kind} ({one.amount})" for one in fit.unmodelled[:2]))
-        yield f"intervals do not include usual errors of {kinds}, which move rates by {change}"
+        beyond = [one for one in fit.unmodelled if not one.included]
+        kinds = " and ".join(dict.fromkeys(one.description for one in beyond[:2]))
+        yield f"intervals do not include {kinds}: rates move by {change}"
 
 
 def fit_exponent(fit: Identification) -> float:
