@@ -52,6 +52,7 @@ BENCHMARKS = {
         90, (("--cases", "145", "--cache", "build/dimple_references.jsonl"),), "reference cases in ../shared/data"
     ),
     "camera_extraction": Benchmark(3, needs=DATA),
+    "plate_from_cameras": Benchmark(12),
     "reduced_order_model": Benchmark(2),
     "calculix": Benchmark(6, (("N3", "N7", "TH", "c1", "c2", "c3"),), "CalculiX (ccx)"),
     "verify_export": Benchmark(20, needs="gcc, gfortran, make, the network for CalculiX's source; CalculiX is built"),

@@ -48,7 +48,7 @@ def whole_identification() -> ck.Identification:
     effects = (
         Perturbation("thickness", 0.01, "mm", 0.08),
         Perturbation("temperature drift", 5.0, "K over a test", 0.05, -3.1, 0.93),
-        Perturbation("temperature", 3.0, "K", -0.14, common=True, tests=2, activation_energy=4e5, assumed=True),
+        Perturbation("temperature", 3.0, "K", -0.14, common=True, tests=2, per_kelvin=0.05, assumed=True),
     )
     return replace(
         fit,

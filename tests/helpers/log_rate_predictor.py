@@ -75,7 +75,7 @@ def known_scatter(
 
     Its covariance is that of least squares with the predictor's derivatives, taken by differences.
     """
-    settings = IdentificationSettings(starts=2, sobol_points=8, nuisances=nuisances)
+    settings = IdentificationSettings(starts=2, sobol_points=8, nuisances=nuisances, usual_errors="none")
     fit = identify(law, tests, using or LogRates(), settings=settings)
     return replace(fit, noise_model=NoiseModel({"amplitude": OutputNoise(noise=sd)}), freedom=1e9)
 

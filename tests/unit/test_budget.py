@@ -21,25 +21,25 @@ BUDGET = {
     "core": 70,
     "dataset": 820,
     "discovery": 1490,
-    "experiments": 1710,
+    "experiments": 1695,
     "exporters": 2690,
     "extraction": 1360,
     "fem": 1900,
     "files": 1425,
-    "forecasts": 1490,
-    "instruments": 1440,
+    "forecasts": 1507,
+    "instruments": 1410,
     "integration": 930,
-    "inverse": 11975,
+    "inverse": 12298,
     "jobs": 260,
     "kernels": 1710,
     "language": 1590,
     "laws": 140,
     "modules": 785,
     "quality": 1545,
-    "readers": 6000,
+    "readers": 6080,
     "records": 1985,
     "registry": 620,
-    "reports": 8345,
+    "reports": 8392,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35150
+TESTS = 35294
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -12,6 +12,7 @@ from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import PAPER_SPECIMEN
 from creepkit.errors import HistoryError
 from creepkit.extraction.options import ClockOptions, ExtractionOptions, ImposedOptions
+from creepkit.instruments.reading_options import RecordOptions
 from creepkit.options import Option
 from creepkit.reports.terminal import ProgressBar, tell, tell_written
 
@@ -26,6 +27,7 @@ def command(
     specimen: Annotated[str, Option(help="What the camera watched.")] = PAPER_SPECIMEN,
     options: Annotated[dict[str, Any], ExtractionOptions],
     conditions: Annotated[dict[str, Any], ImposedOptions],
+    recording: Annotated[dict[str, Any], RecordOptions],
     clocks: Annotated[dict[str, Any], ClockOptions],
     to: Annotated[Path | None, typer.Option(help="Folder: a history of each."), OutputPath("folder")] = None,
     plot: Annotated[Path | None, typer.Option(help="Contact sheet, .png, .svg or .pdf."), OutputPath("picture")] = None,
@@ -37,8 +39,9 @@ def command(
 
     said, under = ExtractionOptions().changed(options), ImposedOptions().changed(conditions)
     known = ClockOptions().changed(clocks)
-    if under.record is None and clocks:
-        raise HistoryError("--lag, --search and --camera-start are about the clock of a record; give --record FILE")
+    if under.record is None and (clocks or recording):
+        name = next(iter({**clocks, **recording})).replace("_", "-")
+        raise HistoryError(f"--{name} says something of a record; give --record FILE")
     _ = known.bounds, known.start  # which say what is wrong with them, before frames are read
     if to is not None and under.record is None and (under.load is None or under.temperature is None):
         raise HistoryError(
@@ -46,12 +49,7 @@ def command(
         )
     recorded = None
     if under.record is not None:  # before the frames, which take longer
-        recorded = ck.read_record(
-            under.record,
-            time_zone=under.time_zone,
-            date_order=under.date_order,
-            pressure_reference=under.pressure_reference or "",
-        )
+        recorded = ck.read_record(under.record, **recording)
     said.check()
     operator = operator_of(specimen, said)
     read = ck.read_frames(frames, said.format if said.columns is None else dict(said.columns), said.times)

@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.limits import CELSIUS as CELSIUS_LIMITS
@@ -110,9 +109,6 @@ class ImposedOptions(Options, title="options of a test under a camera", error=Hi
     """What was imposed on a test piece: by an instrument's record, or constant; MPa, K. modulus : of the history."""
 
     record: Path | None = option(None, "Instrument record of loads, temperatures.")
-    time_zone: str = option("", "Of the record's times, as America/Chicago.")
-    date_order: str = option("", "Of its dates: 'month first' or 'day first'.")
-    pressure_reference: Literal["gauge", "absolute"] | None = option(None, "Of its pressures.")
     channels: tuple[str, ...] = option((), "Load, then thermocouples, for no known format.", example="P1,T1")
     load: float | None = option(None, "Constant load, for no record.", MEGAPASCAL, unit="MPa")
     temperature: float | None = option(None, "Constant temperature, for no record.", CELSIUS_LIMITS, **CELSIUS)

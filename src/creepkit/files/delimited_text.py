@@ -311,7 +311,7 @@ def _score(sample: Sequence[str], delimiter: str) -> tuple[bool, int, int]:
     counts: dict[int, int] = {}
     for line in sample:
         cells = _unquoted_cells(line, delimiter)
-        if len(cells) < 2:
+        if len(cells) < 2 or (delimiter == " " and "\t" in line.strip()):  # which tabs take apart
             continue
         counts[len(cells)] = counts.get(len(cells), 0) + 1
         for cell in (cell.rstrip("% ") for cell in cells):

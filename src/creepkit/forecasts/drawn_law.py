@@ -12,6 +12,7 @@ from creepkit.forecasts.draws import (
     LawDraws,
     UncertainQuantity,
     dimension_draws,
+    has_sampled_draws,
     log_factor_draws,
     own_variances,
     uncertain_quantities,
@@ -28,6 +29,9 @@ from creepkit.forecasts.simulation import (
     sensitivities_at_values,
 )
 from creepkit.inverse.composite_predictor import predictor_for
+from creepkit.inverse.reference_conditions import reference_condition
+from creepkit.inverse.uncertainty.law_misfit import LawMisfit
+from creepkit.inverse.uncertainty.quantities import log_rate
 from creepkit.records import History, Predictor
 
 LEAST_SOLVED = 0.8
@@ -39,7 +43,8 @@ class DrawnLaw:
     """What one law says of one test.
 
     drawn : draws of its curves, at its times and up to rupture; central : at the identified values.
-    own_variances : {level: variance of ln of what is new in the factor of the test on the rate}.
+    own_variances : {source: variance of ln of what is new in the factor of the test on the rate}. misfit : what the law
+    misses at its stress and temperature, where bands hold that.
     numerical : {output: standard deviation}, in its unit. failed : draws that the solver did not finish, left out.
     """
 
@@ -52,6 +57,7 @@ class DrawnLaw:
     sensitivities: TestSensitivities
     numerical: Mapping[str, float]
     failed: int
+    misfit: LawMisfit | None = None
 
 
 def drawn_law(
@@ -68,10 +74,16 @@ def drawn_law(
     centre = {d.kind: d.mean for d in dimensions}
     followed, own = followed_history(history, predictor, [*centre]), predictor_for(predictor, history)
     mean, _ = fit.scatter_of_rates.mean_joint
-    known = float(mean[[*fit.scatter_of_rates.new_test(history).known.values()]].sum())
+    condition = reference_condition(history, predictor)
+    misfit = fit.misfit_at(*condition)
+    of_rate = 0.0 if misfit is None else misfit.sd
+    if has_sampled_draws(fit):  # samples are those of the tests alone
+        of_rate = float(np.hypot(of_rate, fit.error_sd(log_rate(fit.coordinates, *condition))))
+    test = fit.scatter_of_rates.new_test(history, of_rate)
+    known = float(mean[[*test.known.values()]].sum())
     central, numerical = central_curves(fit, predictor, followed, centre, known)
     cheaper = drawing_predictor(fit, predictor, history, [*centre])
-    factors = log_factor_draws(draws, history, rng)
+    factors = log_factor_draws(draws, test, rng)
     nuisances = dimension_draws(dimensions, draws, rng)
     drawn = curves(fit, cheaper, followed, drawn_theta(fit, draws.u), factors, nuisances)
     if cheaper is not own or numerical:
@@ -91,8 +103,9 @@ def drawn_law(
         drawn,
         central,
         dimensions,
-        own_variances(fit, history),
+        own_variances(fit, test),
         sensitivities_at_values(fit, own, history, centre),
         numerical,
         failed,
+        misfit,
     )

@@ -16,7 +16,8 @@ from creepkit.errors import FitError, nearest
 from creepkit.inverse.composite_predictor import predictor_for, supports_nuisance
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import owner_of, prior_mean
-from creepkit.inverse.uncertainty.rate_scatter import USUAL_SD
+from creepkit.inverse.uncertainty.importance_sampling import covariance_root
+from creepkit.inverse.uncertainty.rate_scatter import USUAL_SD, NewTest
 from creepkit.records import (
     COVARIANCE_NUISANCES,
     GENERAL_NUISANCES,
@@ -47,6 +48,10 @@ SOURCES = {
     "laboratory": "scatter between laboratories",
 }
 """What the scatter of each level is called among the parts of a band."""
+
+
+MISFIT_THERE = "what the law misses at this stress and temperature"
+"""Among the parts of a band."""
 
 
 MOST_BATCHES = 50
@@ -150,31 +155,22 @@ def systematic(weight: Floats, count: int, rng: np.random.Generator) -> Ints:
     return np.minimum(np.searchsorted(np.cumsum(weight), points), weight.size - 1)
 
 
-def covariance_root(covariance: Floats) -> Floats:
-    """A square root (unknowns, unknowns) of covariance (unknowns, unknowns)."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
-
-
-def log_factor_draws(draws: LawDraws, history: History, rng: np.random.Generator) -> Floats:
+def log_factor_draws(draws: LawDraws, test: NewTest, rng: np.random.Generator) -> Floats:
     """(draws,) ln of the factor of one new test on the rate: effects that were fitted, and those drawn anew."""
     scatter = draws.fit.scatter_of_rates
-    test = scatter.new_test(history)
     factor = draws.joint[:, [*test.known.values()]].sum(axis=1)
     for level in test.unknown:
         factor += draws.scatter_sd[:, scatter.levels.index(level)] * rng.standard_normal(draws.count)
     for level in test.unseen:
         factor += np.abs(USUAL_SD[level] * rng.standard_normal(draws.count)) * rng.standard_normal(draws.count)
-    return np.asarray(factor)
+    return np.asarray(factor + test.misfit * rng.standard_normal(draws.count))
 
 
-def own_variances(fit: Identification, history: History) -> dict[str, float]:
-    """{level: variance of ln of what is new in the factor of a test on the rate}."""
-    scatter = fit.scatter_of_rates
-    test = scatter.new_test(history)
-    drawn = {level: scatter.posterior.mean_square(level) for level in test.unknown}
-    return {**drawn, **{level: USUAL_SD[level] ** 2 for level in test.unseen}}
+def own_variances(fit: Identification, test: NewTest) -> dict[str, float]:
+    """{source: variance of ln of what is new in the factor of a test on the rate}."""
+    drawn = {SOURCES[level]: fit.scatter_of_rates.posterior.mean_square(level) for level in test.unknown}
+    drawn.update({SOURCES[level]: USUAL_SD[level] ** 2 for level in test.unseen})
+    return {**drawn, MISFIT_THERE: test.misfit**2} if test.misfit > 0 else drawn
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
 from creepkit.forecasts.bands import band_of_draws
 from creepkit.forecasts.drawn_law import DrawnLaw, drawn_law
-from creepkit.forecasts.draws import SOURCES, LawDraws, has_sampled_draws
+from creepkit.forecasts.draws import LawDraws, has_sampled_draws
 from creepkit.forecasts.measured_test import TestScore, score_test
 from creepkit.forecasts.results import (
     CHOICE_OF_LAW,
@@ -80,7 +80,7 @@ def forecast_test(
     includes = _includes(drawn, best, outputs)
     extrapolation = _extrapolation(banded, predictor, best, times)
     caution = _caution([one.draws for one in drawn])
-    return TestForecast(history, outputs, times, includes, extrapolation, score, tuple(notes), caution)
+    return TestForecast(history, outputs, times, includes, extrapolation, score, tuple(notes), caution, best.misfit)
 
 
 MOST_TIMES = 300
@@ -241,7 +241,7 @@ def _score(
         inside[name] = float(within.mean())
         whole[name] = bool(((values >= band.lowest[used]) & (values <= band.highest[used])).all())
     try:
-        laws = [(one.draws.fit, one.weight, one.dimensions) for one in drawn]
+        laws = [(one.draws.fit, one.weight, one.dimensions, one.misfit) for one in drawn]
         score = score_test(laws, predictor, full, inside, whole)
     except CreepkitError as error:
         return None, f"no score: {error}"
@@ -256,9 +256,9 @@ def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, O
     parts = {LAW: f"{whence}, within their bounds"}
     if len(drawn) > 1:
         parts[CHOICE_OF_LAW] = ", ".join(f"{one.draws.fit.law.name} ({one.weight:.2g})" for one in drawn)
-    for level, variance in best.own_variances.items():
+    for source, variance in best.own_variances.items():
         if variance > 0:
-            parts[SOURCES[level]] = f"{100 * np.sqrt(variance):.2g} % of the rate"
+            parts[source] = f"{100 * np.sqrt(variance):.2g} % of the rate"
     for dimension in best.dimensions:
         unit = "mm" if is_length_nuisance(dimension.kind) else UNITS.get(dimension.kind, "")
         parts[dimension.kind] = f"{dimension.mean:.4g} ± {dimension.sd:.2g} {unit}".strip()

@@ -22,13 +22,15 @@ from scipy.special import logsumexp
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats, Ints
-from creepkit.forecasts.draws import UncertainQuantity, covariance_root, systematic
+from creepkit.forecasts.draws import UncertainQuantity, systematic
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
 from creepkit.inverse.output_transforms import LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.uncertainty.importance_sampling import covariance_root
+from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 from creepkit.inverse.uncertainty.rate_scatter import NewTest
 from creepkit.records import History, Nuisance, Predictor
 
@@ -97,6 +99,7 @@ class LinearForecast:
     fit : the identification. problem, residuals : of the test. values : (data,) r at the prior means. by_joint : (data,
     unknowns + effects) A. rate : (data,) d. tolerance : (data, dimensions) E. noise : (data, data) N. white : (data,)
     standard deviation of what is independent from frame to frame. outputs : (data,) positions; names : of outputs.
+    misfit : standard deviation of ln rate by what the law misses there.
     """
 
     fit: Identification
@@ -114,6 +117,7 @@ class LinearForecast:
     own: tuple[UncertainQuantity, ...]
     dimensions: tuple[UncertainQuantity, ...]
     log_scale: float
+    misfit: float = 0.0
 
     @classmethod
     def of_test(
@@ -163,7 +167,7 @@ class LinearForecast:
         scatter = self.fit.scatter_of_rates
         posterior = scatter.posterior
         nodes = systematic(posterior.weight, SCORED_NODES, np.random.default_rng(0))
-        test = scatter.new_test(history)
+        test = scatter.new_test(history, self.misfit)
         variances = scatter.own_variance(test, posterior.sd[nodes])
         noise_root, noise_freedom = np.linalg.cholesky(self.noise), self.noise_freedom
         p_values, departures, densities = [], [], []
@@ -229,7 +233,7 @@ class LinearForecast:
         """Estimates of the test's own nuisances with the law frozen; residuals (data,) before and after."""
         scatter = self.fit.scatter_of_rates
         mean, joint = scatter.mean_joint
-        test = scatter.new_test(history)
+        test = scatter.new_test(history, self.misfit)
         variance = float(scatter.posterior.weight @ scatter.own_variance(test, scatter.posterior.sd))
         known = np.zeros(mean.size)
         known[[*test.known.values()]] = mean[[*test.known.values()]]
@@ -261,7 +265,7 @@ class LinearForecast:
 
 
 def score_test(
-    laws: Sequence[tuple[Identification, float, Sequence[UncertainQuantity]]],
+    laws: Sequence[tuple[Identification, float, Sequence[UncertainQuantity], LawMisfit | None]],
     predictor: Predictor,
     history: History,
     inside: Mapping[str, float],
@@ -269,10 +273,16 @@ def score_test(
 ) -> TestScore:
     """The score of a measured test.
 
-    laws : each with its weight and the dimensions of the test. inside, whole_inside : as TestScore has them.
+    laws : each with its weight, the dimensions of the test, and what it misses there. inside, whole_inside : as
+        TestScore has them.
     """
-    forecasts = [LinearForecast.of_test(fit, predictor, history, dimensions) for fit, _, dimensions in laws]
-    weight = np.array([w for _, w, _ in laws]) / sum(w for _, w, _ in laws)
+    forecasts = [
+        replace(
+            LinearForecast.of_test(fit, predictor, history, dimensions), misfit=0.0 if misfit is None else misfit.sd
+        )
+        for fit, _, dimensions, misfit in laws
+    ]
+    weight = np.array([w for _, w, *_ in laws]) / sum(w for _, w, *_ in laws)
     evaluated = [one.evaluated(history) for one in forecasts]
     log_density = logsumexp([logsumexp(e[2]) - np.log(SCORED_NODES) for e in evaluated], b=weight)
     best = forecasts[int(weight.argmax())]

@@ -10,6 +10,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.forecasts.bands import Band
 from creepkit.forecasts.measured_test import TestScore
+from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 from creepkit.records import History
 
 LAW, CHOICE_OF_LAW, OFFSET, NOISE, MISFIT, NUMERICAL = (
@@ -73,7 +74,8 @@ class TestForecast:
 
     outputs : {name: its curve and band}. times : to targets and to rupture. score : of a measured test, else None.
     includes : what the bands are made of, with sizes. caution : why bands are not those of the tests, or "".
-    extrapolation : beyond the fitted ranges, in one sentence, or "".
+    extrapolation : beyond the fitted ranges, in one sentence, or "". misfit : what the law of most weight misses there,
+    where bands and times hold that.
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
@@ -86,6 +88,7 @@ class TestForecast:
     score: TestScore | None = None
     notes: tuple[str, ...] = ()
     caution: str = ""
+    misfit: LawMisfit | None = None
 
     @property
     def name(self) -> str:

@@ -8,7 +8,6 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.forecasts.drawn_law import DrawnLaw
-from creepkit.forecasts.draws import SOURCES
 from creepkit.forecasts.results import CHOICE_OF_LAW, LAW, MISFIT, NOISE, NUMERICAL, OFFSET
 from creepkit.forecasts.simulation import at_times
 from creepkit.inverse.identification import Identification
@@ -165,8 +164,8 @@ def _law_variances(one: DrawnLaw, history: History, name: str, transform: Output
         if dimension.shared is not None:
             by_joint[:, dimension.shared] = slope[:, 0] * one.sensitivities.dimensions[dimension.kind][:, column]
     variances = {LAW: np.einsum("ti,ij,tj->t", by_joint, scatter.mean_joint[1], by_joint)}
-    for level, variance in one.own_variances.items():
-        variances[SOURCES[level]] = rate**2 * variance
+    for source, variance in one.own_variances.items():
+        variances[source] = rate**2 * variance
     for dimension in (d for d in one.dimensions if d.shared is None):
         change = slope[:, 0] * one.sensitivities.dimensions[dimension.kind][:, column] * dimension.sd
         variances[dimension.kind] = change**2

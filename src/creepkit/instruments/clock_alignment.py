@@ -361,8 +361,10 @@ def _checked_best(
         found.append((peak + float(np.log(np.exp(totals - peak).sum() * (lags[1] - lags[0]))), best))
     found.sort(reverse=True)
     weights = np.exp([evidence - found[0][0] for evidence, _ in found])
-    others = [
-        f"{lag:.3g}" for (_, lag), w in zip(found[1:], weights[1:] / weights.sum(), strict=True) if w > LARGEST_OTHER
+    others = [  # what lies nearer is within the interval of the best
+        f"{lag:.3g}"
+        for (_, lag), w in zip(found[1:], weights[1:] / weights.sum(), strict=True)
+        if w > LARGEST_OTHER and abs(lag - found[0][1]) > 2.0 * reach
     ]
     if others:
         raise HistoryError(
@@ -396,12 +398,13 @@ def _posterior(
         lags = lag + np.linspace(-reach, reach, FINE_LAGS)
         inner = lags[np.abs(lags - lag) <= half]
         gains = gain + np.linspace(-gain_half, gain_half, DRIFTS if drift else 1)
-        logs = np.zeros((gains.size, inner.size))
+        each = []
         for task, own in zip(warped, models, strict=True):
             terms = [task.terms(lags, model, lags[1] - lags[0]) for model in own]
-            logs += np.logaddexp.reduce(
-                [_joint(one, lags, inner, task.times[1:] - middle, gains - gain) for one in terms]
+            each.append(
+                np.logaddexp.reduce([_joint(one, lags, inner, task.times[1:] - middle, gains - gain) for one in terms])
             )
+        logs = _together(np.array(each), inner)
         if drift:
             logs -= 0.5 * (gains[:, None] / drift) ** 2
         logs[:, (inner < search[0]) | (inner > search[1])] = -np.inf
@@ -442,6 +445,19 @@ def _posterior(
         residual=float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))),
         noise=float(np.median([own[0].noise for own in models])),
     )
+
+
+def _together(each: Floats, lags: Floats) -> Floats:
+    """(gains, lags) logarithm of the likelihood of test pieces (pieces, gains, lags), as sure as the surest of them.
+
+    What no model of the response follows is the same in all, whose errors therefore are no independent ones: the sum of
+    the logarithms counts as if the information in it were that of the piece that has most.
+    """
+    by_lag = np.exp(each - each.max(axis=(1, 2), keepdims=True)).sum(axis=1)
+    by_lag /= by_lag.sum(axis=1, keepdims=True)
+    means = by_lag @ lags
+    information = 1.0 / np.maximum((by_lag * (lags - means[:, None]) ** 2).sum(axis=1), 1e-300)
+    return np.asarray(each.sum(axis=0) * information.max() / information.sum())
 
 
 def _joint(terms: Floats, lags: Floats, inner: Floats, offsets: Floats, gains: Floats) -> Floats:

@@ -25,7 +25,7 @@ from creepkit.instruments.column_heads import (
     split_head,
     stated_unit,
 )
-from creepkit.instruments.reading_options import ReadingOptions
+from creepkit.instruments.reading_options import RecordOptions
 from creepkit.instruments.record_tables import (
     MISSING,
     KeptColumns,
@@ -60,7 +60,7 @@ def read_record(
     path: str | Path, formats: Sequence[InstrumentFormat], format: str | None, options: Mapping[str, Any]
 ) -> InstrumentRecord:
     """The record in a file, read part by part; the public function with this name says what the options are."""
-    given = ReadingOptions.of(options)
+    given = RecordOptions().changed(options)
     if not isinstance(path, (str, Path)):
         raise HistoryError(f"read_record() takes the path of a file, found {quoted(repr(path))}")
     if format is not None and not isinstance(format, str):
@@ -70,7 +70,7 @@ def read_record(
 
 
 def _record(
-    path: Path, formats: Sequence[InstrumentFormat], format: str | None, given: ReadingOptions
+    path: Path, formats: Sequence[InstrumentFormat], format: str | None, given: RecordOptions
 ) -> InstrumentRecord:
     parts = numbered_lines(path)
     ahead = next(parts, [])
@@ -118,7 +118,7 @@ class _Layout:
     path: Path
     head: TableHead
     format: InstrumentFormat
-    options: ReadingOptions
+    options: RecordOptions
     columns: tuple[int, ...]
     names: tuple[str, ...]
     written: tuple[str, ...]
@@ -126,7 +126,7 @@ class _Layout:
     time_unit: str
 
     @classmethod
-    def of(cls, path: Path, head: TableHead, chosen: InstrumentFormat, options: ReadingOptions) -> _Layout:
+    def of(cls, path: Path, head: TableHead, chosen: InstrumentFormat, options: RecordOptions) -> _Layout:
         place = f"{path}:{head.names_line}"
         split = [split_head(text) for text in head.names]
         names = [name for name, _ in split]
@@ -271,7 +271,7 @@ class _Layout:
                     f"{self.path}:{self.head.names_line}: '{quoted(name, 60)}' is called {named}, while {other} says "
                     f"{reference or stated}; keep one"
                 )
-            reference = reference or named or stated or self.format.pressure_reference
+            reference = reference or named or stated or self.format.pressure_reference or ""
             if reference == "absolute" and self.options.ambient_pressure is not None:
                 values, reference = values - self.options.ambient_pressure, "gauge"
                 notes.append(

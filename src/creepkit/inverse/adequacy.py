@@ -74,7 +74,8 @@ class Adequacy:
     are missing. chi_square : of all of them, over `freedom`, its degrees of freedom. p_value : the least of all and of
     each, times their number. correlation : of what is left, as a share of the test (of outputs that span decades: the
     ln of a factor in time); NaN where nothing is. largest : where the law misses most; None if nothing is known.
-    remedies : unmodelled effects, such as "a thickness of 0.01 mm", with any of which the law would explain the tests.
+    remedies : errors that nobody modelled, with the largest size that they take in a test, such as "an error of 0.01 mm
+    in the thickness", with any of which the law would explain the tests.
     rate_scatter : standard deviation of ln rate between tests, which was estimated from them.
     explanations : of that scatter, the likeliest first: the law's dependence on stress or temperature, one test, two
         groups of tests (see inverse.rate_explanations).

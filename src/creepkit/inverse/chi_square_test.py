@@ -28,7 +28,7 @@ from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.largest_deviation import largest_deviation
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.perturbation import Perturbation
-from creepkit.inverse.perturbations import with_random_effects
+from creepkit.inverse.perturbations import sizes_of_effect, with_random_effects
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.records import History, is_logarithmic
@@ -113,7 +113,9 @@ def adequacy_with_remedies(
     if not adequacy.rejects:
         return adequacy.with_explanations(explanations)
     remedies = [
-        effect.description
+        replace(
+            effect, size=effect.size * float(np.abs(sizes_of_effect(linear, effect, noise_model)).max())
+        ).description
         for effect in effects
         if not effect.common
         and adequacy_of(

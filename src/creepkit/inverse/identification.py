@@ -18,7 +18,7 @@ from creepkit.inverse.composite_predictor import CompositePredictor, predict
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import NumericalError, correct_defect
 from creepkit.inverse.explanation import LeftOut
-from creepkit.inverse.extrapolation import warn_of_extrapolation
+from creepkit.inverse.extrapolation import RANGE_TOLERANCE, warn_of_extrapolation
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
@@ -29,7 +29,13 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import LawAtTests, constant_stress_tests
-from creepkit.inverse.uncertainty.laplace_approximation import Estimate, delta_method, interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import (
+    Estimate,
+    delta_method,
+    interval_quantile,
+    parameter_estimates,
+    positive_semidefinite,
+)
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
@@ -41,8 +47,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from creepkit.inverse.search.global_search import SearchTrace
-    from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.sparsity.result import Sparsity
+    from creepkit.inverse.uncertainty.law_misfit import LawMisfit, LawMisfits
     from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity
     from creepkit.inverse.variance_components import LinearisedProblem
 
@@ -58,14 +64,16 @@ class Identification(
 
     estimates : one Estimate for each parameter, in the order of the law.
     u : (parameters,) conditioned coordinates at the optimum; covariance : (parameters, parameters) their posterior
-        covariance (see inverse.coordinates).
+        covariance (see inverse.coordinates). error_covariance : (parameters, parameters) the part of it by errors
+        that tests usually have and nobody modelled (settings.usual_errors), scaled so that one quantile fits both.
     noise_model : standard deviations of the sources of scatter, estimated from the data.
     rms : root mean square of ln((predicted + offset) / measured) over the fitted strains of all tests; each test has
         its own offset (loading strain), none its own rate. NaN without strains.
     errors : {output: OutputErrors} over all used frames of all tests, whatever was minimised.
     nuisances : estimates of explicit nuisances.
     adequacy : whether the law explains the tests to their noise. numerical_error : of the predictor at the optimum,
-        which was corrected; None where there is no more exact one. unmodelled : effects that intervals do not include.
+        which was corrected; None where there is no more exact one. unmodelled : what nobody modelled, and whether
+        intervals include it.
     left_out : each test beside all others, of four tests or more.
     rate_scatter : what the tests say of the scatter of rates between tests, heats and laboratories, and how it enters
         the covariance: what forecasts need.
@@ -97,6 +105,7 @@ class Identification(
     settings: IdentificationSettings
     provenance: Mapping[str, Any]
     errors: Mapping[str, OutputErrors] = field(default_factory=dict)
+    error_covariance: Floats | None = None
     nuisances: tuple[NuisanceEstimate, ...] = ()
     adequacy: Adequacy | None = None
     numerical_error: NumericalError | None = None
@@ -137,7 +146,7 @@ class Identification(
         """The law with its numbers, intervals and range of validity: what every exporter takes."""
         return LawWithValues(self.law, self.values, tuple(self.comments()), ranges=self.ranges)
 
-    def comments(self, ranking: Ranking | None = None) -> list[str]:
+    def comments(self, ranking: Any = None) -> list[str]:
         """What an exported law says of itself, a line each; ranking : that it is the best of, where there was one."""
         return present("reports.identification_text:identification_comments", self, ranking)
 
@@ -199,6 +208,9 @@ class Identification(
         the reference point: without a temperature the rate is that at `reference.temperature`, the median of the tests.
         warn : whether a point outside `ranges` gives a FitWarning, and a temperature that seems to be in Celsius a
             FitError.
+
+        Outside the tests, and by a law that they contradict, the interval is widened by what the law misses there as
+        far as the tests tell (see uncertainty.law_misfit).
         """
         from creepkit.inverse.uncertainty.quantities import log_rate
 
@@ -206,8 +218,44 @@ class Identification(
         if warn:
             point = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
             warn_of_extrapolation(self.ranges, point)
-        log_rate_value, low, high = self.interval_of(function)
-        return np.exp(log_rate_value), np.exp(low), np.exp(high)
+        value, low, high = self.interval_of(function)
+        T = self.reference.temperature if temperature is None else temperature
+        more = self.misfit_half_widths(function, np.asarray(stress, float), np.asarray(T, float))
+        return np.exp(value), np.exp(value - np.hypot(value - low, more)), np.exp(value + np.hypot(high - value, more))
+
+    @cached_property
+    def misfits(self) -> LawMisfits:
+        """What the law misses at any stress and temperature, by what it misses of the rates of its tests."""
+        from creepkit.inverse.uncertainty.law_misfit import LawMisfits
+
+        return LawMisfits(self.coordinates, self.u, self.scatter_of_rates)
+
+    def misfit_at(self, stress: float, temperature: float) -> LawMisfit | None:
+        """What intervals at MPa and K hold of what the law misses: outside the tests, or where they contradict it."""
+        inside = all(
+            low * (1.0 - RANGE_TOLERANCE) <= value <= high * (1.0 + RANGE_TOLERANCE)
+            for value, (low, high) in ((stress, self.ranges["stress"]), (temperature, self.ranges["temperature"]))
+        )
+        if self.rate_scatter is None or (inside and (self.adequacy is None or not self.adequacy.rejects)):
+            return None
+        return self.misfits.at(stress, temperature)
+
+    def misfit_half_widths(self, function: CoordinateFunction, stress: Floats, temperature: Floats) -> Floats:
+        """(...,) what is to be added in quadrature to the half widths of ln rate by what the law misses; or 0.
+
+        function : ln rate as a function of the coordinates. stress, temperature : MPa and K, that broadcast to (...,).
+        """
+        stresses, temperatures = np.broadcast_arrays(stress, temperature)
+        found = [self.misfit_at(float(s), float(T)) for s, T in zip(stresses.flat, temperatures.flat, strict=True)]
+        if not any(found):
+            return np.zeros(())
+        value, _, high = self.by_tests_alone.interval_of(function)
+        total, own = (
+            np.reshape([0.0 if one is None else float(getattr(one, name)) for one in found], stresses.shape)
+            for name in ("total", "own")
+        )
+        normal = interval_quantile(1e9)
+        return np.sqrt(np.clip((normal * total) ** 2 - (high - value) ** 2, 0.0, (normal * own) ** 2))
 
     @checked
     def local_exponent(
@@ -248,7 +296,9 @@ class Identification(
         if self.samples is not None:
             value, draws = function(self.u), function(self.samples)
             low, high = np.quantile(draws, (0.025, 0.975), axis=0)
-            return value, np.minimum(low, value), np.maximum(high, value)
+            below, above = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
+            errors = self._quantile * self.error_sd(function)
+            return value, value - np.hypot(below, errors), value + np.hypot(above, errors)
         value, sd = delta_method(function, self.u, self.covariance)
         return value, value - self._quantile * sd, value + self._quantile * sd
 
@@ -289,7 +339,9 @@ class Identification(
     def at_tests(self, predictor: Predictor, *, test_scatter: bool = True) -> LawAtTests:
         """The law as it predicts single values of tests; test_scatter : whether the scatter of tests counts."""
         noise_model = self.noise_model if test_scatter else None
-        return LawAtTests(self.coordinates, self.u, self.scatter_of_rates, noise_model, predictor)
+        return LawAtTests(
+            self.coordinates, self.u, self.scatter_of_rates, noise_model, predictor, misfit_at=self.misfit_at
+        )
 
     @checked
     def predict(
@@ -368,9 +420,35 @@ class Identification(
             raise FitError(missing_predictor(self.predictor_documents))
         return predictor
 
+    def error_sd(self, function: CoordinateFunction) -> Floats:
+        """(...,) standard deviation that usual errors of tests make of a function of the coordinates; 0 without them.
+
+        Scaled as `error_covariance` is.
+        """
+        if self.error_covariance is None:
+            return np.zeros(())
+        return delta_method(function, self.u, self.error_covariance)[1]
+
+    @cached_property
+    def by_tests_alone(self) -> Identification:
+        """The same with intervals that take temperatures, loads and dimensions as exactly known."""
+        if self.error_covariance is None:
+            return self
+        covariance = positive_semidefinite(self.covariance - self.error_covariance)
+        scatter = None if self.rate_scatter is None else replace(self.rate_scatter, errors=None)
+        return replace(
+            self,
+            settings=replace(self.settings, usual_errors="none"),
+            covariance=covariance,
+            error_covariance=None,
+            estimates=parameter_estimates(self.law, self.coordinates, self.u, covariance, self._quantile),
+            rate_scatter=scatter,
+        )
+
     def __getstate__(self) -> dict[str, Any]:
         """All but the problem, which holds compiled code and is set up again when it is needed."""
-        state = {name: value for name, value in self.__dict__.items() if name != "least_squares_problem"}
+        worked_out = ("least_squares_problem", "by_tests_alone", "misfits")
+        state = {name: value for name, value in self.__dict__.items() if name not in worked_out}
         return {**state, "problem": None}
 
     def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:

@@ -36,7 +36,7 @@ from creepkit.records import Nuisance
 
 IDENTIFICATION = DocumentFormat(
     "creepkit-identification",
-    7,
+    8,
     FileKind("an identification", FitError, "give a file that Identification.save wrote"),
     remedy="identify again",
 )
@@ -71,7 +71,7 @@ CODEC = RecordCodec(
     omitted={
         Identification: ("histories", "predictor", "search_trace", "linearised", "problem"),
         Sparsity: ("path",),
-        Perturbation: ("residual_change",),
+        Perturbation: ("residual_change", "value_change"),
     },
     ranges={
         Identification: {"rms": NOT_NEGATIVE_OR_NAN, "effective_frames": POSITIVE, "freedom": POSITIVE},
@@ -107,7 +107,7 @@ CODEC = RecordCodec(
             "size": NOT_NEGATIVE,
             "rate_change": NAN_ALLOWED,
             "tests": NOT_NEGATIVE,
-            "activation_energy": NAN_ALLOWED,
+            "per_kelvin": NAN_ALLOWED,
             "like_hardening": NAN_ALLOWED,
             "hardening_correlation": NOT_NEGATIVE_OR_NAN,
         },
@@ -183,6 +183,9 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
         raise FitError(f"{source}: estimates, u and covariance do not belong to the {size} parameters of the law")
     if fit.samples is not None and (fit.samples.ndim != 2 or fit.samples.shape[1] != size or not len(fit.samples)):
         raise FitError(f"{source}: samples do not belong to the {size} parameters of the law; the file is damaged")
+    errors = fit.error_covariance
+    if errors is not None and (errors.size != size**2 or not np.isfinite(errors).all()):
+        raise FitError(f"{source}: error_covariance does not belong to the {size} parameters of the law")
     stated = fit.law.to_internal(fit.values)[0] if size else np.zeros(0)
     # A value at its bound is stated as the bound, a little beside u.
     if size and not np.allclose(fit.coordinates.theta(fit.u), stated, rtol=0.01, atol=0.05):
@@ -206,17 +209,18 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
         predictor = predictor_from_documents(fit.predictor_documents)
     except FitError as error:
         raise FitError(f"{source}: {error}") from None
-    return replace(fit, covariance=covariance, predictor=predictor)  # of a law without parameters it is a list
+    errors = None if errors is None else errors.reshape(size, size)
+    # Of a law without parameters both are lists.
+    return replace(fit, covariance=covariance, error_covariance=errors, predictor=predictor)
 
 
 def _with_shapes(scatter: RateScatter, tests: int, unknowns: int) -> RateScatter:
     """The record with two-dimensional arrays where they are empty: JSON holds no shape of those."""
-    shapes = {"design": (tests, unknowns), "precision": (unknowns, unknowns)}
-    design, precision = (
-        np.zeros(shape) if 0 in shape and not getattr(scatter, name).size else getattr(scatter, name)
-        for name, shape in shapes.items()
-    )
-    return replace(scatter, design=design, precision=precision)
+    shapes = {"design": (tests, unknowns), "precision": (unknowns, unknowns), "errors": (unknowns, unknowns)}
+    known = {name: getattr(scatter, name) for name in shapes}
+    empty = [n for n, shape in shapes.items() if known[n] is not None and 0 in shape and not known[n].size]
+    arrays: dict[str, Any] = {name: np.zeros(shapes[name]) for name in empty}
+    return replace(scatter, **arrays)
 
 
 LARGEST_NUMBER = 1e12
@@ -236,6 +240,9 @@ def _problem_with(scatter: RateScatter, tests: Sequence[str], unknowns: int) -> 
         "design": (count, unknowns),
         "precision": (unknowns, unknowns),
         "gradient": (unknowns,),
+        "stresses": (count,),
+        "temperatures": (count,),
+        **({} if scatter.errors is None else {"errors": (unknowns, unknowns)}),
     }
     if scatter.tests != tuple(tests):
         return "its tests are not those of the identification"
@@ -259,6 +266,8 @@ def _problem_with(scatter: RateScatter, tests: Sequence[str], unknowns: int) -> 
     for name in ("output_scales", "output_floors"):
         if not all(0 < value < LARGEST_NUMBER for value in getattr(scatter, name).values()):
             return f"{name} must be above zero"
+    if not ((scatter.stresses > 0).all() and (scatter.temperatures > 0).all()):
+        return "a stress or a temperature is not above zero"
     scale = np.sqrt(np.maximum(np.diag(scatter.precision), 1e-300))
     scaled = scatter.precision / np.outer(scale, scale)
     if unknowns and (not np.allclose(scaled, scaled.T, atol=1e-8) or np.linalg.eigvalsh(scaled)[0] < -1e-6):

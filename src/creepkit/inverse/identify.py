@@ -54,7 +54,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbation import unmodelled_note
-from creepkit.inverse.perturbations import perturbations
+from creepkit.inverse.perturbations import perturbations, usual_scatter
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
@@ -298,7 +298,14 @@ def _result(
     working_noise = None if best.linearised is not None else best.working_noise
     unmodelled = perturbations(problem, x, linear, noise_model, histories, working_noise)
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
-    scatter = rate_scatter(problem, x, residuals, noise_model, lengths)
+    judged = at_own_rates(problem, x, linear, noise_model)
+    rates = RateExplanations(problem, x, judged, noise_model)
+    by_scatter = usual_scatter(problem, x, linear, noise_model, rates.rates.contrasts, working_noise)
+    included = [e for e in unmodelled if e.included]
+    common = np.concatenate([np.zeros((0, x.size)), *(e.value_change for e in included if e.common)])[:, :count]
+    own = np.concatenate([by_scatter, *(e.value_change for e in included if not e.common)])[:, :count]
+    of_unknowns = np.pad(common.T @ common, (0, x.size - count)) if included else None
+    scatter = rate_scatter(problem, x, residuals, noise_model, lengths, of_unknowns)
     prediction = predict(
         problem.predictor,
         law,
@@ -309,7 +316,10 @@ def _result(
     if not problem.observations.followed_to_rupture.any():
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
-    law_covariance = positive_semidefinite(covariance[:count, :count])
+    # Their size is known, so that their interval is a normal one whatever the degrees of freedom of the tests are.
+    quantile = interval_quantile(freedom)
+    error_covariance = (interval_quantile(1e9) / quantile) ** 2 * (common.T @ common + own.T @ own)
+    law_covariance = positive_semidefinite(covariance[:count, :count]) + error_covariance
     values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)
     single_values = values_of_tests.compared(histories, without_curves=used)
@@ -322,13 +332,11 @@ def _result(
     failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]
     failed |= (prediction.status[0] != Status.RUPTURED) & [test.misses_readings for test in tests]
     unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
-    judged = at_own_rates(problem, x, linear, noise_model)
-    rates = RateExplanations(problem, x, judged, noise_model)
     adequacy = adequacy_with_remedies(
         problem, judged, noise_model, working_estimator.predictor_errors, histories, unmodelled, rates.found
     ).with_unpredicted(unpredicted)
     adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
-    estimates = parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom))
+    estimates = parameter_estimates(law, coordinates, u, law_covariance, quantile)
     return Identification(
         law=law,
         estimates=estimates,
@@ -348,6 +356,7 @@ def _result(
             **search_outcome.minima,
         },
         errors=pooled_errors(histories, prediction, tests),
+        error_covariance=error_covariance if problem.settings.included_errors else None,
         nuisances=nuisance_estimates,
         converged=best.minimum.converged,
         adequacy=replace(adequacy, implausible=implausible),

@@ -20,7 +20,7 @@ LARGEST_PER_CENT = 0.4
 """Of ln rate, from which on its change is given as a factor."""
 
 
-NOT_INCLUDED = "the intervals do not include what no nuisance parameter models"
+NOT_INCLUDED = "the intervals do not include"
 """How the note on perturbations that are not modelled begins."""
 
 
@@ -43,9 +43,12 @@ class Perturbation:
     like_hardening : the size, in the same unit, that looks most like the hardening of the law itself, NaN where it has
         none, and hardening_correlation : how much like it, in the residuals, 1 for the same.
     residual_change : (tests, observations) -, of the residuals, by one standard deviation; saved in kept fits alone.
+    value_change : (errors, unknowns) of x, by each independent error of one standard deviation, or by the common one;
+        never saved.
     common : whether it is one error of all tests, as of an instrument that measures them all. tests : how many have it.
-    activation_energy : J/mol, by which kelvins change the rate at the reference temperature, NaN where none do;
-        assumed : whether it is a usual one, as the law has none.
+    included : whether the intervals include it.
+    per_kelvin : change of ln rate a kelvin at the reference point, NaN where it is no error of temperature; assumed :
+        whether by a usual activation energy, as the law has none.
     """
 
     kind: str
@@ -55,9 +58,11 @@ class Perturbation:
     like_hardening: float = float("nan")
     hardening_correlation: float = float("nan")
     residual_change: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    value_change: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     common: bool = False
     tests: int = 1
-    activation_energy: float = float("nan")
+    included: bool = False
+    per_kelvin: float = float("nan")
     assumed: bool = False
 
     @property
@@ -68,6 +73,8 @@ class Perturbation:
     @property
     def description(self) -> str:
         """What, and of which size, in one test."""
+        if self.unit == "mm" and not self.kind.startswith(OFFSET):
+            return f"an error of {self.amount} in the {self.kind}"
         return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind} of {self.amount}"
 
     @property
@@ -82,9 +89,9 @@ class Perturbation:
         """By how much the rate amid the tests would move with what, to follow "would move", without a full stop."""
         spread = "" if self.common or self.tests == 1 else " (one standard deviation)"
         energy = ""
-        if np.isfinite(self.activation_energy):
-            assumed = " (assumed: the law has no temperature)" if self.assumed else ""
-            energy = f", taking an activation energy of {self.activation_energy / 1e3:.3g} kJ/mol{assumed}"
+        if np.isfinite(self.per_kelvin):
+            whence = "assumed, as the law has no temperature" if self.assumed else "by the law"
+            energy = f" ({100 * float(np.expm1(self.per_kelvin)):.2g} % a kelvin, {whence})"
         return f"by {self.change_text}{spread} with {self._cause}{energy}"
 
     @property
@@ -106,17 +113,18 @@ class Perturbation:
 
 
 def combined_change_text(perturbations: Sequence[Perturbation]) -> str:
-    """The root sum of squares of the changes of the rate by all of them; "" where there are none."""
-    if not perturbations:
+    """The root sum of squares of the changes of the rate by those that are not included; "" where there are none."""
+    changes = [p.rate_change for p in perturbations if not p.included]
+    if not changes:
         return ""
-    total = float(np.sqrt(sum(p.rate_change**2 for p in perturbations)))
+    total = float(np.sqrt(np.sum(np.square(changes))))
     return f"a factor of {np.exp(total):.2g}" if total >= LARGEST_PER_CENT else f"{100 * total:.2g} %"
 
 
 def unmodelled_note(perturbations: Sequence[Perturbation]) -> tuple[str, ...]:
     """One sentence on what intervals do not include, with what it would do to the rate; none where that is little."""
-    parts = [p.sentence for p in perturbations if abs(p.rate_change) > NOTEWORTHY_CHANGE]
-    sentences = [f"{NOT_INCLUDED}; the rate amid the tests would move: {'; '.join(parts)}"] if parts else []
+    parts = [p.sentence for p in perturbations if abs(p.rate_change) > NOTEWORTHY_CHANGE and not p.included]
+    sentences = [f"{NOT_INCLUDED} what would move the rate amid the tests: {'; '.join(parts)}"] if parts else []
     sentences += [
         f"no temperature was recorded: a drift of {p.like_hardening:+.2g} K over a test would look like the hardening "
         f"of this law (correlation {p.hardening_correlation:.2f})"

@@ -1,8 +1,8 @@
-"""Perturbations of the tests of an identification: what its intervals do not include, and what it would change.
+"""Perturbations of the tests of an identification: what nobody models, and what it changes.
 
 A dimple may be thicker than its drawing, a camera may have moved, a furnace may drift; a thermocouple, a load cell or a
-micrometer may be off in every test. Where no nuisance parameter stands for it, an interval takes it as exactly known.
-Its effect on the residuals, s (one standard deviation of the usual size), moves the values by
+micrometer may be off in every test. Where no nuisance parameter stands for it, the values take it as exactly known.
+Its effect on the residuals, s (one standard deviation of the usual size), moves them by
 
     du = -(J'C^-1 J + P)^-1 J'C^-1 s
 
@@ -10,6 +10,7 @@ to first order, and with it the rate. C is the covariance under which values are
 in quadrature; where the scatter of rates is estimated from the tests, they are found as such scatter: C then holds the
 scatter that they make, and each test weighs as much as any other, however small the scatter is without them. An error
 common to all tests makes no scatter, and tests repeated on one rig do not average it out: what it does to each adds up.
+So du du' of the errors that the settings name is in the covariance of the values, beside what the tests say themselves.
 
 A temperature or load that is off changes the creep rate of each test by its own factor. Of tests under an imposed
 strain or displacement the stress is E (strain - creep strain): a modulus or a strain that is off moves it from the
@@ -24,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import sympy
@@ -36,6 +38,7 @@ from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
 from creepkit.inverse.working_noise import with_single_value_weight
@@ -60,20 +63,8 @@ USUAL_DRIFT = 5.0
 """K over a test: what furnaces drift where nobody looks."""
 
 
-COMMON_TEMPERATURE_ERROR = 3.0
-"""K, by which ISO 204 permits the temperature of a creep test to be off up to 600 °C; above, 4 or 5 K."""
-
-
-COMMON_LOAD_ERROR = 0.01
-"""Of the load, of a creep machine of class 1 by ISO 7500-2."""
-
-
-COMMON_MODULUS_ERROR = 0.02
-"""Of Young's modulus, by which values of one alloy by different methods usually differ."""
-
-
-COMMON_MOTION_ERROR = 0.01
-"""Of an imposed strain or displacement, of an extensometer of class 1 by ISO 9513."""
+SCATTER_NODES = 60
+"""Standard deviations over which the scatter by errors of single tests is averaged."""
 
 
 LOADS, IMPOSED = ("stress", "pressure", "force"), ("strain", "displacement")
@@ -108,7 +99,6 @@ def perturbations(
     factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
     reference = problem.coordinates.reference
     slope = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature)
-    energy = slope * GAS_CONSTANT * reference.temperature**2
     found, without_energy = [], not problem.law.uses(temperature)
     for one in _all(problem, x, linear, full_histories):
         change, noise = one.residual_change, fitting_noise or noise_model
@@ -116,15 +106,63 @@ def perturbations(
             noise = _with_scatter_of(change, problem, linear, noise_model)
         if one.kind == "modulus" or one.kind.startswith("imposed "):
             noise = _with_offset_of(change, problem, linear, noise)
-        by_test = _rate_changes(problem, x, linear, noise, change)
-        one = replace(one, rate_change=float(by_test.sum() if one.common else np.sqrt((by_test**2).sum())))
+        moved = value_changes(linear, noise, change)
+        moved = moved.sum(axis=0, keepdims=True) if one.common else moved
+        by_error = moved[:, : problem.parameter_count] @ _log_rate_gradient(problem, x)
+        size = float(by_error[0] if one.common else np.sqrt((by_error**2).sum()))
+        one = replace(one, rate_change=size, value_change=moved)
         if one.kind == DRIFT:
             ratio, correlation = _likeness_of_hardening(problem, x, linear, factor, change)
             one = replace(one, like_hardening=one.size * ratio, hardening_correlation=correlation)
         if one.kind in (DRIFT, "temperature"):
-            one = replace(one, activation_energy=energy, assumed=without_energy)
+            one = replace(one, per_kelvin=slope, assumed=without_energy)
         found.append(replace(one, residual_change=np.zeros((0, 0))) if one.common else one)
     return tuple(found)
+
+
+def usual_scatter(
+    problem: LeastSquaresProblem,
+    x: Floats,
+    linear: LinearisedProblem,
+    noise_model: NoiseModel,
+    redundant: int,
+    working_noise: NoiseModel | None = None,
+) -> Floats:
+    """(tests, unknowns) changes of x by temperatures and loads that are off in each test by itself.
+
+    x : (unknowns,) the optimum. redundant : combinations of rates of tests that the law does not move, by which their
+    scatter was estimated. The standard deviation that the usual errors make is that of a prior of the scatter, half of
+    a normal distribution: what is added is its mean square, given the estimate, beyond that; all of it where no test is
+    redundant. Nothing is added where the settings state the scatter, and in one test, whose error is the common one.
+    working_noise : as of perturbations().
+    """
+    included, settings, tests = problem.settings.included_errors, problem.settings, range(len(problem.histories))
+    own = any(n.kind == "temperature" for n in settings.nuisances)
+    if len(tests) == 1 or ("", "rate") in components_fixed_by_priors(settings.nuisances, list(noise_model.outputs)):
+        return np.zeros((0, x.size))
+    kelvin = 0.0 if own else included.get("temperature", 0.0)
+    load, variances = included.get("load", 0.0), []
+    for test in tests:
+        per_kelvin = log_rate_per_kelvin(problem, x, *_conditions(problem, test))
+        loaded = problem.histories[test].loading.quantity in LOADS
+        exponent = _stress_exponent(problem, x, test) if loaded else 0.0
+        variances.append((per_kelvin * kelvin) ** 2 + (exponent * load) ** 2)
+    redundant = redundant if noise_model.rate > 0 else 0
+    added = np.sqrt([_mean_square(variance, noise_model.rate, redundant) for variance in variances])
+    change = added[:, None] * linear.residuals.log_rate_sensitivity
+    if working_noise is not None:
+        return value_changes(linear, with_single_value_weight(working_noise, problem.observations), change)
+    return value_changes(linear, _with_scatter_of(change, problem, linear, noise_model), change)
+
+
+def _mean_square(usual: float, estimate: float, redundant: int) -> float:
+    """Mean square of ln rate by scatter of which `usual` is the prior variance, beyond the square of its estimate."""
+    if not usual > 0:
+        return 0.0
+    s = np.geomspace(1e-3, 5.0, SCATTER_NODES) * np.sqrt(usual)
+    log_weight = (1 - redundant) * np.log(s) - 0.5 * redundant * (estimate / s) ** 2 - 0.5 * s**2 / usual
+    weight = np.exp(log_weight - log_weight.max())
+    return max(float(weight @ s**2 / weight.sum()) - estimate**2, 0.0)
 
 
 def with_random_effects(linear: LinearisedProblem, effects: Sequence[Perturbation]) -> LinearisedProblem:
@@ -149,6 +187,22 @@ def with_unknown_effects(linear: LinearisedProblem, changes: Floats) -> Linearis
         np.append(linear.free, np.ones(more, bool)),
         np.concatenate([linear.step_bounds, np.outer([-np.inf, np.inf], np.ones(more))], axis=1),
     )
+
+
+def effect_columns(effect: Perturbation, *, common: bool) -> Floats:
+    """(tests, observations, unknowns) change of the residuals by a perturbation of all tests alike, or of each test."""
+    column = effect.residual_change[..., None]
+    return np.asarray(column if common else column * np.eye(len(column))[:, None, :])
+
+
+def sizes_of_effect(
+    linear: LinearisedProblem, effect: Perturbation, noise_model: NoiseModel, *, common: bool = False
+) -> Floats:
+    """(1,) of all tests or (tests,) sizes that a perturbation takes in a linear problem, in standard deviations."""
+    columns = effect_columns(effect, common=common)
+    perturbed = with_unknown_effects(linear, columns)
+    factor = CovarianceFactor.of_residuals(perturbed.residuals, noise_model)
+    return perturbed.solve(factor).step[-columns.shape[-1] :]
 
 
 # ---- what each does to the residuals ---------------------------------------------------------------------------------
@@ -183,8 +237,13 @@ def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedPro
     loaded, moved = ([h.loading.quantity in quantities for h in histories] for quantities in (LOADS, IMPOSED))
     errors = list[Perturbation]()
 
+    included = problem.settings.included_errors
+    sizes = {**USUAL_ERRORS, **included}
+
     def add(kind: str, size: float, unit: str, change: Floats) -> None:
-        errors.append(Perturbation(kind, size, unit, residual_change=change, common=True, tests=len(histories)))
+        known = ("motion" if kind.startswith("imposed ") else kind) in included
+        form: dict[str, Any] = {"common": True, "tests": len(histories), "included": known}
+        errors.append(Perturbation(kind, size, unit, residual_change=change, **form))
 
     def of_rates(by_test: Sequence[float], size: float) -> Floats:
         return np.asarray(size * np.array(by_test, float)[:, None] * linear.residuals.log_rate_sensitivity)
@@ -195,20 +254,19 @@ def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedPro
 
     if "temperature" not in shared:
         slopes = [log_rate_per_kelvin(problem, x, *_conditions(problem, test)) for test in tests]
-        change = of_rates(slopes, COMMON_TEMPERATURE_ERROR)
-        add("temperature", COMMON_TEMPERATURE_ERROR, "K", change)
+        add("temperature", sizes["temperature"], "K", of_rates(slopes, sizes["temperature"]))
     if any(loaded):
         exponents = [_stress_exponent(problem, x, test) if known else 0.0 for test, known in enumerate(loaded)]
-        add("load", 100 * COMMON_LOAD_ERROR, "%", of_rates(exponents, COMMON_LOAD_ERROR))
+        add("load", 100 * sizes["load"], "%", of_rates(exponents, sizes["load"]))
     if any(moved):
         imposed = [h for h, counts in zip(histories, moved, strict=True) if counts]
         known = all(supports_nuisance(predictor_for(problem.predictor, h), "modulus") for h in imposed)
         if known and "modulus" not in shared:
-            change = of_outputs(_slope(problem, x, "modulus"), COMMON_MODULUS_ERROR)
-            add("modulus", 100 * COMMON_MODULUS_ERROR, "%", change)
+            change = of_outputs(_slope(problem, x, "modulus"), sizes["modulus"])
+            add("modulus", 100 * sizes["modulus"], "%", change)
         kind = f"imposed {' and '.join(sorted({h.loading.quantity for h in imposed}))}"
-        add(kind, 100 * COMMON_MOTION_ERROR, "%", of_outputs(_motion_slope(problem, x), COMMON_MOTION_ERROR))
-    return errors
+        add(kind, 100 * sizes["motion"], "%", of_outputs(_motion_slope(problem, x), sizes["motion"]))
+    return [one for one in errors if one.size > 0]
 
 
 def tolerated_dimensions(problem: LeastSquaresProblem) -> list[Dimension]:
@@ -225,9 +283,13 @@ def _length(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, 
     if not all(tolerances):
         return []
     nominal = np.array([prior_mean(Nuisance(kind), h, problem.predictor) for h in problem.histories])
-    slope, sizes = _slope(problem, x, kind, nominal), nominal * np.array(tolerances)
+    included = problem.settings.included_errors
+    share = included.get("dimensions", 1.0)
+    slope, sizes = _slope(problem, x, kind, nominal), share * nominal * np.array(tolerances)
     change = linear.residuals.offset_sensitivity * np.where(np.isfinite(slope), slope, 0.0) * sizes[:, None]
-    return [Perturbation(kind, float(np.median(sizes)), "mm", residual_change=change, tests=len(sizes))]
+    form: dict[str, Any] = {"tests": len(sizes), "included": "dimensions" in included}
+    made = Perturbation(kind, float(np.median(sizes)), "mm", residual_change=change, **form)
+    return [made] if made.size > 0 else []
 
 
 def _offsets(problem: LeastSquaresProblem, linear: LinearisedProblem) -> Iterator[Perturbation]:
@@ -354,17 +416,18 @@ def _conditions(problem: LeastSquaresProblem, test: int) -> tuple[float, float]:
 # ---- what each does to the values ------------------------------------------------------------------------------------
 
 
-def _rate_changes(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel, change: Floats
-) -> Floats:
-    """(tests,) changes of ln of the rate at the reference point by changes of the residuals of each test."""
+def value_changes(linear: LinearisedProblem, noise_model: NoiseModel, change: Floats) -> Floats:
+    """(tests, unknowns) changes of x; change : (tests, observations) of the residuals of each test."""
     solution = linear.solve(CovarianceFactor.of_residuals(linear.residuals, noise_model))
+    moved = np.zeros((len(change), linear.free.size))
+    moved[:, linear.free] = -np.einsum("tep,te->tp", solution.weighted_jacobian, change) @ solution.covariance
+    return moved
+
+
+def _log_rate_gradient(problem: LeastSquaresProblem, x: Floats) -> Floats:
+    """(parameters,) derivatives of ln of the rate at the reference point to u."""
     coordinates, count = problem.coordinates, problem.parameter_count
-    free_parameters = np.flatnonzero(linear.free[:count])
-    derivative = gradient(log_rate(coordinates, coordinates.reference.stress), x[:count], np.ones(count))
-    row = np.zeros(len(solution.covariance))
-    row[: free_parameters.size] = derivative[free_parameters]
-    return np.asarray(-np.einsum("tep,te->tp", solution.weighted_jacobian, change) @ solution.covariance @ row)
+    return gradient(log_rate(coordinates, coordinates.reference.stress), x[:count], np.ones(count))
 
 
 def _with_scatter_of(

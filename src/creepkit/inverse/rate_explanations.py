@@ -30,7 +30,7 @@ from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_perturbations import SMALLEST_FACTOR, Evidence, RatePerturbations
-from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import temperature
@@ -81,9 +81,7 @@ class RateConditions:
     @classmethod
     def of_problem(cls, problem: LeastSquaresProblem) -> RateConditions:
         """Medians over each test."""
-        every = [reference_stresses(h, problem.predictor) for h in problem.histories]
-        stresses = [float(np.median(one[one > 0])) if (one > 0).any() else 1e-6 for one in every]
-        return cls(np.array(stresses), np.array([h.mean_temperature for h in problem.histories]))
+        return cls(*np.array([reference_condition(h, problem.predictor) for h in problem.histories]).T)
 
     @cached_property
     def log_stress(self) -> Floats:

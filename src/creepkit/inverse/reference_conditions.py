@@ -102,6 +102,13 @@ def reference_stresses(history: History, predictor: Predictor | None = None) -> 
     return loads
 
 
+def reference_condition(history: History, predictor: Predictor | None = None) -> tuple[float, float]:
+    """Median of the reference stresses of a test above zero, MPa, 1e-6 where none is; and its mean temperature, K."""
+    stresses = reference_stresses(history, predictor)
+    positive = stresses[stresses > 0]
+    return float(np.median(positive)) if positive.size else 1e-6, history.mean_temperature
+
+
 def _stated(history: History, predictor: Predictor | None, method: str) -> Callable[[History], Any] | None:
     """What the predictor of a test says of it by a method, else what the specimen that the test names says."""
     own = None if predictor is None else predictor_for(predictor, history)

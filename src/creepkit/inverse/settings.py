@@ -25,6 +25,25 @@ Weighting = Literal["noise", "likelihood", "equal", "paper"]
 OutputWeights = Weighting | Mapping[str, float]
 
 
+UsualErrors = Literal["usual", "none"] | Mapping[str, float]
+
+
+USUAL_ERRORS: Mapping[str, float] = {
+    "temperature": 3.0,
+    "load": 0.01,
+    "dimensions": 1.0,
+    "modulus": 0.02,
+    "motion": 0.01,
+}
+"""One standard deviation of what tests are usually off by and nobody models.
+
+temperature : K, by which ISO 204 permits a creep test to be off up to 600 °C (above, 4 or 5 K). load : a share, of a
+machine of class 1 by ISO 7500-2. dimensions : times the tolerance that a specimen states, such as 2 % of the thickness
+of a bulge. modulus : a share, by which values of one alloy by different methods differ. motion : of an imposed strain
+or displacement, a share, of an extensometer of class 1 by ISO 9513.
+"""
+
+
 @checked
 @dataclass(frozen=True)
 class IdentificationSettings(Options, title="settings of an identification", error=FitError):
@@ -49,6 +68,8 @@ class IdentificationSettings(Options, title="settings of an identification", err
     rupture_times : whether ends of tests without curves, rupture times and run-outs, are compared with the law: "auto":
         where its rate can rise at constant stress (see inverse.rupture_use), in a comparison of laws where that of any
         can; "use" or "ignore": with every law or with none. Curves that were followed to rupture are compared to it.
+    usual_errors : of tests, which every interval includes where no nuisance stands for them: "usual" ones (see
+        USUAL_ERRORS), {what: one standard deviation} of those that are named alone, or "none".
     """
 
     starts: int = option(8, "Starts of the search.", STARTS)
@@ -73,9 +94,15 @@ class IdentificationSettings(Options, title="settings of an identification", err
     rupture_times: Literal["auto", "use", "ignore"] = option(
         "auto", "Rupture times and run-outs of tests without curves; auto: with laws that describe rupture."
     )
+    usual_errors: UsualErrors = option(
+        "usual",
+        "Errors of tests that intervals include, one standard deviation; temperature in K, others shares.",
+        example="temperature=3,load=0.01",
+    )
 
     def __post_init__(self) -> None:
         _check_weights(self.weights)
+        _check_usual_errors(self.usual_errors)
         super().__post_init__()
         if self.weights == "likelihood" and self.loss != "linear":
             raise FitError(
@@ -92,6 +119,13 @@ class IdentificationSettings(Options, title="settings of an identification", err
                     f"nuisance '{first.key}' is given twice; give one, with the scope that matters most, or name the "
                     "tests of each by tests="
                 )
+
+    @property
+    def included_errors(self) -> Mapping[str, float]:
+        """{what: one standard deviation} of the errors that intervals include."""
+        if isinstance(self.usual_errors, str):
+            return USUAL_ERRORS if self.usual_errors == "usual" else {}
+        return self.usual_errors
 
     def changed(self, changes: Mapping[str, Any], predictor: Predictor | Mapping[str, Predictor] | None = None) -> Self:
         """The settings with fields changed by name; None leaves a field as it is.
@@ -145,6 +179,23 @@ def _check_weights(weights: OutputWeights) -> None:
     if invalid or not weights:
         example = invalid[0] if invalid else "none"
         raise FitError(f"weights must be numbers above zero for at least one output, found {example}")
+
+
+LARGEST_USUAL_ERRORS = {"temperature": 50.0, "dimensions": 10.0, "load": 0.3, "modulus": 0.3, "motion": 0.3}
+
+
+def _check_usual_errors(errors: UsualErrors) -> None:
+    if isinstance(errors, str):
+        if errors not in ("usual", "none"):
+            raise FitError(f'usual_errors is "{errors}"; allowed are usual, none and such as {{"temperature": 3}}')
+        return
+    for name, size in errors.items():
+        if name not in USUAL_ERRORS:
+            raise FitError(f"usual_errors names '{name}', which is none of them; {nearest(name, USUAL_ERRORS)}")
+        if not 0.0 <= size <= LARGEST_USUAL_ERRORS[name]:
+            raise FitError(
+                f"usual_errors: {name} is {size!r}; give a standard deviation from 0 to {LARGEST_USUAL_ERRORS[name]:g}"
+            )
 
 
 def _check_nuisance(nuisance: Nuisance) -> None:

@@ -12,8 +12,9 @@ less often than the level says.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import f
@@ -26,9 +27,13 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.minimum_rates import minimum_rates
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
+from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, MixtureDistribution
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.records import History, Predictor, constant_stress
+
+if TYPE_CHECKING:
+    from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 
 EXTRAPOLATION_FACTOR = 1000.0
 """How far beyond the longest measured test, or its own last time, a test is followed to its rupture; the predictor's
@@ -75,7 +80,7 @@ class LawAtTests:
     """An identified law and what tests are predicted with.
 
     u : (parameters,) conditioned coordinates. noise_model : whose scatter of single tests is in the intervals; None
-    for those of the law alone.
+    for those of the law alone. misfit_at : what the law misses at MPa and K, by default nothing.
     """
 
     coordinates: Coordinates
@@ -83,6 +88,7 @@ class LawAtTests:
     scatter: RateScatter
     noise_model: NoiseModel | None
     predictor: Predictor
+    misfit_at: Callable[[float, float], LawMisfit | None] | None = None
 
     def compared(
         self, histories: Sequence[History], *, without_curves: bool = True
@@ -135,6 +141,12 @@ class LawAtTests:
             for k, history, rate, low, high in zip(compared, tests, *predicted, strict=True)
         }
 
+    def _misfit(self, history: History) -> float:
+        """Standard deviation of ln of the rate of a test by what the law misses there."""
+        stress, T = reference_condition(history, self.predictor)
+        misfit = None if self.misfit_at is None else self.misfit_at(stress, T)
+        return 0.0 if misfit is None else misfit.sd
+
     def _with_intervals(
         self,
         output: str,
@@ -159,14 +171,14 @@ class LawAtTests:
         posterior, locations, variances = self.scatter.posterior, [], []
         parts = [self.scatter.joint(sd) for sd in posterior.sd]
         for k, history in enumerate(histories):
-            test = self.scatter.new_test(history)
+            test = self.scatter.new_test(history, self._misfit(history))
             row = np.zeros(self.scatter.joint_design.shape[1])
             row[: self.u.size] = by_parameter[k] @ coordinates.jacobian(self.u)
             row[[*test.known.values()]] = effects[k] if misfit is not None else 0.0
             own = self.scatter.own_variance(test, posterior.sd) * effects[k] ** 2 + (misfit or 0.0)
             locations.append([row @ mean for mean, _ in parts])
             by_law = np.array([row @ covariance @ row for _, covariance in parts])
-            variances.append(by_law + own if misfit is not None else by_law)
+            variances.append(by_law + (own if misfit is not None else (test.misfit * effects[k]) ** 2))
         mixture = MixtureDistribution(
             posterior.weight,
             np.full(posterior.weight.size, NORMAL_FREEDOM),

@@ -49,7 +49,18 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
-        *("spannung", "prüfspannung", "nennspannung", "anfangsspannung", "contrainte", "contrainte initiale"),
+        *(
+            "remaining stress",
+            "residual stress",
+            "relaxed stress",
+            "restspannung",
+            "spannung",
+            "prüfspannung",
+            "nennspannung",
+            "anfangsspannung",
+            "contrainte",
+            "contrainte initiale",
+        ),
     ),
     "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
     "strain": (
@@ -102,6 +113,8 @@ SYMBOLS: Mapping[str, str] = {
     **{"t": "time", "T": "temperature", "σ": "stress", "sigma": "stress", "ε": "strain", "epsilon": "strain"},
     **{"p": "pressure", "P": "pressure", "E": "modulus", "ν": "poisson", "nu": "poisson"},
     **{"F": "force", "ΔL": "elongation", "Δl": "elongation", "ΔL0": "elongation", "dL": "elongation"},
+    **dict.fromkeys(("σ0", "σo", "σ₀", "R0", "Ro", "sig"), "stress"),
+    **dict.fromkeys(("eps", "ε_c", "εc", "ε_cr"), "strain"),
     **dict.fromkeys(("d0", "D0", "ø", "Ø", "⌀"), "diameter"),
     **dict.fromkeys(("L0", "l0", "Lo", "Le", "Lr0"), "gauge_length"),
     **dict.fromkeys(("S0", "A0", "So", "Ao"), "area"),

@@ -22,7 +22,6 @@ _NUMBER = r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?"
 _UNIT = r"[^\W\d_][^\W_]*(?:/[^\W_]+(?:\^2)?)?|[°º℃℉]\s?[A-Za-z]?|deg\.? ?[A-Za-z]"
 _VALUE = re.compile(rf"(?<![^\W_])(?<![.,])({_NUMBER})[ _]?({_UNIT})(?![^\W_]|°)")
 _ASSIGNED = re.compile(rf"([^\W\d_][\w .'-]{{0,30}}?)\s*[=:]\s*({_NUMBER})\s*({_UNIT})(?![\w°])")
-_VALUE_WITH_UNIT = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?\s*([^\d\s.,;:+-][^;:]{0,10})", re.ASCII)
 
 
 _RANGE = re.compile(r"(?<![^\W_])\d[\d.,]*\s*(?:to|bis|à|and|und|et|or|oder|-|–|/|,|;|\.\.\.?|…)\s*$", re.IGNORECASE)
@@ -51,12 +50,11 @@ def conditions_of_head(cell: str, known: KnownNames) -> list[tuple[str, str]]:
 
     A load is a stress, where the file names no specimen that takes another one.
     """
-    found: list[tuple[str, str]] = []
-    for part in re.split(r"\s*[/;|@]\s*|,\s+", cell.strip()):
-        value = _VALUE_WITH_UNIT.fullmatch(part)
-        found.append((_quantity_of(value[1], known) if value else "", part))
+    text = " ".join(cell.split())
+    found = [(_quantity_of(match[2], known), f"{match[1]} {match[2]}") for match in _VALUE.finditer(text)]
     quantities = [quantity for quantity, _ in found]
-    return found if all(quantities) and len(set(quantities)) == len(quantities) else []
+    is_all = not _VALUE.sub("", text).strip(" ,;/|@()-–")
+    return found if is_all and all(quantities) and len(set(quantities)) == len(quantities) else []
 
 
 def _quantity_of(unit: str, known: KnownNames) -> str:

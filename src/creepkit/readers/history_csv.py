@@ -36,9 +36,10 @@ from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.condition_texts import sources_of_names
 from creepkit.readers.cut_files import CutNumber
+from creepkit.readers.grouped_rows import TabulatedTest
 from creepkit.readers.noise_correlation import noise_correlation_text
 from creepkit.readers.table_heads import is_frame
-from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
+from creepkit.readers.table_layouts import names_time, tests_in
 from creepkit.readers.text_grids import peek_grid, read_head_alone, read_text_grid
 from creepkit.readers.text_tables import TextTable
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
@@ -125,7 +126,7 @@ def _listed(columns: object) -> Sequence[object]:
     return columns if isinstance(columns, Sequence) and not isinstance(columns, str) else [None]
 
 
-TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv"), (".txt", ".dat", ".asc", ".lvm")
+TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv", ".lvm"), (".txt", ".dat", ".asc")
 """Endings of files that are taken for tables, and of those that are where a column of time is among the first names."""
 
 

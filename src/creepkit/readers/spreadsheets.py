@@ -24,9 +24,10 @@ from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
 from creepkit.readers.cell_grids import CellGrid, grid_of_rows, table_of, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
+from creepkit.readers.grouped_rows import TabulatedTest
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.number_formats import number_text
-from creepkit.readers.table_layouts import TabulatedTest, names_time, tests_in
+from creepkit.readers.table_layouts import names_time, tests_in
 from creepkit.readers.table_rows import TableRow
 from creepkit.readers.text_tables import SourceText, unknown_text
 from creepkit.readers.vocabulary import HeaderVocabulary

@@ -14,8 +14,16 @@ from itertools import pairwise
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing, is_number
 from creepkit.readers.cell_grids import CellGrid, table_of, with_stated, without_ignored
-from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, words_of
+from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
+from creepkit.readers.grouped_rows import (
+    TabulatedTest,
+    refuse_twice,
+    rows_by_test,
+    with_groups,
+    without_clocks,
+    without_remarks,
+)
 from creepkit.readers.table_heads import (
     MAXIMUM_ROWS_BELOW,
     Head,
@@ -26,18 +34,10 @@ from creepkit.readers.table_heads import (
     row_of_names,
     test_and_column,
 )
-from creepkit.readers.table_rows import NumberRows, TableRow, cells_of, grouped, with_columns
-from creepkit.readers.text_tables import SourceText, TextTable, check_columns, some_of, unknown_text
+from creepkit.readers.table_rows import NumberRows, TableRow, with_columns
+from creepkit.readers.text_tables import SourceText, TextTable, check_columns, some_of
 from creepkit.readers.vocabulary import HeaderVocabulary
-
-
-@dataclass(frozen=True)
-class TabulatedTest:
-    """What a file says of one test: its name, "" where it has none; its conditions; the table of its frames."""
-
-    name: str
-    entries: Mapping[str, SourceText]
-    table: TextTable
+from creepkit.records.quantities import STRAIN
 
 
 @dataclass(frozen=True)
@@ -125,10 +125,11 @@ def _tests_of_rows(headed: HeadedGrid) -> list[TabulatedTest]:
             "its '#' where it has one"
         )
     head = head_of_one_test(grid, headed.whole, headed.known)
-    _refuse_twice(head.entries, grid.header, headed.known)
-    table = table_of(_without_margin(grid, head.entries))
-    table = replace(table, assumptions=(*head.assumptions, *footers), sources=tuple(head.sources))
-    return _rows_by_test(table, {**grid.header, **head.entries}, headed.known)
+    refuse_twice(head.entries, grid.header, headed.known)
+    table = without_clocks(table_of(_without_margin(grid, head.entries)), headed.known)
+    table = replace(table, assumptions=(*table.assumptions, *head.assumptions, *footers), sources=tuple(head.sources))
+    table = with_groups(without_remarks(table, head.entries), headed.known)
+    return rows_by_test(table, {**grid.header, **head.entries}, headed.known)
 
 
 LAYOUTS: Sequence[Layout] = (
@@ -168,13 +169,6 @@ def _with_comments(grid: CellGrid, names_line: int, known: KnownNames) -> CellGr
         if line < names_line:
             header[key] = entry
     return replace(grid, header=header)
-
-
-def _refuse_twice(entries: Mapping[str, SourceText], header: Mapping[str, SourceText], known: KnownNames) -> None:
-    given = {known.condition(key) for key in header}
-    for key, entry in entries.items():
-        if key in given:
-            raise HistoryError(f"{entry.location}: '{key}' was already given; keep one of them")
 
 
 def _one_time_in_two_units(cells: Sequence[str], times: Sequence[int]) -> bool:
@@ -218,6 +212,12 @@ def _columns_beside(headed: HeadedGrid, time: int) -> list[TestColumns]:
             continue
         test, column = test_and_column(cell, known)
         if not known.quantity(column):
+            strain_unit = split_written_name(cell)[1]
+            if stated is None and unit_suffix(strain_unit) in STRAIN.units and headed.head.rows:
+                results.append(
+                    TestColumns(split_written_name(cell)[0], {time: names[time], k: f"strain ({strain_unit})"})
+                )
+                continue
             if stated is None and not of_conditions:
                 raise HistoryError(
                     f"{place}: the column '{quoted(cell)}' does not say what it holds; write '# columns: strain_pct' "
@@ -226,9 +226,10 @@ def _columns_beside(headed: HeadedGrid, time: int) -> list[TestColumns]:
             written = headed.head.written[k]
             test, column = written, stated.text if stated else f"strain{cell.removeprefix(written)}"
         results.append(TestColumns(test, {time: names[time], k: column}))
-    if not headed.head.rows and all(one.test.isdigit() for one in results):
+    beside = [[cell for k, cell in enumerate(row.cells) if cell and k > time] for row in headed.head.rows]
+    if all(one.test.isdigit() for one in results) and not any(len(set(cells)) > 1 for cells in beside):
         raise HistoryError(
-            f"{place}: several columns of one quantity, and no conditions above them, may be tests or sensors of one "
+            f"{place}: several columns of one quantity, and no conditions above each, may be tests or sensors of one "
             "test; name the tests, such as 'A1 strain (%)', or keep one column, with '# ignore: NAME' for the others"
         )
     return results
@@ -276,7 +277,7 @@ def _tests_of_blocks(headed: HeadedGrid, tests: Sequence[TestColumns], key_colum
         entries = dict(head.entries)
         for quantity, text in conditions_of_head(test.test, known):
             entries[quantity] = SourceText(text, place, grid.dialect.decimal, test.test)
-        _refuse_twice(entries, header, known)
+        refuse_twice(entries, header, known)
         written = entries.pop("name", None)
         measured = [entry.text for key, entry in entries.items() if entry.key in known.conditions.kinds]
         name = test.test or (written.text if written else " ".join(measured) or str(number))
@@ -361,64 +362,12 @@ def _without_footers(grid: CellGrid) -> tuple[CellGrid, tuple[str, ...]]:
 
 
 def _is_remark(row: TableRow, grid: CellGrid) -> bool:
-    """Whether a row holds one cell of several words, or `End`, and no digit; `nan` and the like are lost numbers."""
+    """Whether a row holds one cell of several words, none of them first a number, or `End`; `nan` is a lost number."""
     cells = [cell for cell in row.cells if cell]
     if grid.dialect.delimiter == " ":
         cells = [" ".join(cells)]
-    if len(cells) != 1 or any(character.isdigit() for character in cells[0]):
+    if len(cells) != 1 or not cells[0].lstrip("(*#- ")[:1].isalpha():
         return False
     words = cells[0].lower().strip(".:*-= ").split()
     lost = {"nan", "inf", "na", "n/a", "-", "--", "none", "null", "-nan", "-inf"}
     return (len(words) > 1 and not lost.intersection(words)) or words in (["end"], ["eof"])
-
-
-def _rows_by_test(table: TextTable, entries: Mapping[str, SourceText], known: KnownNames) -> list[TabulatedTest]:
-    """The tests of a table in which a column of names tells them apart; columns of words state conditions of a test."""
-    foreign = [
-        k for k, column in enumerate(table.columns) if column not in known.declared and not known.quantity(column)
-    ]
-    keys = [k for k in foreign if words_of(table.columns[k]) in TEST_NAME_COLUMNS]
-    if not foreign:
-        return [TabulatedTest("", entries, table)]
-
-    def check(row: TableRow) -> None:
-        if not row.cells[keys[0]]:
-            column = table.columns[keys[0]]
-            raise HistoryError(f"{table.location(row.line)}: the row names no test; fill the column '{column}'")
-
-    groups = grouped(table.rows, keys[0], check) if keys else {"": table.rows}
-    tests = []
-    for name, rows in groups.items():
-        stated = [k for k in foreign if k not in keys[:1] and _states_condition(table, k, rows, known)]
-        own = _entries_of_columns(table, stated, rows[0], known)
-        _refuse_twice(own, entries, known)
-        kept = [k for k in range(len(table.columns)) if k not in (*stated, *keys[:1])]
-        cut = with_columns(rows, kept)
-        empty = [
-            table.columns[k] for k in stated if is_missing(rows[0].cells[k]) and known.is_condition(table.columns[k])
-        ]
-        assumptions = (*table.assumptions, *map(unknown_text, empty))
-        part = replace(table, columns=[table.columns[k] for k in kept], rows=cut, assumptions=assumptions)
-        tests.append(TabulatedTest(name, {**entries, **own}, part))
-    return tests
-
-
-def _states_condition(table: TextTable, column: int, rows: Sequence[TableRow], known: KnownNames) -> bool:
-    """Whether a column holds one condition, or one text, in all rows of a test."""
-    cells = cells_of(rows, column)
-    first = next(cells)
-    if any(cell != first for cell in cells):
-        return False
-    return not is_number(first, table.dialect) or known.is_condition(table.columns[column])
-
-
-def _entries_of_columns(
-    table: TextTable, columns: Sequence[int], row: TableRow, known: KnownNames
-) -> dict[str, SourceText]:
-    entries = {}
-    for k in columns:
-        name = table.columns[k]
-        key = known.condition(name) if known.is_condition(name) else f"label {name}"
-        if not is_missing(row.cells[k]):
-            entries[key] = SourceText(row.cells[k], table.location(row.line), table.dialect.decimal, name)
-    return entries

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from pathlib import Path
-from typing import Unpack
+from typing import Any
 
 from creepkit.arrays import ArrayLike
 from creepkit.cameras import reading as camera_reading
@@ -12,6 +12,7 @@ from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import CreepkitError
 from creepkit.instruments import reading as instrument_files
 from creepkit.instruments.reading_options import RecordOptions
+from creepkit.options import takes_options
 from creepkit.readers import reading
 from creepkit.records import Frames, History, InstrumentRecord
 from creepkit.registry.plugin_registry import default_registry
@@ -72,16 +73,17 @@ def frame_files(path: camera_reading.FramePath, format: camera_reading.FormatLik
     return camera_reading.frame_files(path, formats, format)
 
 
-@checked_with_own_words("format", "path", "missing", "options")
-def read_record(path: str | Path, format: str | None = None, **options: Unpack[RecordOptions]) -> InstrumentRecord:
+@takes_options(RecordOptions)
+@checked_with_own_words("format", "path", "options")
+def read_record(path: str | Path, format: str | None = None, **options: Any) -> InstrumentRecord:
     """Read the record of an instrument: channels of pressure, temperature and others over one clock.
 
     format : name of one of `available("instruments")`; by default the one whose columns are there.
     time="", date="" : names of their columns, where they are not called so. time_unit="" : "s", "ms", "min", "h", of
-    times without a unit. date_order="" : "month first", "day first" or "year first". time_zone="" : such as
+    times without a unit. date_order=None : "month first", "day first" or "year first". time_zone="" : such as
     "America/Chicago" or "+01:00". channels=None : names of those that are kept; all by default. every=1 : rows that are
-    averaged to one. units={} : {channel: unit} of heads without one. pressure_reference="" : "gauge" or "absolute", of
-    pressures whose unit does not say. ambient_pressure=None : MPa, to be taken off absolute pressures. missing=() :
+    averaged to one. units={} : {channel: unit} of heads without one. pressure_reference=None : "gauge" or "absolute",
+    of pressures whose unit does not say. ambient_pressure=None : MPa, to be taken off absolute pressures. missing=() :
     texts in the place of a reading, beside the usual ones.
     """
     formats = [entry.value for entry in default_registry().instruments().values()]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -85,30 +85,25 @@ def _written_out(value: float, digits: int, number: NumberText) -> str:
 
 
 def key_figures(fit: Identification) -> list[KeyFigure]:
-    """Stress exponent, activation energy and creep rate at the tests; of a rejected law those that were measured."""
-    return [*_exponents(fit), *_of_the_law(fit)]
-
-
-def _exponents(fit: Identification) -> Iterator[KeyFigure]:
-    """The apparent stress exponent of the minimum rates that tests show, beside that of the law for the same tests."""
+    """Stress exponent, activation energy and creep rate at the tests; of a rejected law what was measured."""
     rates = compared_minimum_rates(fit)
     measured, predicted = exponents(rates) if rates else (math.nan, math.nan)
-    if math.isfinite(measured):
-        by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
-        yield KeyFigure("stress exponent of measured minimum rates", _range(fit), measured, remark=by_law)
-
-
-def _of_the_law(fit: Identification) -> Iterator[KeyFigure]:
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
-        return
+        if not math.isfinite(measured):
+            return []
+        by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
+        return [KeyFigure("stress exponent of measured minimum rates", _range(fit), measured, remark=by_law)]
     r = fit.reference
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}"
     rate, exponent = rate_and_exponent(fit)
-    yield _with_interval("stress exponent", at, exponent)
+    by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
+    figures = [replace(_with_interval("stress exponent", at, exponent), remark=by_tests)]
     low, high = fit.ranges["temperature"]
     if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
-        yield _with_interval("activation energy", at, fit.activation_energy(), 1e-3, "kJ/mol")
-    yield _with_interval("creep rate", at, rate, 100.0 * SECONDS_PER_HOUR, "%/h")
+        figures.append(_with_interval("activation energy", at, fit.activation_energy(), 1e-3, "kJ/mol"))
+    rate_figure = _with_interval("creep rate", at, rate, 100.0 * SECONDS_PER_HOUR, "%/h")
+    included = any(one.included for one in fit.unmodelled)
+    return [*figures, replace(rate_figure, remark="usual errors of tests included") if included else rate_figure]
 
 
 def _with_interval(name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "") -> KeyFigure:
@@ -217,8 +212,9 @@ def _precision(fit: Identification) -> Iterator[str]:
         yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
     change = combined_change_text(fit.unmodelled)
     if change:
-        kinds = " and ".join(dict.fromkeys(f"{one.kind} ({one.amount})" for one in fit.unmodelled[:2]))
-        yield f"intervals do not include usual errors of {kinds}, which move rates by {change}"
+        beyond = [one for one in fit.unmodelled if not one.included]
+        kinds = " and ".join(dict.fromkeys(one.description for one in beyond[:2]))
+        yield f"intervals do not include {kinds}: rates move by {change}"
 
 
 def fit_exponent(fit: Identification) -> float:

@@ -98,6 +98,9 @@ def _draw_maps(figure: Any, axes: Any, e: Extraction, shown: tuple[FieldMap, ...
             panel.plot(0.0, 0.0, "+", color="r", ms=6)
             panel.set_aspect("equal")
             panel.tick_params(labelsize=6)
+            if k:  # as wide as the first
+                panel.set_xticks([])
+                panel.set_yticks([])
             if row == 0:
                 panel.plot(*e.places[e.clamped].T, ",", color="w", alpha=0.8)
                 for radius in e.region.held:

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.records import output_unit
-from creepkit.records.units import hours_number
+from creepkit.records.units import celsius_text, hours_number
 from creepkit.reports.load_programs import kind_of_test
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
     from creepkit.forecasts.measured_test import ExplainedNuisance, TestScore
     from creepkit.forecasts.results import OutputForecast, TestForecast, TimeForecast
+    from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 
 SHOWN_SHARE = 0.02
 """Of the variance: smaller parts of a band are not named."""
@@ -27,7 +28,7 @@ def forecast_text(forecast: Forecast) -> str:
     names += f" ({forecast.left_out} more of too little weight)" if forecast.left_out else ""
     lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests, if {right_law(forecast)}"]
     if forecast.rejected:
-        lines.append("the tests contradict the law: bands and intervals do not have this probability")
+        lines.append("the tests contradict the law: bands and intervals are wider by what it misses of their rates")
     for test in forecast.tests:
         lines += ["", *_test_lines(test)]
     return "\n".join(lines)
@@ -42,6 +43,7 @@ def _test_lines(test: TestForecast) -> list[str]:
     lines = [f"{test.name}: {kind_of_test(test.history)}, {test.history.condition}"]
     lines += [f"  {_end_text(one)}" for one in test.outputs.values()]
     lines += [f"  {_time_text(one, float(test.history.times[-1]))}" for one in test.times]
+    lines += [f"  {misfit_sentence(test.misfit)}"] if test.misfit is not None else []
     lines += [f"  {test.caution}"] if test.caution else []
     if test.score is not None:
         lines += [f"  {line}" for line in score_lines(test.score)]
@@ -51,6 +53,16 @@ def _test_lines(test: TestForecast) -> list[str]:
         lines.append(f"  shares of the variance at its end, to first order: {parts}")
     lines += [f"  {test.extrapolation}"] if test.extrapolation else []
     return [*lines, *(f"  note: {note}" for note in test.notes)]
+
+
+def misfit_sentence(misfit: LawMisfit) -> str:
+    """By which factor the law misses the tests nearest to a forecast, and what that widens it by."""
+    factor = math.exp(abs(misfit.log_factor))
+    where = f"{misfit.stress:.4g} MPa and {celsius_text(misfit.temperature, digits=0)}"
+    return (
+        f"the law misses the rate of the tests nearest to it, at {where}, by a factor of {factor:.3g} when the others "
+        f"predict it; what it misses here is in the intervals, as a factor of {misfit.factor:.3g} on the rate"
+    )
 
 
 def _end_text(one: OutputForecast) -> str:

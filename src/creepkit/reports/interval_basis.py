@@ -18,7 +18,26 @@ def interval_basis(fit: Identification) -> list[str]:
     """
     rejected = fit.adequacy is not None and fit.adequacy.rejects
     conditional = "" if rejected else constant_load_sentence(fit)
-    return [_weights(fit.settings), *([conditional] if conditional else [])]
+    return [_usual_errors(fit, rejected=rejected), _weights(fit.settings), *([conditional] if conditional else [])]
+
+
+def _usual_errors(fit: Identification, *, rejected: bool) -> str:
+    """Which errors of tests the intervals include, of which size, and how wide they are without."""
+    included = {one.kind: one.amount for one in fit.unmodelled if one.included}
+    if not included:
+        return "the intervals take the temperatures, loads and dimensions of the tests as exactly known"
+    errors = ", ".join(f"{kind} {amount}" for kind, amount in included.items())
+    begin = f"the intervals include errors of the tests that nobody measured (one standard deviation: {errors})"
+    if rejected or not fit.estimates:
+        return begin
+    stress = fit.reference.stress
+    with_errors, without = (
+        float(one.rate(stress, warn=False)[2] / one.rate(stress, warn=False)[0]) for one in (fit, fit.by_tests_alone)
+    )
+    return (
+        f"{begin}: the rate amid the tests is known to a factor of {with_errors:.3g}, and if all of these were exact "
+        f'(usual_errors="none") to {without:.3g}'
+    )
 
 
 def _weights(settings: IdentificationSettings) -> str:

@@ -43,7 +43,7 @@ EMPTY_HEADS = (
 """Of a table that is to be filled in."""
 
 
-TOLERANCE_WORDS = ("tolerance", "sd", "uncertainty", "toleranz", "unsicherheit")
+TOLERANCE_WORDS = ("tolerance", "tol", "sd", "uncertainty", "toleranz", "unsicherheit")
 """Behind the name of a length."""
 
 
@@ -83,25 +83,38 @@ class AlloyTable:
     path: Path
     rows: tuple[Dimple, ...]
 
-    def of_camera(self, camera: str) -> dict[str, Dimple]:
-        """{dimple: its row} of one camera; rows that name none are of every camera."""
-        return {one.name: one for one in self.rows if one.camera in ("", camera)}
+    def of_camera(self, camera: str, dimples: Sequence[str]) -> dict[str, Dimple]:
+        """{dimple: its row} of these of one camera; rows that name no camera are of every one, or name it in front."""
+        rows = {}
+        for row in self.rows:
+            for name in dimples:
+                known_by = (name,) if row.camera else (name, f"{camera} {name}")
+                if _same(row.camera or camera, camera) and any(_same(row.name, one) for one in known_by):
+                    rows[name] = row
+        return rows
 
     def check(self, camera: str, dimples: Sequence[str], cameras: Sequence[str]) -> None:
         """HistoryError for dimples of a camera without a row, and for rows of what it does not show."""
+        rows = self.of_camera(camera, dimples)
         for row in self.rows:
-            if row.camera and row.camera not in cameras:
+            if row.camera and not any(_same(row.camera, one) for one in cameras):
                 raise HistoryError(f"{row.place}: there is no camera '{row.camera}'; {nearest(row.camera, cameras)}")
-            if row.camera in ("", camera) and row.name not in dimples and (row.camera or len(cameras) == 1):
+            is_own = _same(row.camera, camera) or (not row.camera and len(cameras) == 1)
+            if is_own and row not in rows.values():
                 shown = f"it shows {', '.join(dimples[:30])}"
                 raise HistoryError(f"{row.place}: camera '{camera}' shows no dimple '{row.name}'; {shown}")
-        rows = self.of_camera(camera)
         lacking = [name for name in dimples if name not in rows]
         if lacking:
             raise HistoryError(
                 f"{self.path}: has no row of {', '.join(lacking[:30])} of camera '{camera}'; write one for each, with "
                 "a word under exclude for those that do not count"
             )
+
+
+def _same(first: str, second: str) -> bool:
+    """Whether two names are the same but for capitals and blanks; a number alone is that of D1, D2, ..."""
+    one, other = ("".join(name.split()).casefold() for name in (first, second))
+    return one == other or (one.isdecimal() and other == f"d{int(one)}")
 
 
 def read_alloy_table(path: Path, specimen: Specimen) -> AlloyTable:

@@ -22,6 +22,7 @@ from creepkit.extraction.temperature_fields import IMAGE_FILE, InfraredCamera, I
 from creepkit.files.record_codec import record_to_json
 from creepkit.forecasts.planned_tests import stepped_load
 from creepkit.instruments.imposed import Imposed
+from creepkit.instruments.reading_options import RecordOptions
 from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.options import values_of_table
 from creepkit.records import (
@@ -41,7 +42,7 @@ from creepkit.studies.alloy_table import AlloyTable, Dimple, read_alloy_table
 from creepkit.studies.inputs import InputFile
 from creepkit.studies.stage import Results, Stage, Tick
 from creepkit.studies.study_file import KeyPath, StudyFile
-from creepkit.studies.tables import CameraTable, RecordTable
+from creepkit.studies.tables import CameraTable
 
 MOST_REASON = 300
 """Characters of a reason for which frames were flagged."""
@@ -331,7 +332,7 @@ class StudyCamera:
         record = self.file.model.record[index]
 
         def make(results: Results, tick: Tick) -> ImposedOnTests:
-            read = ck.read_record(path, record.format, **_record_options(record))
+            read = ck.read_record(path, record.format, **values_of_table(RecordOptions, record))
             places = {name: (x, y) for name, (x, y) in part.thermocouples_mm.items()}
             known, failed = ImposedChannels(part.channels, places, self.infrared), dict[str, str]()
             tests: tuple[Extraction, ...] = results[self.name].tests
@@ -369,8 +370,7 @@ class StudyCamera:
             if stage in results
             for piece, reason in results[stage].failed.items()
         }
-        rows = {} if self.alloys is None else self.alloys.of_camera(self.label)
-        reasons |= {piece: row.excluded for piece, row in rows.items() if row.excluded and self.name in results}
+        reasons |= {piece: row.excluded for piece, row in self._rows(results).items() if row.excluded}
         return [Exclusion(f"{self.label} {piece}", (), reason[:MOST_REASON]) for piece, reason in reasons.items()]
 
     def histories(self, results: Any) -> list[History]:
@@ -380,21 +380,30 @@ class StudyCamera:
             for name, one, under in self.tests(results)
             if under is not None or self.record_number is None
         ]
-        rows: Mapping[str, Dimple] = {}
+        rows = self._rows(results)
         if self.alloys is not None and self.name in results:
-            rows = self.alloys.of_camera(self.label)
-            shown = [*(one.name for one in results[self.name].tests), *results[self.name].failed]
             with self.file.at("alloys", "file"):
-                self.alloys.check(self.label, shown, [one.label for one in self._all])
+                self.alloys.check(self.label, self._shown(results), [one.label for one in self._all])
         with self.file.at(*self.key()):
             kept = [test for test in tests if (row := rows.get(test[1].name)) is None or not row.excluded]
-            return [self._history(name, one, under, rows.get(one.name)) for name, one, under in kept]
+            several = len(rows) > 1
+            return [self._history(name, one, under, rows.get(one.name), several) for name, one, under in kept]
+
+    def _shown(self, results: Any) -> list[str]:
+        """The test pieces in its field of view."""
+        return [*(one.name for one in results[self.name].tests), *results[self.name].failed]
+
+    def _rows(self, results: Any) -> Mapping[str, Dimple]:
+        """{test piece: its row in the table of alloys}."""
+        if self.alloys is None or self.name not in results:
+            return {}
+        return self.alloys.of_camera(self.label, self._shown(results))
 
     @property
     def _all(self) -> list[StudyCamera]:
         return [StudyCamera(self.file, k) for k in range(len(self.file.model.camera))]
 
-    def _history(self, name: str, one: Extraction, under: Imposed | None, row: Dimple | None) -> History:
+    def _history(self, name: str, one: Extraction, under: Imposed | None, row: Dimple | None, several: bool) -> History:
         part, stated = self.part, self.stated_loading
         row = row or Dimple("", self.label, one.name)
         if stated is None:
@@ -410,7 +419,6 @@ class StudyCamera:
             history = one.history_under(loading, kelvin)
             history = history.replace(labels={**history.labels, **labels})
         modulus = row.modulus or (None if part.modulus_GPa is None else 1e3 * part.modulus_GPa)
-        several = self.alloys is not None and len(self.alloys.of_camera(self.label)) > 1
         alloy = row.alloy or part.alloy or (name if several else "")
         assumed = "an alloy of its own, for the table of alloys names none" if several and alloy == name else ""
         labels = {**history.labels, **part.labels, **row.labels}
@@ -427,11 +435,12 @@ class StudyCamera:
 
     def priors(self, histories: Sequence[History]) -> list[Nuisance]:
         """What is known of single test pieces but for an error: their lengths and their temperatures."""
-        rows = {} if self.alloys is None else self.alloys.of_camera(self.label)
         found = []
+        places = {history.name: history.labels.get("place", "") for history in histories}
+        rows = {} if self.alloys is None else self.alloys.of_camera(self.label, list(places.values()))
         for history in histories:
-            row = rows.get(history.labels.get("place", ""))
-            if row is not None and history.name == f"{self.label} {row.name}":
+            row = rows.get(places[history.name])
+            if row is not None and history.name == f"{self.label} {places[history.name]}":
                 kinds = {one.name: one.alias or one.name for one in dimensions_of(self.specimen)}
                 found += [Nuisance(kinds[name], sd=sd, tests=(history.name,)) for name, sd in row.tolerances.items()]
             if "temperature_sd_K" in history.labels and history.name.startswith(f"{self.label} "):
@@ -476,12 +485,6 @@ def _numbers_of_records(imposed: ImposedOnTests) -> dict[str, Any]:
             for one in imposed.tests
         },
     }
-
-
-def _record_options(record: RecordTable) -> Any:
-    options = record.model_dump(exclude={"name", "file", "format", "pressure_reference", "ambient_pressure_MPa"})
-    reference, ambient = record.pressure_reference or "", record.ambient_pressure_MPa
-    return {**options, "pressure_reference": reference, "ambient_pressure": ambient}
 
 
 def _without_folders(extraction: Extraction, folder: Path) -> Extraction:

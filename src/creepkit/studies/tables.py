@@ -16,9 +16,10 @@ from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.experiments.design_options import GoalOptions
 from creepkit.experiments.rig import Rig
 from creepkit.extraction.options import ClockOptions, ExtractionOptions
+from creepkit.instruments.reading_options import RecordOptions
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.search_options import SearchOptions
-from creepkit.inverse.settings import IdentificationSettings, OutputWeights
+from creepkit.inverse.settings import IdentificationSettings, OutputWeights, UsualErrors
 from creepkit.options import Options, table_of
 from creepkit.rupture_assessment.assessment import RuptureQuestion, RuptureSettings
 
@@ -86,11 +87,11 @@ def _label_values(value: Any) -> Any:
 
 
 def _output_weights(value: Any) -> Any:
-    """A word, or weights by output."""
+    """A word, or numbers by name."""
     numbers = isinstance(value, dict) and all(_is_number(one) for one in value.values())
     if isinstance(value, str) or (value and numbers):
         return value
-    raise PydanticCustomError("misfit", "must be a word such as noise, or numbers by output such as { strain = 1 }")
+    raise PydanticCustomError("misfit", "must be a word such as noise, or numbers by name such as { strain = 1 }")
 
 
 def _channels(value: Any) -> Any:
@@ -111,6 +112,7 @@ TYPES: dict[Any, Any] = {
     tuple[str, ...]: OneOrMore,
     tuple[tuple[float, ...], ...]: Annotated[list[Bounds], Field(max_length=MOST_ITEMS)],
     OutputWeights: Annotated[Any, BeforeValidator(_output_weights)],
+    UsualErrors: Annotated[Any, BeforeValidator(_output_weights)],
 }
 """{type of an option: that of its key}, where it is another one in TOML."""
 
@@ -147,7 +149,7 @@ class DataTable(TableModel):
     citation: Annotated[Texts, BeforeValidator(_one_or_more)] = []
 
 
-class RecordTable(TableModel):
+class RecordTable(_keys(RecordOptions), TableModel):  # type: ignore[misc]
     """[[record]]: what an instrument recorded of loads and temperatures, and what its file does not say, as in
     ck.read_record.
     """
@@ -155,16 +157,6 @@ class RecordTable(TableModel):
     name: Text
     file: Text
     format: Text | None = None
-    time: Text = ""
-    date: Text = ""
-    time_unit: Text = ""
-    date_order: Text = ""
-    time_zone: Text = ""
-    every: Annotated[int, Field(ge=1, le=100_000)] = 1
-    units: dict[Text, Text] = {}
-    pressure_reference: Literal["gauge", "absolute"] | None = None
-    ambient_pressure_MPa: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
-    missing: Texts = []
 
 
 class AlloysTable(TableModel):

@@ -81,7 +81,7 @@ REFUSED = {
     "--interval-s -1": "--interval-s is -1.0; allowed are numbers above 0 up to",
     "--specimen uniaxial": "specimen 'uniaxial' does not say how cameras see its surface",
     "--plot sheet.txt": "'.txt' is no format of pictures",
-    "--lag 5": "are about the clock of a record; give --record FILE",
+    "--lag 5": "--lag says something of a record; give --record FILE",
     "--names D1,D1": "names D1, D1: stand there twice",
     "": "their files hold no times; give times, a file with a row for each of the 20 frames",
 }

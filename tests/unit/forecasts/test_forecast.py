@@ -37,7 +37,7 @@ def tests():
 @pytest.fixture(scope="module")
 def fit(tests):
     nuisances = [ck.Nuisance("rate", sd=SCATTER)]
-    return ck.identify("norton", tests, using=BAR, starts=2, nuisances=nuisances)
+    return ck.identify("norton", tests, using=BAR, starts=2, nuisances=nuisances, usual_errors="none")
 
 
 def test_the_band_of_a_planned_bar_is_that_of_a_linear_regression(fit, tests):
@@ -70,7 +70,7 @@ def test_a_factor_on_all_rates_is_followed_by_laws_without_a_coefficient_of_thei
         references=["none"],
     )
     made = [bar(f"bar {k}", s, seed=k) for k, s in enumerate([70, 85, 100, 120])]
-    fit = ck.identify(law, made, using=BAR, starts=2, nuisances=[ck.Nuisance("rate", sd=SCATTER)])
+    fit = ck.identify(law, made, using=BAR, starts=2, usual_errors="none", nuisances=[ck.Nuisance("rate", sd=SCATTER)])
     strain = fit.forecast(bar("plan", 90.0, noise=0.0), draws=5000).tests[0].outputs["strain"]
     variance = (np.log(strain.band.high[-1] / strain.band.low[-1]) / 2 / norm.ppf(0.975)) ** 2
     assert variance * strain.shares["scatter between tests"][-1] == pytest.approx(SCATTER**2, rel=0.15)
@@ -153,7 +153,7 @@ def test_a_known_heat_or_laboratory_narrows_the_band(label):
         for heat, effect in heats.items()
         for k in range(4)
     ]
-    fit = ck.identify("norton", made, using=BAR, starts=2)
+    fit = ck.identify("norton", made, using=BAR, starts=2, usual_errors="none")
     plans = [bar(h, 95.0, noise=0.0, labels={label: h}) for h in ("a", "b", "new")]
     a, b, new = (t.times[0] for t in fit.forecast(plans).tests)
     assert b.median / a.median == pytest.approx(np.exp(0.8), rel=0.1)
@@ -169,7 +169,7 @@ def test_a_known_heat_is_where_its_tests_were_and_departures_are_judged_by_its_o
         for heat, effect in {"a": 0.5, "b": -0.5, "c": 0.2}.items()
         for k in range(5)
     ]
-    fit = ck.identify("norton", made, using=BAR, starts=2)
+    fit = ck.identify("norton", made, using=BAR, starts=2, usual_errors="none")
     usual, far = (
         fit.forecast(bar("x", 95.0, np.exp(0.5 + b), seed=9, labels={"heat": "a"})).tests[0] for b in (0.0, 0.25)
     )
@@ -191,7 +191,7 @@ def test_what_tests_share_is_at_its_estimate_in_forecast_and_score():
         bar(f"bar {k}", s, np.exp(shift + rng.normal(0, 0.02)), seed=k) for k, s in enumerate([80, 90, 100, 110, 120])
     ]
     nuisances = [ck.Nuisance("rate"), ck.Nuisance("temperature", scope="all", sd=10.0)]
-    fit = ck.identify(law, made, using=BAR, starts=1, nuisances=nuisances)
+    fit = ck.identify(law, made, using=BAR, starts=1, nuisances=nuisances, usual_errors="none")
     one = fit.forecast(bar("new", 95.0, np.exp(shift), seed=9)).tests[0]
     assert one.score.inside["strain"] > 0.9
     assert one.score.p_value > 0.01

@@ -155,7 +155,7 @@ def test_files_of_several_parts_are_read_as_one(tmp_path: Path, monkeypatch: pyt
         ("time,p_bar\n10:00:00,1\n9:00:00,2\n", {}, ":3: time falls by 3600 s"),
         ("time,p_bar\n10:00:00,1\n10:61:00,2\n", {}, ":3, column 1: time is '10:61:00'"),
         ("time_s,p_bar,p_bar\n1,1,2\n", {}, ":1: the channel 'p' stands there twice"),
-        ("time_s,p_bar\n0,1\n", {"chanels": ["p"]}, "no option 'chanels'; did you mean 'channels'"),
+        ("time_s,p_bar\n0,1\n", {"chanels": ["p"]}, "have no 'chanels'; did you mean 'channels'"),
         ("time_s,p_bar\n0,1\n", {"channels": ["q"]}, ":1: there is no channel 'q'; known: p"),
         ("time_s,p_bar\n0,1\n", {"format": "tabel"}, "no instrument format is called 'tabel'; did you mean 'table'"),
         ("time_s,p\nh,bar\n0,1\n1,2\n", {}, ":1: 'time_s' has the unit s, the row of units says h"),

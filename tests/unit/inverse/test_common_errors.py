@@ -7,14 +7,9 @@ import pytest
 
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
-from creepkit.inverse.perturbations import (
-    COMMON_LOAD_ERROR,
-    COMMON_TEMPERATURE_ERROR,
-    USUAL_ACTIVATION_ENERGY,
-    common_errors,
-)
+from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, common_errors
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.settings import USUAL_ERRORS, IdentificationSettings
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance, constant_stress
@@ -47,9 +42,9 @@ def test_temperatures_and_loads_that_are_off_in_all_tests_move_the_rate_as_ident
     tests = planted_at()
     fit = identified(tests, settings=settings)
     stress, T = fit.reference.stress, fit.reference.temperature
-    hotter = [h.replace(temperature=h.temperature + COMMON_TEMPERATURE_ERROR) for h in tests]
+    hotter = [h.replace(temperature=h.temperature + USUAL_ERRORS["temperature"]) for h in tests]
     heavier = [
-        h.replace(loading=constant_stress(h.loading.program().values[0] * (1 + COMMON_LOAD_ERROR), "stress"))
+        h.replace(loading=constant_stress(h.loading.program().values[0] * (1 + USUAL_ERRORS["load"]), "stress"))
         for h in tests
     ]
     for kind, altered in (("temperature", hotter), ("load", heavier)):
@@ -61,18 +56,18 @@ def test_temperatures_and_loads_that_are_off_in_all_tests_move_the_rate_as_ident
 def test_a_law_without_temperature_takes_the_usual_energy_and_says_so():
     tests = planted_at([(60.0, 1020.0), (70.0, 1020.0), (80.0, 1020.0)], NORTON, {"A": 1e-15, "n": 4.0})
     effect = common(identified(tests, NORTON))["temperature"]
-    expected = -USUAL_ACTIVATION_ENERGY / (R * 1020.0**2) * COMMON_TEMPERATURE_ERROR
+    expected = -USUAL_ACTIVATION_ENERGY / (R * 1020.0**2) * USUAL_ERRORS["temperature"]
     assert effect.rate_change == pytest.approx(expected, rel=1e-3)
     assert effect.sentence == (
-        "by -13 % with temperatures 3 K above those stated, in all 3 tests, taking an activation energy of 400 kJ/mol "
-        "(assumed: the law has no temperature)"
+        "by -13 % with temperatures 3 K above those stated, in all 3 tests (4.7 % a kelvin, assumed, as the law has no "
+        "temperature)"
     )
 
 
 def test_a_law_with_temperature_takes_its_own_energy():
     fit = identified(planted_at())
     effect = common(fit)["temperature"]
-    assert effect.activation_energy == pytest.approx(fit.values["Q"], rel=1e-3)
+    assert effect.per_kelvin == pytest.approx(fit.values["Q"] / (R * fit.reference.temperature**2), rel=1e-3)
     assert not effect.assumed
     assert "assumed" not in effect.sentence
 

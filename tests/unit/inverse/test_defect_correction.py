@@ -30,7 +30,7 @@ THETA = NORTON.to_internal(VALUES)[0]
 NOISE = {"amplitude": 2e-3, "width": 2e-2}
 NONE = dict.fromkeys(NOISE, 0.0)
 BARS = planted(NORTON, VALUES, [(s, 1000.0) for s in (50.0, 70.0, 100.0)], seed=0, frames=24)
-SETTINGS = IdentificationSettings(starts=1, sobol_points=8, weights="likelihood", nuisances=())
+SETTINGS = IdentificationSettings(starts=1, sobol_points=8, weights="likelihood", nuisances=(), usual_errors="none")
 EXACT = TwoOutputs()
 
 

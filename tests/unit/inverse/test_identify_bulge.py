@@ -24,7 +24,7 @@ PRESSURES = (8, 10, 8, 9, 11, 8, 7)
 MEAN, SPREAD, OFFSET = 0.4935, 0.02, 0.005
 BOTH = (Nuisance("offset"), Nuisance("rate"))
 THICKNESS = Nuisance("thickness", mean=MEAN, sd=SPREAD)
-QUICK = IdentificationSettings(starts=1, sobol_points=8, frames=20)
+QUICK = IdentificationSettings(starts=1, sobol_points=8, frames=20, usual_errors="none")
 WITH_THICKNESS = replace(QUICK, nuisances=(*BOTH, THICKNESS))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.perturbations import COMMON_MODULUS_ERROR, COMMON_MOTION_ERROR
+from creepkit.inverse.settings import USUAL_ERRORS
 
 E, A, N = 150e3, 2e-8 / 200.0**6, 6.0
 
@@ -35,8 +35,8 @@ def _relaxation(stiffness: float = E) -> list[ck.History]:
 def test_the_rate_moves_as_identifications_with_these_errors_say(share, how, tolerance):
     fit = ck.identify("norton", _relaxation(), starts=1, **how)
     effects = {e.kind: e for e in fit.unmodelled if e.common}
-    stiffer = _relaxation(E * (1 + share * COMMON_MODULUS_ERROR))
-    factor = 1 + share * COMMON_MOTION_ERROR
+    stiffer = _relaxation(E * (1 + share * USUAL_ERRORS["modulus"]))
+    factor = 1 + share * USUAL_ERRORS["motion"]
     strained = [replace(h, loading=ck.constant_strain(h.loading.program().values[-1] * factor)) for h in _relaxation()]
     stress = fit.reference.stress
     for kind, altered in (("modulus", stiffer), ("imposed strain", strained)):

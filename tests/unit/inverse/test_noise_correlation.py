@@ -19,7 +19,9 @@ from helpers.correlated_noise import BARS, LAW, NOISE, PAIR, least_squares, meas
 from helpers.steady_rate_predictor import Steady
 from helpers.two_outputs_predictor import TwoOutputs
 
-SETTINGS = IdentificationSettings(starts=1, sobol_points=8, frames=60, weights="likelihood", nuisances=())
+SETTINGS = IdentificationSettings(
+    starts=1, sobol_points=8, frames=60, weights="likelihood", nuisances=(), usual_errors="none"
+)
 
 
 def exactly_known(problem: LeastSquaresProblem) -> tuple[LeastSquaresProblem, NoiseModel]:

@@ -40,10 +40,9 @@ def test_titles_above_conditions_and_remarks_beside_frames(tmp_path: Path) -> No
     conditions = [["Program Z, 2024"], [], ["Test", "Stress (MPa)", "Temperature (°C)"], ["Z1", 120, 650]]
     frames = [["Test Z1"], ["Time (h)", "Creep strain (%)", "Remark"], [0, 0.0, "start"], [1, 0.01], [5, 0.02]]
     file = workbook(tmp_path / "program.xlsx", {"Summary": conditions, "Z1": frames})
-    (test,) = ck.read_histories(file, ignore=["Remark"])
+    (test,) = ck.read_histories(file)
     assert (test.loading.program().values.tolist(), test.temperature) == ([120.0], 923.15)
-    with pytest.raises(HistoryError, match=r"sheet 'Z1', row 2: column 'Remark' is not understood"):
-        ck.read_histories(file)
+    assert (test.times.size, test.labels["line 3"]) == (3, "start")
 
 
 def test_values_with_units_above_pairs_are_conditions(tmp_path: Path) -> None:
@@ -198,3 +197,51 @@ def test_numbers_that_nothing_names_are_asked_for(tmp_path: Path) -> None:
         with pytest.raises(HistoryError, match="time_h") as caught:
             ck.read_histories(tmp_path / "x.csv")
         assert "ignore" not in str(caught.value)
+
+
+FILES_OF_LABORATORIES = {
+    "German head": ("x.csv", "Versuch;Z1\nTemperatur;600;°C\nSpannung;120;MPa\n\nZeit;Dehnung\nStd.;%\n0;0\n10;0,1\n"),
+    "French head": ("x.csv", "Température (°C);600\nContrainte (MPa);120\nTemps (h);Déformation (%)\n0;0\n10;0,1\n"),
+    "US title": ("x.csv", "Temperature 1112 F, stress 17.404528 ksi\nTime, hr;Strain, in/in\n0;0\n10;0.001\n"),
+    "tabs below a title": ("x.txt", "Creep test 12\n120 MPa, 600 °C\nTime (h)\tStrain (%)\n0\t0\n10\t0.1\n"),
+    "symbols": ("x.csv", "T = 600 °C\nσ0 = 120 MPa\nt in h;ε in %\n0;0\n10;0,1\n"),
+    "permille": ("x_600C.csv", "# stress_kg/mm2: 12.2365946\nt (1000 h);eps (mm/m)\n0;0\n0,01;1\n"),
+    "rows of words": ("x_600C_120MPa.csv", "time [h];strain [%];note\n0;0;start\n10;0,1;door\n"),
+    "a note in the margin": ("x_600C_120MPa.csv", "time [h];strain [%]\n0;0\n10;0,1;looks odd\n"),
+    "two values in one head": (
+        "x.csv",
+        "A;;B;\n120 MPa 600 °C;;140 MPa 600 °C;\ntime/h;strain/%;time/h;strain/%\n0;0;0;0\n10;0,1;9;2\n",
+    ),
+    "names of curves": (
+        "x.csv",
+        "Temperature (°C);600;\nStress (MPa);120;140\nTime (h);e1 (%);e2 (%)\n0;0;0\n10;0,1;0,2\n",
+    ),
+    "groups": ("x.csv", "Stress (MPa);Temp (°C);Time (h);Strain (%)\n120;600;0;0\n;;10;0,1\n140;600;0;0\n;;10;0,3\n"),
+    "groups by name": (
+        "x.csv",
+        "Sample;Stress (MPa);T_C;time_h;strain_pct\nA;120;600;0;0\n;;;10;0,1\nB;140;;0;0\n;;;10;0,3\n",
+    ),
+    "load on a bar": (
+        "x.csv",
+        "d0 = 8 mm\nL0 = 40 mm\nT = 600 °C\nF = 6.0318579 kN\nTime (h);Extension (mm)\n0;0\n10;0.04\n",
+    ),
+    "kilograms": ("x_600C.csv", "Diameter (mm);8\nTime (h);Load (kg);Strain (%)\n0;615.07834;0\n10;615.07834;0.1\n"),
+}
+
+
+@pytest.mark.parametrize("kind", FILES_OF_LABORATORIES)
+def test_files_of_laboratories(tmp_path: Path, kind: str) -> None:
+    """All hold a bar at 600 °C and 120 MPa that crept by 0.1 % in 10 h, the first of two in some."""
+    name, text = FILES_OF_LABORATORIES[kind]
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    test = ck.read_histories(tmp_path / name)[0]
+    assert test.temperature_program().at(np.array([0.0]))[0] == pytest.approx(873.15)
+    assert test.loading.program().at(np.array([0.0]))[0] == pytest.approx(120.0, rel=1e-6)
+    assert (test.times[-1], test.outputs["strain"][-1]) == (pytest.approx(36000.0), pytest.approx(1e-3))
+
+
+def test_sensors_of_one_test_are_no_tests(tmp_path: Path) -> None:
+    head = "Temperature (°C);600\nStress (MPa);100\nGauge length (mm);40\n"
+    (tmp_path / "x.csv").write_text(f"{head}Time (h);Extensometer 1 (mm);Extensometer 2 (mm)\n0;0;0\n1;0.02;0.021\n")
+    with pytest.raises(HistoryError, match="may be tests or sensors of one test"):
+        ck.read_histories(tmp_path / "x.csv")

@@ -106,7 +106,7 @@ def test_a_record_that_is_too_short_is_not_of_the_frames(tmp_path: Path) -> None
     write_times(tmp_path / "times.csv", Schedule(frames=6).times)
     write_record(tmp_path / "long.csv", Schedule(frames=6), 1.0, {"T [C]": 800.0})
     lines = (tmp_path / "long.csv").read_text().splitlines()
-    (tmp_path / "short.csv").write_text("\n".join(lines[:300]) + "\n")
+    (tmp_path / "short.csv").write_text("\n".join(lines[:60]) + "\n")
     _, model = proposed(tmp_path)
     assert model.camera[0].record == "long"
 
@@ -213,3 +213,14 @@ def test_priors_of_the_table_enter_and_rates_of_one_test_do_not(tmp_path: Path) 
     stated = 'nuisances = [{ kind = "rate", sd = 0.2 }, { kind = "thickness", mean_mm = 0.4, sd_mm = 0.1 }]\n'
     kinds = [(n.kind, n.sd) for n in nuisances_of(tmp_path, stated, priors, ["east D1"])]
     assert kinds == [("offset", None), ("rate", 0.2), ("thickness", 0.1)]
+
+
+def test_dimples_are_known_by_number_and_by_their_whole_name(tmp_path: Path) -> None:
+    path = tmp_path / "alloys.csv"
+    path.write_text("dimple,alloy\nWest D1,A\nwest d2,B\neast D1,C\n")
+    rows = read_alloy_table(path, BULGE).of_camera("west", ["D1", "D2"])
+    assert {name: row.alloy for name, row in rows.items()} == {"D1": "A", "D2": "B"}
+    path.write_text("Kamera,Dimple,Alloy\nwest,1,A\nwest,2,B\neast,1,C\n")
+    table = read_alloy_table(path, BULGE)
+    table.check("west", ["D1", "D2"], ["west", "east"])
+    assert table.of_camera("east", ["D1"])["D1"].alloy == "C"

@@ -25,7 +25,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
-from creepkit.inverse.perturbations import with_random_effects, with_unknown_effects
+from creepkit.inverse.perturbations import effect_columns, sizes_of_effect, with_random_effects, with_unknown_effects
 from creepkit.inverse.selection.discrimination import (
     DISTINGUISHABLE_CHI_SQUARE,
     under_common_covariance,
@@ -76,7 +76,7 @@ class Trial:
     def of(cls, fits: Sequence[Identification], effects: tuple[Perturbation, ...], scope: Scope) -> Trial:
         """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
         perturbed = [
-            with_random_effects(p, [e]) if scope == "test" else with_unknown_effects(p, _columns(e, scope))
+            with_random_effects(p, [e]) if scope == "test" else with_unknown_effects(p, effect_columns(e, common=True))
             for p, e in zip(_problems(fits), effects, strict=True)
         ]
         scores, noise_model = _scores(fits, perturbed)
@@ -89,11 +89,9 @@ class Trial:
 
     def sizes(self, fits: Sequence[Identification], law: int) -> Floats:
         """(1,) of all tests or (tests,) sizes of the perturbation by a law, in standard deviations."""
-        linear, columns = fits[law].linearised, _columns(self.effects[law], self.scope)
+        linear = fits[law].linearised
         assert linear is not None
-        linear = with_unknown_effects(linear, columns)
-        factor = CovarianceFactor.of_residuals(linear.residuals, self.noise_model)
-        return linear.solve(factor).step[-columns.shape[-1] :]
+        return sizes_of_effect(linear, self.effects[law], self.noise_model, common=self.scope == "all")
 
     def description(self, fits: Sequence[Identification], law: int) -> str:
         """The perturbation with the size that it has in the linear problem of a law, by its position."""
@@ -118,12 +116,6 @@ def _scores(fits: Sequence[Identification], problems: Sequence[LinearisedProblem
     scores += [log_determinant(new) - log_determinant(old) for new, old in zip(problems, unperturbed, strict=True)]
     frames = effective_sample_size(reference, noise_model)
     return scores + [bic_penalty(len(fit.u), frames) for fit in fits], noise_model
-
-
-def _columns(effect: Perturbation, scope: Scope) -> Floats:
-    """(tests, observations, unknowns) change of the residuals by a perturbation of all tests, or of each test."""
-    column = effect.residual_change[..., None]
-    return column if scope == "all" else column * np.eye(len(column))[:, None, :]
 
 
 def _description(trial: Trial, fit: Identification, law: int, sizes: Floats) -> str:
@@ -220,4 +212,4 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
 def _explains_with(fit: Identification, effect: Perturbation) -> bool:
     """Whether a law explains the tests, with that perturbation where it does not without."""
     adequacy = fit.adequacy
-    return adequacy is not None and (adequacy.explains or effect.description in adequacy.remedies)
+    return adequacy is not None and (adequacy.explains or any(effect.kind in one for one in adequacy.remedies))

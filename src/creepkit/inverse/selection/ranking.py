@@ -293,8 +293,9 @@ def _effective_deviance(fit: Identification, independent_frames: float) -> float
 
 def determined_parameter_count(fit: Identification) -> int:
     """How many parameters the data determine: the others have the variance of their bounds, uncorrelated."""
-    variances = np.diag(fit.covariance)
-    is_uncorrelated = (fit.covariance != 0).sum(axis=1) == 1
+    covariance = fit.by_tests_alone.covariance
+    variances = np.diag(covariance)
+    is_uncorrelated = (covariance != 0).sum(axis=1) == 1
     return int(
         (
             ~(is_uncorrelated & np.isclose(variances, np.ptp(fit.law.internal_bounds, axis=0) ** 2 / 12.0, rtol=1e-6))

@@ -71,8 +71,8 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     if cheaper is not None:
         problem = with_cheaper_predictor(problem, fit.x, search_predictor_of(cheaper))
     posterior = Posterior.from_identification(replace(fit, problem=problem))
-    centre, seed = np.array(fit.u), fit.settings.seed
-    shape = shortened_covariance(posterior, centre, fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance)))
+    centre, seed, covariance = np.array(fit.u), fit.settings.seed, fit.by_tests_alone.covariance
+    shape = shortened_covariance(posterior, centre, covariance + 1e-12 * np.diag(np.diag(covariance)))
     samples = _samples_by_quadratic_residuals(posterior, centre, shape, seed)
     samples = posterior_samples(posterior, centre, shape, seed) if samples is None else samples
     if samples is None:
@@ -81,6 +81,13 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
         )
         return replace(fit, notes=(*fit.notes, f"{note}rates may be too narrow"))
     return replace(fit, samples=samples)
+
+
+def covariance_root(covariance: Floats) -> Floats:
+    """A square root (unknowns, unknowns) of covariance (unknowns, unknowns)."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape: Floats, seed: int) -> Floats | None:

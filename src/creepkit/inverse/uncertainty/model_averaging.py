@@ -151,8 +151,16 @@ class ModelAverage(Presentable, text="reports.uncertainty:model_average_text"):
                 (time, reference.time),
             )
         ]
-        normals = [_normal_under_law(fit, quantity(fit.coordinates, stress, *point)) for fit in self.fits]
+        functions = [quantity(fit.coordinates, stress, *point) for fit in self.fits]
+        normals = [_normal_under_law(fit, function) for fit, function in zip(self.fits, functions, strict=True)]
         location, scale = (np.stack([each[k] for each in normals]) for k in (0, 1))
+        if quantity is log_rate:
+            at = np.asarray(stress, float), np.asarray(point[0], float)
+            misses = [
+                f.misfit_half_widths(g, *at) / interval_quantile(f.freedom)
+                for f, g in zip(self.fits, functions, strict=True)
+            ]
+            scale = np.stack([np.hypot(own, more) for own, more in zip(scale, misses, strict=True)])
         return MixtureDistribution(np.array(self.weights), degrees_of_freedom(self.fits), location, scale)
 
 

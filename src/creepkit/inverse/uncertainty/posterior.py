@@ -45,6 +45,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+TESTS_ALONE = "by the tests alone: their temperatures, loads and dimensions are taken as exactly known"
+"""What is said of intervals that do not include the errors which tests usually have."""
+
+
 REFIT_TOLERANCES = Tolerances(max_steps=25, tolerance=1e-7)
 """Of minima about an optimum that is known."""
 
@@ -350,7 +354,8 @@ def _import_emcee() -> Any:
 
 def _initial_walkers(fit: Identification, posterior: Posterior, walkers: int, rng: np.random.Generator) -> Floats:
     """(walkers, parameters) from Laplace's approximation, drawn again where a bound cuts it, ever closer to the fit."""
-    root = np.linalg.cholesky(fit.covariance + 1e-14 * np.diag(np.diag(fit.covariance)))
+    covariance = fit.by_tests_alone.covariance
+    root = np.linalg.cholesky(covariance + 1e-14 * np.diag(np.diag(covariance)))
     centre = np.clip(fit.u, posterior.lower, posterior.upper)
     starts = np.empty((walkers, fit.u.size))
     missing = np.ones(walkers, bool)
@@ -380,7 +385,7 @@ def _posterior_samples(
     )
     autocorrelation_time = np.where(np.isfinite(autocorrelation_time), np.maximum(autocorrelation_time, 1.0), steps)
     burn_in = int(min(np.ceil(5 * autocorrelation_time.max()), steps // 2))
-    notes = []
+    notes = [] if fit.error_covariance is None else [TESTS_ALONE]
     if steps <= CONVERGED_LENGTH * autocorrelation_time.max():
         notes.append(
             f"not converged: the chain is {steps / autocorrelation_time.max():.0f} autocorrelation times long, "

@@ -33,6 +33,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel, Residuals
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.records import History, Nuisance
 
@@ -82,6 +83,8 @@ class RateScatter:
     log_factor, variance, weight : (tests,) z, var e, and the weight of the test. design : (tests, unknowns) X.
     precision, gradient : (unknowns, unknowns) K and (unknowns,) g.
     known : the standard deviation between tests where it was given, None where it is estimated; 0 for none.
+    stresses, temperatures : (tests,) MPa and K. errors : (unknowns, unknowns) covariance of x by errors common to all
+        tests that nobody modelled, or None; of nuisances none.
     output_scales, output_floors : {output: scale of a linear, floor of a logarithmic transform}, in its unit, in which
         misfit and drift of the noise model are stated.
     """
@@ -96,6 +99,9 @@ class RateScatter:
     gradient: Floats
     common: Mapping[str, str] = field(default_factory=dict)
     known: float | None = None
+    stresses: Floats = field(default_factory=lambda: np.zeros(0))
+    temperatures: Floats = field(default_factory=lambda: np.zeros(0))
+    errors: Floats | None = None
     output_scales: Mapping[str, float] = field(default_factory=dict)
     output_floors: Mapping[str, float] = field(default_factory=dict)
 
@@ -166,7 +172,7 @@ class RateScatter:
         size = self.design.shape[1]
         shift, own = optimum[:size], covariance[:size, :size]
         gain = _scaled_solve(own, covariance[:size, size:]).T if size else np.zeros((len(self.groups), 0))
-        about = own + np.outer(shift, shift)
+        about = own + np.outer(shift, shift) + (0.0 if self.errors is None else self.errors)
         mean = np.concatenate([np.zeros(size), optimum[size:] - gain @ shift])
         cross, effects = about @ gain.T, covariance[size:, size:] + gain @ np.outer(shift, shift) @ gain.T
         return mean, np.block([[about, cross], [cross.T, effects]])
@@ -195,8 +201,11 @@ class RateScatter:
         between = np.einsum("n,ni,nj->ij", posterior.weight, deviation, deviation)
         return mean, np.einsum("n,nij->ij", posterior.weight, covariances) + between
 
-    def new_test(self, history: History) -> NewTest:
-        """Which effects a new test shares with those that were fitted, and which levels it draws anew."""
+    def new_test(self, history: History, misfit: float = 0.0) -> NewTest:
+        """Which effects a new test shares with those that were fitted, and which levels it draws anew.
+
+        misfit : standard deviation of ln of its rate by what the law misses there (see uncertainty.law_misfit).
+        """
         known, unknown = {}, ["test"]
         for level in LEVELS[:-1]:
             name = level_of(history, level)
@@ -212,12 +221,12 @@ class RateScatter:
             and level_of(history, level)
             and self.common.get(level, "") not in ("", level_of(history, level))
         ]
-        return NewTest(known, tuple(unknown), tuple(unseen))
+        return NewTest(known, tuple(unknown), tuple(unseen), misfit)
 
     def own_variance(self, test: NewTest, sd: Floats) -> Floats:
         """(nodes,) variance of ln of what is new in the factor of a test; sd : (nodes, levels)."""
         drawn = sum(sd[:, self.levels.index(level)] ** 2 for level in test.unknown)
-        return np.asarray(drawn + sum(USUAL_SD[level] ** 2 for level in test.unseen))
+        return np.asarray(drawn + sum(USUAL_SD[level] ** 2 for level in test.unseen) + test.misfit**2)
 
 
 @dataclass(frozen=True)
@@ -226,12 +235,13 @@ class NewTest:
 
     known : {level: position of its effect among unknowns and effects} of a heat or laboratory that was fitted.
     unknown : levels that are drawn anew; unseen : levels of which all fitted tests had one other member, so that the
-    scatter is what is usual.
+    scatter is what is usual. misfit : standard deviation of ln of its rate by what the law misses there.
     """
 
     known: Mapping[str, int]
     unknown: tuple[str, ...]
     unseen: tuple[str, ...]
+    misfit: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,12 +272,13 @@ def rate_scatter(
     residuals: Residuals,
     noise_model: NoiseModel,
     test_effects: Sequence[Floats] = (),
+    errors: Floats | None = None,
 ) -> RateScatter:
     """The scatter of rates between tests at an estimate x (unknowns,).
 
     residuals : there, with derivatives to all unknowns. noise_model : of the data. test_effects : (tests, observations)
         each, one standard deviation of what differs between tests beside their rates, such as a thickness within its
-        tolerance.
+        tolerance. errors : (unknowns, unknowns) as RateScatter has them.
     """
     count, nuisances = problem.parameter_count, problem.nuisance_parameters
     prior_precision = np.concatenate([12.0 / problem.bounds.width[:count] ** 2, nuisances.precision])
@@ -282,6 +293,7 @@ def rate_scatter(
     prior_gradient[integrated] = 0.0
     at_prior_means = nuisances.integrate_out(residuals, x[count:])
     observations = problem.observations
+    conditions = np.array([reference_condition(h, problem.predictor) for h in problem.histories])
     transforms = dict(zip(observations.outputs, observations.transforms, strict=True))
     return RateScatter(
         tests=tuple(h.name for h in problem.histories),
@@ -289,6 +301,9 @@ def rate_scatter(
         weight=np.array(residuals.test_weights, float),
         common=_common_members(problem.histories),
         known=_known_sd(problem.settings.nuisances),
+        stresses=conditions[:, 0],
+        temperatures=conditions[:, 1],
+        errors=errors,
         output_scales={n: t.scale for n, t in transforms.items() if isinstance(t, LinearTransform)},
         output_floors={n: t.floor for n, t in transforms.items() if isinstance(t, LogTransform)},
         **_evidence(

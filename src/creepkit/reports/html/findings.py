@@ -183,10 +183,13 @@ def _value_blocks(found: GroupFindings) -> list[Block]:
     elif undetermined:
         blocks += [Paragraph("What these tests do not determine, or poorly, given this law:"), Items(undetermined)]
     blocks += credible_values(found.ranking)
-    unmodelled = [sentence(effect.sentence) for effect in fit.unmodelled]
+    unmodelled = [sentence(effect.sentence) for effect in fit.unmodelled if not effect.included]
     if unmodelled:
-        blocks += [Paragraph(f"{sentence(NOT_INCLUDED)} The rate amid the tests would move:"), Items(unmodelled)]
-    notes = [note for note in fit.notes if not (fit.unmodelled and note.startswith(NOT_INCLUDED))]  # said above
+        blocks += [
+            Paragraph("The intervals do not include what would move the rate amid the tests:"),
+            Items(unmodelled),
+        ]
+    notes = [note for note in fit.notes if not (unmodelled and note.startswith(NOT_INCLUDED))]  # said above
     remarks = list(dict.fromkeys(map(sentence, [*found.remarks, *map(LawNames.of(found.fits).in_text, notes)])))
     return [*blocks, Paragraph("Remarks:"), Items(remarks)] if remarks else blocks
 

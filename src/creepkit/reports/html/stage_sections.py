@@ -249,8 +249,8 @@ def forecast_blocks(
             f"By {laws}: if {right_law(forecast)}, bands and intervals hold a measured value of a single test with a "
             f"probability of {100 * forecast.level:g} %."
             + (
-                " The tests contradict the law, so that the bands do not have this probability: that the form of the "
-                "law is wrong is not in them."
+                " The tests contradict the law: what it misses of their rates is in the bands, and what it misses of "
+                "the shape of their curves only as far as its estimated misfit goes."
                 if forecast.rejected
                 else ""
             )

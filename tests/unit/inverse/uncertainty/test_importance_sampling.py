@@ -22,7 +22,7 @@ from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals
 from creepkit.laws.norton import NORTON
 from helpers.steady_rate_predictor import Steady, planted
 
-SETTINGS = IdentificationSettings(starts=1, sobol_points=8, weights="likelihood", nuisances=())
+SETTINGS = IdentificationSettings(starts=1, sobol_points=8, weights="likelihood", nuisances=(), usual_errors="none")
 A, N = NORTON.params
 BOUNDED = replace(NORTON, params={A: NORTON.params[A], N: replace(NORTON.params[N], bounds=(1.0, 4.0))})
 """Norton's law with n of at most 4."""

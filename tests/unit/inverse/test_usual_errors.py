@@ -1,0 +1,116 @@
+"""Errors that tests usually have, in intervals: against identifications of tests that have them."""
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import FitError
+from creepkit.inverse.identify import identify
+from creepkit.inverse.settings import USUAL_ERRORS, IdentificationSettings
+from creepkit.language import arrhenius
+from creepkit.laws.norton import NORTON
+from creepkit.records import Nuisance, constant_stress
+from helpers.steady_rate_predictor import Steady, planted
+
+AT_TEMPERATURES = NORTON.times(arrhenius(T_ref=1000.0))
+VALUES = {"A": 1e-15, "n": 4.0, "Q": 316e3}
+CONDITIONS = [(60.0, 1000.0), (70.0, 980.0), (80.0, 1000.0), (70.0, 1020.0), (65.0, 1010.0), (75.0, 990.0)]
+SETTINGS = IdentificationSettings(
+    starts=1, sobol_points=8, weights="likelihood", nuisances=(Nuisance("offset"), Nuisance("rate"))
+)
+NORMAL = 1.959964
+
+
+def half_width(fit, quantity="rate"):
+    value, low, high = getattr(fit, quantity)(70.0, 1000.0)
+    assert np.log(high / value) == pytest.approx(np.log(value / low), rel=1e-6)
+    return float(np.log(high / value))
+
+
+def moved(tests, kelvin, share):
+    return [
+        h.replace(
+            temperature=h.temperature + kelvin,
+            loading=constant_stress(h.loading.program().values[0] * (1 + share), "stress"),
+        )
+        for h in tests
+    ]
+
+
+def test_what_is_common_to_all_tests_adds_in_quadrature_and_no_number_of_tests_averages_it_out():
+    """Six tests, and the same twice: what 3 K and 1 % in all of them do to the rate is that of identifications."""
+    tests = planted(AT_TEMPERATURES, VALUES, CONDITIONS, seed=4, rate=0.2, noise=2e-5)
+    fit = identify(AT_TEMPERATURES, tests, Steady(), settings=SETTINGS)
+    shifts = [
+        np.log(identify(AT_TEMPERATURES, moved(tests, *by), Steady(), settings=SETTINGS).rate(70.0, 1000.0)[0])
+        - np.log(fit.rate(70.0, 1000.0)[0])
+        for by in ((USUAL_ERRORS["temperature"], 0.0), (0.0, USUAL_ERRORS["load"]))
+    ]
+    expected = np.hypot(half_width(fit.by_tests_alone), NORMAL * np.linalg.norm(shifts))
+    assert fit.noise_model.rate > 0.13  # more than temperatures and loads off by so much would make
+    assert half_width(fit) == pytest.approx(expected, rel=0.02)
+    again = identify(AT_TEMPERATURES, tests, Steady(), settings=SETTINGS.changed({"usual_errors": "none"}))
+    assert half_width(again) == pytest.approx(half_width(fit.by_tests_alone), rel=1e-9)
+    assert again.values == fit.values
+
+
+def test_a_single_test_is_off_once_and_its_exponent_is_not():
+    """One bar of a law of one stress: 3 K of its 400 kJ/mol and 1 % of its load, nothing twice."""
+    law = NORTON.fix(n=4.0)
+    (test,) = planted(law, {"A": 1e-15}, [(70.0, 1000.0)], seed=1, noise=1e-6)
+    fit = identify(law, [test], Steady(), settings=SETTINGS)
+    by_temperature = USUAL_ERRORS["temperature"] * 400e3 / (8.314462618 * 1000.0**2)
+    added = NORMAL * np.hypot(by_temperature, 4.0 * USUAL_ERRORS["load"])
+    assert half_width(fit) == pytest.approx(np.hypot(half_width(fit.by_tests_alone), added), rel=0.02)
+    (a,) = fit.estimates
+    assert np.log(a.high / a.value) == pytest.approx(half_width(fit), rel=1e-6)
+
+
+def test_intervals_hold_where_every_test_is_off_by_itself():
+    """60 campaigns of five tests whose rates do not scatter otherwise; intervals of tests taken as exact hold too few.
+
+    Half of the campaigns are off alike in all tests. The standard error of a share of 0.95 is 0.03.
+    """
+    inside = {"with": 0, "alone": 0}
+    truth = float(ck.lower(AT_TEMPERATURES, "numpy").rate(VALUES, stress=70.0, temperature=1000.0))
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        tests = []
+        common = rng.standard_normal(2)
+        for k, (stress, T) in enumerate(CONDITIONS[:5]):
+            kelvin, share = (common if seed % 2 else rng.standard_normal(2)) * (3.0, 0.01)
+            true = (stress * (1 + share), T + kelvin)
+            (test,) = planted(AT_TEMPERATURES, VALUES, [true], seed=100 * seed + k, noise=2e-5)
+            stated = {"loading": constant_stress(stress, "stress"), "temperature": T, "name": f"bar {k}"}
+            tests.append(test.replace(**stated))
+        fit = identify(AT_TEMPERATURES, tests, Steady(), settings=SETTINGS.changed({"frames": 15}))
+        for name, one in (("with", fit), ("alone", fit.by_tests_alone)):
+            _, low, high = one.rate(70.0, 1000.0)
+            inside[name] += bool(low <= truth <= high)
+    assert inside["with"] >= 54
+    assert inside["alone"] < 50
+
+
+@pytest.mark.parametrize(
+    ("errors", "message"),
+    [
+        ("all", 'usual_errors is "all"; allowed are usual, none and such as'),
+        ({"temperatures": 3.0}, "usual_errors names 'temperatures'.*temperature"),
+        ({"load": -0.01}, "load is -0.01; give a standard deviation from 0 to 0.3"),
+    ],
+)
+def test_errors_that_are_none_are_refused(errors, message):
+    with pytest.raises(FitError, match=message):
+        IdentificationSettings(usual_errors=errors)
+
+
+def test_lives_hold_them_too():
+    """A bar of a law of rupture: what 3 K in all tests do to the logarithm of its life, in the interval of the law."""
+    tests = planted(AT_TEMPERATURES, VALUES, CONDITIONS, seed=4, rate=0.05, noise=2e-5)
+    fit = identify(AT_TEMPERATURES, tests, Steady(), settings=SETTINGS)
+    (mean, with_errors), (_, alone) = (
+        one.scatter_of_rates.joint(np.array([0.05])) for one in (fit, fit.by_tests_alone)
+    )
+    changes = [e.value_change[0] for e in fit.unmodelled if e.included and e.common]
+    np.testing.assert_allclose(with_errors - alone, sum(np.outer(c, c) for c in changes), rtol=1e-6, atol=1e-12)
+    assert mean.size == 3
