@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 140,
     "modules": 785,
     "quality": 1545,
-    "readers": 6080,
+    "readers": 6095,
     "records": 1985,
     "registry": 620,
     "reports": 8392,
@@ -44,7 +44,7 @@ BUDGET = {
     "sampling": 1070,
     "screening": 740,
     "specimens": 3985,
-    "studies": 3075,
+    "studies": 3076,
     "surrogates": 1790,
     "testing": 1900,
 }
