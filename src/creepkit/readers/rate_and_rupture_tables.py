@@ -149,9 +149,8 @@ class RowPerTestReader:
         measure = _includes_elastic(table.names, keys)
         if measure and "includes_elastic" not in entries:
             entries["includes_elastic"] = SourceText(measure, location)
-        marked = [*((time, strain, 1) for time, strain in frames), *_end_without_reading(entries, frames)]
-        rows = [TableRow(row.line, (repr(time), repr(strain), str(used))) for time, strain, used in marked]
-        text = TextTable(grid.path, {}, ("time_s", "strain_1", "used"), row.line, rows, sheet=grid.sheet)
+        rows = [TableRow(row.line, (repr(time), repr(strain))) for time, strain in frames]
+        text = TextTable(grid.path, {}, ("time_s", "strain_1"), row.line, rows, sheet=grid.sheet)
         return assemble_history(name, entries, text, self.vocabulary, location=location, source=source)
 
     def _with_weak_sources(
@@ -363,17 +362,6 @@ def _strains_reached(cells: Mapping[str, SourceText]) -> tuple[list[tuple[float,
             )
     frames = [(time, strain) for time, strain, _ in reached]
     return ([(0.0, 0.0), *frames] if len(frames) == 1 else frames), others
-
-
-def _end_without_reading(
-    entries: Mapping[str, SourceText], frames: Sequence[tuple[float, float]]
-) -> list[tuple[float, float, int]]:
-    """The end of a test that did not break, after its last frame: a frame that is not used, with the last strain."""
-    key = next((key for key in entries if quantity_of(key) == "end_time"), None)
-    if key is None or "ended" not in entries or entries["ended"].text != STOPPED:
-        return []
-    end = TIME.convert(entries[key].number(entries[key].key or key), unit_of(key), entries[key].location, key)
-    return [(end, frames[-1][1], 0)] if end > frames[-1][0] else []
 
 
 # ---- rows that say nothing -----------------------------------------------------------------------------------------
