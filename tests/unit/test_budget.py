@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35340
+TESTS = 35380
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
