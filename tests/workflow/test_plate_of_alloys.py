@@ -98,16 +98,24 @@ def test_temperatures_of_dimples_between_thermocouples_and_in_the_infrared(lab: 
     one = ck.Study.load(study).run(only="extraction")
     centers = {name: e.center for name, e in one.extractions.items()}
     assert {i.temperature_sd for i in one.imposed.values()} == {0.0}
-    middle, y = np.mean([c[0] for c in centers.values()]), next(iter(centers.values()))[1]
+    x, y = next(iter(centers.values()))
+    where = f'centers_mm = [[{x}, {y}], [{x - 60}, {y}]]\nnames = ["good", "outside"]\n'
+    study.write_text(WEST_ALONE + 'channels = ["P", "TC1"]\n' + where)
+    partly = ck.Study.load(study).run(only="extraction")
+    assert [h.name for h in partly.histories] == ["west good"]
+    ((left_out, reason),) = [(e.test, e.reason) for e in partly.exclusions if not e.frames]
+    assert left_out == "west outside"
+    assert "points of the clamped plate" in reason
+    middle = np.mean([center[0] for center in centers.values()])
     places = f"TC1 = [{middle}, {y}], TC2 = [{middle + 2}, {y}], TC3 = [{middle - 2}, {y}]"  # 800, 801 and 799 C
     study.write_text(WEST_ALONE + f'channels = ["P", "TC1", "TC2", "TC3"]\nthermocouples_mm = {{ {places} }}\n')
     between = ck.Study.load(study).run(only="extraction")
     left, right = (between.imposed[f"west D{k}"] for k in (1, 2))
     assert left.temperature.values.mean() < 1073.15 < right.temperature.values.mean()
     assert left.temperature_sd > 1.0
-    x = middle + 0.5 * (np.arange(161) - 80)
+    columns = middle + 0.5 * (np.arange(161) - 80)
     (lab / "ir").mkdir(exist_ok=True)
-    np.save(lab / "ir" / "image_1.npy", np.tile(800.0 + 0.5 * (x - middle), (81, 1)))
+    np.save(lab / "ir" / "image_1.npy", np.tile(800.0 + 0.5 * (columns - middle), (81, 1)))
     infrared = 'infrared = {{ images = "ir", center_mm = [{}, {}], mm_per_pixel = 0.5, emissivity = 1.0, {} }}\n'
     infrared = infrared.format(middle, y, "emissivity_sd = 0.01")
     study.write_text(WEST_ALONE + 'channels = ["P"]\n' + infrared)
