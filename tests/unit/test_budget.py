@@ -44,7 +44,7 @@ BUDGET = {
     "sampling": 1070,
     "screening": 740,
     "specimens": 3985,
-    "studies": 3100,
+    "studies": 3106,
     "surrogates": 1790,
     "testing": 1900,
 }
