@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 140,
     "modules": 785,
     "quality": 1545,
-    "readers": 6080,
+    "readers": 6125,
     "records": 1985,
     "registry": 620,
     "reports": 8440,
@@ -44,13 +44,13 @@ BUDGET = {
     "sampling": 1070,
     "screening": 740,
     "specimens": 3985,
-    "studies": 3075,
+    "studies": 3100,
     "surrogates": 1790,
     "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35294
+TESTS = 35340
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
