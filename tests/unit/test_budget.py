@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 6125,
     "records": 1985,
     "registry": 620,
-    "reports": 8392,
+    "reports": 8440,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
