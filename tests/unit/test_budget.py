@@ -17,7 +17,7 @@ BUDGET = {
     "api": 340,
     "app": 630,
     "cameras": 1170,
-    "cli": 2365,
+    "cli": 2385,
     "core": 70,
     "dataset": 820,
     "discovery": 1490,
@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 140,
     "modules": 785,
     "quality": 1545,
-    "readers": 6125,
+    "readers": 6130,
     "records": 1985,
     "registry": 620,
     "reports": 8440,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35380
+TESTS = 35410
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
