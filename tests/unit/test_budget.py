@@ -14,20 +14,20 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 340,
+    "api": 349,
     "app": 630,
     "cameras": 1170,
-    "cli": 2365,
+    "cli": 2385,
     "core": 70,
     "dataset": 820,
     "discovery": 1490,
     "experiments": 1695,
     "exporters": 2690,
-    "extraction": 1360,
+    "extraction": 1352,
     "fem": 1900,
     "files": 1425,
     "forecasts": 1507,
-    "instruments": 1410,
+    "instruments": 1402,
     "integration": 930,
     "inverse": 12298,
     "jobs": 260,
@@ -36,21 +36,21 @@ BUDGET = {
     "laws": 140,
     "modules": 785,
     "quality": 1545,
-    "readers": 6036,
+    "readers": 6130,
     "records": 1985,
     "registry": 620,
-    "reports": 8392,
+    "reports": 8440,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
     "specimens": 3985,
-    "studies": 3075,
+    "studies": 3114,
     "surrogates": 1790,
     "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35294
+TESTS = 35410
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -49,7 +49,18 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
-        *("spannung", "prüfspannung", "nennspannung", "anfangsspannung", "contrainte", "contrainte initiale"),
+        *(
+            "remaining stress",
+            "residual stress",
+            "relaxed stress",
+            "restspannung",
+            "spannung",
+            "prüfspannung",
+            "nennspannung",
+            "anfangsspannung",
+            "contrainte",
+            "contrainte initiale",
+        ),
     ),
     "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
     "strain": (

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import is_missing, is_number
+from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
 from creepkit.readers.table_rows import NumberRows, TableRow, cells_of, grouped, with_columns
 from creepkit.readers.text_tables import SourceText, TextTable, unknown_text
@@ -53,6 +54,29 @@ def without_remarks(table: TextTable, notes: dict[str, SourceText]) -> TextTable
     places = [(table.positions or range(len(table.columns)))[k] for k in kept]
     rows = with_columns(table.rows, kept)
     return replace(table, columns=[table.columns[k] for k in kept], rows=rows, positions=places)
+
+
+_DATES = frozenset(("date", "datum", "day", "jour", "heure"))
+"""Names of columns of days, in small letters, and of the clock times beside them."""
+
+
+def without_clocks(table: TextTable, known: KnownNames) -> TextTable:
+    """The table without dates and times of a clock, where a column of elapsed times in a unit is beside them."""
+    if isinstance(table.rows, NumberRows) or not table.rows:
+        return table
+    first = table.rows[0].cells
+    times = [k for k, name in enumerate(table.columns) if known.quantity(name) == "time"]
+    elapsed = [k for k in times if is_number(first[k], table.dialect)]
+    dates = [k for k, name in enumerate(table.columns) if words_of(name) in _DATES]
+    clocks = [k for k in {*times, *dates} if is_clock_time(first[k])]
+    if not elapsed or not clocks:
+        return table
+    kept = [k for k in range(len(table.columns)) if k not in clocks]
+    names = " ".join(f"'{table.columns[k]}'" for k in sorted(clocks))
+    note = f"{names} not used beside '{table.columns[elapsed[0]]}'"
+    places = [(table.positions or range(len(table.columns)))[k] for k in kept]
+    columns, rows = [table.columns[k] for k in kept], with_columns(table.rows, kept)
+    return replace(table, columns=columns, rows=rows, positions=places, assumptions=(*table.assumptions, note))
 
 
 _GROUP = "test no"

@@ -126,7 +126,7 @@ def _listed(columns: object) -> Sequence[object]:
     return columns if isinstance(columns, Sequence) and not isinstance(columns, str) else [None]
 
 
-TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv"), (".txt", ".dat", ".asc", ".lvm")
+TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv", ".lvm"), (".txt", ".dat", ".asc")
 """Endings of files that are taken for tables, and of those that are where a column of time is among the first names."""
 
 

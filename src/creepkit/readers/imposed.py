@@ -348,12 +348,14 @@ def _recorded(
         return float(column[0])
     is_temperature = quantity == "temperature"
     start = hold_begins(frames.times, column) if quantity == "strain" else None
-    if start is not None and 0 < start < column.size - 2:
-        return _ramp_and_hold(frames.times, np.maximum(column, 0.0), start)
     tolerance = TEMPERATURE_RECORD_TOLERANCE if is_temperature else LOAD_RECORD_TOLERANCE * float(np.abs(column).max())
+    if start is not None and start < column.size - 2 and not _drifts(column[start:], tolerance):
+        held = np.maximum(column, 0.0)
+        return _ramp_and_hold(frames.times, held, start) if start else float(held.mean())
     starts = _level_starts(column, tolerance)
     if not starts:
-        return recorded_program(frames.times, column, tolerance)
+        program = recorded_program(frames.times, column, tolerance)
+        return program if column.min() < 0.0 else Program(program.times, np.maximum(program.values, 0.0))
     bounds = [*starts, column.size]
     for before, frame, after in zip(bounds, bounds[1:-1], bounds[2:], strict=False):
         shorter = min(frames.times[frame - 1] - frames.times[before], frames.times[after - 1] - frames.times[frame])
@@ -369,6 +371,14 @@ def _recorded(
     conditions.record_assumption(f"steps of {quantity} from the first frame of each level on")
     values = [float(np.median(column[first:last])) for first, last in pairwise(bounds)]
     return tuple((0.0 if k == 0 else float(frames.times[k]), v) for k, v in zip(starts, values, strict=True))
+
+
+def _drifts(held: Floats, tolerance: float) -> bool:
+    """Whether what was held changed from its first to its last third by more than a tolerance and than noise can do."""
+    third = max(held.size // 3, 1)
+    early, late = held[:third], held[-third:]
+    noise = float(np.hypot(early.std(), late.std())) / third**0.5
+    return bool(abs(float(late.mean() - early.mean())) > max(tolerance, 3.0 * noise))
 
 
 def _ramp_and_hold(times: Floats, column: Floats, start: int) -> Program:

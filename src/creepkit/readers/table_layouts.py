@@ -16,7 +16,14 @@ from creepkit.files.delimited_text import is_missing, is_number
 from creepkit.readers.cell_grids import CellGrid, table_of, with_stated, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
-from creepkit.readers.grouped_rows import TabulatedTest, refuse_twice, rows_by_test, with_groups, without_remarks
+from creepkit.readers.grouped_rows import (
+    TabulatedTest,
+    refuse_twice,
+    rows_by_test,
+    with_groups,
+    without_clocks,
+    without_remarks,
+)
 from creepkit.readers.table_heads import (
     MAXIMUM_ROWS_BELOW,
     Head,
@@ -119,8 +126,8 @@ def _tests_of_rows(headed: HeadedGrid) -> list[TabulatedTest]:
         )
     head = head_of_one_test(grid, headed.whole, headed.known)
     refuse_twice(head.entries, grid.header, headed.known)
-    table = table_of(_without_margin(grid, head.entries))
-    table = replace(table, assumptions=(*head.assumptions, *footers), sources=tuple(head.sources))
+    table = without_clocks(table_of(_without_margin(grid, head.entries)), headed.known)
+    table = replace(table, assumptions=(*table.assumptions, *head.assumptions, *footers), sources=tuple(head.sources))
     table = with_groups(without_remarks(table, head.entries), headed.known)
     return rows_by_test(table, {**grid.header, **head.entries}, headed.known)
 
@@ -355,11 +362,11 @@ def _without_footers(grid: CellGrid) -> tuple[CellGrid, tuple[str, ...]]:
 
 
 def _is_remark(row: TableRow, grid: CellGrid) -> bool:
-    """Whether a row holds one cell of several words, or `End`, and no digit; `nan` and the like are lost numbers."""
+    """Whether a row holds one cell of several words, none of them first a number, or `End`; `nan` is a lost number."""
     cells = [cell for cell in row.cells if cell]
     if grid.dialect.delimiter == " ":
         cells = [" ".join(cells)]
-    if len(cells) != 1 or any(character.isdigit() for character in cells[0]):
+    if len(cells) != 1 or not cells[0].lstrip("(*#- ")[:1].isalpha():
         return False
     words = cells[0].lower().strip(".:*-= ").split()
     lost = {"nan", "inf", "na", "n/a", "-", "--", "none", "null", "-nan", "-inf"}

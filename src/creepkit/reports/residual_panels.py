@@ -58,7 +58,7 @@ def draw_residuals(
     is not known, measured less identified. Readings beyond the axis are marked at its edge.
     """
     readings = judged_readings(fit)
-    judged = readings is not None and bool(readings.mask(output=output).any())
+    judged = readings is not None and any(readings.mask(k, output).any() for k in tests)
     every = []
     for k in (k for k in tests if any(one.output == output for one in fit.tests[k].outputs)):
         series = _judged_series(readings, k, output) if judged and readings else _plain_series(fit, curves, k, output)

@@ -23,6 +23,7 @@ from creepkit.errors import CreepkitError
 from creepkit.extraction.domes import find_domes
 from creepkit.extraction.series import reference_plate
 from creepkit.instruments.clock_alignment import UNIX_TIME
+from creepkit.instruments.imposed import named_specimens
 from creepkit.registry.arguments import specimen_by_name
 from creepkit.registry.reading import frame_files, read_frames, read_record
 from creepkit.studies.alloy_table import empty_table, looks_like_alloys
@@ -39,6 +40,23 @@ FEWEST_FRAMES = 2
 
 ALLOYS_FILE = "alloys.csv"
 """Of the table of alloys that is written to be filled in."""
+
+
+OF_ANY_FRAMES = (
+    "frames",
+    "frame",
+    "images",
+    "image",
+    "dic",
+    "dice",
+    "vic",
+    "exports",
+    "export",
+    "camera",
+    "cam",
+    "results",
+)
+"""Words in the name of a folder that say only that it holds frames."""
 
 
 LOADS = ("pressure", "force")
@@ -71,7 +89,8 @@ class FoundCamera:
     """A folder of frames.
 
     source : it as the study file names it. times : a file with a row for each frame. record : of what was imposed.
-    dimples : names of the test pieces that it shows, () where none was found. unseen : why not.
+    dimples : names of the test pieces that it shows, () where none was found. unseen : why not. named : those of which
+    its record has channels.
     """
 
     folder: Path
@@ -81,6 +100,7 @@ class FoundCamera:
     record: Choice
     dimples: tuple[str, ...] = ()
     unseen: str = ""
+    named: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -101,6 +121,9 @@ class FoundCamera:
                 asked.append(f"which of {', '.join(one.name for one in choice.open)} is the {what} of {self.name}?")
         if self.untimed and self.times == Choice():
             asked.append(f"when were the frames of {self.name} taken? give times = a file, or interval_s")
+        if len(self.dimples) > 1 and self.named and {*self.named} != {*self.dimples}:
+            row = f"{self.dimples[0]} to {self.dimples[-1]}"
+            asked.append(f"which of {', '.join(self.named)} are {row} of {self.name}, row by row? give names")
         return tuple(asked)
 
 
@@ -187,6 +210,8 @@ def found_cameras(folder: Path, path: Path, others: Sequence[Path], base: str) -
     }
     times = {one: rows for one in files if one not in records and (rows := _of(read_frame_times, one)) is not None}
     owners = {one: _owner(one, list(frames)) for one in files}
+    for kind in (times, records):
+        owners |= _one_of_each([one for one in kind if owners[one] is None], list(frames))
     cameras = []
     for one, found in frames.items():
         right = {file: rows for file, rows in times.items() if rows.size == len(found)}
@@ -197,7 +222,8 @@ def found_cameras(folder: Path, path: Path, others: Sequence[Path], base: str) -
         under = _chosen(covering | dict.fromkeys(by_name, one), one, "it is the only one that lasts as long")
         dimples, unseen = _dimples(found)
         source = base if one == folder else f"{place}{one.name}"
-        cameras.append(FoundCamera(one, source, found, own, under, dimples, unseen))
+        named_in = () if under.file is None else tuple(named_specimens(records[under.file]))
+        cameras.append(FoundCamera(one, source, found, own, under, dimples, unseen, named_in))
     used = {c.file for camera in cameras for c in (camera.times, camera.record)} - {None}
     offered = {file for camera in cameras for c in (camera.times, camera.record) for file in c.open}
     kept = {file: record for file, record in records.items() if file in used | offered}
@@ -227,12 +253,23 @@ def _owner(file: Path, folders: Sequence[Path]) -> Path | None:
         return file.parent
     words, found = _words(file.stem), list[tuple[int, Path]]()
     for folder in folders:
-        name = _words(folder.absolute().name)
+        name = [word for word in _words(folder.absolute().name) if word not in OF_ANY_FRAMES]
         if name and any(words[k : k + len(name)] == name for k in range(len(words))):
             found.append((len(name), folder))
     longest = max((size for size, _ in found), default=0)
     best = [folder for size, folder in found if size == longest]
     return best[0] if len(best) == 1 else None
+
+
+def _one_of_each(files: Sequence[Path], folders: Sequence[Path]) -> dict[Path, Path]:
+    """{file: folder} where what tells folders apart, as the number in run1 and run2, tells files apart alike."""
+    names = {folder: set(_words(folder.absolute().name)) for folder in folders}
+    own = {
+        folder: words.difference(*(names[one] for one in folders if one != folder)) for folder, words in names.items()
+    }
+    found = {file: [one for one in folders if own[one] and own[one] <= set(_words(file.stem))] for file in files}
+    pairs = {file: owners[0] for file, owners in found.items() if len(owners) == 1}
+    return pairs if len(folders) > 1 and len(pairs) == len(files) == len(set(pairs.values())) == len(folders) else {}
 
 
 def _chosen(owners: Mapping[Path, Path | None], folder: Path, reason: str) -> Choice:

@@ -14,6 +14,7 @@ from creepkit.studies.alloy_table import looks_like_alloys, read_alloy_table
 from creepkit.studies.proposal import propose_study
 from creepkit.studies.study_file import parse_study
 from helpers.camera_samples import dice, vic_3d
+from helpers.instrument_samples import plate_record
 from helpers.plates import Schedule, write_record, write_times
 
 BULGE = ck.specimen("bulge")
@@ -73,6 +74,16 @@ def test_files_in_the_folder_of_the_frames_are_of_these(tmp_path: Path) -> None:
     assert [one.times for one in model.camera] == ["a/stamps.csv", "b/stamps.csv"]
     records = {one.name: one.file for one in model.record}
     assert [records[one.record] for one in model.camera] == ["a/log.csv", "b/log.csv"]
+
+
+def test_folders_say_that_they_hold_frames_and_files_may_have_the_number_alone(tmp_path: Path) -> None:
+    write_views(tmp_path, {"run1_frames": 6, "run2_frames": 6})
+    for k in (1, 2):
+        write_times(tmp_path / f"times_{k}.csv", Schedule(frames=6).times)
+        write_record(tmp_path / f"run{k}_log.csv", Schedule(frames=6), 1.0, {"T [C]": 800.0})
+    _, model = proposed(tmp_path)
+    files = [(one.times, one.record) for one in model.camera]
+    assert files == [("times_1.csv", "run1_log"), ("times_2.csv", "run2_log")]
 
 
 def test_where_several_would_do_it_is_a_question(tmp_path: Path) -> None:
@@ -224,3 +235,18 @@ def test_dimples_are_known_by_number_and_by_their_whole_name(tmp_path: Path) -> 
     table = read_alloy_table(path, BULGE)
     table.check("west", ["D1", "D2"], ["west", "east"])
     assert table.of_camera("east", ["D1"])["D1"].alloy == "C"
+
+
+def test_numbers_of_dimples_are_no_names_of_the_record(tmp_path: Path) -> None:
+    """A record of A1, B2 and D1 does not lend the channels of its D1 to the first of several dimples in the view."""
+    from creepkit.api.extraction import ImposedChannels
+
+    path = tmp_path / "rig.csv"
+    path.write_text(plate_record())
+    record = ck.read_record(path)
+    ImposedChannels(numbered=True).check(record, ["D1"])
+    ImposedChannels().check(record, ["D1", "D2"])
+    with pytest.raises(
+        HistoryError, match=r"channels of A1, B2, D1, and .* only numbered, D1 to D2 row by row; say names"
+    ):
+        ImposedChannels(numbered=True).check(record, ["D1", "D2"])
