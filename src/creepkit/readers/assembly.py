@@ -206,6 +206,10 @@ def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | Non
         raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
 
 
+_OF_OTHER_THINGS = ("assumed", "ended", "heat", "laboratory", "operator")
+"""Labels that do not say how a test ended; `ended` is what creepkit's simulation says beside a time of rupture."""
+
+
 def _time_and_end(conditions: StatedConditions, path: Path, name: str) -> tuple[StatedNumber | None, str, bool]:
     """The rupture time, how the test ended, by `ended`, an answer or a label, and whether the time is that of its end.
 
@@ -218,7 +222,7 @@ def _time_and_end(conditions: StatedConditions, path: Path, name: str) -> tuple[
     firm, remarks, unclear = dict[str, str](), dict[str, str](), dict[str, str]()
     for label, text in conditions.labels.items():
         kind = kind_of_column(label)
-        if label in ("assumed", "heat", "laboratory", "operator") or (not kind and text.casefold() in YES | NO):
+        if label in _OF_OTHER_THINGS or (not kind and text.casefold() in YES | NO):
             continue
         (end,) = ends_in_column(label, [text], conditions.end_terms, False).ends
         firmness = firm if kind in FIRM else remarks
