@@ -17,7 +17,7 @@ BUDGET = {
     "api": 340,
     "app": 630,
     "cameras": 1170,
-    "cli": 2365,
+    "cli": 2385,
     "core": 70,
     "dataset": 820,
     "discovery": 1490,
@@ -36,21 +36,21 @@ BUDGET = {
     "laws": 140,
     "modules": 785,
     "quality": 1545,
-    "readers": 6105,
+    "readers": 6150,
     "records": 1985,
     "registry": 620,
-    "reports": 8392,
+    "reports": 8440,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
     "specimens": 3985,
-    "studies": 3075,
+    "studies": 3106,
     "surrogates": 1790,
     "testing": 1900,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35294
+TESTS = 35410
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

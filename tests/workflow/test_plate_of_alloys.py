@@ -78,6 +78,62 @@ def test_init_one_edit_and_run_give_a_law_of_every_alloy(lab: Path) -> None:
     assert all(one.alloy in page for one in (*WEST, *EAST))
 
 
+WEST_ALONE = """
+[[record]]
+name = "logger"
+file = "logger.csv"
+
+[[camera]]
+frames = "west"
+times = "west_times.csv"
+subset_mm = 1
+modulus_GPa = 150
+"""
+
+
+def test_temperatures_of_dimples_between_thermocouples_and_in_the_infrared(lab: Path) -> None:
+    """Two dimples 24 mm apart on a plate that is 0.5 K/mm hotter to the right."""
+    study = lab / "temperatures.toml"
+    study.write_text(WEST_ALONE + 'channels = ["P", "TC1"]\n')
+    one = ck.Study.load(study).run(only="extraction")
+    centers = {name: e.center for name, e in one.extractions.items()}
+    assert {i.temperature_sd for i in one.imposed.values()} == {0.0}
+    x, y = next(iter(centers.values()))
+    where = f'centers_mm = [[{x}, {y}], [{x - 60}, {y}]]\nnames = ["good", "outside"]\n'
+    study.write_text(WEST_ALONE + 'channels = ["P", "TC1"]\n' + where)
+    partly = ck.Study.load(study).run(only="extraction")
+    assert [h.name for h in partly.histories] == ["west good"]
+    ((left_out, reason),) = [(e.test, e.reason) for e in partly.exclusions if not e.frames]
+    assert left_out == "west outside"
+    assert "points of the clamped plate" in reason
+    middle = np.mean([center[0] for center in centers.values()])
+    places = f"TC1 = [{middle}, {y}], TC2 = [{middle + 2}, {y}], TC3 = [{middle - 2}, {y}]"  # 800, 801 and 799 C
+    study.write_text(WEST_ALONE + f'channels = ["P", "TC1", "TC2", "TC3"]\nthermocouples_mm = {{ {places} }}\n')
+    between = ck.Study.load(study).run(only="extraction")
+    left, right = (between.imposed[f"west D{k}"] for k in (1, 2))
+    assert left.temperature.values.mean() < 1073.15 < right.temperature.values.mean()
+    assert left.temperature_sd > 1.0
+    columns = middle + 0.5 * (np.arange(161) - 80)
+    (lab / "ir").mkdir(exist_ok=True)
+    np.save(lab / "ir" / "image_1.npy", np.tile(800.0 + 0.5 * (columns - middle), (81, 1)))
+    infrared = 'infrared = {{ images = "ir", center_mm = [{}, {}], mm_per_pixel = 0.5, emissivity = 1.0, {} }}\n'
+    infrared = infrared.format(middle, y, "emissivity_sd = 0.01")
+    study.write_text(WEST_ALONE + 'channels = ["P"]\n' + infrared)
+    seen = ck.Study.load(study).run(only="extraction").imposed
+    for name, center in centers.items():
+        planted = 1073.15 + 0.5 * (center[0] - middle)
+        assert seen[name].temperature.values.mean() == pytest.approx(planted, abs=0.1)
+        # d(ln S)/dT of Planck's law at 10 um and 1073 K: 1 % of radiance is 5.8 K
+        assert seen[name].temperature_sd == pytest.approx(5.8, rel=0.1)
+    text = WEST_ALONE.partition("[[camera]]")[2] + "load = { pressure_MPa = 8 }\n" + infrared
+    study.write_text("[[camera]]" + text)
+    stated = ck.Study.load(study).run(only="extraction")
+    assert [h.temperature for h in stated.histories] == pytest.approx(
+        [1073.15 + 0.5 * (center[0] - middle) for center in centers.values()], abs=0.1
+    )
+    assert all(float(h.labels["temperature_sd_K"]) > 1.0 for h in stated.histories)
+
+
 def test_what_succeeded_is_written_whatever_failed(lab: Path, tmp_path: Path) -> None:
     """A centre beside the dimples, whose ring lies outside of the field of view."""
     frames = ck.read_frames(lab / "west", None, lab / "west_times.csv")

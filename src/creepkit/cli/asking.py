@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import fnmatch
+from collections.abc import Callable, Sequence
+from itertools import takewhile
 from pathlib import Path
 
 from creepkit.errors import CreepkitError, HistoryError, printable
@@ -23,22 +25,40 @@ def put_questions(read: Callable[[], object], answer: Callable[[str], str] | Non
     read : reads the files, and raises what is open. answer : what was typed at a prompt; None without a terminal, where
     each question is a line with the text that answers it, and the last of them an error.
     """
-    asked, written = set[tuple[Path, str, str]](), dict[Path, None]()
-    while questions := [one for one in _open_questions(read) if _identity(one) not in asked]:
+    asked, written = set[tuple[object, ...]](), dict[Path, None]()
+    while groups := {key: found for key, found in _by_content(_open_questions(read)).items() if key not in asked}:
         if answer is None:
-            for question in questions:
-                tell(question)
-            count = f"{len(questions)} question{'s' if len(questions) > 1 else ''}"
+            for questions in groups.values():
+                tell(questions[0].asked_of(_name_of(questions), len(questions)))
+            count = f"{len(groups)} question{'s' if len(groups) > 1 else ''}"
             raise HistoryError(f"{count} open; answer them in {ANSWERS_FILE}, or run this in a terminal")
-        for question in questions:
-            asked.add(_identity(question))
-            if (value := _answer_to(question, answer)) is not None:
-                written[_write(question, value)] = None
+        for key, questions in groups.items():
+            asked.add(key)
+            if (value := _answer_to(questions, answer)) is not None:
+                written[_write(questions, value)] = None
     return list(written)
 
 
-def _identity(question: Question) -> tuple[Path, str, str]:
-    return question.path, question.key, question.sentence
+def _by_content(questions: Sequence[Question]) -> dict[tuple[object, ...], list[Question]]:
+    """The questions of each folder that say the same of several files."""
+    groups: dict[tuple[object, ...], list[Question]] = {}
+    for one in questions:
+        groups.setdefault((one.path.parent, one.key, one.sentence, repr(one.choices)), []).append(one)
+    return groups
+
+
+def _name_of(questions: Sequence[Question]) -> str:
+    """The name of the file that questions are about; of several a pattern, such as RX*.csv, which may match others."""
+    names = _names_of(questions)
+    if len(names) == 1:
+        return names[0]
+    suffixes = {one.path.suffix for one in questions}
+    shared = takewhile(lambda signs: len(set(signs)) == 1, zip(*names, strict=False))
+    return f"{''.join(signs[0] for signs in shared)}*{suffixes.pop() if len(suffixes) == 1 else ''}"
+
+
+def _names_of(questions: Sequence[Question]) -> list[str]:
+    return sorted({one.path.name for one in questions})
 
 
 def _open_questions(read: Callable[[], object]) -> list[Question]:
@@ -50,9 +70,11 @@ def _open_questions(read: Callable[[], object]) -> list[Question]:
     return []
 
 
-def _answer_to(question: Question, answer: Callable[[str], str]) -> str | None:
+def _answer_to(questions: Sequence[Question], answer: Callable[[str], str]) -> str | None:
     """The answer as TOML; None where the question stays open."""
-    tell(f"{question.place}: {question.sentence}")
+    question = questions[0]
+    more = f" (and {len(questions) - 1} more, {_name_of(questions)})" if len(questions) > 1 else ""
+    tell(f"{question.place}{more}: {question.sentence}")
     for number, choice in enumerate(question.choices, 1):
         tell(f"  {number}  {_in_words(choice)}{' [Enter]' if number == 1 else ''}")
     count = len(question.choices)
@@ -87,10 +109,15 @@ def _number_or_text(typed: str) -> str | float:
         return typed
 
 
-def _write(question: Question, value: str) -> Path:
-    """Add an answer to the file beside the tests; it stays valid, or nothing is written."""
+def _write(questions: Sequence[Question], value: str) -> Path:
+    """Add an answer to the file beside the tests, and read that again."""
+    question = questions[0]
     file = question.path.parent / ANSWERS_FILE
     text = file.read_text(encoding="utf-8") if file.is_file() else ""
-    write_text(with_answer(text, question.path.name, question.key, value), file, HistoryError, force=True)
+    names, pattern = _names_of(questions), _name_of(questions)
+    matched = fnmatch.filter([one.name for one in file.parent.iterdir()], pattern)
+    for name in [pattern] if len(names) > 1 and set(matched) <= set(names) else names:
+        text = with_answer(text, name, question.key, value)
+    write_text(text, file, HistoryError, force=True)
     read_answers(file)
     return file

@@ -33,19 +33,22 @@ def _words(*alternatives: str) -> re.Pattern[str]:
 
 
 _RUPTURE = (
-    r"rupt(?:ur\w*|ed|s)?|frac|gebr|ausfall\w*|broken?|brk|breaks?|breaking|breakage|fail(?:s|ed|ing|ures?)?|fractur\w*|snapped|parted"
+    r"rupt(?:ur\w*|ed|s)?|frac|gebr|ausfall\w*|broken?|brk|breaks?|breaking"
+    r"|breakage|fail(?:s|ed|ing|ures?)?|fractur\w*|snapped|parted"
     r"|(?:zer)?gebrochen\w*|zerbrochen\w*|(?:kriech|zeitstand|dauer|proben|gewalt|sprod|rest)?br[uü]che?|bricht"
     r"|(?:ab|durch)?gerissen\w*|zerrissen\w*|versag\w*|romp(?:u|us|ues?|t|re)|cass(?:e|ee|es|ees|er|ure)"
     r"|bris(?:e|ee|es|ees|er|ure)|defaillance"
 )
 _CENSORED = r"(?:right |left )?cens(?:or\w*)?|censur\w*|zensi?er\w*|suspen[sd]\w*"
 _GOES_ON = (
-    rf"run ?outs?|{_CENSORED}|unbroken|unfailed|unruptured|unfractured|discontinu\w+|surviv\w*|survecu\w*|running"
+    rf"run ?outs?|(?:failure|rupture|fracture) free|{_CENSORED}|unbroken|unfailed"
+    r"|unruptured|unfractured|discontinu\w+|surviv\w*|survecu\w*|running"
     r"|on ?going|in progress|(?:in|on|under) test|test continu\w*|(?:durch)?lauf(?:er|end\w*|t(?: noch| weiter)?)"
     r"|un(?:ge|zer)broch\w*|disc|bruchfrei\w*|bruchlos\w*|uberleb\w*|im versuch|en cours|en essai|essai continu\w*"
 )
 _INTERRUPTED = (
-    r"interr|aktiv\w*|intactes?|stopp?(?:ed|s)?|halted|aborted|interrupt\w*|removed|withdrawn|unloaded|truncated|intact|active|gestoppt\w*"
+    r"broken off|interr|aktiv\w*|intactes?|stopp?(?:ed|s)?|halted|aborted|interrupt\w*"
+    r"|removed|withdrawn|unloaded|truncated|intact|active|gestoppt\w*"
     r"|abgebroch\w*|angehalten|ausgebaut\w*|entlastet\w*|unterbroch\w*|unterbruch|abbruch|intakt\w*|arret\w*|stoppe\w*"
     r"|interromp\w*|interruption|demont\w*|decharg\w*|retire\w*"
 )
@@ -59,7 +62,21 @@ _FILLERS = (
 )
 _AHEAD = r"before|prior to|short of|vor|vor dem|avant|avant la|bevor"
 _EXPECTED = _words(
-    *("near", "close to", "nearly", "almost", "imminent", "expected", "likely", "will", "soon", "kurz vor", "fast"),
+    *("before", "prior", "avant", "vor", "bevor", "could", "would", "might", "may", "should", "konnte"),
+    *(
+        "pourrait",
+        "near",
+        "close to",
+        "nearly",
+        "almost",
+        "imminent",
+        "expected",
+        "likely",
+        "will",
+        "soon",
+        "kurz vor",
+        "fast",
+    ),
     *("still", "noch", "yet", "encore", "toujours", "pending", "outstanding", "aus"),
     *("beinahe", "erwartet", "bald", "wird", "soll", "presque", "proche", "prevue?", "attendue?", "bientot", "if"),
 )
@@ -69,19 +86,45 @@ _REACHED = (
 )
 _UNBROKEN = re.compile(
     rf"(?<!\w)(?:(?:{_NOT}){_FILLERS} (?:{_RUPTURE})|(?:{_AHEAD}){_FILLERS} (?:{_RUPTURE})"
-    rf"|(?:{_RUPTURE}) (?:noch )?(?:{_NOT}){_REACHED}(?= ?(?:\||$)))(?!\w)"
+    rf"|fail(?:ed|s)? to (?:{_RUPTURE})|(?:{_RUPTURE}) (?:noch )?(?:{_NOT}){_REACHED}(?= ?(?:\||$)))(?!\w)"
 )
 _UNCENSORED = re.compile(rf"(?<!\w)(?:(?:{_NOT}){_FILLERS} (?:{_CENSORED})|un(?:{_CENSORED}))(?!\w)")
 _NOT_INTERRUPTED = re.compile(
     rf"(?<!\w)(?:(?:{_NOT}|plus|longer){_FILLERS} (?:{_GOES_ON}|{_INTERRUPTED})|lauft (?:nicht|nimmer))(?!\w)"
 )
 _ENDED = _words(r"ended|finished|complete[d]?|terminat\w*|beendet\w*|abgeschlossen|fertig|termine\w*|fini\w*|stop date")
-_EQUIPMENT = _words(
-    *("furnace", "oven", "thermocouples?", "tc", "power", "mains", "grips?", "machine", "rig", "heaters?", "heating"),
+_DOUBTFUL = _words(
+    *(
+        "unloading",
+        "removal",
+        r"dismount\w*",
+        "cooling",
+        r"reload\w*",
+        r"restart\w*",
+        "ausbau",
+        "entlasten",
+        "abkuhlen",
+    ),
+    *(
+        "demontage",
+        "dechargement",
+        "furnace",
+        "oven",
+        "thermocouples?",
+        "tc",
+        "power",
+        "mains",
+        "grips?",
+        "machine",
+        "rig",
+        "heaters?",
+        "heating",
+    ),
     *("controller", "extensometer", "lvdt", "lever", "pull rod", "adapter", "ofen", "ofens", "thermoelemente?s?"),
     *("strom", "stromausfall", "netz", "einspannung", "maschine", "heizung", "regler", "gestange", "four"),
     *("thermocouple", "courant", "regulation", "extensometre", "equipment", "chauffage"),
 )
+"""Words of what breaks in the place of a test, or of what it broke by."""
 
 
 @lru_cache(maxsize=4096)
@@ -91,9 +134,15 @@ def plain_words(text: str) -> str:
     plain = "".join(sign for sign in plain if not unicodedata.combining(sign))
     for pair in ("ae", "oe", "ue"):  # also how umlauts are written without them
         plain = re.sub(rf"(?<!q){pair}(?=[a-z])", pair[0], plain)
-    plain = re.sub(r"(?<=\d)[.,](?=\d)", "_", re.sub(r"\bo\.\s*(?=b)", "ohne ", plain))
-    plain = re.sub(r"[;:,.!()\[\]/|]+", " | ", plain)
+    plain = re.sub(r"(?<=\d)[.,](?=\d)", "_", _without_short_forms(plain))
+    plain = re.sub(r"[;,.!()\[\]/|]+", " | ", plain)
     return " ".join(re.sub(r"[^\w|?]+", " ", plain).split()).strip(" |")
+
+
+def _without_short_forms(plain: str) -> str:
+    """A text in small letters with short forms of not and none as words: `n. gebr.`, `o. Bruch`, `Bruch: n/a`."""
+    plain = re.sub(r"\b(?:n/a|n\.\s?a\.?|k\.\s?a\.?|n\.\s?b\.?)(?!\w)|(?<=[:=])\s*[-–—]+\s*$", " none ", plain)
+    return re.sub(r"\b([nok])\.\s*(?=gebr|br|rupt|romp|fail|cass)", "ohne ", plain)
 
 
 @lru_cache(maxsize=4096)
@@ -111,7 +160,7 @@ def end_said_by(text: str) -> str:
             said.add(STOPPED)
             clause = goes_on.sub(" ", clause)
         if breaks.search(clause):
-            is_doubtful = _EQUIPMENT.search(clause) or _EXPECTED.search(clause) or _words(_NOT).search(clause)
+            is_doubtful = _DOUBTFUL.search(clause) or _EXPECTED.search(clause) or _words(_NOT).search(clause)
             without = re.search(rf"(?:{_RUPTURE}) (?:without|ohne|sans) ", clause)
             said.add(UNCLEAR if is_doubtful and not without else RUPTURED)
         if stops.search(clause):

@@ -46,11 +46,16 @@ class Question(HistoryError):
     ) -> None:
         self.path, self.place, self.sentence, self.key = path, place, sentence, key
         self.choices, self.is_free = tuple(choices), is_free
+        super().__init__(self.asked_of(path.name))
+
+    def asked_of(self, files: str, count: int = 1) -> str:
+        """The question with the line that answers it; files : name or pattern of those that it is about."""
         others = " or ".join(self.entry(choice) for choice in self.choices[1:])
-        first = self.entry(self.choices[0]) if self.choices else f"{key} = ..."
-        under = f"rite into {ANSWERS_FILE} beside it: [{toml_key_in_quotes(path.name)}] {first}"
-        joined = f"{sentence} W" if sentence.endswith("?") else f"{sentence}; w"
-        super().__init__(f"{place}: {joined}{under}{f' (or {others})' if others else ''}")
+        first = self.entry(self.choices[0]) if self.choices else f"{self.key} = ..."
+        more = f" (and {count - 1} file{'s' if count > 2 else ''} more)" if count > 1 else ""
+        under = f"rite into {ANSWERS_FILE} beside it: [{toml_key_in_quotes(files)}] {first}"
+        joined = f"{self.sentence} W" if self.sentence.endswith("?") else f"{self.sentence}; w"
+        return f"{self.place}{more}: {joined}{under}{f' (or {others})' if others else ''}"
 
     def entry(self, choice: str | float | dict[str, str]) -> str:
         """The line of tests.toml that gives an answer."""

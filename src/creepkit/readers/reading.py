@@ -65,11 +65,11 @@ def read_histories(
 
 
 def _histories_of(source: Path, readers: Sequence[Reader]) -> list[History]:
-    answered = _with_answers(source, readers)
+    answered = answered_readers(source, readers)
     return _histories_in(_reader_of(source, answered), source)
 
 
-def _with_answers(path: Path, readers: Sequence[Reader]) -> Sequence[Reader]:
+def answered_readers(path: Path, readers: Sequence[Reader]) -> Sequence[Reader]:
     """The readers with what the file of answers beside a path says of it."""
     answers = answers_of(path)
     return [_with_vocabulary(one, answers.added_to) for one in readers] if answers else readers
@@ -138,7 +138,7 @@ def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
         raise HistoryError(f"{path}: the folder cannot be read ({error.strerror}); name another one") from None
     visible = [file for file in entries if file.is_file() and file.name[0] != "."]
     visible = [file for file in visible if file.name != ANSWERS_FILE]
-    files = [file for file in visible if any(accepts_path(reader, file) for reader in _with_answers(file, readers))]
+    files = [file for file in visible if any(accepts_path(reader, file) for reader in answered_readers(file, readers))]
     return files or [path]
 
 

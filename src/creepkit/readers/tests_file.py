@@ -83,7 +83,7 @@ def answers_of(path: Path) -> Answers:
         return Answers()
     found = Answers()
     for pattern, table in read_answers(file).items():
-        if fnmatchcase(path.name, pattern) or (path.is_dir() and pattern == "*"):
+        if path.name == pattern or fnmatchcase(path.name, pattern) or (path.is_dir() and pattern == "*"):
             one = _answers_in(file, pattern, table)
             found = Answers(
                 {**found.stated, **one.stated}, {**found.columns, **one.columns}, {**found.ended, **one.ended}

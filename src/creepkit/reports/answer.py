@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.inverse.adequacy import SHAPE_MISFIT
+from creepkit.inverse.identified_values import depends_on_history
 from creepkit.inverse.perturbation import combined_change_text
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
@@ -101,9 +102,10 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     low, high = fit.ranges["temperature"]
     if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
         figures.append(_with_interval("activation energy", at, fit.activation_energy(), 1e-3, "kJ/mol"))
-    rate_figure = _with_interval("creep rate", at, rate, 100.0 * SECONDS_PER_HOUR, "%/h")
+    of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
+    rate_figure = _with_interval("creep rate", f"{at}{of_state}", rate, 100.0 * SECONDS_PER_HOUR, "%/h")
     included = any(one.included for one in fit.unmodelled)
-    return [*figures, replace(rate_figure, remark="usual errors of tests included") if included else rate_figure]
+    return [*figures, replace(rate_figure, remark="usual errors included") if included else rate_figure]
 
 
 def _with_interval(name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "") -> KeyFigure:
@@ -118,6 +120,11 @@ def asked_figures(forecast: Forecast) -> list[KeyFigure]:
 
 
 def _of_test(test: TestForecast) -> KeyFigure | None:
+    figure = _shown(test)
+    return replace(figure, remark="extrapolated beyond the tests") if figure and test.extrapolation else figure
+
+
+def _shown(test: TestForecast) -> KeyFigure | None:
     condition = test.history.condition
     where = condition if test.name in condition else f"{test.name}: {condition}"
     for one in test.times:
@@ -176,11 +183,10 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         percent = is_logarithmic(worst.output)
         unit = "%" if percent else output_unit(worst.output)
         size = abs(worst.deviation) * (100.0 if percent else 1.0)
-        side = "above" if worst.deviation > 0 else "below"
+        side = "too large" if worst.deviation > 0 else "too small"
         what = worst.output.replace("_", " ")
-        yield f"worst in {what} of '{worst.test}': {size:.2g} {unit} {side} at {time_text(worst.time)}".replace(
-            "  ", " "
-        )
+        amount = f"{size:.2g} {unit}".strip()
+        yield f"it is worst in '{worst.test}': {what} {amount} {side} at {time_text(worst.time)}"
     if adequacy.remedies and not adequacy.explanations:
         yield f"it would explain the tests with {adequacy.remedies[0]}, which nobody modelled"
     yield from (f"it takes {one.description}, far from what was stated" for one in adequacy.implausible[:1])
@@ -249,13 +255,13 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
         return f"check {what} (label, unit, thermocouple), then identify without"
     if adequacy is not None and (adequacy.rejects or adequacy.verdict == "cannot be judged"):
         if ranking is None or len(ranking.laws) < 2:
-            return "compare laws: select(candidates(tests), tests)"
-        return "use it within the tests, by the factors above; try other laws for more"
+            return "compare it with other laws that suit the tests (creepkit init)"
+        return "use it within the range of the tests alone; try further laws for more"
     if ranking is not None and len(ranking.laws) > 1 and not ranking.decisive:
-        return "plan a test that tells the laws apart: design(ranking)"
+        return "make a test that tells the laws apart (creepkit design says which)"
     if any(e.verdict in (NOT_DETERMINED, POORLY_DETERMINED) for e in fit.estimates):
-        return "plan a test that determines more: design(fit)"
-    return "forecast, or write the law for your code: fit.forecast(test), export(fit, target)"
+        return "make a test that determines more (creepkit design says which)"
+    return "forecast (creepkit predict), or write the law for your code (creepkit export)"
 
 
 # ---- as text ---------------------------------------------------------------------------------------------------------
@@ -284,9 +290,9 @@ def _text(fit: Identification, ranking: Ranking | None) -> str:
     lines += [f"  rate = {summands}", *(f"  {equation}" for equation in state_equations(fit.law))]
     lines += _indented("   ".join(_value(fit, e) for e in fit.estimates), "    ")
     lines += _indented(fit.sparsity.verdict, "    ") if fit.sparsity is not None else []
-    lines += [_figure_line(one) for one in key_figures(fit)]
+    lines += [line for one in key_figures(fit) for line in _indented(_figure_text(one), "    ")]
     lines += [line for text in cautions(fit, ranking)[:MOST_CAUTIONS] for line in _indented(f"- {text}", "    ")]
-    return "\n".join([*lines, *_indented(f"next: {next_step(fit, ranking)}; all numbers: .details()")])
+    return "\n".join([*lines, *_indented(f"next: {next_step(fit, ranking)}; more: .details()")])
 
 
 def chosen_text(ranking: Ranking) -> str:
@@ -305,9 +311,9 @@ def _value(fit: Identification, estimate: Estimate) -> str:
     return text.replace(" ", "\u00a0")
 
 
-def _figure_line(figure: KeyFigure) -> str:
+def _figure_text(figure: KeyFigure) -> str:
     remark = f", {figure.remark}" if figure.remark else ""
-    return f"  {figure.name} at {figure.where}: {figure.text(plain_number)}{remark}"
+    return f"{figure.name} at {figure.where}: {figure.text(plain_number)}{remark}"
 
 
 def _indented(text: str, hanging: str = "  ") -> list[str]:

@@ -41,6 +41,10 @@ SUMMARY_WIDTH, CURVES_HEIGHT, PANELS_HEIGHT = 8.6, 3.6, 2.9
 """Inches of the figure of an answer and of its rows."""
 
 
+MOST_LABELLED = 16
+"""Tests whose stress stands beside their curve, where colours are temperatures."""
+
+
 MOST_IN_ONE_PANEL = 24
 """Tests."""
 
@@ -85,11 +89,28 @@ def summary_figure(fit: Identification) -> Figure:
         axes.set_title("measured (dots) and by the law (lines, 95 % band)", fontsize=9)
         if np.ptp(scale.values) > 0:
             scale.add_bar(upper, [axes])
+        if scale is by_temperature and len(tests) <= MOST_LABELLED:
+            _label_stresses(axes, fit, by_stress.values, tests, scale.colours)
     panels = np.atleast_1d(lower.subplots(1, len(below)))
     draw_rates(panels[0], fit, curves.prediction)
     if len(below) > 1:
         draw_ruptures(panels[1], fit, scale.colours)
     return figure
+
+
+def _label_stresses(
+    axes: Axes, fit: Identification, stresses: Floats, tests: Sequence[int], colours: Sequence[Any]
+) -> None:
+    """The stress of each test, MPa, at the end of its curve; stresses : (tests,)."""
+    lines = [line for line in axes.lines if line.get_linestyle() != "None"]
+    for k, line in zip(tests, lines, strict=True):
+        points = np.asarray(line.get_xydata())
+        known = points[np.isfinite(points).all(axis=1)]
+        if known.size:
+            place = (float(known[-1, 0]), float(known[-1, 1]))
+            axes.annotate(
+                f"{stresses[k]:.3g}", place, (2, -3), textcoords="offset points", fontsize=7, color=colours[k]
+            )
 
 
 def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:

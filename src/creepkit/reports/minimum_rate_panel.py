@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from creepkit.inverse.identified_values import MinimumRate, minimum_rates_of
 from creepkit.inverse.minimum_rates import apparent_exponent
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import strain, time
-from creepkit.records import ZERO_CELSIUS
+from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.records.units import celsius_text
 from creepkit.reports.condition_colours import ColourScale, temperature_scale
 from creepkit.reports.figures import place_legend_right, set_range
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 
 MOST_NAMED_TEMPERATURES = 6
 """Temperatures that the legend names."""
+
+
+PERCENT_PER_HOUR = 100.0 * SECONDS_PER_HOUR
+"""Of 1/s."""
 
 
 DRAWN_FACTOR = 30.0
@@ -68,6 +73,7 @@ def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
 def draw_minimum_rates(axes: Axes, fit: Identification, rates: Sequence[MinimumRate]) -> None:
     """Measured minimum rates as dots, those by the law for the same tests as a line with the 95 % band of one test."""
     scale = temperature_scale(fit.histories)
+    rates = [_in_percent(rate) for rate in rates]
     levels = _levels(rates)
     for level in levels:
         _draw_level(axes, [r for r in rates if _level(r) == level], scale, named=len(levels) <= MOST_NAMED_TEMPERATURES)
@@ -79,12 +85,18 @@ def draw_minimum_rates(axes: Axes, fit: Identification, rates: Sequence[MinimumR
     set_range(axes, "x", 0.93 * float(stresses.min()), 1.07 * float(stresses.max()), logarithmic=True, most=6)
     set_range(axes, "y", 0.8 * float(values.min()), 1.25 * float(values.max()), logarithmic=True)
     axes.plot([], [], "o", ms=4, color="grey", mec="black", mew=0.4, label="measured")
-    axes.set(xlabel="stress, MPa", ylabel="minimum creep rate, 1/s")
+    axes.set(xlabel="stress, MPa", ylabel="minimum creep rate, %/h")
     axes.grid(alpha=0.25)
     place_legend_right(axes, "line: by the law;\nband: 95 % of\na single test")
     sentence = exponent_sentence(rates)
     heading = "minimum creep rate of the tests"
     axes.set_title(f"{heading}\n{sentence}" if sentence else heading, fontsize=9)
+
+
+def _in_percent(rate: MinimumRate) -> MinimumRate:
+    """The same in %/h."""
+    drawn = {name: PERCENT_PER_HOUR * getattr(rate, name) for name in ("measured", "predicted", "low", "high")}
+    return replace(rate, **drawn)
 
 
 def _draw_level(axes: Axes, rates: Sequence[MinimumRate], scale: ColourScale, *, named: bool) -> None:

@@ -12,7 +12,7 @@ from creepkit.records import ZERO_CELSIUS, Prediction
 from creepkit.reports.condition_colours import temperature_scale, tested_temperatures
 from creepkit.reports.figures import place_legend_right, set_range
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
-from creepkit.reports.minimum_rate_panel import compared_minimum_rates, draw_minimum_rates
+from creepkit.reports.minimum_rate_panel import PERCENT_PER_HOUR, compared_minimum_rates, draw_minimum_rates
 from creepkit.reports.prediction_bands import HoldRate, rates_of_tests
 
 if TYPE_CHECKING:
@@ -52,10 +52,11 @@ def _draw_reference_rates(axes: Axes, fit: Identification, rates: Sequence[HoldR
     bounds: list[float] = []
     for celsius in _drawn_temperatures(tested_temperatures(fit.histories)):
         rate, low, high = fit.rate(grid, np.full_like(grid, celsius + ZERO_CELSIUS), warn=False)
+        rate, low, high = (PERCENT_PER_HOUR * v for v in (rate, low, high))
         axes.fill_between(grid, low, high, color=scale(celsius), alpha=0.25, lw=0)
         axes.plot(grid, rate, color=scale(celsius), lw=1.4, label=f"{celsius:.0f} °C")
         bounds += [float(rate.min()), float(rate.max()), float(low.min()), float(high.max())]
-    shown = [r for r in rates if r.rate > SMALLEST_SHARE * min(bounds)]
+    shown = [r for r in rates if PERCENT_PER_HOUR * r.rate > SMALLEST_SHARE * min(bounds)]
     for marker, label, tests in (
         ("o", "law × measured /\nidentified growth\nof each test", [r for r in shown if not r.stated]),
         ("s", "law × measured /\nidentified minimum\nrate of each test", [r for r in shown if r.stated]),
@@ -63,7 +64,7 @@ def _draw_reference_rates(axes: Axes, fit: Identification, rates: Sequence[HoldR
         for k, test in enumerate(tests):
             axes.plot(
                 test.stress,
-                test.rate,
+                PERCENT_PER_HOUR * test.rate,
                 marker,
                 ms=4,
                 color=scale(test.temperature - ZERO_CELSIUS),
@@ -71,11 +72,11 @@ def _draw_reference_rates(axes: Axes, fit: Identification, rates: Sequence[HoldR
                 mew=0.4,
                 label=label if k == 0 else None,
             )
-    bounds += [r.rate for r in shown]
+    bounds += [PERCENT_PER_HOUR * r.rate for r in shown]
     set_range(axes, "x", float(grid[0]), float(grid[-1]), logarithmic=True)
     finite = [b for b in bounds if np.isfinite(b) and b > 0]
     set_range(axes, "y", max(min(finite), 1e-12 * max(finite)), max(finite), logarithmic=True)
-    axes.set(xlabel="von Mises stress, MPa", ylabel="creep rate, 1/s")
+    axes.set(xlabel="von Mises stress, MPa", ylabel="creep rate, %/h")
     axes.grid(alpha=0.25)
     place_legend_right(axes, "95 % band:\nlaw")
     reference = fit.reference

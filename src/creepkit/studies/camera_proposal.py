@@ -41,6 +41,23 @@ ALLOYS_FILE = "alloys.csv"
 """Of the table of alloys that is written to be filled in."""
 
 
+OF_ANY_FRAMES = (
+    "frames",
+    "frame",
+    "images",
+    "image",
+    "dic",
+    "dice",
+    "vic",
+    "exports",
+    "export",
+    "camera",
+    "cam",
+    "results",
+)
+"""Words in the name of a folder that say only that it holds frames."""
+
+
 LOADS = ("pressure", "force")
 """Quantities of channels that make a table a record of what was imposed."""
 
@@ -187,6 +204,8 @@ def found_cameras(folder: Path, path: Path, others: Sequence[Path], base: str) -
     }
     times = {one: rows for one in files if one not in records and (rows := _of(read_frame_times, one)) is not None}
     owners = {one: _owner(one, list(frames)) for one in files}
+    for kind in (times, records):
+        owners |= _one_of_each([one for one in kind if owners[one] is None], list(frames))
     cameras = []
     for one, found in frames.items():
         right = {file: rows for file, rows in times.items() if rows.size == len(found)}
@@ -227,12 +246,23 @@ def _owner(file: Path, folders: Sequence[Path]) -> Path | None:
         return file.parent
     words, found = _words(file.stem), list[tuple[int, Path]]()
     for folder in folders:
-        name = _words(folder.absolute().name)
+        name = [word for word in _words(folder.absolute().name) if word not in OF_ANY_FRAMES]
         if name and any(words[k : k + len(name)] == name for k in range(len(words))):
             found.append((len(name), folder))
     longest = max((size for size, _ in found), default=0)
     best = [folder for size, folder in found if size == longest]
     return best[0] if len(best) == 1 else None
+
+
+def _one_of_each(files: Sequence[Path], folders: Sequence[Path]) -> dict[Path, Path]:
+    """{file: folder} where what tells folders apart, as the number in run1 and run2, tells files apart alike."""
+    names = {folder: set(_words(folder.absolute().name)) for folder in folders}
+    own = {
+        folder: words.difference(*(names[one] for one in folders if one != folder)) for folder, words in names.items()
+    }
+    found = {file: [one for one in folders if own[one] and own[one] <= set(_words(file.stem))] for file in files}
+    pairs = {file: owners[0] for file, owners in found.items() if len(owners) == 1}
+    return pairs if len(folders) > 1 and len(pairs) == len(files) == len(set(pairs.values())) == len(folders) else {}
 
 
 def _chosen(owners: Mapping[Path, Path | None], folder: Path, reason: str) -> Choice:

@@ -15,6 +15,8 @@ from creepkit.errors import StudyError, nearest
 from creepkit.files.reading import FileKind, check_readable, sha256_of
 from creepkit.inverse.history_checks import SUSPECT_LABEL, truncated_at_strain
 from creepkit.quality import without_copies
+from creepkit.readers.questions import ANSWERS_FILE
+from creepkit.readers.reading import answered_readers
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History
 from creepkit.records.history_selection import select_tests
 from creepkit.records.plugin_calls import accepts_path
@@ -67,8 +69,12 @@ class StudyInputs:
 
 
 def input_files(file: StudyFile, paths: Sequence[Path], left_out: Sequence[Path]) -> list[InputFile]:
-    """Every regular file among paths and in folders among them, with its hash; without what the study itself writes."""
-    found = (one for path in paths for one in (_files_of_tests(path) if path.is_dir() else [path]))
+    """Every regular file among paths and in folders among them, and of answers beside them, with its hash.
+
+    left_out : what the study itself writes.
+    """
+    found = [one for path in paths for one in (_files_of_tests(path) if path.is_dir() else [path])]
+    found += [one.parent / ANSWERS_FILE for one in found if (one.parent / ANSWERS_FILE).is_file()]
     files = list(dict.fromkeys(one for one in found if one.is_file() and one not in left_out))
     for one in files:  # of all, before any is read from its beginning to its end
         check_readable(one, DATA_FILE)
@@ -85,7 +91,9 @@ def _files_of_tests(folder: Path) -> list[Path]:
     whole = any(accepts_path(reader, folder) for reader in readers)
     below = sorted(folder.rglob("*") if whole else folder.iterdir())
     visible = [one for one in below if not any(part[0] == "." for part in one.relative_to(folder).parts)]
-    return visible if whole else [one for one in visible if any(accepts_path(reader, one) for reader in readers)]
+    if whole:
+        return visible
+    return [one for one in visible if any(accepts_path(each, one) for each in answered_readers(one, readers))]
 
 
 # ---- tests ---------------------------------------------------------------------------------------------------------

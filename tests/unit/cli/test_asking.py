@@ -30,6 +30,17 @@ def test_questions_are_answered_one_after_another(tmp_path, capsys):
     assert (tmp_path / "rates.csv").read_text(encoding="utf-8") == TABLE
 
 
+def test_the_same_question_of_several_files_is_put_once(tmp_path):
+    head = "Stress (MPa);120\nTemperature (C);600\nTime (h);Extension (mm)\n"
+    for name in ("RX1.csv", "RX2.csv"):
+        (tmp_path / name).write_text(f"{head}0;0,01\n10;0,05\n50;0,1\n100;0,16\n", encoding="utf-8")
+    answer, left = typing("40")
+    put_questions(partial(ck.read_histories, tmp_path), answer)
+    assert left == []
+    assert (tmp_path / "tests.toml").read_text(encoding="utf-8") == '["RX*.csv"]\ngauge_length_mm = 40\n'
+    assert [one.outputs["strain"][-1] for one in ck.read_histories(tmp_path)] == pytest.approx([0.004, 0.004])
+
+
 def test_a_question_may_stay_open(tmp_path):
     (tmp_path / "rates.csv").write_text(TABLE, encoding="utf-8")
     answer, _ = typing("?")

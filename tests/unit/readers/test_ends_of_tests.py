@@ -4,6 +4,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
+from creepkit.readers.ends_of_tests import end_said_by
 
 SPELLINGS = [
     # column, cell of the test that did not break, cell of the tests that broke
@@ -92,6 +93,22 @@ UNSEEN = [
     ("Remarques", "la machine a lâché"),
 ]
 
+SENTENCES = {
+    "stopped": (
+        *("Failure: no", "Bruch: nein", "Rupture: N/A", "Bruch: -", "n. gebr.", "o. Bruch", "failure-free"),
+        *("1000 h without rupture", "n’a toujours pas cassé", "kein Versagen bis 5000 h", "failed to rupture"),
+        *("Versagen noch nicht eingetreten", "aucune rupture constatée", "specimen was not broken when the test ended"),
+    ),
+    "unclear": (
+        *("furnace failure at 3000 h", "before it could break", "no sign of failure", "broke during unloading"),
+        *("failure criterion not met", "rupture lors du démontage", "test broken off", "Bruch steht noch aus"),
+        *("failed in grips", "rupture expected in May", "ruptured?"),
+    ),
+    "ruptured": ("ruptured without necking", "Bruch ohne Einschnürung", "uncensored", "gerissen", "premature failure"),
+    "": ("necking", "heat X7", "thermocouple replaced", "Probe hält noch", "still holding"),
+}
+
+
 HEAD = "Temp (C);Stress (MPa);Rupture time (h);"
 ROWS = ((600, 320, "4454"), (600, 260, "23220"), (650, 320, "233.3"), (650, 260, "1112"))
 
@@ -117,3 +134,8 @@ def test_what_is_not_understood_is_asked_for(tmp_path, column, text):
     with pytest.raises(HistoryError, match=r"tests\.toml") as caught:
         ck.read_histories(table(tmp_path / "t.csv", column, text, ""))
     assert f"'{text}'" in str(caught.value)
+
+
+def test_what_sentences_say():
+    found = {text: end_said_by(text) for texts in SENTENCES.values() for text in texts}
+    assert found == {text: end for end, texts in SENTENCES.items() for text in texts}

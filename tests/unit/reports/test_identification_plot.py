@@ -35,7 +35,7 @@ def many():
 def test_a_few_tests_have_curves_and_rates_with_units(few, tmp_path):
     figure = few.plot(tmp_path / "fit.png")
     panels = [axes for axes in figure.axes if axes.get_xlabel()]
-    assert [axes.get_ylabel() for axes in panels] == ["strain, %", "creep rate, 1/s"]
+    assert [axes.get_ylabel() for axes in panels] == ["strain, %", "creep rate, %/h"]
     assert [axes.get_xlabel() for axes in panels] == ["time, h", "von Mises stress, MPa"]
     assert (tmp_path / "fit.png").stat().st_size > 10_000
 

@@ -75,6 +75,16 @@ def test_files_in_the_folder_of_the_frames_are_of_these(tmp_path: Path) -> None:
     assert [records[one.record] for one in model.camera] == ["a/log.csv", "b/log.csv"]
 
 
+def test_folders_say_that_they_hold_frames_and_files_may_have_the_number_alone(tmp_path: Path) -> None:
+    write_views(tmp_path, {"run1_frames": 6, "run2_frames": 6})
+    for k in (1, 2):
+        write_times(tmp_path / f"times_{k}.csv", Schedule(frames=6).times)
+        write_record(tmp_path / f"run{k}_log.csv", Schedule(frames=6), 1.0, {"T [C]": 800.0})
+    _, model = proposed(tmp_path)
+    files = [(one.times, one.record) for one in model.camera]
+    assert files == [("times_1.csv", "run1_log"), ("times_2.csv", "run2_log")]
+
+
 def test_where_several_would_do_it_is_a_question(tmp_path: Path) -> None:
     """Neither the first is taken, nor a number of seconds assumed; a run says what is missing."""
     write_views(tmp_path, {"frames": 6})

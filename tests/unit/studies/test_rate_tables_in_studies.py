@@ -9,7 +9,9 @@ import pytest
 
 import creepkit as ck
 from creepkit.inverse import candidates
+from creepkit.studies.inputs import input_files
 from creepkit.studies.proposal import propose_study
+from creepkit.studies.study_file import parse_study
 from helpers.rate_tables import GAS_CONSTANT
 
 EXPONENT, ENERGY = 6.5, 430e3
@@ -93,3 +95,12 @@ def test_one_law_has_one_set_of_values(folder):
     assert [(e.low, e.high) for e in study.joint_fit.estimates] == [(e.low, e.high) for e in best.estimates]
     law = {e.name: e for e in study.temperature_law.estimates}
     assert law["n"].value == pytest.approx(best.values["n"], rel=0.01)
+
+
+def test_answers_beside_the_data_are_among_its_files(folder):
+    """A report that carries the data of a study carries what was answered about them."""
+    data, study = folder / "data", folder / "study.toml"
+    (data / "other.csv").write_text("Last (MPa);T (C);t_r (h)\n120;600;900\n")
+    (data / "tests.toml").write_text('["other.csv"]\ncolumns = {Last = "stress"}\n')
+    files = input_files(parse_study(study, '[data]\nfiles = ["data"]\n'), [data], [])
+    assert {one.path.name for one in files} == {"table.csv", "other.csv", "tests.toml"}

@@ -100,7 +100,7 @@ class Fragment:
 class Answer:
     """The first screen: headline, picture, and a card with the law, its key figures, cautions and files.
 
-    figures : (name, where it holds, value with interval, remark).
+    figures : (name, where it holds, value with interval, remark). values : of the parameters, on a line.
     """
 
     kind: ClassVar[str] = "answer"
@@ -108,6 +108,7 @@ class Answer:
     picture: Picture | Paragraph | None
     law: str
     equations: Sequence[Markup]
+    values: Markup
     figures: Sequence[tuple[str, str, str, str]]
     cautions: Sequence[str]
     next_step: str

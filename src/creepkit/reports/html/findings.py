@@ -55,7 +55,7 @@ _DEPENDENCE = re.compile(r" with [\w-]+ temperature dependence")
 """Of titles in a headline, which the equation shows."""
 
 
-MOST_FILES = 6
+MOST_FILES = 4
 """On the first screen."""
 
 
@@ -76,6 +76,11 @@ class GroupFindings:
     equivalents: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     decisive: bool | None = None
+
+    @property
+    def weight(self) -> float:
+        """Of the best law among those compared, 1 of one law alone."""
+        return 1.0 if self.ranking is None else self.ranking.laws[0].weight
 
     @property
     def fits(self) -> list[Identification]:
@@ -152,7 +157,21 @@ def answer_block(
     equations = [Markup(equation) for equation in law_equations(fit.law)]
     headline = sentence(_DEPENDENCE.sub("", in_text(fit.headline)))
     step = sentence(next_step(fit, found.ranking))
-    return Answer(headline, picture, titled_law(fit.law), equations, rows, said, step, files[:MOST_FILES])
+    return Answer(
+        headline, picture, titled_law(fit.law), equations, _on_a_line(fit), rows, said, step, files[:MOST_FILES]
+    )
+
+
+def _on_a_line(fit: Identification) -> Markup:
+    """The parameters with their values; intervals are in the table of values."""
+    symbols = {str(symbol): symbol for symbol in fit.law.params}
+    texts = [
+        Markup("{} = {}{}").format(
+            Markup(expression_mathml(symbols[e.name])), number(e.value, 4), "" if e.unit == "1" else f" {e.unit}"
+        )
+        for e in fit.estimates
+    ]
+    return Markup(", ").join(texts)
 
 
 # ---- values and verdict ----------------------------------------------------------------------------------------------

@@ -29,7 +29,7 @@ from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import correlation_table, titled_law
 from creepkit.reports.html.methods_identification import rate_scatter_sentence
 from creepkit.reports.html.page_figures import PageFigures
-from creepkit.reports.identification_text import rupture_rows, scatter_of_rates
+from creepkit.reports.identification_text import rejected, rupture_rows, scatter_of_rates
 from creepkit.reports.judged_readings import LAW_RATE_MEANING, OWN_RATE_CHI_SQUARE, judged_readings
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 from creepkit.reports.ranking import explanation, misfit_cells, misfit_columns
@@ -291,8 +291,11 @@ def group_sections(
     fit, ranking = found.fit, found.ranking
     worst = _worst_tests(fit)[:1]
     far = f"; farthest from the law: {printable(fit.tests[worst[0]].name, 60)}" if len(fit.tests) > 1 and worst else ""
-    laws = "" if ranking is None else f"best of {plural(len(ranking.laws), 'law')}: weight {ranking.laws[0].weight:.2f}"
-    noise = f"rates of tests scatter by {scatter_of_rates(fit)}"
+    none = ", none of which explains the tests" if rejected(fit) else f": weight {found.weight:.2f}"
+    laws = "" if ranking is None else f"best of {plural(len(ranking.laws), 'law')}{none}"
+    noise = (
+        f"rates of tests scatter by {scatter_of_rates(fit)}" if len(fit.tests) > 1 else "of the readings of one test"
+    )
     tests, ranked = test_blocks(found, figures, most_tests), ranking_blocks(found, figures, drawn=ranking_drawn)
     return [
         values_section(found, prefix),
