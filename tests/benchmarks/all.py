@@ -73,6 +73,8 @@ BENCHMARKS = {
     "forecast_coverage": Benchmark(50),
     "forecast_measured": Benchmark(12, needs=DATA),
     "causes": Benchmark(5, (("--campaigns", "20"),)),
+    "forecast_beyond": Benchmark(4, (("--campaigns", "20"),), short=("--campaigns", "1", "--truths", "sinh")),
+    "usual_errors": Benchmark(8, (("--campaigns", "20"),)),
     "weights": Benchmark(8),
     "noise_correlation": Benchmark(4),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),

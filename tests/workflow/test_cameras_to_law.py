@@ -161,7 +161,7 @@ def test_a_study_goes_from_frames_and_a_record_to_a_law_and_to_its_report(labora
         assert text in page
     lock = json.loads((tmp_path / "study.lock").read_text())
     assert {"record.csv", "times.csv", "frames/f_030.csv"} <= set(lock["inputs"])
-    assert lock["stages"]["record of plate 3"]["numbers"]["1"]["lag_s"] == pytest.approx(-LAG, abs=10)
+    assert lock["stages"]["record of plate 3"]["numbers"]["lag_s"] == pytest.approx(-LAG, abs=10)
 
     again = ck.Study.load(file).run()
     assert set(states(again).values()) == {"kept"}

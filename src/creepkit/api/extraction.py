@@ -12,7 +12,7 @@ from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import HistoryError
 from creepkit.extraction.domes import Centers
 from creepkit.extraction.options import ClockOptions
-from creepkit.instruments.imposed import channel_names
+from creepkit.instruments.imposed import channel_names, named_specimens
 from creepkit.records import Loading, Program, RecordedLoading, Specimen, SupportsSurfaceObservation
 from creepkit.registry.arguments import resolve_predictor
 
@@ -135,11 +135,22 @@ class ImposedChannels:
 
     channels : {test piece: load, then thermocouples}, "" for all; {} for those that the record's format has for their
     names. places : {thermocouple: (x, y)} mm in the axes of the frames. infrared : mean temperatures there.
+    numbered : whether test pieces are called D1, D2, ... because nobody named them.
     """
 
     channels: Mapping[str, Sequence[str]] = field(default_factory=dict)
     places: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     infrared: InfraredField | None = None
+    numbered: bool = False
+
+    def check(self, record: InstrumentRecord, pieces: Sequence[str]) -> None:
+        """HistoryError where numbers that several test pieces were given may be taken for names of the record."""
+        named = named_specimens(record)
+        if self.numbered and not self.channels and len(pieces) > 1 and named and {*named} != {*pieces}:
+            raise HistoryError(
+                f"{record.origin}: has channels of {', '.join(named[:30])}, and the test pieces that were found are "
+                f"only numbered, {pieces[0]} to {pieces[-1]} row by row; say names, in this order, out of these"
+            )
 
     def names_for(self, piece: str, record: InstrumentRecord) -> tuple[str, list[str]]:
         """Channels of the load of a test piece and of its thermocouples; HistoryError where they are not known."""
@@ -168,6 +179,7 @@ def imposed_on(
 
     known, clock, failed_here = known or ImposedChannels(), clock or ClockOptions(), dict[str, str]()
     times = extractions[0].times + extractions[0].first_time
+    known.check(record, [one.name for one in extractions])
     names: dict[str, tuple[str, list[str]]] = {}
     for one in extractions:
         try:

@@ -67,7 +67,7 @@ def command(
         for one, path in zip(found, sheets, strict=False):
             one.plot(path)
             tell_written(path)
-        histories = _histories(found, recorded, under, known, failed) if to is not None else {}
+        histories = _histories(found, recorded, under, known, failed, numbered=not said.names) if to is not None else {}
         for name, history in histories.items():
             assert to is not None
             to.mkdir(parents=True, exist_ok=True)
@@ -83,6 +83,8 @@ def _histories(
     under: ImposedOptions,
     clock: ClockOptions,
     failed: dict[str, str],
+    *,
+    numbered: bool,
 ) -> dict[str, History]:
     """Histories under what an instrument recorded, after the clocks were aligned, or under constants."""
     import creepkit as ck
@@ -93,7 +95,7 @@ def _histories(
         assert under.temperature is not None
         histories = {one.name: one.history_under(under.load, under.temperature) for one in found}
     else:
-        known = ImposedChannels({"": under.channels} if under.channels else {})
+        known = ImposedChannels({"": under.channels} if under.channels else {}, numbered=numbered)
         imposed = imposed_on(found, recorded, known, clock, failed)
         by_name = {one.name: one for one in found}
         histories = {one.specimen: history_of(by_name[one.specimen], one) for one in imposed}

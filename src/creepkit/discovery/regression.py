@@ -150,11 +150,10 @@ def isothermal_groups(temperatures: Sequence[float], tolerance: float = ISOTHERM
 
 
 def _theta_covariance(fit: Identification) -> Floats:
-    jacobian, variance_factor = (
-        fit.coordinates.jacobian(fit.u),
-        (interval_quantile(fit.freedom) / interval_quantile(INFINITE_FREEDOM)) ** 2,
-    )
-    return np.asarray(variance_factor * jacobian @ fit.covariance @ jacobian.T + _bound_variance(fit))
+    """(parameters, parameters) by the tests alone: what is off alike at every temperature tells no forms apart."""
+    jacobian, covariance = fit.coordinates.jacobian(fit.u), fit.by_tests_alone.covariance
+    variance_factor = (interval_quantile(fit.freedom) / interval_quantile(INFINITE_FREEDOM)) ** 2
+    return np.asarray(variance_factor * jacobian @ covariance @ jacobian.T + _bound_variance(fit))
 
 
 def _bound_variance(fit: Identification) -> Floats:

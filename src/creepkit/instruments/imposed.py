@@ -113,6 +113,13 @@ def _agreeing(record: InstrumentRecord, times: Floats) -> ClockAlignment:
     return ClockAlignment.stated(0.0, zero=record.start)
 
 
+def named_specimens(record: InstrumentRecord, pattern: str = "") -> list[str]:
+    """The specimens of which a record has channels of this pattern, by default of the load; [] where it names none."""
+    front, _, back = (pattern or record.channel_patterns.get("pressure", "{}")).partition("{}")
+    channels = [one for one in record.channels if front + back and one.startswith(front) and one.endswith(back)]
+    return [one[len(front) : len(one) - len(back)] for one in channels]
+
+
 def channel_names(record: InstrumentRecord, specimen: str) -> tuple[str, str]:
     """Channels of load and temperature of a specimen, by the format of the record; HistoryError where there are none.
 
@@ -128,12 +135,7 @@ def channel_names(record: InstrumentRecord, specimen: str) -> tuple[str, str]:
     wanted = (patterns["pressure"].replace("{}", specimen), patterns["temperature"].replace("{}", specimen))
     for name, pattern in zip(wanted, (patterns["pressure"], patterns["temperature"]), strict=True):
         if name not in record.channels:
-            front, _, back = pattern.partition("{}")
-            known = [
-                one[len(front) : len(one) - len(back)]
-                for one in record.channels
-                if one.startswith(front) and one.endswith(back)
-            ]
+            known = named_specimens(record, pattern)
             raise HistoryError(
                 f"{record.origin}: it has no channel '{name}' of '{specimen}'; {nearest(specimen, known)}"
             )

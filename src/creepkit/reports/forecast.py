@@ -158,7 +158,8 @@ def forecast_rows(forecast: Forecast) -> list[tuple[str, ...]]:
         end = "" if leading is None else _end_text(leading).replace(" at ", "\nat ", 1)
         end += f"\n{test.caution}" if test.caution else ""
         condition = f"{kind_of_test(test.history)}, {test.history.condition}"
-        rows.append((test.name, condition, end, times, measured, explained, test.extrapolation or "no"))
+        beyond = "\n".join(filter(None, (test.extrapolation, test.misfit and misfit_sentence(test.misfit)))) or "no"
+        rows.append((test.name, condition, end, times, measured, explained, beyond))
     return rows
 
 
@@ -187,10 +188,17 @@ def _test_to_json(test: TestForecast) -> dict[str, Any]:
         ],
         "includes": dict(test.includes),
         "extrapolation": test.extrapolation,
+        "misfit": None if test.misfit is None else _misfit_to_json(test.misfit),
         "notes": list(test.notes),
         "caution": test.caution,
         "score": None if test.score is None else _score_to_json(test.score),
     }
+
+
+def _misfit_to_json(misfit: LawMisfit) -> dict[str, Any]:
+    """The factor in the intervals, and that by which the law misses the tests nearest to the question."""
+    nearest = {"stress": misfit.stress, "temperature": misfit.temperature, "factor": math.exp(misfit.log_factor)}
+    return {"factor": misfit.factor, "nearest": nearest}
 
 
 def _output_to_json(one: OutputForecast) -> dict[str, Any]:

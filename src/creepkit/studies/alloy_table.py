@@ -101,8 +101,10 @@ class AlloyTable:
                 raise HistoryError(f"{row.place}: there is no camera '{row.camera}'; {nearest(row.camera, cameras)}")
             is_own = _same(row.camera, camera) or (not row.camera and len(cameras) == 1)
             if is_own and row not in rows.values():
-                shown = f"it shows {', '.join(dimples[:30])}"
-                raise HistoryError(f"{row.place}: camera '{camera}' shows no dimple '{row.name}'; {shown}")
+                raise HistoryError(
+                    f"{row.place}: camera '{camera}' shows no dimple '{row.name}'; it shows {', '.join(dimples[:30])}, "
+                    "numbered row by row: where one between them is not seen, say names and centers_mm of the others"
+                )
         lacking = [name for name in dimples if name not in rows]
         if lacking:
             raise HistoryError(

@@ -23,6 +23,7 @@ from creepkit.errors import CreepkitError
 from creepkit.extraction.domes import find_domes
 from creepkit.extraction.series import reference_plate
 from creepkit.instruments.clock_alignment import UNIX_TIME
+from creepkit.instruments.imposed import named_specimens
 from creepkit.registry.arguments import specimen_by_name
 from creepkit.registry.reading import frame_files, read_frames, read_record
 from creepkit.studies.alloy_table import empty_table, looks_like_alloys
@@ -88,7 +89,8 @@ class FoundCamera:
     """A folder of frames.
 
     source : it as the study file names it. times : a file with a row for each frame. record : of what was imposed.
-    dimples : names of the test pieces that it shows, () where none was found. unseen : why not.
+    dimples : names of the test pieces that it shows, () where none was found. unseen : why not. named : those of which
+    its record has channels.
     """
 
     folder: Path
@@ -98,6 +100,7 @@ class FoundCamera:
     record: Choice
     dimples: tuple[str, ...] = ()
     unseen: str = ""
+    named: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -118,6 +121,9 @@ class FoundCamera:
                 asked.append(f"which of {', '.join(one.name for one in choice.open)} is the {what} of {self.name}?")
         if self.untimed and self.times == Choice():
             asked.append(f"when were the frames of {self.name} taken? give times = a file, or interval_s")
+        if len(self.dimples) > 1 and self.named and {*self.named} != {*self.dimples}:
+            row = f"{self.dimples[0]} to {self.dimples[-1]}"
+            asked.append(f"which of {', '.join(self.named)} are {row} of {self.name}, row by row? give names")
         return tuple(asked)
 
 
@@ -216,7 +222,8 @@ def found_cameras(folder: Path, path: Path, others: Sequence[Path], base: str) -
         under = _chosen(covering | dict.fromkeys(by_name, one), one, "it is the only one that lasts as long")
         dimples, unseen = _dimples(found)
         source = base if one == folder else f"{place}{one.name}"
-        cameras.append(FoundCamera(one, source, found, own, under, dimples, unseen))
+        named_in = () if under.file is None else tuple(named_specimens(records[under.file]))
+        cameras.append(FoundCamera(one, source, found, own, under, dimples, unseen, named_in))
     used = {c.file for camera in cameras for c in (camera.times, camera.record)} - {None}
     offered = {file for camera in cameras for c in (camera.times, camera.record) for file in c.open}
     kept = {file: record for file, record in records.items() if file in used | offered}

@@ -334,7 +334,8 @@ class StudyCamera:
         def make(results: Results, tick: Tick) -> ImposedOnTests:
             read = ck.read_record(path, record.format, **values_of_table(RecordOptions, record))
             places = {name: (x, y) for name, (x, y) in part.thermocouples_mm.items()}
-            known, failed = ImposedChannels(part.channels, places, self.infrared), dict[str, str]()
+            known = ImposedChannels(part.channels, places, self.infrared, numbered=not self.said.names)
+            failed: dict[str, str] = {}
             tests: tuple[Extraction, ...] = results[self.name].tests
             tick("align clocks", 0, len(tests))
             found = imposed_on(tests, read, known, self.clock, failed)
@@ -435,15 +436,15 @@ class StudyCamera:
 
     def priors(self, histories: Sequence[History]) -> list[Nuisance]:
         """What is known of single test pieces but for an error: their lengths and their temperatures."""
-        found = []
         places = {history.name: history.labels.get("place", "") for history in histories}
-        rows = {} if self.alloys is None else self.alloys.of_camera(self.label, list(places.values()))
-        for history in histories:
-            row = rows.get(places[history.name])
-            if row is not None and history.name == f"{self.label} {places[history.name]}":
-                kinds = {one.name: one.alias or one.name for one in dimensions_of(self.specimen)}
-                found += [Nuisance(kinds[name], sd=sd, tests=(history.name,)) for name, sd in row.tolerances.items()]
-            if "temperature_sd_K" in history.labels and history.name.startswith(f"{self.label} "):
+        own = [history for history in histories if history.name == f"{self.label} {places[history.name]}"]
+        rows = {} if self.alloys is None else self.alloys.of_camera(self.label, [places[one.name] for one in own])
+        kinds = {one.name: one.alias or one.name for one in dimensions_of(self.specimen)}
+        found = []
+        for history in own:
+            tolerances = rows[places[history.name]].tolerances if places[history.name] in rows else {}
+            found += [Nuisance(kinds[name], sd=sd, tests=(history.name,)) for name, sd in tolerances.items()]
+            if "temperature_sd_K" in history.labels:
                 sd = float(history.labels["temperature_sd_K"])
                 found.append(Nuisance("temperature", sd=sd, tests=(history.name,)))
         return found

@@ -91,7 +91,7 @@ def _output_weights(value: Any) -> Any:
     numbers = isinstance(value, dict) and all(_is_number(one) for one in value.values())
     if isinstance(value, str) or (value and numbers):
         return value
-    raise PydanticCustomError("misfit", "must be a word such as noise, or numbers by name such as { strain = 1 }")
+    raise PydanticCustomError("misfit", "must be a word such as noise, or numbers by output such as { strain = 1 }")
 
 
 def _channels(value: Any) -> Any:

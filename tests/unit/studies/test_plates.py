@@ -14,6 +14,7 @@ from creepkit.studies.alloy_table import looks_like_alloys, read_alloy_table
 from creepkit.studies.proposal import propose_study
 from creepkit.studies.study_file import parse_study
 from helpers.camera_samples import dice, vic_3d
+from helpers.instrument_samples import plate_record
 from helpers.plates import Schedule, write_record, write_times
 
 BULGE = ck.specimen("bulge")
@@ -234,3 +235,18 @@ def test_dimples_are_known_by_number_and_by_their_whole_name(tmp_path: Path) -> 
     table = read_alloy_table(path, BULGE)
     table.check("west", ["D1", "D2"], ["west", "east"])
     assert table.of_camera("east", ["D1"])["D1"].alloy == "C"
+
+
+def test_numbers_of_dimples_are_no_names_of_the_record(tmp_path: Path) -> None:
+    """A record of A1, B2 and D1 does not lend the channels of its D1 to the first of several dimples in the view."""
+    from creepkit.api.extraction import ImposedChannels
+
+    path = tmp_path / "rig.csv"
+    path.write_text(plate_record())
+    record = ck.read_record(path)
+    ImposedChannels(numbered=True).check(record, ["D1"])
+    ImposedChannels().check(record, ["D1", "D2"])
+    with pytest.raises(
+        HistoryError, match=r"channels of A1, B2, D1, and .* only numbered, D1 to D2 row by row; say names"
+    ):
+        ImposedChannels(numbered=True).check(record, ["D1", "D2"])

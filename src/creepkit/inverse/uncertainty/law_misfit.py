@@ -31,8 +31,13 @@ from creepkit.inverse.uncertainty.quantities import gradient, log_rate
 from creepkit.inverse.uncertainty.rate_scatter import FLAT_BELOW, SMALLEST_EFFECT, USUAL_SD, RateScatter
 from creepkit.language.symbols import GAS_CONSTANT
 
+USUAL_LOG_STRESS, USUAL_KELVIN = 0.9, 50.0
+"""Over which a stress exponent and an activation energy may change by EXPONENT_CHANGE and ENERGY_CHANGE: a factor of
+2.5 in stress, and K."""
+
+
 CHANGES = np.geomspace(0.1, 1.0, 5)
-"""Over EXPONENT_CHANGE and ENERGY_CHANGE: standard deviations of what exponent and energy change by over the tests."""
+"""Sizes of the misfit, over these changes."""
 
 
 SCATTERS = np.geomspace(5e-3, 1.0, 10)
@@ -83,25 +88,31 @@ class LawMisfit:
 class Wandering:
     """A slope of ln rate that wanders: over one abscissa of the tests.
 
-    values : (tests,) the abscissa. change : one standard deviation of the slope over the span, at size one.
+    values : (tests,) the abscissa. usual_change : one standard deviation of what the slope changes by over usual_span.
     """
 
     values: Floats
-    change: float
+    usual_change: float
+    usual_span: float
 
     @property
     def span(self) -> float:
-        """Of the tests."""
-        return float(np.ptp(self.values))
+        """Of the tests, or a tenth of the usual one where that is more."""
+        return max(float(np.ptp(self.values)), 0.1 * self.usual_span)
+
+    @property
+    def change(self) -> float:
+        """One standard deviation of the slope over the span, at size one."""
+        return float(self.usual_change * np.sqrt(self.span / self.usual_span))
 
     @property
     def conditions(self) -> int:
         """How many of the tests' values are apart by more than what is one condition."""
-        return 1 + int((np.diff(np.sort(self.values)) > SAME_CONDITION * self.span).sum()) if self.span > 0 else 1
+        return 1 + int((np.diff(np.sort(self.values)) > SAME_CONDITION * self.span).sum())
 
     def distance(self, at: float) -> Floats:
-        """(tests,) of the tests from a value, in spans; 0 where they have one value."""
-        return np.abs(self.values - at) / self.span if self.span > 0 else np.zeros(self.values.size)
+        """(tests,) of the tests from a value, in spans."""
+        return np.asarray(np.abs(self.values - at) / self.span)
 
     def effects(self, at: Floats) -> Floats:
         """(points, knots) effects on ln rate of changes of the slope, one standard deviation each.
@@ -128,8 +139,10 @@ class LawMisfits:
 
     @cached_property
     def _axes(self) -> tuple[Wandering, Wandering]:
-        over_stress = Wandering(np.log(self.scatter.stresses), EXPONENT_CHANGE)
-        return over_stress, Wandering(-1.0 / (GAS_CONSTANT * self.scatter.temperatures), ENERGY_CHANGE)
+        stresses, temperatures = self.scatter.stresses, self.scatter.temperatures
+        kelvin = GAS_CONSTANT * float(np.mean(temperatures)) ** 2
+        over_temperature = Wandering(-1.0 / (GAS_CONSTANT * temperatures), ENERGY_CHANGE, USUAL_KELVIN / kelvin)
+        return Wandering(np.log(stresses), EXPONENT_CHANGE, USUAL_LOG_STRESS), over_temperature
 
     @cached_property
     def _seen(self) -> list[bool]:
