@@ -45,7 +45,16 @@ from creepkit.readers.text_tables import (
     read_frames,
 )
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
-from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, outputs_of_test, specimen_of
+from creepkit.records import (
+    UNKNOWN_DURATION,
+    History,
+    Loading,
+    Program,
+    dimensions_of,
+    known_specimens,
+    outputs_of_test,
+    specimen_of,
+)
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -84,7 +93,10 @@ def assemble_history(
     frames = as_plain_bar(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
     columns = table.location(table.columns_line)
     loading = read_loading(conditions, frames, marked)
+    is_named = conditions.states("specimen")
     specimen, outputs = _specimen_and_outputs(conditions, frames, loading.quantity, columns)
+    if not is_named:
+        _record_unstated(conditions, specimen)
     strain_measure = conditions.take_choice(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
@@ -206,6 +218,10 @@ def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | Non
         raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
 
 
+_OF_OTHER_THINGS = ("assumed", "ended", "heat", "laboratory", "operator")
+"""Labels that do not say how a test ended; `ended` is what creepkit's simulation says beside a time of rupture."""
+
+
 def _time_and_end(conditions: StatedConditions, path: Path, name: str) -> tuple[StatedNumber | None, str, bool]:
     """The rupture time, how the test ended, by `ended`, an answer or a label, and whether the time is that of its end.
 
@@ -218,7 +234,7 @@ def _time_and_end(conditions: StatedConditions, path: Path, name: str) -> tuple[
     firm, remarks, unclear = dict[str, str](), dict[str, str](), dict[str, str]()
     for label, text in conditions.labels.items():
         kind = kind_of_column(label)
-        if label in ("assumed", "heat", "laboratory", "operator") or (not kind and text.casefold() in YES | NO):
+        if label in _OF_OTHER_THINGS or (not kind and text.casefold() in YES | NO):
             continue
         (end,) = ends_in_column(label, [text], conditions.end_terms, False).ends
         firmness = firm if kind in FIRM else remarks
@@ -289,6 +305,18 @@ def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Ela
 
 def _merge_label(frames: TableFrames) -> dict[str, str]:
     return {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
+
+
+def _record_unstated(conditions: StatedConditions, specimen: str) -> None:
+    """Record, before all else that is assumed, a specimen that columns alone tell, and its lengths by default."""
+    lengths = [
+        f"{one.name} {one.default:g}"
+        for one in dimensions_of(known_specimens().get(specimen))
+        if one.of_piece and not {*one.names, one.name} & conditions.geometry.keys()
+    ]
+    if lengths:
+        what = f"specimen {specimen} by its columns with lengths by default: {'; '.join(lengths)} mm"
+        conditions.record_assumption(what, first=True)
 
 
 def _specimen_and_outputs(

@@ -10,9 +10,9 @@ GOOD = "# stress_MPa: 150\n# temperature_C: 600\nTime (h),Creep strain (%)\n" + 
 def test_the_good_files_are_shown_and_the_errors_come_last(tmp_path):
     (tmp_path / "good.csv").write_text(GOOD)
     (tmp_path / "other.csv").write_text(GOOD.replace("150", "170"))
-    (tmp_path / "spoilt.csv").write_text("# Abbruch: furnace\n" + GOOD)
+    (tmp_path / "spoilt.csv").write_text("# Ofenplatz: 3\n" + GOOD)
     result = creepkit("read", str(tmp_path))
     assert result.exit_code == 1
     assert "good: uniaxial, 150 MPa" in result.output
     assert "other: uniaxial, 170 MPa" in result.output
-    assert "unknown key 'Abbruch'" in result.output
+    assert "unknown key 'Ofenplatz'" in result.output
