@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1507,
     "instruments": 1402,
     "integration": 930,
-    "inverse": 12298,
+    "inverse": 12316,
     "jobs": 260,
     "kernels": 1710,
     "language": 1590,

@@ -158,8 +158,9 @@ def forecast_rows(forecast: Forecast) -> list[tuple[str, ...]]:
         end = "" if leading is None else _end_text(leading).replace(" at ", "\nat ", 1)
         end += f"\n{test.caution}" if test.caution else ""
         condition = f"{kind_of_test(test.history)}, {test.history.condition}"
-        beyond = "\n".join(filter(None, (test.extrapolation, test.misfit and misfit_sentence(test.misfit)))) or "no"
-        rows.append((test.name, condition, end, times, measured, explained, beyond))
+        beyond = [test.extrapolation] if test.extrapolation else []
+        beyond += [misfit_sentence(test.misfit)] if test.misfit is not None else []
+        rows.append((test.name, condition, end, times, measured, explained, "\n".join(beyond) or "no"))
     return rows
 
 
