@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 140,
     "modules": 785,
     "quality": 1545,
-    "readers": 6150,
+    "readers": 6180,
     "records": 1985,
     "registry": 620,
     "reports": 8440,
@@ -44,7 +44,7 @@ BUDGET = {
     "sampling": 1070,
     "screening": 740,
     "specimens": 3985,
-    "studies": 3114,
+    "studies": 3115,
     "surrogates": 1790,
     "testing": 1900,
 }

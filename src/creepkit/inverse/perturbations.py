@@ -106,6 +106,8 @@ def perturbations(
             noise = _with_scatter_of(change, problem, linear, noise_model)
         if one.kind == "modulus" or one.kind.startswith("imposed "):
             noise = _with_offset_of(change, problem, linear, noise)
+        if one.kind == DRIFT:
+            noise = _with_misfit_of(change, problem, noise)
         moved = value_changes(linear, noise, change)
         moved = moved.sum(axis=0, keepdims=True) if one.common else moved
         by_error = moved[:, : problem.parameter_count] @ _log_rate_gradient(problem, x)
@@ -447,6 +449,20 @@ def _with_scatter_of(
     like_rates = (change * weighted).sum(axis=1) / information
     scatter = float(np.hypot(noise_model.rate, np.sqrt(np.mean(like_rates**2))))
     return replace(noise_model, rate=min(scatter, LARGEST_RATE_SCATTER))
+
+
+def _with_misfit_of(change: Floats, problem: LeastSquaresProblem, noise_model: NoiseModel) -> NoiseModel:
+    """The noise model with the autocorrelated misfit that a change of the shape of curves would be estimated as.
+
+    change : (tests, observations) -, of the residuals; of each output its root mean square counts.
+    """
+    observations = problem.observations
+    for position, name in enumerate(observations.outputs):
+        mask = observations.present & (observations.output_index == position)
+        if name in noise_model.outputs and mask.any():
+            size = float(np.hypot(noise_model[name].drift, np.sqrt(np.mean(change[mask] ** 2))))
+            noise_model = noise_model.with_output(name, drift=size, correlation_length=1.0)
+    return noise_model
 
 
 def _with_offset_of(

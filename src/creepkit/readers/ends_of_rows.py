@@ -213,6 +213,7 @@ def with_end(cells: Mapping[str, SourceText], end: RowEnd, location: str) -> dic
     taken = next((key for key in entries if quantity_of(key) == "end_time"), None)
     if taken is not None and (lasted := marked_time(entries[taken].text, {})).number:
         entries[taken] = replace(entries[taken], text=lasted.number)
+        stated = stated or (STOPPED if lasted.said == STOPPED and key is None else "")
     if key is not None:
         time = entries.pop(key)
         if mark.said == STOPPED and stated == RUPTURED and mark.number:

@@ -90,8 +90,8 @@ def with_groups(table: TextTable, known: KnownNames) -> TextTable:
     """
     if isinstance(table.rows, NumberRows) or len(table.rows) < 2:
         return table
-    time = next(k for k, name in enumerate(table.columns) if known.quantity(name) == "time")
-    clock = [row.cells[time] for row in table.rows]
+    time = next((k for k, name in enumerate(table.columns) if known.quantity(name) == "time"), None)
+    clock = [row.cells[time] for row in table.rows] if time is not None else [""]
     if not all(is_number(cell, table.dialect) for cell in clock):
         return table
     times = [float(cell.replace(",", ".")) for cell in clock]

@@ -126,7 +126,7 @@ class RowPerTestReader:
             for k, key in enumerate(keys)
             if not is_missing(row.cells[k])
         }
-        frames, not_reached = _strains_reached(cells)
+        frames, not_reached = _strains_reached(cells, location)
         cells = {key: entry for key, entry in cells.items() if not key.startswith(TIME_TO_STRAIN)}
         entries = {**table.header, **row.stated, **with_end(cells, end, location)}
         entries, of_names = self._with_weak_sources(table, entries)
@@ -149,8 +149,9 @@ class RowPerTestReader:
         measure = _includes_elastic(table.names, keys)
         if measure and "includes_elastic" not in entries:
             entries["includes_elastic"] = SourceText(measure, location)
-        rows = [TableRow(row.line, (repr(time), repr(strain))) for time, strain in frames]
-        text = TextTable(grid.path, {}, ("time_s", "strain_1"), row.line, rows, sheet=grid.sheet)
+        marked = [*((time, strain, 1) for time, strain in frames), *_end_without_reading(entries, frames)]
+        rows = [TableRow(row.line, (repr(time), repr(strain), str(used))) for time, strain, used in marked]
+        text = TextTable(grid.path, {}, ("time_s", "strain_1", "used"), row.line, rows, sheet=grid.sheet)
         return assemble_history(name, entries, text, self.vocabulary, location=location, source=source)
 
     def _with_weak_sources(
@@ -337,22 +338,29 @@ def _with_stated(table: TestTable, vocabulary: HeaderVocabulary, errors: list[Hi
 # ---- times to strains ----------------------------------------------------------------------------------------------
 
 
-def _strains_reached(cells: Mapping[str, SourceText]) -> tuple[list[tuple[float, float]], list[str]]:
+def _strains_reached(cells: Mapping[str, SourceText], location: str) -> tuple[list[tuple[float, float]], list[str]]:
     """(s, strain) in the order of time, and what is said of strains that were not reached.
 
     A creep strain that is the only one follows one of zero when the load is put on.
     """
     reached, others = list[tuple[float, float, SourceText]](), list[str]()
+    broke = next((key for key in cells if quantity_of(key) == "rupture"), "")
+    end = marked_time(cells[broke].text, {}) if broke else None
+    lasted = _seconds(end.number, broke, cells[broke]) if end is not None and end.number and not end.said else None
     for key, entry in cells.items():
         if not key.startswith(TIME_TO_STRAIN):
             continue
         strain = float(quantity_of(key).split()[1])
         mark = marked_time(entry.text, {})
         if mark.said == STOPPED:
+            if lasted is not None and _seconds(mark.number, key, entry) > (1 + _ROUNDING) * lasted:
+                what = f"'{entry.key}' is {quoted(entry.text)}, and '{cells[broke].key}' {quoted(cells[broke].text)}"
+                raise HistoryError(
+                    f"{location}: {what}; a strain is reached before rupture or not: correct one of them"
+                )
             others.append(f"{strain:.3g} of strain not reached by {mark.number} {unit_of(key)}")
         else:
-            time = replace(entry, text=mark.number or entry.text).number(entry.key)
-            reached.append((TIME.convert(time, unit_of(key), entry.location, entry.key), strain, entry))
+            reached.append((_seconds(mark.number or entry.text, key, entry), strain, entry))
     reached.sort(key=lambda one: one[:2])
     for (_, before, one), (_, strain, other) in pairwise(reached):
         if strain <= before:
@@ -362,6 +370,25 @@ def _strains_reached(cells: Mapping[str, SourceText]) -> tuple[list[tuple[float,
             )
     frames = [(time, strain) for time, strain, _ in reached]
     return ([(0.0, 0.0), *frames] if len(frames) == 1 else frames), others
+
+
+_ROUNDING = 0.01
+"""Part of a time by which two that are the same may differ."""
+
+
+def _seconds(number: str, key: str, entry: SourceText) -> float:
+    return TIME.convert(replace(entry, text=number).number(entry.key), unit_of(key), entry.location, entry.key)
+
+
+def _end_without_reading(
+    entries: Mapping[str, SourceText], frames: Sequence[tuple[float, float]]
+) -> list[tuple[float, float, int]]:
+    """The end of a test that did not break, after its last frame: a frame that is not used, with the last strain."""
+    key = next((key for key in entries if quantity_of(key) == "end_time"), None)
+    if key is None or "ended" not in entries or entries["ended"].text != STOPPED:
+        return []
+    end = _seconds(entries[key].text, key, entries[key])
+    return [(end, frames[-1][1], 0)] if end > frames[-1][0] else []
 
 
 # ---- rows that say nothing -----------------------------------------------------------------------------------------

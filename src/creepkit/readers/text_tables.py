@@ -18,6 +18,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_missing, is_number, parse_number, parse_numbers
 from creepkit.readers.column_names import NameTable, split_written_name
+from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column
 from creepkit.readers.questions import Question
 from creepkit.readers.table_rows import NumberRows, TableRow, cells_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
@@ -186,12 +187,13 @@ def read_frames(
 ) -> TableFrames:
     """Read the frames in a table, except `skipped_columns` and those that are averaged to labels."""
     kinds = terms.column_kinds
-    ignored = {*skipped_columns, *(name for names in vocabulary.averaged_columns.values() for name in names)}
+    averaged = (name for names in vocabulary.averaged_columns.values() for name in names)
+    ignored = {*skipped_columns, *vocabulary.labels, *averaged}
     values: dict[str, Floats] = {}
     found: dict[str, str] = {}
     for k, name in enumerate(table.columns):
-        if name not in ignored:
-            written = table.as_written(k)
+        written = table.as_written(k)
+        if ignored.isdisjoint((name, written)):
             quantity, suffix = _parsed_column(table, k, vocabulary.synonyms.get(name, name), kinds)
             if quantity in values:
                 raise column_question(
@@ -251,6 +253,9 @@ def _parsed_column(table: TextTable, k: int, name: str, kinds: Mapping[str, Quan
         if sensor and sensor not in {(split_unit(other, kinds) or ("",))[0] for other in table.columns}:
             what = f"'{written}' seems to be a sensor of the {sensor}; is it?"
             raise column_question(table, what, {written: measured}, {written: UNUSED})
+        if kind_of_column(written) in (*FIRM, "remark"):
+            what = f"column '{written}' holds words beside frames; is it a label of the test?"
+            raise column_question(table, what, {written: LABEL}, {written: UNUSED})
         near = get_close_matches(written, kinds, 1, cutoff=0.55)
         meant = f"column '{written}' is not understood; " + (
             f"did you mean '{near[0]}'?" if near else "what does it hold?"

@@ -86,10 +86,11 @@ class DataSummary:
             loads += f", {self.loads[0]:g}"
             loads += f" to {self.loads[-1]:g} {units.pop() or self.tests[0].loading.quantity}" if several else ""
         kinds = ", ".join(dict.fromkeys(history.specimen for history in self.tests))
+        stopped = sum(history.unruptured for history in self.tests)
         count = f"{len(self.tests)} test{'s' if len(self.tests) > 1 else ''} ({kinds})"
         return [
             f"{count}, {len(self.framed)} with curves or rates; {loads}; {at}",
-            f"ended by rupture: {self.ruptured}; with tertiary creep: {self.tertiary}",
+            f"ended by rupture: {self.ruptured}; stopped before: {stopped}; with tertiary creep: {self.tertiary}",
         ]
 
 

@@ -93,6 +93,17 @@ def test_the_clock_argument_is_a_simulation_with_a_program_of_temperature(law, l
     assert expected.max() > 20 * NOISE
 
 
+@pytest.mark.parametrize("law", [NORTON_AT, HARDENING_AT], ids=["Norton", "strain hardening"])
+@pytest.mark.parametrize("noise", [1e-5, 1e-8])
+def test_independent_drifts_move_the_rate_by_no_more_than_their_own_mean(law, noise):
+    """However small the noise: a drift of 5 K heats a test by 2.5 K in the mean, and three tests average."""
+    tests = bars(law, [constant_stress(s, "stress") for s in (70.0, 90.0, 110.0)])
+    problem, x, linear = at_the_truth(law, tests)
+    found = perturbations(problem, x, linear, NoiseModel({"strain": OutputNoise(noise)}), tests)
+    drift = next(e for e in found if e.kind == DRIFT)
+    assert 0.3 < drift.rate_change / (0.5 * USUAL_DRIFT * drift.per_kelvin / np.sqrt(3.0)) < 1.0
+
+
 def test_a_law_without_temperature_has_the_usual_activation_energy():
     """At constant stress the strain of a steady rate changes by rate x Q / R T^2 x 5 K x t^2 / 2 t_end."""
     plain = NORTON_AT.fix(Q=420e3).at(1040.0)

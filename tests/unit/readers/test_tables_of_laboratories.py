@@ -70,7 +70,8 @@ def test_times_to_strains_are_frames(tmp_path, names):
     first, second = read(tmp_path, f"Temp (C),Stress (MPa),{names}\n550,200,120,1900,5200\n550,170,410,,>9000\n")
     assert first.outputs["strain"] == pytest.approx([0.002, 0.01])
     assert first.times == pytest.approx([120 * HOUR, 1900 * HOUR])
-    assert (first.rupture_time, second.unruptured) == (5200 * HOUR, True)
+    assert (first.rupture_time, second.unruptured, second.times[-1]) == (5200 * HOUR, True, 9000 * HOUR)
+    assert list(second.used) == [True, True, False]  # a creep strain of zero, 0.2 %, and the end
 
 
 def test_a_name_above_several_columns(tmp_path):
