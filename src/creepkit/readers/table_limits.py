@@ -11,7 +11,7 @@ from creepkit.files.limits import how_to_raise, raised
 MAXIMUM_COLUMNS, MAXIMUM_LINE, MAXIMUM_KEYS = 2000, 1_000_000, 1000
 """Columns of a table, characters of a line, and `# key: value` lines; no table of tests comes near them."""
 
-MAXIMUM_CELL, MAXIMUM_TEXTS = 10_000, 10_000_000
+MAXIMUM_CELL, MAXIMUM_TEXTS = 10_000, 40_000_000
 """Characters of a cell, for units are looked for in it; cells of a table that holds not numbers alone."""
 
 MAXIMUM_SKIPPED_LINES = 100_000
