@@ -16,7 +16,7 @@ from helpers.paths import ROOT
 BUDGET = {
     "api": 349,
     "app": 630,
-    "cameras": 1170,
+    "cameras": 1166,
     "cli": 2385,
     "core": 70,
     "dataset": 820,
@@ -44,7 +44,7 @@ BUDGET = {
     "sampling": 1070,
     "screening": 740,
     "specimens": 3985,
-    "studies": 3115,
+    "studies": 3121,
     "surrogates": 1790,
     "testing": 1900,
 }

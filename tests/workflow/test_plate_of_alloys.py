@@ -50,13 +50,16 @@ def fill_in(path: Path, planned: dict[tuple[str, str], PlannedDimple]) -> None:
 def test_init_one_edit_and_run_give_a_law_of_every_alloy(lab: Path) -> None:
     said = run("init", lab)
     assert "question" not in said
-    fill_in(lab / "alloys.csv", {("west", "D1"): WEST[0], ("west", "D2"): WEST[1], ("east", "D1"): EAST[0]})
     study = lab / "study.toml"
     text = study.read_text().replace("subset_mm = 0 ", "subset_mm = 1 ")
     text = re.sub(r"laws = \[.*?\]", 'laws = ["norton"]\nstarts = 1\nframes = 12', text).replace(
         '[selection]\nby = "bic"', ""
     )
     study.write_text(text)
+    empty = creepkit("run", study, "--only", "identification")
+    assert empty.exit_code == 1
+    assert "Young's modulus of east D1 is not stated; write modulus [GPa] of the table of alloys" in empty.stderr
+    fill_in(lab / "alloys.csv", {("west", "D1"): WEST[0], ("west", "D2"): WEST[1], ("east", "D1"): EAST[0]})
     run("run", study)
     result = ck.Study.load(study).run()  # kept
     assert {one.state for one in result.stages} == {"kept"}

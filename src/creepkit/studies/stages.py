@@ -22,7 +22,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import temperature
 from creepkit.options import values_of_table
 from creepkit.quality import DataQuality
-from creepkit.records import ZERO_CELSIUS, History, Nuisance
+from creepkit.records import ZERO_CELSIUS, History, Nuisance, known_specimens
 from creepkit.registry import default_registry
 from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
@@ -148,6 +148,12 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
         raise study.file.error(("selection",), what)
 
     def make(results: Results, tick: Tick) -> Ranking:
+        watched = [one for one in tests if "extraction" in one.labels and one.elastic is None]  # by cameras
+        known = {name: getattr(one, "conditions", {}) for name, one in known_specimens().items()}
+        needing = [one.name for one in watched if "modulus" in known[one.specimen]]
+        if needing:
+            where = "modulus [GPa] of the table of alloys, or modulus_GPa of [[camera]]"
+            raise StudyError(f"Young's modulus of {', '.join(needing[:30])} is not stated; write {where}")
         compared = selection is not None
         return ranked_candidates(
             laws, tests, using, asked, changes, compared=compared, settings=settings, progress=tick
