@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1507,
     "instruments": 1402,
     "integration": 930,
-    "inverse": 12316,
+    "inverse": 12320,
     "jobs": 260,
     "kernels": 1710,
     "language": 1590,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35410
+TESTS = 35420
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

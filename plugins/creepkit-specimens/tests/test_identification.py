@@ -35,7 +35,8 @@ def test_planted_values_are_found_again(case: str) -> None:
         noisy = {name: run.outputs[name] + random.normal(0.0, name.noise, run.times.size) for name in specimen.outputs}
         geometry = {name: value for name, value in run.geometry.items() if name != length}
         tests.append(run.replace(name=f"{case} {k}", outputs=noisy, geometry=geometry))
-    fit = ck.identify("norton", tests, specimen, nuisances=[ck.Nuisance(length, sd=2 * spread * default)], starts=1)
+    length_prior = ck.Nuisance(length, sd=2 * spread * default)
+    fit = ck.identify("norton", tests, specimen, nuisances=[length_prior], starts=1, usual_errors="none")
     for estimate in fit.estimates:
         half = 0.5 * (np.log(estimate.high) - np.log(estimate.low))
         assert abs(np.log(estimate.value / PLANTED[estimate.name])) <= 1.5 * half + 0.01, estimate

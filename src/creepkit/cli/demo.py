@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -37,8 +38,7 @@ HEADINGS = {
     MEASURED: "MEASURED: nine creep curves of CMSX-6 at 980 °C, thinned; six tests ruptured, three were stopped\n"
     "(Federal Institute for Materials Research and Testing, doi 10.5281/zenodo.13937986, CC BY 4.0)",
     PLANTED: "SIMULATED: nine creep curves with noise, 750 to 850 °C",
-    PLANTED_BULGE: "\nSIMULATED: a bulge test of one dimple with camera noise, at two pressures in turn;\n"
-    "every law is simulated by finite elements",
+    PLANTED_BULGE: "\nSIMULATED: a bulge test of one dimple with camera noise, at two pressures; laws by finite elements",
 }
 """What is said before the study of each."""
 
@@ -74,7 +74,7 @@ def command(
         tell(f"simulated creep curves in the place of measured ones, which need laws of damage; {MORE_LAWS}")
         studies[to / "creep_curves"] = PLANTED
     results = [_run(source, folder) for folder, source in studies.items()]
-    tell(f"\ntime: {time.perf_counter() - started:.0f} s")
+    tell(f"time: {time.perf_counter() - started:.0f} s")
     tell(f"results, the best law of each as LaTeX and Python, and the study files' locks: {to}")
     tell(f"reports: {' '.join(str(result.report) for result in results)}")
 
@@ -102,7 +102,7 @@ def _run(data: Path, folder: Path) -> StudyResult:
     tell(HEADINGS[data])
     study = ck.Study.load(data / "study.toml")
     with ProgressBar() as progress:
-        result = study.run(to=folder, progress=progress.tick)
+        result = study.run(to=folder, progress=progress.tick if sys.stdout.isatty() else None)
     for failure in result.failures:
         raise FitError(f"{failure.stage}: {failure.sentence}")
     ranking = result.rankings[""]

@@ -188,7 +188,7 @@ def image_of_numbers(path: Path) -> Floats:
         import io
 
         try:
-            values = np.load(io.BytesIO(read_bytes(path, IMAGE_FILE)), allow_pickle=False)
+            values = np.load(io.BytesIO(read_bytes(path, IMAGE_FILE)))
         except (ValueError, EOFError, OSError):
             raise HistoryError(f"{path}: is no array of numbers; save it by numpy.save()") from None
     elif ending == ".mat":

@@ -25,6 +25,7 @@ from creepkit.records import (
     dimension_named,
     drift_duration,
     is_length_nuisance,
+    kind_and_start,
     nuisance_key,
 )
 
@@ -113,7 +114,9 @@ class NuisanceParameters:
                 )
             parameters += [(nuisance, owner) for owner in owners]
         for key, index in test_index.items():
-            if is_length_nuisance(key) and (index >= 0).any():  # which is no deviation: a test cannot be without one
+            if (
+                is_length_nuisance(kind_and_start(key)[0]) and (index >= 0).any()
+            ):  # which is no deviation: a test cannot be without one
                 for test in map(int, np.flatnonzero(index < 0)):
                     if supports_nuisance(predictor_for(predictor, histories[test]), key):
                         raise FitError(

@@ -261,7 +261,7 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
         return "make a test that tells the laws apart (creepkit design says which)"
     if any(e.verdict in (NOT_DETERMINED, POORLY_DETERMINED) for e in fit.estimates):
         return "make a test that determines more (creepkit design says which)"
-    return "forecast (creepkit predict), or write the law for your code (creepkit export)"
+    return "forecast (creepkit predict), or export the law to your code (creepkit export)"
 
 
 # ---- as text ---------------------------------------------------------------------------------------------------------

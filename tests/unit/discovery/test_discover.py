@@ -100,7 +100,7 @@ def test_a_study_groups_tests_and_finds_the_same(tests, trend):
     assert len(found.isothermal_fits) == 5
     assert found.joint_fit.law.names == ("A", "n", "Q")
     assert found.temperature_law.forms == trend.forms
-    assert "Norton power law (PL) with Arrhenius temperature dependence" in str(found)
+    assert "norton*arrhenius describes" in str(found)
 
 
 def stepped(test, kelvin):

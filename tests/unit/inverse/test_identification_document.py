@@ -17,7 +17,9 @@ SAMPLES = np.random.default_rng(0).normal(size=(400, 2))
 @pytest.fixture(scope="module")
 def fit():
     tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(60.0, 1000.0), (80.0, 1000.0)], seed=1, noise=2e-5)
-    settings = IdentificationSettings(starts=1, sobol_points=8, weights="likelihood", nuisances=(), further_laws=3)
+    settings = IdentificationSettings(
+        starts=1, sobol_points=8, weights="likelihood", nuisances=(), further_laws=3, usual_errors="none"
+    )
     return identify(NORTON, tests, Steady(), settings=settings)
 
 

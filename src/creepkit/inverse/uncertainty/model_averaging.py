@@ -225,8 +225,8 @@ def rate_band(
 ) -> RateBand:
     """Creep rates at stresses (points,) MPa and temperature +- uncertainty (K), over one law or the laws of a ranking.
 
-    A law without temperature cannot know how the temperature moves its rate: its part of the band is not widened, and
-    a note says so. warn : whether a temperature that seems to be in Celsius is a FitError.
+    A law without temperature cannot know how the temperature moves its rate, and a note says so. warn : whether a
+    temperature that seems to be in Celsius is a FitError.
     """
     mixture = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
     levels = np.atleast_1d(np.asarray(stresses, float))

@@ -112,5 +112,5 @@ def test_without_uncertainty_of_temperature_it_is_the_band_of_the_law(fit):
 
 def test_a_law_without_temperature_cannot_know(fit):
     found = rate_band(fit, [40.0, 60.0], 1000.0)
-    assert found.low == pytest.approx(found.parameter_band[0])
+    assert (found.low <= found.parameter_band[0]).all()
     assert "without a temperature in the law norton the band cannot hold what 10 K do" in found.notes[0]
