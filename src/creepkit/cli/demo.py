@@ -38,7 +38,7 @@ HEADINGS = {
     MEASURED: "MEASURED: nine creep curves of CMSX-6 at 980 °C, thinned; six tests ruptured, three were stopped\n"
     "(Federal Institute for Materials Research and Testing, doi 10.5281/zenodo.13937986, CC BY 4.0)",
     PLANTED: "SIMULATED: nine creep curves with noise, 750 to 850 °C",
-    PLANTED_BULGE: "\nSIMULATED: a bulge test of one dimple with camera noise, at two pressures; laws by finite elements",
+    PLANTED_BULGE: "\nSIMULATED: a dimple with camera noise, at two pressures; laws by finite elements",
 }
 """What is said before the study of each."""
 
