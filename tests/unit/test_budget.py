@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35420
+TESTS = 35440
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -6,7 +6,7 @@ Terminal, notebook and page take their first lines from here. A sentence has 25 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -22,8 +22,8 @@ from creepkit.language import temperature
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.minimum_rate_panel import compared_minimum_rates, exponents
-from creepkit.reports.stress_exponents import interval_digits, plain_number, rate_and_exponent
+from creepkit.reports.minimum_rate_panel import PERCENT_PER_HOUR, compared_minimum_rates, exponents
+from creepkit.reports.stress_exponents import NumberText, interval_digits, plain_number, rate_and_exponent
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -43,10 +43,6 @@ MOST_NAMED = 4
 
 NOTEWORTHY_EXPONENT = 0.15
 """Of the stress exponent, by which leaving out one test changes it, from which on this is said."""
-
-
-NumberText = Callable[[float, int], str]
-"""A number with so many digits, as the place where it stands writes it."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +99,7 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
         figures.append(_with_interval("activation energy", at, fit.activation_energy(), 1e-3, "kJ/mol"))
     of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
-    rate_figure = _with_interval("creep rate", f"{at}{of_state}", rate, 100.0 * SECONDS_PER_HOUR, "%/h")
+    rate_figure = _with_interval("creep rate", f"{at}{of_state}", rate, PERCENT_PER_HOUR, "%/h")
     included = any(one.included for one in fit.unmodelled)
     return [*figures, replace(rate_figure, remark="usual errors included") if included else rate_figure]
 
@@ -213,19 +209,15 @@ def _precision(fit: Identification) -> Iterator[str]:
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
             yield f"the tests {words} {_named(names, 'parameter', quoted=False)}"
-    far = max(fit.left_out, key=lambda one: abs(one.exponent - fit_exponent(fit)), default=None)
-    if far is not None and abs(far.exponent - fit_exponent(fit)) > NOTEWORTHY_EXPONENT * fit_exponent(fit):
+    exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
+    far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
+    if far is not None and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
         yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
     change = combined_change_text(fit.unmodelled)
     if change:
         beyond = [one for one in fit.unmodelled if not one.included]
         kinds = " and ".join(dict.fromkeys(one.description for one in beyond[:2]))
         yield f"intervals do not include {kinds}: rates move by {change}"
-
-
-def fit_exponent(fit: Identification) -> float:
-    """The stress exponent of the law's formula amid the tests."""
-    return float(fit.local_exponent(fit.reference.stress, warn=False)[0])
 
 
 def _data(quality: DataQuality | None) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Plot of an identification: tests over time with bands, residuals, creep rates over stress, times to rupture."""
+"""Plot of an identification: tests over time with bands, creep rates over stress, times to rupture."""
 
 from __future__ import annotations
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.records import SECONDS_PER_HOUR
 from creepkit.reports.condition_colours import distinct_colours
 from creepkit.reports.figures import empty_figure, place_legend_right, set_range, shortened
+from creepkit.reports.minimum_rate_panel import DRAWN_FACTOR, PERCENT_PER_HOUR
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,10 +24,6 @@ WIDTH, ROW, LARGEST = 8.6, 0.17, 11.0
 """Inches of the figure, of a material in it, and of its height at most."""
 
 
-DRAWN_FACTOR = 30.0
-"""Beyond the rates by which intervals end at the axis."""
-
-
 def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
     """Rates in %/h with 95 % intervals at the median stress of all; fits : (material, best law), in the order drawn."""
     stress = float(np.median([fit.reference.stress for _, fit in fits]))
@@ -36,7 +32,7 @@ def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
     laws = list(dict.fromkeys(fit.law.name for _, fit in fits))
     colours = dict(zip(laws, distinct_colours(len(laws)), strict=True))
     rates = np.array([[float(v) for v in fit.rate(stress, warn=False)] for _, fit in fits])
-    rates = 100.0 * SECONDS_PER_HOUR * rates
+    rates = PERCENT_PER_HOUR * rates
     centre = rates[:, 0][np.isfinite(rates[:, 0]) & (rates[:, 0] > 0)]
     named: set[str] = set()
     for k, ((_, fit), (rate, low, high)) in enumerate(zip(fits, rates, strict=True)):

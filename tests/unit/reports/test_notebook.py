@@ -6,7 +6,10 @@ import html5lib
 import numpy as np
 
 import creepkit as ck
+from creepkit.reports.answer import key_figures
+from creepkit.reports.plate_figure import plate_figure
 from helpers.report_pages import ranking
+from helpers.steady_rate_predictor import Steady, planted
 
 
 def test_a_record_is_one_line_and_a_cell_of_html() -> None:
@@ -51,3 +54,17 @@ def test_a_bulge_test_keeps_its_outputs_by_name() -> None:
     frame = bulge.to_dataframe()
     again = ck.History.from_dataframe(frame, "again", bulge.loading, bulge.temperature, specimen=bulge.specimen)
     assert set(again.outputs) == set(bulge.outputs)
+
+
+def test_key_figures_are_those_of_the_law() -> None:
+    """Of a power law with Arrhenius's factor the exponent is n, the energy Q; the map has its rate in %/h."""
+    law = ck.law("norton").times(ck.arrhenius(T_ref=1073.15))
+    tests = planted(law, {"A": 1e-16, "n": 5.2, "Q": 3.5e5}, [(s, T) for s in (40, 60) for T in (1050, 1100)], seed=5)
+    fit = ck.identify(law, tests, Steady(), starts=1)
+    figures = {one.name: one for one in key_figures(fit)}
+    np.testing.assert_allclose(figures["stress exponent"].value, fit.values["n"], rtol=1e-6)
+    np.testing.assert_allclose(figures["activation energy"].value, fit.values["Q"] / 1e3, rtol=1e-4)
+    rate = 3.6e5 * float(fit.rate(fit.reference.stress)[0])
+    np.testing.assert_allclose(figures["creep rate"].value, rate, rtol=1e-9)
+    (axes,) = plate_figure([("a", fit), ("b", fit)]).axes
+    assert {float(line.get_xdata()[0]) for line in axes.lines if line.get_marker() == "o"} == {rate}
