@@ -47,7 +47,7 @@ def read_those_that_can_be(
     return read, tests, errors
 
 
-@checked_with_own_words("path", "times")
+@checked_with_own_words("times")
 def read_frames(
     path: camera_reading.FramePath,
     format: camera_reading.FormatLike = None,
