@@ -74,7 +74,7 @@ def frame_files(path: camera_reading.FramePath, format: camera_reading.FormatLik
 
 
 @takes_options(RecordOptions)
-@checked_with_own_words("format", "path", "options")
+@checked_with_own_words("options")
 def read_record(path: str | Path, format: str | None = None, **options: Any) -> InstrumentRecord:
     """Read the record of an instrument: channels of pressure, temperature and others over one clock.
 
