@@ -36,7 +36,7 @@ _NO_NUMBERS = ("char", "cell", "struct", "object", "opaque", "function", "sparse
 class ArrayTable:
     """Columns of one frame that are arrays in a file.
 
-    shapes : {name: shape}. load : the arrays of some names, as they are; only what is asked for is read.
+    shapes : {name: shape}. load : of some names, the arrays (...,) of these shapes; others are not read.
     """
 
     path: Path

@@ -290,7 +290,7 @@ class RowReader:
 
 
 def means(values: Floats, starts: Ints) -> Floats:
-    """(groups,) means of the values (rows,) from each start to the next, NaN left out."""
+    """(groups,) means of values (rows,) from each of the starts (groups,) to the next, NaN left out."""
     seen = ~np.isnan(values)
     counts = np.add.reduceat(seen.astype(float), starts)
     sums = np.add.reduceat(np.where(seen, values, 0.0), starts)
