@@ -86,10 +86,10 @@ def plate_axes(points: Floats) -> PlateAxes:
     middle = np.median(points, axis=0)
     X = points - middle
     terms = np.stack([np.ones(len(X)), X[:, 0], X[:, 1]], axis=1)
-    weights = np.ones(len(X))
-    values = np.zeros(3)
+    weights, values = np.ones(len(X)), np.zeros(3)
     for k in range(30):
-        values = np.linalg.lstsq(terms * np.sqrt(weights)[:, None], X[:, 2] * np.sqrt(weights), rcond=None)[0]
+        weighted = terms * weights[:, None]
+        values = np.asarray(np.linalg.lstsq(weighted.T @ terms, weighted.T @ X[:, 2], rcond=None)[0], dtype=float)
         residual = X[:, 2] - terms @ values
         weights = _robust_weights(residual / _spread(residual), first=k < 5)
     normal = np.array([-values[1], -values[2], 1.0])
