@@ -244,15 +244,18 @@ def _with_temperature(
 
 
 def history_of(extraction: Extraction, under: Imposed) -> History:
-    """The test as a history, under what was imposed."""
+    """The test as a history, under what was imposed; what is not known of the lag enters the noise of its outputs."""
     history = extraction.history_under(
         RecordedLoading(under.load, extraction.load_name),
         under.temperature,
         time_zero=float(under.time_zero) - extraction.first_time,
     )
-    if not under.temperature_sd:
-        return history
-    return history.replace(labels={**history.labels, "temperature_sd_K": f"{under.temperature_sd:.2g}"})
+    sd = {
+        name: np.hypot(history.standard_deviation[name], under.lag_error(history.times, values))
+        for name, values in history.outputs.items()
+    }
+    kelvin = {"temperature_sd_K": f"{under.temperature_sd:.2g}"} if under.temperature_sd else {}
+    return history.replace(standard_deviation=sd, labels={**history.labels, **kelvin})
 
 
 def _watched(specimen: Specimen | str) -> SupportsSurfaceObservation:

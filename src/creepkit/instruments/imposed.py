@@ -55,6 +55,23 @@ class Imposed(Presentable, text="reports.instrument_records:imposed_text"):
     notes: tuple[str, ...] = ()
     temperature_sd: float = 0.0
 
+    def lag_error(self, times: Floats, values: Floats) -> Floats:
+        """(frames,) standard deviation of an output by what is not known of the lag, over its posterior probability.
+
+        An output D at a time shifted by s is c (P(t + s) - P(t)) + r s away: c is its response to changes of the load P
+        between frames by least squares, r the rate of what is left. times : (frames,) s of the history. values :
+        (frames,) of the output.
+        """
+        lags, probability = self.alignment.lags, self.alignment.probability
+        if lags.size < 2 or times.size < 2:
+            return np.zeros(times.size)
+        shifts, loads = lags - probability @ lags, self.load.at(times)
+        steps = np.where(np.abs(np.diff(loads)) > REST * np.abs(loads).max(), np.diff(loads), 0.0)
+        response = float(steps @ np.diff(values)) / max(float(steps @ steps), 1e-300)
+        rate = np.gradient(values - response * loads, times)
+        errors = response * (self.load.at(times[:, None] + shifts) - loads[:, None]) + rate[:, None] * shifts
+        return np.asarray(np.sqrt(errors**2 @ probability))
+
 
 @checked
 def imposed(
