@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 140,
     "modules": 785,
     "quality": 1545,
-    "readers": 6180,
+    "readers": 5980,
     "records": 1985,
     "registry": 620,
     "reports": 8440,
