@@ -35,7 +35,7 @@ from creepkit.readers.plain_bar import as_plain_bar, modulus_of_ramp
 from creepkit.readers.questions import Question
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.steps_taken_off import without_steps
-from creepkit.readers.table import NumberRows, SourceText, Table, cells_of
+from creepkit.readers.table import CellTable, NumberRows, SourceText, cells_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records import (
     UNKNOWN_DURATION,
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 def assemble_history(
     name: str,
     entries: Mapping[str, SourceText],
-    table: Table,
+    table: CellTable,
     vocabulary: HeaderVocabulary,
     *,
     location: str,
@@ -174,7 +174,7 @@ def assemble_without_frames(
             "time_h,strain_pct",
         )
     duration = (time or end or StatedNumber(UNKNOWN_DURATION, "", location)).value
-    only = TableFrames(Table(Path(source), ()), {"time": np.array([duration])}, np.array([0]))
+    only = TableFrames(CellTable(Path(source), ()), {"time": np.array([duration])}, np.array([0]))
     loading = read_loading(conditions, only)
     strain_measure = conditions.take_choice("strain_measure", ("engineering", "logarithmic"), required=rate_known)
     conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
@@ -259,7 +259,9 @@ def _refuse_unknown_specimen(named: str, terms: Terms, location: str) -> None:
         raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
 
 
-def _without_readings_before_steps(table: Table, vocabulary: HeaderVocabulary, terms: Terms) -> tuple[Table, set[int]]:
+def _without_readings_before_steps(
+    table: CellTable, vocabulary: HeaderVocabulary, terms: Terms
+) -> tuple[CellTable, set[int]]:
     """The table with the later of two rows of one time that differ in load, temperature or step; their lines.
 
     A reading before a change of load and one after it state when it was; the mean of both would be neither.

@@ -14,7 +14,7 @@ from creepkit.errors import HistoryError
 from creepkit.readers.column_names import NameTable, split_written_name
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column
 from creepkit.readers.questions import Question
-from creepkit.readers.table import Table, some_of
+from creepkit.readers.table import CellTable, some_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
 from creepkit.records.quantities import QuantityKind
 
@@ -31,7 +31,7 @@ class TableFrames:
     merged_count : number of frames that were merged into another one of the same time.
     """
 
-    table: Table
+    table: CellTable
     values: Mapping[str, Floats]
     lines: Ints
     merged_count: int = 0
@@ -47,7 +47,7 @@ class TableFrames:
 
 
 def read_frames(
-    table: Table, vocabulary: HeaderVocabulary, terms: Terms, skipped_columns: Collection[str] = ()
+    table: CellTable, vocabulary: HeaderVocabulary, terms: Terms, skipped_columns: Collection[str] = ()
 ) -> TableFrames:
     """Read the frames in a table, except `skipped_columns` and those that are averaged to labels."""
     kinds = terms.column_kinds
@@ -76,7 +76,7 @@ def read_frames(
     return _strictly_increasing(TableFrames(table, values, table.lines))
 
 
-def column_means(table: Table, vocabulary: HeaderVocabulary) -> dict[str, str]:
+def column_means(table: CellTable, vocabulary: HeaderVocabulary) -> dict[str, str]:
     """The labels that are means over all frames of some columns, with two decimals."""
     return {
         label: f"{np.mean([table.numbers(name) for name in names]):.2f}"
@@ -93,13 +93,13 @@ UNUSED = "unused"
 """What an answer says of a column that stays unread."""
 
 
-def column_question(table: Table, sentence: str, *choices: dict[str, str]) -> Question:
+def column_question(table: CellTable, sentence: str, *choices: dict[str, str]) -> Question:
     """The question of what columns of a table are; choices : {column: what it is}, the likely one first."""
     place = table.location(table.columns_line)
     return Question(table.path, place, sentence, "columns", choices, is_free=True)
 
 
-def _parsed_column(table: Table, k: int, name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:
+def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:
     """Quantity and unit suffix of a column."""
     location, written = table.location(table.columns_line), table.as_written(k)
     result = split_unit(name, kinds)
@@ -137,7 +137,7 @@ def _sensor(name: str, kinds: Mapping[str, QuantityKind]) -> str:
     return NameTable(kinds).meaning(stem) or ("temperature" if stem.casefold() in ("tc", "thermocouple") else "")
 
 
-def _converted_column(table: Table, name: str, kind: QuantityKind, suffix: str) -> Floats:
+def _converted_column(table: CellTable, name: str, kind: QuantityKind, suffix: str) -> Floats:
     """One column in creepkit's unit."""
     k, numbers = table.column(name), table.numbers(name)
     written = table.as_written(k)
@@ -146,7 +146,7 @@ def _converted_column(table: Table, name: str, kind: QuantityKind, suffix: str) 
     return kind.convert_all(numbers, suffix, lambda row: table.location(int(table.lines[row]), k), written)
 
 
-def _check_marks(table: Table, k: int, marks: Floats) -> None:
+def _check_marks(table: CellTable, k: int, marks: Floats) -> None:
     """Refuse what neither uses a frame nor leaves it out."""
     for row in np.flatnonzero((marks != 0.0) & (marks != 1.0))[:1]:
         raise HistoryError(

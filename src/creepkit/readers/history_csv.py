@@ -37,7 +37,7 @@ from creepkit.readers.condition_texts import sources_of_names
 from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.grouped_rows import TabulatedTest
 from creepkit.readers.noise_correlation import noise_correlation_text
-from creepkit.readers.table import Table
+from creepkit.readers.table import CellTable
 from creepkit.readers.table_heads import is_frame
 from creepkit.readers.table_layouts import names_time, tests_in
 from creepkit.readers.text_files import peek_table, read_head_alone, read_text_table
@@ -102,14 +102,14 @@ class HistoryCsvReader:
             return histories_of_tests(tests_in(grid, self.vocabulary), path, self.vocabulary)
 
 
-def _has_numbers(grid: Table) -> bool:
+def _has_numbers(grid: CellTable) -> bool:
     """Whether some row holds numbers alone, with either decimal sign."""
     signs = [replace(grid, dialect=replace(grid.dialect, decimal=sign)) for sign in ".,"]
     return any(is_frame(row, one) for one in signs for row in grid.rows)
 
 
 @contextmanager
-def _errors_of_format(grid: Table) -> Iterator[None]:
+def _errors_of_format(grid: CellTable) -> Iterator[None]:
     """Say of errors about a LabVIEW measurement where its names and units stand."""
     try:
         yield
@@ -151,7 +151,7 @@ def histories_of_tests(found: Iterable[TabulatedTest], path: Path, vocabulary: H
     return histories
 
 
-def _holds_number(table: Table, number: CutNumber) -> bool:
+def _holds_number(table: CellTable, number: CutNumber) -> bool:
     """Whether the last row of a test ends with this number of the file."""
     return int(table.lines[-1]) == number.line and number.column in (table.positions or [number.column])
 

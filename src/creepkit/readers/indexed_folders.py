@@ -14,7 +14,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.readers.assembly import assemble_history
 from creepkit.readers.column_names import KnownNames
 from creepkit.readers.frames import unknown_text
-from creepkit.readers.table import SourceText, Table, TableRow, grouped
+from creepkit.readers.table import CellTable, SourceText, TableRow, grouped
 from creepkit.readers.text_files import peek_table, read_table
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
@@ -66,7 +66,7 @@ class IndexedFolderReader:
     def _frame_files(self, folder: Path) -> list[Path]:
         return sorted(path for path in folder.glob(self._pattern) if path.name != self.index_file)
 
-    def _index_rows(self, index: Table) -> dict[str, TableRow]:
+    def _index_rows(self, index: CellTable) -> dict[str, TableRow]:
         """The rows of the index by key."""
         k = index.column(self.key_column)
         tests: dict[str, TableRow] = {}
@@ -81,7 +81,9 @@ class IndexedFolderReader:
             tests[key] = row
         return tests
 
-    def _split_common_file(self, table: Table, index: Table, tests: dict[str, TableRow]) -> Iterator[tuple[str, Table]]:
+    def _split_common_file(
+        self, table: CellTable, index: CellTable, tests: dict[str, TableRow]
+    ) -> Iterator[tuple[str, CellTable]]:
         """Key and frames of every test, cut from one table."""
         k = table.column(self.key_column)
 
@@ -99,8 +101,8 @@ class IndexedFolderReader:
             yield key, replace(table, rows=part)
 
     def _read_files(
-        self, folder: Path, index: Table, tests: dict[str, TableRow], only: Path | None
-    ) -> Iterator[tuple[str, Table]]:
+        self, folder: Path, index: CellTable, tests: dict[str, TableRow], only: Path | None
+    ) -> Iterator[tuple[str, CellTable]]:
         """Key and frames of every test, each in a file of its own; of the one whose file is named, if any."""
         files = {key: folder / self.frames_file.replace("{key}", key) for key in tests}
         for path in self._frame_files(folder):
@@ -114,10 +116,10 @@ class IndexedFolderReader:
             if only is None or path == only:
                 yield key, self._frames(path)
 
-    def _frames(self, path: Path) -> Table:
+    def _frames(self, path: Path) -> CellTable:
         return read_table(path, self.vocabulary.ignored)
 
-    def _history(self, index: Table, row: TableRow, key: str, frames: Table) -> History:
+    def _history(self, index: CellTable, row: TableRow, key: str, frames: CellTable) -> History:
         entries = {name: entry for name, entry in index.entries(row).items() if name != self.key_column}
         location = index.location(row.line)
         entries.setdefault("alloy", SourceText(frames.path.absolute().parent.name, location))

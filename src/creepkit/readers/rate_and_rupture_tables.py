@@ -40,7 +40,7 @@ from creepkit.readers.ends_of_rows import MOST_ASKED, RowEnd, assumed_of_empty, 
 from creepkit.readers.ends_of_tests import LABEL, NO, STOPPED, YES, kind_of_column, marked_time
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.standard_names import in_standard_keys, specimen_named
-from creepkit.readers.table import SourceText, Table, TableRow
+from creepkit.readers.table import CellTable, SourceText, TableRow
 from creepkit.readers.tables_of_tests import (
     SPREADSHEET_SUFFIXES,
     TEXT_SUFFIXES,
@@ -84,7 +84,7 @@ class RowPerTestReader:
         framed = any(has_frames(row.cells) for grid in grids for row in grid.rows[:_TITLES])
         return not framed and any(self._is_table(grid) for grid in grids)
 
-    def _is_table(self, grid: Table) -> bool:
+    def _is_table(self, grid: CellTable) -> bool:
         return head_in(grid, self.vocabulary) is not None or stands_in_columns(grid, self.vocabulary)
 
     def read(self, path: Path) -> list[History]:
@@ -149,7 +149,7 @@ class RowPerTestReader:
             entries["includes_elastic"] = SourceText(measure, location)
         marked = [*((time, strain, 1) for time, strain in frames), *_end_without_reading(entries, frames)]
         rows = [TableRow(row.line, (repr(time), repr(strain), str(used))) for time, strain, used in marked]
-        text = Table(grid.path, rows, grid.sheet, columns=("time_s", "strain_1", "used"), columns_line=row.line)
+        text = CellTable(grid.path, rows, grid.sheet, columns=("time_s", "strain_1", "used"), columns_line=row.line)
         return assemble_history(name, entries, text, self.vocabulary, location=location, source=source)
 
     def _with_weak_sources(
@@ -159,7 +159,7 @@ class RowPerTestReader:
         known = KnownNames.of(self.vocabulary, specimen_named(entries, self.vocabulary))
         quantities = {key_of_column(name)[0] for name in table.names}
         sources = tuple(one for one in table.sources if one.key not in quantities)
-        text = Table(table.grid.path, (), columns_line=table.line, sources=sources)
+        text = CellTable(table.grid.path, (), columns_line=table.line, sources=sources)
         return with_weak_sources(in_standard_keys(entries, known), text, known)
 
 

@@ -29,8 +29,8 @@ from creepkit.readers.frames import unknown_text
 from creepkit.readers.grouped_rows import TabulatedTest
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.table import (
+    CellTable,
     SourceText,
-    Table,
     TableRow,
     entry_of,
     is_comment,
@@ -58,7 +58,7 @@ _DAY_ZERO, _FIRST_DATE = datetime(1899, 12, 31), datetime(1902, 1, 1)
 """The day that a spreadsheet counts as 0, and the first on which a creep test may have been made."""
 
 
-def read_sheets(path: Path) -> list[Table]:
+def read_sheets(path: Path) -> list[CellTable]:
     """The sheets that hold something; HistoryError for a file that is no spreadsheet, or too large unpacked."""
     content = read_bytes(path, SPREADSHEET_FILE)
     from openpyxl import load_workbook
@@ -148,12 +148,12 @@ def _notes_of(archive: zipfile.ZipFile, sheet: Any) -> _SheetNotes:
     return notes
 
 
-def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str]) -> Table | None:
+def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str]) -> CellTable | None:
     """A sheet as a table, None where it is empty; comments fill the first cell, `# key:` may have its value beside it.
 
     aside : what was left aside of the file.
     """
-    table = Table(path, [], str(sheet.title), Dialect("\t"), assumptions=(*notes.remarks(sheet.title), *aside))
+    table = CellTable(path, [], str(sheet.title), Dialect("\t"), assumptions=(*notes.remarks(sheet.title), *aside))
     if notes.uncomputed:
         raise HistoryError(
             f"{table.place}, cell {notes.uncomputed}: a formula without a computed value; open the file in a "
@@ -184,7 +184,7 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str]) -> 
 
 
 def _entries(
-    table: Table, comments: Sequence[TableRow], first: int
+    table: CellTable, comments: Sequence[TableRow], first: int
 ) -> tuple[dict[str, SourceText], list[tuple[int, str, SourceText]]]:
     """The entries of comments above the first row, and those below it."""
     header, late = dict[str, SourceText](), list[tuple[int, str, SourceText]]()
@@ -349,7 +349,7 @@ def _names_tests(row: TableRow) -> bool:
     return len(cells) > 1 and not set(cells).isdisjoint(_TEST_NAMES)
 
 
-def _conditions_by_test(sheet: Table, vocabulary: HeaderVocabulary) -> dict[str, dict[str, SourceText]]:
+def _conditions_by_test(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[str, dict[str, SourceText]]:
     """{test: its conditions} of a sheet with a column of tests; {} of any other sheet."""
     head = [k for k, row in enumerate(sheet.rows[:_FILLED_ROWS]) if _names_tests(row)]
     if not head or head[0] + 1 >= len(sheet.rows):
@@ -372,7 +372,7 @@ def _conditions_by_test(sheet: Table, vocabulary: HeaderVocabulary) -> dict[str,
     return tests
 
 
-def _note_of_sheet(sheet: Table) -> dict[str, SourceText]:
+def _note_of_sheet(sheet: CellTable) -> dict[str, SourceText]:
     """The texts of a sheet of few remarks as one label; {} of a sheet that holds more."""
     cells = [cell for row in sheet.rows for cell in row.cells if cell]
     is_note = len(cells) <= _MOST_REMARKS and not any(is_number(cell, sheet.dialect) for cell in cells)

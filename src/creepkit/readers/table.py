@@ -1,9 +1,9 @@
 """One table: cells with where they stand (file, sheet, row, column), whatever they come from.
 
 `text_files.read_text_table` reads a text of any dialect and `spreadsheets.read_sheets` the sheets of an .xlsx into a
-`Table`. Its `rows` are then all rows that hold something, in which names, units and titles stand anywhere;
+`CellTable`. Its `rows` are then all rows that hold something, in which names, units and titles stand anywhere;
 `named_columns` makes the table whose `columns` are named by the first of them. Cells stay text, with their place, until
-`Table.numbers` makes numbers of a column; `column_names` knows what names and units mean.
+`CellTable.numbers` makes numbers of a column; `column_names` knows what names and units mean.
 
     table = read_table(Path("alloys.csv"))
     thickness = table.numbers("thickness (mm)")
@@ -149,7 +149,7 @@ def refuse_long_cells(place: str, cells: Sequence[str]) -> None:
 
 
 @dataclass(frozen=True)
-class Table:
+class CellTable:
     """Cells with where they stand; all still text.
 
     rows : those that hold something and are no comment. sheet : of a spreadsheet, "" of a text. header : the entries of
@@ -221,17 +221,17 @@ class Table:
         """The columns whose cell in one row is empty: what they would say of it is unknown."""
         return [name for name, cell in zip(self.columns, row.cells, strict=True) if is_missing(cell)]
 
-    def renamed(self, columns: Sequence[str]) -> Table:
+    def renamed(self, columns: Sequence[str]) -> CellTable:
         """The table with other names of its columns, which keeps those that were written."""
         return replace(self, columns=columns, written=self.written or self.columns)
 
-    def keeping(self, kept: Sequence[int]) -> Table:
+    def keeping(self, kept: Sequence[int]) -> CellTable:
         """The table with some of its columns."""
         places = [(self.positions or range(len(self.columns)))[k] for k in kept]
         columns = [self.columns[k] for k in kept]
         return replace(self, columns=columns, rows=with_columns(self.rows, kept), positions=places)
 
-    def assuming(self, *assumptions: str) -> Table:
+    def assuming(self, *assumptions: str) -> CellTable:
         """The table with more that was assumed of it."""
         return replace(self, assumptions=(*self.assumptions, *assumptions))
 
@@ -267,7 +267,7 @@ def entry_of(line: str) -> tuple[str, bool, str]:
 # ---- columns -------------------------------------------------------------------------------------------------------
 
 
-def without_ignored(table: Table, names_at: int, ignored: Collection[str]) -> Table:
+def without_ignored(table: CellTable, names_at: int, ignored: Collection[str]) -> CellTable:
     """The table without the columns that its key `ignore` names, all of which must be there, and those in `ignored`.
 
     names_at : the row of the names. A name is told as it is written; else but for capitals and its unit.
@@ -315,7 +315,7 @@ def check_columns(location: str, columns: Sequence[str]) -> None:
         raise HistoryError(f"{location}: the column '{twice}' stands there twice; keep one of them")
 
 
-def named_columns(table: Table) -> Table:
+def named_columns(table: CellTable) -> CellTable:
     """The table whose first row names its columns."""
     names, rows = table.rows[0], table.rows[1:]
     width = max((k for k, cell in enumerate(names.cells, 1) if cell), default=0)
@@ -328,7 +328,7 @@ def named_columns(table: Table) -> Table:
     return replace(table, columns=names.cells[:width], columns_line=names.line, rows=rows)
 
 
-def cells_of_width(table: Table, row: TableRow, width: int, *, beside: bool = False) -> Sequence[str]:
+def cells_of_width(table: CellTable, row: TableRow, width: int, *, beside: bool = False) -> Sequence[str]:
     """As many cells of a row as there are columns; empty ones behind them are none, in a sheet also those that lack.
 
     beside : whether more cells may stand behind the columns.

@@ -14,7 +14,7 @@ from creepkit.files.delimited_text import is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.column_names import KnownNames, split_written_name, unit_suffix
 from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
-from creepkit.readers.table import SourceText, Table, TableRow
+from creepkit.readers.table import CellTable, SourceText, TableRow
 
 _MAXIMUM_HEAD_ROWS, MAXIMUM_ROWS_BELOW = 60, 6
 """Rows among which the names of the columns are looked for, and rows of a head below them."""
@@ -75,7 +75,7 @@ def is_time(cell: str, known: KnownNames) -> bool:
     return known.quantity(test_and_column(cell, known)[1]) == "time"
 
 
-def row_of_names(grid: Table, known: KnownNames) -> int:
+def row_of_names(grid: CellTable, known: KnownNames) -> int:
     """The first row that names a time among texts alone; the first of all where there is none."""
     for k, row in enumerate(grid.rows[:_MAXIMUM_HEAD_ROWS]):
         cells = [cell for cell in row.cells if cell]
@@ -86,7 +86,7 @@ def row_of_names(grid: Table, known: KnownNames) -> int:
     return 0
 
 
-def head_of(grid: Table, known: KnownNames) -> Head:
+def head_of(grid: CellTable, known: KnownNames) -> Head:
     """The head of a grid; HistoryError for rows of numbers that nothing names."""
     at = row_of_names(grid, known)
     rows = list(grid.rows[: at + MAXIMUM_ROWS_BELOW])
@@ -109,14 +109,14 @@ def head_of(grid: Table, known: KnownNames) -> Head:
     return Head(cells, written, names.line, tuple(row for row in others if row is not units), at + 1 + count)
 
 
-def is_frame(row: TableRow, grid: Table) -> bool:
+def is_frame(row: TableRow, grid: CellTable) -> bool:
     """Whether a row holds numbers or times alone, with marks of missing values."""
     cells = [cell for cell in row.cells if cell]
     numbers = [is_number(cell.rstrip("% "), grid.dialect) or is_clock_time(cell) for cell in cells]
     return any(numbers) and all(one or is_missing(cell) for one, cell in zip(numbers, cells, strict=True))
 
 
-def _belongs_to_head(row: TableRow, times: Sequence[int], grid: Table, known: KnownNames) -> bool:
+def _belongs_to_head(row: TableRow, times: Sequence[int], grid: CellTable, known: KnownNames) -> bool:
     """Whether a row below the names is one of units, names, conditions or notes, and no frame."""
     filled = [cell for cell in row.cells if cell]
     at_times = [row.cells[k] for k in times if k < len(row.cells) and row.cells[k]]
@@ -133,7 +133,7 @@ def _is_lost(cell: str) -> bool:
     return cell.casefold() in ("nan", "inf", "-inf", "null", "none") or cell.startswith("#")
 
 
-def _holds_units(row: TableRow, names: TableRow, grid: Table) -> bool:
+def _holds_units(row: TableRow, names: TableRow, grid: CellTable) -> bool:
     """Whether a row holds the units of the columns; a name that has one already needs none."""
     filled = [k for k, cell in enumerate(row.cells) if cell]
     named = [k for k, cell in enumerate(names.cells) if cell]
@@ -151,7 +151,7 @@ def _fill_names(cells: list[str], below: Sequence[TableRow], first: Sequence[str
 
 
 def heads_of_tests(
-    grid: Table, head: Sequence[TableRow], tests: Sequence[Sequence[int]], key_columns: set[int], known: KnownNames
+    grid: CellTable, head: Sequence[TableRow], tests: Sequence[Sequence[int]], key_columns: set[int], known: KnownNames
 ) -> list[HeadOfTest]:
     """What the rows of a head say of each test.
 
@@ -205,7 +205,7 @@ def _add_row(
     filled: Mapping[int, str],
     key: str,
     key_columns: set[int],
-    grid: Table,
+    grid: CellTable,
     known: KnownNames,
 ) -> None:
     """Add a row of a key and values, of pairs of key and value, or of names."""
@@ -237,7 +237,7 @@ def _add_row(
             result.sources += conditions_in_text(values[0][1], place, known)
 
 
-def _add_title(result: HeadOfTest, text: str, row: TableRow, grid: Table, known: KnownNames) -> None:
+def _add_title(result: HeadOfTest, text: str, row: TableRow, grid: CellTable, known: KnownNames) -> None:
     """Keep a title; what it states is a weak source, but for `key: value`."""
     place = grid.location(row.line)
     key, colon, value = (part.strip() for part in text.partition(":"))
@@ -248,7 +248,7 @@ def _add_title(result: HeadOfTest, text: str, row: TableRow, grid: Table, known:
     result.sources += conditions_in_text(text, place, known)
 
 
-def head_of_one_test(grid: Table, head: Sequence[TableRow], known: KnownNames) -> HeadOfTest:
+def head_of_one_test(grid: CellTable, head: Sequence[TableRow], known: KnownNames) -> HeadOfTest:
     """What rows of a head say of the only test: keys, each with its value and perhaps a unit behind it; titles."""
     result = HeadOfTest()
     for row in head:
@@ -308,7 +308,9 @@ def _with_unit(key: str, unit: str, place: str) -> str:
     return key if stated else f"{key.rstrip(': ')} ({unit})"
 
 
-def put_entry(entries: dict[str, SourceText], key: str, text: str, place: str, grid: Table, known: KnownNames) -> None:
+def put_entry(
+    entries: dict[str, SourceText], key: str, text: str, place: str, grid: CellTable, known: KnownNames
+) -> None:
     """Add an entry under creepkit's name of its key; HistoryError where it is there already."""
     written = key.rstrip(": ")
     key = known.condition(written)

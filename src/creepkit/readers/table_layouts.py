@@ -24,9 +24,9 @@ from creepkit.readers.grouped_rows import (
     without_remarks,
 )
 from creepkit.readers.table import (
+    CellTable,
     NumberRows,
     SourceText,
-    Table,
     TableRow,
     cells_of_width,
     check_columns,
@@ -65,7 +65,7 @@ class HeadedGrid:
     times : positions of the columns of time. whole : the rows of the head, columns that are left out included.
     """
 
-    grid: Table
+    grid: CellTable
     head: Head
     times: Sequence[int]
     known: KnownNames
@@ -82,7 +82,7 @@ class Layout:
     tests: Callable[[HeadedGrid], list[TabulatedTest]]
 
 
-def tests_in(grid: Table, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
+def tests_in(grid: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
     """The tests of a grid; HistoryError, in one sentence, where it cannot be told how it is laid out."""
     for key, (text, place) in vocabulary.stated.items():
         if key in grid.header and grid.header[key].text != text:
@@ -104,7 +104,7 @@ def tests_in(grid: Table, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
     return next(layout for layout in LAYOUTS if layout.match(headed)).tests(headed)
 
 
-def names_time(grid: Table, vocabulary: HeaderVocabulary) -> bool:
+def names_time(grid: CellTable, vocabulary: HeaderVocabulary) -> bool:
     """Whether some row of a grid names a time, as that above frames does."""
     known = KnownNames.of(vocabulary)
     row = grid.rows[row_of_names(grid, known)]
@@ -168,7 +168,7 @@ LAYOUTS: Sequence[Layout] = (
 """The first that matches is the layout of a table."""
 
 
-def _with_comments(grid: Table, names_line: int, known: KnownNames) -> Table:
+def _with_comments(grid: CellTable, names_line: int, known: KnownNames) -> CellTable:
     """The grid with the entries of comments between its first row and its names.
 
     A condition in a comment below the names is refused, for it must not go unread; remarks may stand anywhere.
@@ -248,7 +248,7 @@ def _columns_beside(headed: HeadedGrid, time: int) -> list[TestColumns]:
     return results
 
 
-def _pairs(grid: Table, times: Sequence[int], known: KnownNames) -> list[TestColumns]:
+def _pairs(grid: CellTable, times: Sequence[int], known: KnownNames) -> list[TestColumns]:
     """Columns of each test side by side, each beginning with its time."""
     names = grid.rows[0]
     place = grid.location(names.line)
@@ -306,7 +306,7 @@ def _tests_of_blocks(headed: HeadedGrid, tests: Sequence[TestColumns], key_colum
 
 
 def _checked_cells(
-    grid: Table, rows: Sequence[TableRow], used: set[int], notes: dict[str, SourceText]
+    grid: CellTable, rows: Sequence[TableRow], used: set[int], notes: dict[str, SourceText]
 ) -> Iterator[TableRow]:
     """The rows, of as many cells as there are columns in use; texts beside them are added to the notes."""
     width = max(used) + 1
@@ -316,7 +316,7 @@ def _checked_cells(
         yield TableRow(row.line, cells_of_width(grid, row, width, beside=True)[:width])
 
 
-def _add_note(grid: Table, row: TableRow, text: str, notes: dict[str, SourceText]) -> None:
+def _add_note(grid: CellTable, row: TableRow, text: str, notes: dict[str, SourceText]) -> None:
     """Keep a text that stands in a column without a name; HistoryError for a number."""
     place, key = grid.location(row.line), f"label line {row.line}"
     if is_number(text, grid.dialect):
@@ -325,7 +325,7 @@ def _add_note(grid: Table, row: TableRow, text: str, notes: dict[str, SourceText
     notes[key] = SourceText(earlier + text, place)
 
 
-def _without_margin(grid: Table, notes: dict[str, SourceText]) -> Table:
+def _without_margin(grid: CellTable, notes: dict[str, SourceText]) -> CellTable:
     """The grid without texts right of its named columns, which become notes; other cells are told by who reads them."""
     width = max((k for k, cell in enumerate(grid.rows[0].cells, 1) if cell), default=0)
     if isinstance(grid.rows, NumberRows) or not any(any(row.cells[width:]) for row in grid.rows):
@@ -345,7 +345,7 @@ def _without_margin(grid: Table, notes: dict[str, SourceText]) -> Table:
     return replace(grid, rows=list(rows()))
 
 
-def _table_of_block(grid: Table, rows: Sequence[TableRow], name: str, columns: Mapping[int, str]) -> Table:
+def _table_of_block(grid: CellTable, rows: Sequence[TableRow], name: str, columns: Mapping[int, str]) -> CellTable:
     """The frames of one test: the rows in which a column of its own holds something, its time in pairs among them."""
     positions, line = list(columns), grid.rows[0].line
     own = with_columns(rows, positions)
@@ -360,7 +360,7 @@ def _table_of_block(grid: Table, rows: Sequence[TableRow], name: str, columns: M
     return replace(grid, rows=cut, header={}, columns=names, columns_line=line, positions=places)
 
 
-def _without_footers(grid: Table) -> tuple[Table, tuple[str, ...]]:
+def _without_footers(grid: CellTable) -> tuple[CellTable, tuple[str, ...]]:
     """The grid without remarks below its frames, which hold words alone, and what says so."""
     count, footers = len(grid.rows), list[str]()
     while count > 2 and _is_remark(row := grid.rows[count - 1], grid):
@@ -370,7 +370,7 @@ def _without_footers(grid: Table) -> tuple[Table, tuple[str, ...]]:
     return (replace(grid, rows=grid.rows[:count]), tuple(reversed(footers))) if footers else (grid, ())
 
 
-def _is_remark(row: TableRow, grid: Table) -> bool:
+def _is_remark(row: TableRow, grid: CellTable) -> bool:
     """Whether a row holds one cell of several words, none of them first a number, or `End`; `nan` is a lost number."""
     cells = [cell for cell in row.cells if cell]
     if grid.dialect.delimiter == " ":

@@ -11,7 +11,7 @@ from creepkit.readers.columns_of_tests import key_of_column
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.rate_and_rupture_tables import TEST_TABLE, columns_of_tests
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
-from creepkit.readers.table import Table
+from creepkit.readers.table import CellTable
 from creepkit.readers.table_layouts import names_time, tests_in
 from creepkit.readers.tests_file import answers_of
 from creepkit.readers.text_files import read_text_table
@@ -53,7 +53,7 @@ def summarise_tables(path: Path, ignored: Collection[str] = ()) -> list[TableSum
     return [summary for grid in grids for summary in _summaries(grid, vocabulary)]
 
 
-def _summaries(grid: Table, vocabulary: HeaderVocabulary) -> list[TableSummary]:
+def _summaries(grid: CellTable, vocabulary: HeaderVocabulary) -> list[TableSummary]:
     known = KnownNames.of(vocabulary, grid.header["specimen"].text if "specimen" in grid.header else "")
     return [
         TableSummary(

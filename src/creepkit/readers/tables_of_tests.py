@@ -22,7 +22,7 @@ from creepkit.readers.columns_of_tests import (
 )
 from creepkit.readers.condition_texts import conditions_in_text, sources_of_names
 from creepkit.readers.questions import Question
-from creepkit.readers.table import SourceText, Table, TableRow, cells_of_width, without_ignored
+from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width, without_ignored
 from creepkit.readers.text_files import read_text_table
 from creepkit.readers.vocabulary import HeaderVocabulary, plain_name
 
@@ -53,7 +53,7 @@ class TestTable:
     file, from 0. sources : conditions in titles and in the names of sheet and file.
     """
 
-    grid: Table
+    grid: CellTable
     names: tuple[str, ...]
     line: int
     rows: tuple[TestRow, ...]
@@ -97,7 +97,7 @@ def plain_number(text: str, decimal: str) -> tuple[str, str]:
     return changed, "." if count else decimal
 
 
-def grids_of(path: Path) -> list[Table]:
+def grids_of(path: Path) -> list[CellTable]:
     """The cells of a text file, or of the sheets of a spreadsheet."""
     if path.suffix.lower() not in SPREADSHEET_SUFFIXES:
         return [read_text_table(path)]
@@ -106,7 +106,7 @@ def grids_of(path: Path) -> list[Table]:
     return read_sheets(path)
 
 
-def head_in(grid: Table, vocabulary: HeaderVocabulary) -> TestTableHead | None:
+def head_in(grid: CellTable, vocabulary: HeaderVocabulary) -> TestTableHead | None:
     """The head of a grid with one row a test; None of any other grid."""
     return head_of_tests(grid.rows, grid.dialect, vocabulary.synonyms)
 
@@ -132,7 +132,7 @@ def tables_in(path: Path, vocabulary: HeaderVocabulary) -> list[TestTable]:
 _MOST_ROWS_OF_COLUMNS = 30
 
 
-def stands_in_columns(grid: Table, vocabulary: HeaderVocabulary) -> bool:
+def stands_in_columns(grid: CellTable, vocabulary: HeaderVocabulary) -> bool:
     """Whether the first cells of the rows name what is known of tests, each of which stands in a column."""
     names = [row.cells[0] for row in grid.rows[:_MOST_ROWS_OF_COLUMNS] if row.cells[0]]
     known = [bool(key_of_column(vocabulary.synonyms.get(name, name))[0]) for name in names]
@@ -140,7 +140,7 @@ def stands_in_columns(grid: Table, vocabulary: HeaderVocabulary) -> bool:
     return 2 * sum(known) > len(known) and min(filled) > 2 and is_test_table(names)
 
 
-def _table(grid: Table, head: TestTableHead, vocabulary: HeaderVocabulary, aside: tuple[str, ...]) -> TestTable:
+def _table(grid: CellTable, head: TestTableHead, vocabulary: HeaderVocabulary, aside: tuple[str, ...]) -> TestTable:
     rows = list(grid.rows)
     known, line = KnownNames.of(vocabulary), rows[head.line].line
     heading = {tuple(row.cells) for row in rows[head.first : head.body]}
@@ -172,13 +172,13 @@ def _table(grid: Table, head: TestTableHead, vocabulary: HeaderVocabulary, aside
     )
 
 
-def _sources(above: Sequence[TableRow], grid: Table, known: KnownNames) -> list[SourceText]:
+def _sources(above: Sequence[TableRow], grid: CellTable, known: KnownNames) -> list[SourceText]:
     """Conditions in titles above a table."""
     titles = [(row.line, only_text(row, grid.dialect)) for row in above]
     return [one for line, text in titles for one in conditions_in_text(text, grid.location(line), known)]
 
 
-def _with_margin(row: TestRow, width: int, columns: int, grid: Table) -> TestRow:
+def _with_margin(row: TestRow, width: int, columns: int, grid: CellTable) -> TestRow:
     """The row with what stands beside the table as the note in its last column; HistoryError for a number there."""
     beside = [cell for cell in row.cells[width:] if cell]
     if any(is_number_like(cell, grid.dialect) for cell in beside):
@@ -188,14 +188,14 @@ def _with_margin(row: TestRow, width: int, columns: int, grid: Table) -> TestRow
     return replace(row, cells=(*row.cells[:width], *[" ".join(beside)] * (columns - width)))
 
 
-def _is_note(row: TableRow, grid: Table) -> bool:
+def _is_note(row: TableRow, grid: CellTable) -> bool:
     """Whether a row below the tests is one of remarks: it holds texts in one or two cells, and no number."""
     filled = [cell for cell in row.cells if cell]
     few = len(filled) <= 2 < len(row.cells) and not any(is_number_like(cell, grid.dialect) for cell in filled)
     return few or bool(only_text(row, grid.dialect))
 
 
-def _around(grid: Table, above: Sequence[TableRow], known: KnownNames) -> tuple[dict[str, SourceText], list[str]]:
+def _around(grid: CellTable, above: Sequence[TableRow], known: KnownNames) -> tuple[dict[str, SourceText], list[str]]:
     """What lines above a table state of all its tests, and what is a note."""
     header, notes = dict(grid.header), list[str]()
     for row in above:

@@ -31,9 +31,9 @@ from creepkit.readers.table import (
     MAXIMUM_CELL,
     MAXIMUM_COLUMNS,
     MAXIMUM_TEXTS,
+    CellTable,
     NumberRows,
     SourceText,
-    Table,
     TableRow,
     entry_of,
     is_comment,
@@ -59,17 +59,17 @@ _BEFORE_COMMENT = frozenset(' \t"\ufeff#/')
 """Characters with which a comment may begin."""
 
 
-def read_table(path: Path, ignored: Collection[str] = ()) -> Table:
+def read_table(path: Path, ignored: Collection[str] = ()) -> CellTable:
     """Read a file of one table: its first row names the columns, whatever they are, but those left out."""
     return named_columns(without_ignored(read_text_table(path), 0, ignored))
 
 
-def read_text_table(path: Path) -> Table:
+def read_text_table(path: Path) -> CellTable:
     """Read a text table of any delimiter, decimal sign and encoding; HistoryError where it holds no table."""
     return _table_of(path, decode_text(read_bytes(path, TABLE_FILE), path))
 
 
-def peek_table(path: Path) -> Table | None:
+def peek_table(path: Path) -> CellTable | None:
     """The beginning of a text as a table; None where it is no table; never raises for what it holds."""
     try:
         return _table_of(path, decode_text(_beginning(path), path), decimal=".")
@@ -95,7 +95,7 @@ def read_head_alone(path: Path) -> dict[str, SourceText]:
     return _head_entries(path, lines, (), Dialect(decimal=_stated_decimal(path, lines) or "."))
 
 
-def _table_of(path: Path, text: str, decimal: str | None = None) -> Table:
+def _table_of(path: Path, text: str, decimal: str | None = None) -> CellTable:
     """The table of a text; decimal : its sign, where it does not matter or is known."""
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
@@ -119,7 +119,7 @@ def _table_of(path: Path, text: str, decimal: str | None = None) -> Table:
         rows = list(_rows_of_texts(_numbered(text, offset, first, comments), dialect, path))
     if not rows:
         raise HistoryError(f"{path}:{first}: no cell holds anything; write a line of columns, then rows")
-    return Table(
+    return CellTable(
         path,
         rows,
         dialect=dialect,

@@ -20,7 +20,7 @@ from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
 from creepkit.files.delimited_text import Dialect, is_number, parse_number
 from creepkit.readers.column_names import split_written_name, unit_suffix
 from creepkit.readers.spreadsheets import read_sheets
-from creepkit.readers.table import Table
+from creepkit.readers.table import CellTable
 from creepkit.readers.text_files import read_text_table
 from creepkit.readers.vocabulary import plain_name
 from creepkit.records import Specimen, dimensions_of
@@ -147,7 +147,7 @@ class _Head:
     written: str
 
 
-def _heads(grid: Table, specimen: Specimen) -> list[_Head]:
+def _heads(grid: CellTable, specimen: Specimen) -> list[_Head]:
     if not grid.rows:
         raise HistoryError(f"{grid.place}: has no heads; write camera, dimple, alloy, ...")
     place = grid.location(grid.rows[0].line)
