@@ -21,7 +21,7 @@ import creepkit as ck
 from creepkit.errors import CreepkitError
 from creepkit.inverse.sparsity.bootstrap import binomial_interval
 from creepkit.quality import check_data_quality
-from creepkit.quality.rig_flags import temperature_step
+from creepkit.quality.rig import temperature_step
 from creepkit.records import History, Program
 
 SEED = 14

@@ -16,7 +16,7 @@ from helpers.paths import ROOT
 BUDGET = {
     "api": 349,
     "app": 630,
-    "cameras": 1166,
+    "cameras": 976,
     "cli": 2385,
     "core": 70,
     "dataset": 811,
@@ -27,7 +27,7 @@ BUDGET = {
     "fem": 1853,
     "files": 1420,
     "forecasts": 1505,
-    "instruments": 1402,
+    "instruments": 1288,
     "integration": 782,
     "inverse": 12320,
     "jobs": 254,
@@ -35,11 +35,11 @@ BUDGET = {
     "language": 1589,
     "laws": 136,
     "modules": 782,
-    "quality": 1545,
-    "readers": 6180,
+    "quality": 1467,
+    "readers": 5980,
     "records": 1979,
     "registry": 616,
-    "reports": 8440,
+    "reports": 8060,
     "rupture_assessment": 1878,
     "sampling": 1069,
     "screening": 740,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 35405
+TESTS = 35328
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

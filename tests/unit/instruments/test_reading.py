@@ -135,7 +135,7 @@ def test_files_of_several_parts_are_read_as_one(tmp_path: Path, monkeypatch: pyt
     path = written(tmp_path, FILES["plate.csv"].replace(b"\n", b"\r\n"))
     whole = ck.read_record(path)
     for size in (700, 1023, 1500):
-        monkeypatch.setattr(record_tables, "PART_BYTES", size)
+        monkeypatch.setattr(record_tables, "PART_CHARACTERS", size)
         parts = ck.read_record(path)
         np.testing.assert_array_equal(parts.times, whole.times)
         np.testing.assert_array_equal(parts.channel("D1: Temp.").values, whole.channel("D1: Temp.").values)
