@@ -17,8 +17,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve
 from creepkit.readers.column_names import KnownNames, words_of
-from creepkit.readers.table_rows import NumberRows, TableRow, cells_of
-from creepkit.readers.text_tables import SourceText, TextTable
+from creepkit.readers.table import CellTable, NumberRows, SourceText, TableRow, cells_of
 from creepkit.readers.vocabulary import split_unit
 
 _ELAPSED = re.compile(r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d{1,9})?)", re.ASCII)
@@ -30,7 +29,7 @@ _ELAPSED_NAME = re.compile(r"elapsed|test time|creep time|laufzeit|h:mm|\[h|hh:m
 _OF_DAY = ("time of day", "clock", "clock time", "uhrzeit")
 
 
-def with_elapsed_times(stated: dict[str, SourceText], table: TextTable, known: KnownNames) -> TextTable:
+def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: KnownNames) -> CellTable:
     """The table with its times as numbers; takes `date_order` and `time_zone` from what is stated."""
     order, zone = stated.pop("date_order", None), stated.pop("time_zone", None)
     if order is not None and order.text not in DATE_ORDERS:
@@ -65,7 +64,7 @@ def with_elapsed_times(stated: dict[str, SourceText], table: TextTable, known: K
     return replace(table, columns=columns, rows=rows, written=table.written or table.columns, assumptions=assumptions)
 
 
-def _with_times(table: TextTable, clock: int, times: Floats) -> Iterator[TableRow]:
+def _with_times(table: CellTable, clock: int, times: Floats) -> Iterator[TableRow]:
     """The rows with other times, s."""
     for row, time in zip(table.rows, times, strict=True):
         changed = list(row.cells)
@@ -73,7 +72,7 @@ def _with_times(table: TextTable, clock: int, times: Floats) -> Iterator[TableRo
         yield TableRow(row.line, changed)
 
 
-def _times_of(elapsed: Sequence[re.Match[str] | None], table: TextTable, clock: int) -> tuple[Floats, str]:
+def _times_of(elapsed: Sequence[re.Match[str] | None], table: CellTable, clock: int) -> tuple[Floats, str]:
     """(rows,) s of times h:mm:ss, elapsed or of the day, and what was assumed of them."""
     seconds, name = [], table.as_written(clock)
     for row, match in zip(table.rows, elapsed, strict=True):
@@ -99,7 +98,7 @@ def _times_of(elapsed: Sequence[re.Match[str] | None], table: TextTable, clock: 
     )
 
 
-def _since_first_row(cells: Sequence[str], table: TextTable, order: str, zone: str) -> tuple[Floats, str]:
+def _since_first_row(cells: Sequence[str], table: CellTable, order: str, zone: str) -> tuple[Floats, str]:
     """(rows,) s of time stamps since that of the first row, and what was assumed of them."""
     column = ClockColumn()
     column.add(cells, [table.location(row.line) for row in table.rows])

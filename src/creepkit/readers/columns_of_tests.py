@@ -15,7 +15,7 @@ from functools import lru_cache
 from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.column_names import NAMES_OF, NameTable, split_written_name, unit_suffix, words_of
 from creepkit.readers.ends_of_tests import FIRM, kind_of_column, plain_words
-from creepkit.readers.table_rows import TableRow
+from creepkit.readers.table import TableRow
 from creepkit.readers.vocabulary import CONDITION_KINDS, plain_name, split_unit
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
 

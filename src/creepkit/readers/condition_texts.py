@@ -12,9 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames, unit_suffix
-from creepkit.readers.text_tables import SourceText, TextTable
+from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.vocabulary import HeaderVocabulary, split_unit
 from creepkit.records.quantities import LENGTH
 
@@ -89,7 +88,7 @@ def conditions_in_text(text: str, place: str, known: KnownNames) -> list[SourceT
     return [SourceText(values[0], place, key=name) for name, values in found.items() if len(values) == 1]
 
 
-def sources_of_names(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[SourceText]:
+def sources_of_names(grid: CellTable, vocabulary: HeaderVocabulary) -> list[SourceText]:
     """What the names of sheet and file state of a test."""
     known, path = KnownNames.of(vocabulary), grid.path
     sheet = conditions_in_text(grid.sheet, f"{path}, name of sheet '{grid.sheet}'", known) if grid.sheet else []
@@ -97,7 +96,7 @@ def sources_of_names(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[Sourc
 
 
 def with_weak_sources(
-    entries: Mapping[str, SourceText], table: TextTable, known: KnownNames
+    entries: Mapping[str, SourceText], table: CellTable, known: KnownNames
 ) -> tuple[dict[str, SourceText], list[str]]:
     """Entries with what titles and names state beside them, and what is assumed so; HistoryError where two disagree.
 
@@ -124,7 +123,7 @@ def with_weak_sources(
 
 
 def _stated(
-    quantity: str, entries: Mapping[str, SourceText], table: TextTable, known: KnownNames
+    quantity: str, entries: Mapping[str, SourceText], table: CellTable, known: KnownNames
 ) -> tuple[float, str] | None:
     """What is stated or was recorded of a quantity, with where; None for what changes or is not there."""
     kind = known.conditions.kinds[quantity]
@@ -145,7 +144,7 @@ def _stated(
     return None
 
 
-def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table: TextTable, known: KnownNames) -> bool:
+def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table: CellTable, known: KnownNames) -> bool:
     """Whether steps, programs, columns or another load leave nothing to state."""
     names, terms = [*entries, *table.columns], known.terms
     if any(name == quantity or name.startswith(f"{quantity}_") for name in names):

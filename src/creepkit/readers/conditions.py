@@ -26,7 +26,7 @@ from creepkit.readers.ends_of_tests import (
     marked_time,
 )
 from creepkit.readers.questions import Question
-from creepkit.readers.text_tables import SourceText
+from creepkit.readers.table import SourceText
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
     SPECIMEN_NAME_PATTERN,

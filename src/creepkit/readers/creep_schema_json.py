@@ -25,8 +25,7 @@ from creepkit.files.json_documents import read_json
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.assembly import assemble_history
 from creepkit.readers.column_names import unit_suffix
-from creepkit.readers.table_rows import TableRow
-from creepkit.readers.text_tables import SourceText, TextTable
+from creepkit.readers.table import CellTable, SourceText, TableRow
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, constant_stress
 from creepkit.records.quantities import STRAIN, STRESS, TEMPERATURE, TIME, QuantityKind
@@ -260,7 +259,7 @@ def _control(entries: _Entries) -> str:
     return entries.choice(CONTROL, {"constant force": "load", "constant stress": "stress"})
 
 
-def _history(entries: _Entries, path: Path, table: TextTable, extension: str) -> History:
+def _history(entries: _Entries, path: Path, table: CellTable, extension: str) -> History:
     """The history; `extension` : one of EXTENSIONS, that of the series."""
     stated: dict[str, SourceText] = {}
 
@@ -338,7 +337,7 @@ def _text(path: Path, first: int | None = None) -> str:
         return content.decode("cp1252", errors="replace")
 
 
-def _read_series(path: Path) -> tuple[dict[str, tuple[str, str]], TextTable, str]:
+def _read_series(path: Path) -> tuple[dict[str, tuple[str, str]], CellTable, str]:
     """Entries of the head of a LIS file, {name in small letters: (value, unit)}, its table, its extension."""
     lines = _text(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     start = next((k for k, line in enumerate(lines) if line.strip().casefold() == "[data]"), None)
@@ -366,7 +365,7 @@ def _read_series(path: Path) -> tuple[dict[str, tuple[str, str]], TextTable, str
         raise HistoryError(f"{path}:{start + 4}: no rows below the units; a test needs at least two")
     names = [cell.strip().casefold() for cell in lines[start + 1].split("\t")]
     extension = next((name for name in names if name in EXTENSIONS), CREEP_EXTENSION)
-    return head, TextTable(path, {}, columns, start + 2, tuple(rows)), extension
+    return head, CellTable(path, tuple(rows), columns=columns, columns_line=start + 2), extension
 
 
 def _columns(path: Path, start: int, lines: Sequence[str]) -> tuple[tuple[str, ...], int]:

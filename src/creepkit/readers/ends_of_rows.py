@@ -25,9 +25,10 @@ from creepkit.readers.ends_of_tests import (
     legend_in,
     marked_time,
 )
+from creepkit.readers.frames import unknown_text
 from creepkit.readers.questions import Question
+from creepkit.readers.table import SourceText
 from creepkit.readers.tables_of_tests import TestRow, TestTable
-from creepkit.readers.text_tables import SourceText, unknown_text
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records.quantities import TIME
 

@@ -12,8 +12,8 @@ from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
-from creepkit.readers.table_rows import NumberRows, TableRow, cells_of, grouped, with_columns
-from creepkit.readers.text_tables import SourceText, TextTable, unknown_text
+from creepkit.readers.frames import unknown_text
+from creepkit.readers.table import CellTable, NumberRows, SourceText, TableRow, cells_of, grouped, with_columns
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class TabulatedTest:
 
     name: str
     entries: Mapping[str, SourceText]
-    table: TextTable
+    table: CellTable
 
 
 def refuse_twice(entries: Mapping[str, SourceText], header: Mapping[str, SourceText], known: KnownNames) -> None:
@@ -42,7 +42,7 @@ _REMARKS = frozenset(
 """Names of columns of remarks, in small letters."""
 
 
-def without_remarks(table: TextTable, notes: dict[str, SourceText]) -> TextTable:
+def without_remarks(table: CellTable, notes: dict[str, SourceText]) -> CellTable:
     """The table without columns of remarks, whose texts are added to the notes by line."""
     columns = [k for k, name in enumerate(table.columns) if words_of(name) in _REMARKS]
     if not columns or isinstance(table.rows, NumberRows):
@@ -60,7 +60,7 @@ _DATES = frozenset(("date", "datum", "day", "jour", "heure"))
 """Names of columns of days, in small letters, and of the clock times beside them."""
 
 
-def without_clocks(table: TextTable, known: KnownNames) -> TextTable:
+def without_clocks(table: CellTable, known: KnownNames) -> CellTable:
     """The table without dates and times of a clock, where a column of elapsed times in a unit is beside them."""
     if isinstance(table.rows, NumberRows) or not table.rows:
         return table
@@ -83,7 +83,7 @@ _GROUP = "test no"
 """Name of the column that numbers the tests of a table whose times begin anew."""
 
 
-def with_groups(table: TextTable, known: KnownNames) -> TextTable:
+def with_groups(table: CellTable, known: KnownNames) -> CellTable:
     """The table with conditions and names of tests in all rows of a group, where they stand in its first row alone.
 
     A group begins where time falls. Groups that no name tells apart, but a condition does, get numbers.
@@ -122,7 +122,7 @@ def with_groups(table: TextTable, known: KnownNames) -> TextTable:
     return replace(result, columns=[_GROUP, *result.columns], rows=rows, positions=places)
 
 
-def rows_by_test(table: TextTable, entries: Mapping[str, SourceText], known: KnownNames) -> list[TabulatedTest]:
+def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: KnownNames) -> list[TabulatedTest]:
     """The tests of a table in which a column of names tells them apart; columns of words state conditions of a test."""
     foreign = [
         k for k, column in enumerate(table.columns) if column not in known.declared and not known.quantity(column)
@@ -153,7 +153,7 @@ def rows_by_test(table: TextTable, entries: Mapping[str, SourceText], known: Kno
     return tests
 
 
-def _states_condition(table: TextTable, column: int, rows: Sequence[TableRow], known: KnownNames) -> bool:
+def _states_condition(table: CellTable, column: int, rows: Sequence[TableRow], known: KnownNames) -> bool:
     """Whether a column holds one condition, or one text, in all rows of a test."""
     cells = cells_of(rows, column)
     first = next(cells)
@@ -163,7 +163,7 @@ def _states_condition(table: TextTable, column: int, rows: Sequence[TableRow], k
 
 
 def _entries_of_columns(
-    table: TextTable, columns: Sequence[int], row: TableRow, known: KnownNames
+    table: CellTable, columns: Sequence[int], row: TableRow, known: KnownNames
 ) -> dict[str, SourceText]:
     entries = {}
     for k in columns:

@@ -15,7 +15,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.readers.conditions import StatedConditions
-from creepkit.readers.text_tables import TableFrames
+from creepkit.readers.frames import TableFrames
 
 PLAIN = ("", "uniaxial", "relaxation")
 """Specimens, as files state them, that are plain bars; "" where a file states none."""

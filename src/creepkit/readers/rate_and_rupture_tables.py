@@ -23,7 +23,6 @@ from pathlib import Path
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
-from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.columns_of_tests import (
     NAMES,
@@ -41,7 +40,7 @@ from creepkit.readers.ends_of_rows import MOST_ASKED, RowEnd, assumed_of_empty, 
 from creepkit.readers.ends_of_tests import LABEL, NO, STOPPED, YES, kind_of_column, marked_time
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.standard_names import in_standard_keys, specimen_named
-from creepkit.readers.table_rows import TableRow
+from creepkit.readers.table import CellTable, SourceText, TableRow
 from creepkit.readers.tables_of_tests import (
     SPREADSHEET_SUFFIXES,
     TEXT_SUFFIXES,
@@ -53,8 +52,7 @@ from creepkit.readers.tables_of_tests import (
     tables_in,
     with_groups,
 )
-from creepkit.readers.text_grids import peek_grid
-from creepkit.readers.text_tables import SourceText, TextTable
+from creepkit.readers.text_files import peek_table
 from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary, split_unit
 from creepkit.records import History
 from creepkit.records.quantities import TIME, QuantityKind
@@ -77,7 +75,7 @@ class RowPerTestReader:
         if suffix not in (*TEXT_SUFFIXES, *SPREADSHEET_SUFFIXES) or not path.is_file():
             return False
         if suffix in TEXT_SUFFIXES:
-            grid = peek_grid(path)
+            grid = peek_table(path)
             return grid is not None and self._is_table(grid)
         try:
             grids = grids_of(path)
@@ -86,7 +84,7 @@ class RowPerTestReader:
         framed = any(has_frames(row.cells) for grid in grids for row in grid.rows[:_TITLES])
         return not framed and any(self._is_table(grid) for grid in grids)
 
-    def _is_table(self, grid: CellGrid) -> bool:
+    def _is_table(self, grid: CellTable) -> bool:
         return head_in(grid, self.vocabulary) is not None or stands_in_columns(grid, self.vocabulary)
 
     def read(self, path: Path) -> list[History]:
@@ -151,7 +149,7 @@ class RowPerTestReader:
             entries["includes_elastic"] = SourceText(measure, location)
         marked = [*((time, strain, 1) for time, strain in frames), *_end_without_reading(entries, frames)]
         rows = [TableRow(row.line, (repr(time), repr(strain), str(used))) for time, strain, used in marked]
-        text = TextTable(grid.path, {}, ("time_s", "strain_1", "used"), row.line, rows, sheet=grid.sheet)
+        text = CellTable(grid.path, rows, grid.sheet, columns=("time_s", "strain_1", "used"), columns_line=row.line)
         return assemble_history(name, entries, text, self.vocabulary, location=location, source=source)
 
     def _with_weak_sources(
@@ -161,7 +159,7 @@ class RowPerTestReader:
         known = KnownNames.of(self.vocabulary, specimen_named(entries, self.vocabulary))
         quantities = {key_of_column(name)[0] for name in table.names}
         sources = tuple(one for one in table.sources if one.key not in quantities)
-        text = TextTable(table.grid.path, {}, (), table.line, (), sources=sources)
+        text = CellTable(table.grid.path, (), columns_line=table.line, sources=sources)
         return with_weak_sources(in_standard_keys(entries, known), text, known)
 
 

@@ -18,8 +18,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.readers.clock_times import with_elapsed_times
 from creepkit.readers.column_names import STATED_BY_NAME, KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.questions import Question
-from creepkit.readers.table_rows import NumberRows, TableRow
-from creepkit.readers.text_tables import SourceText, TextTable
+from creepkit.readers.table import CellTable, NumberRows, SourceText, TableRow
 from creepkit.readers.vocabulary import HeaderVocabulary, plain_name, split_unit
 
 SURELY_PER_CENT, SURELY_FRACTION = 1.0, 1e-3
@@ -42,8 +41,8 @@ _WRITTEN_HEAD = ("name", "specimen", "control", "temperature_K", "strain_measure
 
 
 def in_standard_names(
-    entries: Mapping[str, SourceText], table: TextTable, vocabulary: HeaderVocabulary
-) -> tuple[dict[str, SourceText], TextTable]:
+    entries: Mapping[str, SourceText], table: CellTable, vocabulary: HeaderVocabulary
+) -> tuple[dict[str, SourceText], CellTable]:
     """Entries and columns of one test under creepkit's names, with units, and a strain whose unit is decided."""
     known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
     stated = in_standard_keys(entries, known)
@@ -81,7 +80,7 @@ def in_standard_keys(entries: Mapping[str, SourceText], known: KnownNames) -> di
     return stated
 
 
-def _stated_by_columns(table: TextTable) -> list[tuple[str, SourceText]]:
+def _stated_by_columns(table: CellTable) -> list[tuple[str, SourceText]]:
     """Conditions that names of columns state, as `True strain (%)` does."""
     place = table.location(table.columns_line)
     names = [(column, words_of(split_written_name(column)[0])) for column in table.columns]
@@ -92,7 +91,7 @@ def _stated_by_columns(table: TextTable) -> list[tuple[str, SourceText]]:
     ]
 
 
-def _without_per_cent_signs(table: TextTable, known: KnownNames) -> TextTable:
+def _without_per_cent_signs(table: CellTable, known: KnownNames) -> CellTable:
     """The table without the signs in cells such as `1.2 %`, whose columns are in per cent, as their names must say."""
     if isinstance(table.rows, NumberRows):
         return table
@@ -110,7 +109,7 @@ def _without_per_cent_signs(table: TextTable, known: KnownNames) -> TextTable:
     return replace(table, columns=columns, rows=rows, written=table.written or table.columns)
 
 
-def _rows_without_signs(table: TextTable, signed: Collection[int]) -> Iterator[TableRow]:
+def _rows_without_signs(table: CellTable, signed: Collection[int]) -> Iterator[TableRow]:
     for row in table.rows:
         cells = list(row.cells)
         for k in signed:
@@ -130,8 +129,8 @@ def _kind(name: str, known: KnownNames) -> bool:
 
 
 def _with_decided_strains(
-    stated: dict[str, SourceText], table: TextTable, known: KnownNames, written: Mapping[str, SourceText]
-) -> tuple[dict[str, SourceText], TextTable]:
+    stated: dict[str, SourceText], table: CellTable, known: KnownNames, written: Mapping[str, SourceText]
+) -> tuple[dict[str, SourceText], CellTable]:
     """The columns and entries that have no unit, though it matters, under names with one."""
     unit = stated.pop("strain_unit", None)
     suffix = None if unit is None else unit_suffix(unit.text)
@@ -170,7 +169,7 @@ def _is_undecided(name: str, known: KnownNames) -> bool:
     return bool(found) and found == (name, "") and kinds[name].is_ambiguous_without_unit
 
 
-def _decided_by_table(name: str, table: TextTable, written: Mapping[str, SourceText]) -> tuple[str, str]:
+def _decided_by_table(name: str, table: CellTable, written: Mapping[str, SourceText]) -> tuple[str, str]:
     """The unit of a column that states none, and how it was decided; HistoryError where it cannot be."""
     if set(_WRITTEN_HEAD) <= written.keys() and "time_s" in table.columns:
         return "1", f"{name} a fraction as in files of write_history"

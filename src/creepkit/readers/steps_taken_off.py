@@ -14,7 +14,7 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.conditions import StatedConditions
-from creepkit.readers.text_tables import SourceText
+from creepkit.readers.table import SourceText
 from creepkit.records.quantities import TIME
 from creepkit.records.units import time_text
 

@@ -12,11 +12,9 @@ from dataclasses import dataclass, field
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
-from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames, split_written_name, unit_suffix
 from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
-from creepkit.readers.table_rows import TableRow
-from creepkit.readers.text_tables import SourceText
+from creepkit.readers.table import CellTable, SourceText, TableRow
 
 _MAXIMUM_HEAD_ROWS, MAXIMUM_ROWS_BELOW = 60, 6
 """Rows among which the names of the columns are looked for, and rows of a head below them."""
@@ -77,7 +75,7 @@ def is_time(cell: str, known: KnownNames) -> bool:
     return known.quantity(test_and_column(cell, known)[1]) == "time"
 
 
-def row_of_names(grid: CellGrid, known: KnownNames) -> int:
+def row_of_names(grid: CellTable, known: KnownNames) -> int:
     """The first row that names a time among texts alone; the first of all where there is none."""
     for k, row in enumerate(grid.rows[:_MAXIMUM_HEAD_ROWS]):
         cells = [cell for cell in row.cells if cell]
@@ -88,7 +86,7 @@ def row_of_names(grid: CellGrid, known: KnownNames) -> int:
     return 0
 
 
-def head_of(grid: CellGrid, known: KnownNames) -> Head:
+def head_of(grid: CellTable, known: KnownNames) -> Head:
     """The head of a grid; HistoryError for rows of numbers that nothing names."""
     at = row_of_names(grid, known)
     rows = list(grid.rows[: at + MAXIMUM_ROWS_BELOW])
@@ -99,8 +97,6 @@ def head_of(grid: CellGrid, known: KnownNames) -> Head:
             "row of names such as time_h,strain_pct above it (behind '#' it is one, too)"
         )
     times = [k for k, cell in enumerate(names.cells) if cell and is_time(cell, known)]
-    if grid.numbers is not None:
-        below = []
     count = next((k for k, row in enumerate(below) if not _belongs_to_head(row, times, grid, known)), len(below))
     others = [*above, *below[:count]]
     cells, units = list(names.cells), next((row for row in others if _holds_units(row, names, grid)), None)
@@ -113,14 +109,14 @@ def head_of(grid: CellGrid, known: KnownNames) -> Head:
     return Head(cells, written, names.line, tuple(row for row in others if row is not units), at + 1 + count)
 
 
-def is_frame(row: TableRow, grid: CellGrid) -> bool:
+def is_frame(row: TableRow, grid: CellTable) -> bool:
     """Whether a row holds numbers or times alone, with marks of missing values."""
     cells = [cell for cell in row.cells if cell]
     numbers = [is_number(cell.rstrip("% "), grid.dialect) or is_clock_time(cell) for cell in cells]
     return any(numbers) and all(one or is_missing(cell) for one, cell in zip(numbers, cells, strict=True))
 
 
-def _belongs_to_head(row: TableRow, times: Sequence[int], grid: CellGrid, known: KnownNames) -> bool:
+def _belongs_to_head(row: TableRow, times: Sequence[int], grid: CellTable, known: KnownNames) -> bool:
     """Whether a row below the names is one of units, names, conditions or notes, and no frame."""
     filled = [cell for cell in row.cells if cell]
     at_times = [row.cells[k] for k in times if k < len(row.cells) and row.cells[k]]
@@ -137,7 +133,7 @@ def _is_lost(cell: str) -> bool:
     return cell.casefold() in ("nan", "inf", "-inf", "null", "none") or cell.startswith("#")
 
 
-def _holds_units(row: TableRow, names: TableRow, grid: CellGrid) -> bool:
+def _holds_units(row: TableRow, names: TableRow, grid: CellTable) -> bool:
     """Whether a row holds the units of the columns; a name that has one already needs none."""
     filled = [k for k, cell in enumerate(row.cells) if cell]
     named = [k for k, cell in enumerate(names.cells) if cell]
@@ -155,7 +151,7 @@ def _fill_names(cells: list[str], below: Sequence[TableRow], first: Sequence[str
 
 
 def heads_of_tests(
-    grid: CellGrid, head: Sequence[TableRow], tests: Sequence[Sequence[int]], key_columns: set[int], known: KnownNames
+    grid: CellTable, head: Sequence[TableRow], tests: Sequence[Sequence[int]], key_columns: set[int], known: KnownNames
 ) -> list[HeadOfTest]:
     """What the rows of a head say of each test.
 
@@ -209,7 +205,7 @@ def _add_row(
     filled: Mapping[int, str],
     key: str,
     key_columns: set[int],
-    grid: CellGrid,
+    grid: CellTable,
     known: KnownNames,
 ) -> None:
     """Add a row of a key and values, of pairs of key and value, or of names."""
@@ -241,7 +237,7 @@ def _add_row(
             result.sources += conditions_in_text(values[0][1], place, known)
 
 
-def _add_title(result: HeadOfTest, text: str, row: TableRow, grid: CellGrid, known: KnownNames) -> None:
+def _add_title(result: HeadOfTest, text: str, row: TableRow, grid: CellTable, known: KnownNames) -> None:
     """Keep a title; what it states is a weak source, but for `key: value`."""
     place = grid.location(row.line)
     key, colon, value = (part.strip() for part in text.partition(":"))
@@ -252,7 +248,7 @@ def _add_title(result: HeadOfTest, text: str, row: TableRow, grid: CellGrid, kno
     result.sources += conditions_in_text(text, place, known)
 
 
-def head_of_one_test(grid: CellGrid, head: Sequence[TableRow], known: KnownNames) -> HeadOfTest:
+def head_of_one_test(grid: CellTable, head: Sequence[TableRow], known: KnownNames) -> HeadOfTest:
     """What rows of a head say of the only test: keys, each with its value and perhaps a unit behind it; titles."""
     result = HeadOfTest()
     for row in head:
@@ -313,7 +309,7 @@ def _with_unit(key: str, unit: str, place: str) -> str:
 
 
 def put_entry(
-    entries: dict[str, SourceText], key: str, text: str, place: str, grid: CellGrid, known: KnownNames
+    entries: dict[str, SourceText], key: str, text: str, place: str, grid: CellTable, known: KnownNames
 ) -> None:
     """Add an entry under creepkit's name of its key; HistoryError where it is there already."""
     written = key.rstrip(": ")

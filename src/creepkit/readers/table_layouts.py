@@ -13,7 +13,6 @@ from itertools import pairwise
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing, is_number
-from creepkit.readers.cell_grids import CellGrid, table_of, with_stated, without_ignored
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, unit_suffix, words_of
 from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
 from creepkit.readers.grouped_rows import (
@@ -23,6 +22,19 @@ from creepkit.readers.grouped_rows import (
     with_groups,
     without_clocks,
     without_remarks,
+)
+from creepkit.readers.table import (
+    CellTable,
+    NumberRows,
+    SourceText,
+    TableRow,
+    cells_of_width,
+    check_columns,
+    joined,
+    named_columns,
+    some_of,
+    with_columns,
+    without_ignored,
 )
 from creepkit.readers.table_heads import (
     MAXIMUM_ROWS_BELOW,
@@ -34,8 +46,6 @@ from creepkit.readers.table_heads import (
     row_of_names,
     test_and_column,
 )
-from creepkit.readers.table_rows import NumberRows, TableRow, with_columns
-from creepkit.readers.text_tables import SourceText, TextTable, check_columns, some_of
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records.quantities import STRAIN
 
@@ -55,7 +65,7 @@ class HeadedGrid:
     times : positions of the columns of time. whole : the rows of the head, columns that are left out included.
     """
 
-    grid: CellGrid
+    grid: CellTable
     head: Head
     times: Sequence[int]
     known: KnownNames
@@ -72,9 +82,12 @@ class Layout:
     tests: Callable[[HeadedGrid], list[TabulatedTest]]
 
 
-def tests_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
+def tests_in(grid: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
     """The tests of a grid; HistoryError, in one sentence, where it cannot be told how it is laid out."""
-    grid = with_stated(grid, vocabulary.stated)
+    for key, (text, place) in vocabulary.stated.items():
+        if key in grid.header and grid.header[key].text != text:
+            raise HistoryError(f"{place}: {key} is '{quoted(text)}', and {grid.header[key].location} says another one")
+    grid = replace(grid, header={**grid.header, **{key: SourceText(*one) for key, one in vocabulary.stated.items()}})
     stated = grid.header.get("specimen")
     known = KnownNames.of(vocabulary, stated.text if stated else "")
     names_at = row_of_names(grid, known)
@@ -83,7 +96,7 @@ def tests_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TabulatedTest
     if not any(row.line == names_line for row in grid.rows):
         raise HistoryError(f"{grid.location(names_line)}: every column is left out by ignore; keep those of the test")
     head = head_of(grid, known)
-    below = replace(grid, rows=[TableRow(head.line, head.names), *grid.rows[head.body :]])
+    below = replace(grid, rows=joined([TableRow(head.line, head.names)], grid.rows[head.body :]))
     times = [k for k, cell in enumerate(head.names) if cell and is_time(cell, known)]
     lines = {row.line for row in head.rows}
     whole = [row for k, row in enumerate(all_rows) if k < names_at or row.line in lines]
@@ -91,7 +104,7 @@ def tests_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TabulatedTest
     return next(layout for layout in LAYOUTS if layout.match(headed)).tests(headed)
 
 
-def names_time(grid: CellGrid, vocabulary: HeaderVocabulary) -> bool:
+def names_time(grid: CellTable, vocabulary: HeaderVocabulary) -> bool:
     """Whether some row of a grid names a time, as that above frames does."""
     known = KnownNames.of(vocabulary)
     row = grid.rows[row_of_names(grid, known)]
@@ -126,7 +139,7 @@ def _tests_of_rows(headed: HeadedGrid) -> list[TabulatedTest]:
         )
     head = head_of_one_test(grid, headed.whole, headed.known)
     refuse_twice(head.entries, grid.header, headed.known)
-    table = without_clocks(table_of(_without_margin(grid, head.entries)), headed.known)
+    table = without_clocks(named_columns(_without_margin(grid, head.entries)), headed.known)
     table = replace(table, assumptions=(*table.assumptions, *head.assumptions, *footers), sources=tuple(head.sources))
     table = with_groups(without_remarks(table, head.entries), headed.known)
     return rows_by_test(table, {**grid.header, **head.entries}, headed.known)
@@ -155,7 +168,7 @@ LAYOUTS: Sequence[Layout] = (
 """The first that matches is the layout of a table."""
 
 
-def _with_comments(grid: CellGrid, names_line: int, known: KnownNames) -> CellGrid:
+def _with_comments(grid: CellTable, names_line: int, known: KnownNames) -> CellTable:
     """The grid with the entries of comments between its first row and its names.
 
     A condition in a comment below the names is refused, for it must not go unread; remarks may stand anywhere.
@@ -235,7 +248,7 @@ def _columns_beside(headed: HeadedGrid, time: int) -> list[TestColumns]:
     return results
 
 
-def _pairs(grid: CellGrid, times: Sequence[int], known: KnownNames) -> list[TestColumns]:
+def _pairs(grid: CellTable, times: Sequence[int], known: KnownNames) -> list[TestColumns]:
     """Columns of each test side by side, each beginning with its time."""
     names = grid.rows[0]
     place = grid.location(names.line)
@@ -265,11 +278,11 @@ def _tests_of_blocks(headed: HeadedGrid, tests: Sequence[TestColumns], key_colum
     header = {key: entry for key, entry in grid.header.items() if key != "columns"}
     used = {k for test in tests for k in test.columns}
     notes: dict[str, SourceText] = {}
-    rows: Sequence[TableRow] = grid.rows[1:] if grid.numbers is None else grid.numbers
-    if grid.numbers is None:
-        rows = list(_checked_cells(grid, rows, used, notes))
+    rows = grid.rows[1:]
+    if isinstance(rows, NumberRows):
+        list(_checked_cells(grid, rows[:1], used, notes))  # every row has the same columns
     else:
-        list(_checked_cells(grid, grid.numbers[:1], used, notes))  # every row has the same columns
+        rows = list(_checked_cells(grid, rows, used, notes))
     place = grid.location(headed.head.line)
     results: dict[str, TabulatedTest] = {}
     heads = heads_of_tests(grid, headed.head.rows, [list(test.columns) for test in tests], key_columns, known)
@@ -287,28 +300,23 @@ def _tests_of_blocks(headed: HeadedGrid, tests: Sequence[TestColumns], key_colum
         check_columns(f"{place}, test '{quoted(name)}'", list(test.columns.values()))
         sources = (*conditions_in_text(test.test, place, known), *head.sources)
         table = _table_of_block(grid, rows, name, test.columns)
-        table = replace(table, assumptions=head.assumptions, sources=sources)
+        table = replace(table.assuming(*head.assumptions), sources=sources)
         results[name] = TabulatedTest(name, {**notes, **header, **entries}, table)
     return list(results.values())
 
 
 def _checked_cells(
-    grid: CellGrid, rows: Sequence[TableRow], used: set[int], notes: dict[str, SourceText]
+    grid: CellTable, rows: Sequence[TableRow], used: set[int], notes: dict[str, SourceText]
 ) -> Iterator[TableRow]:
     """The rows, of as many cells as there are columns in use; texts beside them are added to the notes."""
     width = max(used) + 1
     for row in rows:
-        if len(row.cells) < width and not grid.sheet:  # a cell lost within a line of text moves those behind it
-            raise HistoryError(
-                f"{grid.location(row.line)}: number of cells {len(row.cells)}, of columns {width}; write one cell a "
-                "column, empty ones too"
-            )
         for foreign in (cell for k, cell in enumerate(row.cells) if cell and k not in used):
             _add_note(grid, row, foreign, notes)
-        yield TableRow(row.line, [*row.cells[:width], *[""] * (width - len(row.cells))])
+        yield TableRow(row.line, cells_of_width(grid, row, width, beside=True)[:width])
 
 
-def _add_note(grid: CellGrid, row: TableRow, text: str, notes: dict[str, SourceText]) -> None:
+def _add_note(grid: CellTable, row: TableRow, text: str, notes: dict[str, SourceText]) -> None:
     """Keep a text that stands in a column without a name; HistoryError for a number."""
     place, key = grid.location(row.line), f"label line {row.line}"
     if is_number(text, grid.dialect):
@@ -317,10 +325,10 @@ def _add_note(grid: CellGrid, row: TableRow, text: str, notes: dict[str, SourceT
     notes[key] = SourceText(earlier + text, place)
 
 
-def _without_margin(grid: CellGrid, notes: dict[str, SourceText]) -> CellGrid:
+def _without_margin(grid: CellTable, notes: dict[str, SourceText]) -> CellTable:
     """The grid without texts right of its named columns, which become notes; other cells are told by who reads them."""
     width = max((k for k, cell in enumerate(grid.rows[0].cells, 1) if cell), default=0)
-    if grid.numbers is not None or not any(any(row.cells[width:]) for row in grid.rows):
+    if isinstance(grid.rows, NumberRows) or not any(any(row.cells[width:]) for row in grid.rows):
         return grid
 
     def rows() -> Iterator[TableRow]:
@@ -337,7 +345,7 @@ def _without_margin(grid: CellGrid, notes: dict[str, SourceText]) -> CellGrid:
     return replace(grid, rows=list(rows()))
 
 
-def _table_of_block(grid: CellGrid, rows: Sequence[TableRow], name: str, columns: Mapping[int, str]) -> TextTable:
+def _table_of_block(grid: CellTable, rows: Sequence[TableRow], name: str, columns: Mapping[int, str]) -> CellTable:
     """The frames of one test: the rows in which a column of its own holds something, its time in pairs among them."""
     positions, line = list(columns), grid.rows[0].line
     own = with_columns(rows, positions)
@@ -348,10 +356,11 @@ def _table_of_block(grid: CellGrid, rows: Sequence[TableRow], name: str, columns
             "fill it"
         )
     places = [grid.positions[k] if grid.positions else k for k in positions]
-    return TextTable(grid.path, {}, list(columns.values()), line, cut, grid.dialect, grid.sheet, places)
+    names = list(columns.values())
+    return replace(grid, rows=cut, header={}, columns=names, columns_line=line, positions=places)
 
 
-def _without_footers(grid: CellGrid) -> tuple[CellGrid, tuple[str, ...]]:
+def _without_footers(grid: CellTable) -> tuple[CellTable, tuple[str, ...]]:
     """The grid without remarks below its frames, which hold words alone, and what says so."""
     count, footers = len(grid.rows), list[str]()
     while count > 2 and _is_remark(row := grid.rows[count - 1], grid):
@@ -361,7 +370,7 @@ def _without_footers(grid: CellGrid) -> tuple[CellGrid, tuple[str, ...]]:
     return (replace(grid, rows=grid.rows[:count]), tuple(reversed(footers))) if footers else (grid, ())
 
 
-def _is_remark(row: TableRow, grid: CellGrid) -> bool:
+def _is_remark(row: TableRow, grid: CellTable) -> bool:
     """Whether a row holds one cell of several words, none of them first a number, or `End`; `nan` is a lost number."""
     cells = [cell for cell in row.cells if cell]
     if grid.dialect.delimiter == " ":

@@ -6,15 +6,15 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import KnownNames
 from creepkit.readers.columns_of_tests import key_of_column
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.rate_and_rupture_tables import TEST_TABLE, columns_of_tests
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
+from creepkit.readers.table import CellTable
 from creepkit.readers.table_layouts import names_time, tests_in
 from creepkit.readers.tests_file import answers_of
-from creepkit.readers.text_grids import read_text_grid
+from creepkit.readers.text_files import read_text_table
 from creepkit.readers.vocabulary import HeaderVocabulary
 
 
@@ -47,13 +47,13 @@ def summarise_tables(path: Path, ignored: Collection[str] = ()) -> list[TableSum
     if SPREADSHEET.accepts(path):
         grids = [grid for grid in read_sheets(path) if names_time(grid, vocabulary)]
     elif HISTORY_CSV.accepts(path):
-        grids = [read_text_grid(path)]
+        grids = [read_text_table(path)]
     else:
         return []
     return [summary for grid in grids for summary in _summaries(grid, vocabulary)]
 
 
-def _summaries(grid: CellGrid, vocabulary: HeaderVocabulary) -> list[TableSummary]:
+def _summaries(grid: CellTable, vocabulary: HeaderVocabulary) -> list[TableSummary]:
     known = KnownNames.of(vocabulary, grid.header["specimen"].text if "specimen" in grid.header else "")
     return [
         TableSummary(

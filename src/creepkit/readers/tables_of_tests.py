@@ -11,7 +11,6 @@ from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_missing, is_number
-from creepkit.readers.cell_grids import CellGrid, without_ignored
 from creepkit.readers.column_names import KnownNames, split_written_name
 from creepkit.readers.columns_of_tests import (
     TestTableHead,
@@ -23,9 +22,8 @@ from creepkit.readers.columns_of_tests import (
 )
 from creepkit.readers.condition_texts import conditions_in_text, sources_of_names
 from creepkit.readers.questions import Question
-from creepkit.readers.table_rows import TableRow
-from creepkit.readers.text_grids import read_text_grid
-from creepkit.readers.text_tables import SourceText
+from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width, without_ignored
+from creepkit.readers.text_files import read_text_table
 from creepkit.readers.vocabulary import HeaderVocabulary, plain_name
 
 TEXT_SUFFIXES, SPREADSHEET_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc"), (".xlsx", ".xlsm")
@@ -55,7 +53,7 @@ class TestTable:
     file, from 0. sources : conditions in titles and in the names of sheet and file.
     """
 
-    grid: CellGrid
+    grid: CellTable
     names: tuple[str, ...]
     line: int
     rows: tuple[TestRow, ...]
@@ -99,19 +97,18 @@ def plain_number(text: str, decimal: str) -> tuple[str, str]:
     return changed, "." if count else decimal
 
 
-def grids_of(path: Path) -> list[CellGrid]:
+def grids_of(path: Path) -> list[CellTable]:
     """The cells of a text file, or of the sheets of a spreadsheet."""
     if path.suffix.lower() not in SPREADSHEET_SUFFIXES:
-        return [read_text_grid(path)]
+        return [read_text_table(path)]
     from creepkit.readers.spreadsheets import read_sheets
 
     return read_sheets(path)
 
 
-def head_in(grid: CellGrid, vocabulary: HeaderVocabulary) -> TestTableHead | None:
+def head_in(grid: CellTable, vocabulary: HeaderVocabulary) -> TestTableHead | None:
     """The head of a grid with one row a test; None of any other grid."""
-    rows = list(grid.rows) if grid.numbers is None else [*grid.rows, *grid.numbers[:3]]
-    return head_of_tests(rows, grid.dialect, vocabulary.synonyms)
+    return head_of_tests(grid.rows, grid.dialect, vocabulary.synonyms)
 
 
 def tables_in(path: Path, vocabulary: HeaderVocabulary) -> list[TestTable]:
@@ -135,7 +132,7 @@ def tables_in(path: Path, vocabulary: HeaderVocabulary) -> list[TestTable]:
 _MOST_ROWS_OF_COLUMNS = 30
 
 
-def stands_in_columns(grid: CellGrid, vocabulary: HeaderVocabulary) -> bool:
+def stands_in_columns(grid: CellTable, vocabulary: HeaderVocabulary) -> bool:
     """Whether the first cells of the rows name what is known of tests, each of which stands in a column."""
     names = [row.cells[0] for row in grid.rows[:_MOST_ROWS_OF_COLUMNS] if row.cells[0]]
     known = [bool(key_of_column(vocabulary.synonyms.get(name, name))[0]) for name in names]
@@ -143,14 +140,12 @@ def stands_in_columns(grid: CellGrid, vocabulary: HeaderVocabulary) -> bool:
     return 2 * sum(known) > len(known) and min(filled) > 2 and is_test_table(names)
 
 
-def _table(grid: CellGrid, head: TestTableHead, vocabulary: HeaderVocabulary, aside: tuple[str, ...]) -> TestTable:
-    rows = list(grid.rows) if grid.numbers is None else [*grid.rows, *grid.numbers]
+def _table(grid: CellTable, head: TestTableHead, vocabulary: HeaderVocabulary, aside: tuple[str, ...]) -> TestTable:
+    rows = list(grid.rows)
     known, line = KnownNames.of(vocabulary), rows[head.line].line
     heading = {tuple(row.cells) for row in rows[head.first : head.body]}
     body = [row for row in rows[head.body :] if tuple(row.cells) not in heading]
-    below = without_ignored(
-        replace(grid, rows=[TableRow(line, list(head.names)), *body], numbers=None), 0, vocabulary.ignored
-    )
+    below = without_ignored(replace(grid, rows=[TableRow(line, list(head.names)), *body]), 0, vocabulary.ignored)
     header, notes = _around(replace(grid, header=below.header), rows[: head.first], known)
     names, body = below.rows[0].cells, list(below.rows[1:])
     while body and _is_note(body[-1], grid):
@@ -161,9 +156,9 @@ def _table(grid: CellGrid, head: TestTableHead, vocabulary: HeaderVocabulary, as
         if text := only_text(row, grid.dialect):
             stated = conditions_of_group(text, grid.location(row.line), known)
         else:
-            cells = _cells_of_width(row, width, grid)
+            cells = cells_of_width(grid, row, width, beside=True)
             if any(cells[k] for k in range(width) if names[k]):
-                tests.append(TestRow(row.line, cells, stated))
+                tests.append(TestRow(row.line, tuple(cells), stated))
     beside = [k for k in range(max((len(row.cells) for row in tests), default=width)) if k >= width or not names[k]]
     written = [name or "note" for name in names[:width]] + ["note"] * any(k >= width for k in beside)
     tests = [_with_margin(row, width, len(written), grid) for row in tests]
@@ -171,29 +166,19 @@ def _table(grid: CellGrid, head: TestTableHead, vocabulary: HeaderVocabulary, as
     rows_of_tests = tuple(replace(row, cells=tuple(row.cells[k] for k in kept)) for row in tests)
     columns, positions = tuple(written[k] for k in kept), below.positions or range(len(written))
     return TestTable(
-        *(grid, columns, line, rows_of_tests, header, tuple(notes), (*grid.remarks, *aside)),
+        *(grid, columns, line, rows_of_tests, header, tuple(notes), (*grid.assumptions, *aside)),
         tuple(positions[k] if k < len(positions) else k for k in kept),
         (*_sources(rows[: head.first], grid, known), *sources_of_names(grid, vocabulary)),
     )
 
 
-def _sources(above: Sequence[TableRow], grid: CellGrid, known: KnownNames) -> list[SourceText]:
+def _sources(above: Sequence[TableRow], grid: CellTable, known: KnownNames) -> list[SourceText]:
     """Conditions in titles above a table."""
     titles = [(row.line, only_text(row, grid.dialect)) for row in above]
     return [one for line, text in titles for one in conditions_in_text(text, grid.location(line), known)]
 
 
-def _cells_of_width(row: TableRow, width: int, grid: CellGrid) -> tuple[str, ...]:
-    """The cells of a row, as many as there are columns or more; HistoryError for a line of text with fewer."""
-    if len(row.cells) < width and not grid.sheet:  # a cell lost within a line of text moves those behind it
-        raise HistoryError(
-            f"{grid.location(row.line)}: number of cells {len(row.cells)}, of columns {width}; write one cell a "
-            f"column, separated by {str(grid.dialect).partition(',')[0]}, empty ones too"
-        )
-    return (*row.cells, *[""] * (width - len(row.cells)))
-
-
-def _with_margin(row: TestRow, width: int, columns: int, grid: CellGrid) -> TestRow:
+def _with_margin(row: TestRow, width: int, columns: int, grid: CellTable) -> TestRow:
     """The row with what stands beside the table as the note in its last column; HistoryError for a number there."""
     beside = [cell for cell in row.cells[width:] if cell]
     if any(is_number_like(cell, grid.dialect) for cell in beside):
@@ -203,14 +188,14 @@ def _with_margin(row: TestRow, width: int, columns: int, grid: CellGrid) -> Test
     return replace(row, cells=(*row.cells[:width], *[" ".join(beside)] * (columns - width)))
 
 
-def _is_note(row: TableRow, grid: CellGrid) -> bool:
+def _is_note(row: TableRow, grid: CellTable) -> bool:
     """Whether a row below the tests is one of remarks: it holds texts in one or two cells, and no number."""
     filled = [cell for cell in row.cells if cell]
     few = len(filled) <= 2 < len(row.cells) and not any(is_number_like(cell, grid.dialect) for cell in filled)
     return few or bool(only_text(row, grid.dialect))
 
 
-def _around(grid: CellGrid, above: Sequence[TableRow], known: KnownNames) -> tuple[dict[str, SourceText], list[str]]:
+def _around(grid: CellTable, above: Sequence[TableRow], known: KnownNames) -> tuple[dict[str, SourceText], list[str]]:
     """What lines above a table state of all its tests, and what is a note."""
     header, notes = dict(grid.header), list[str]()
     for row in above:

@@ -29,8 +29,8 @@ from creepkit.files.reading import FileKind, read_text
 from creepkit.readers.column_names import KnownNames, NameTable, split_written_name
 from creepkit.readers.columns_of_tests import NAMES
 from creepkit.readers.ends_of_tests import LABEL, RUPTURED, STOPPED
+from creepkit.readers.frames import UNUSED
 from creepkit.readers.questions import ANSWERS_FILE, raise_all
-from creepkit.readers.text_tables import UNUSED
 from creepkit.readers.vocabulary import HeaderVocabulary
 
 ANSWERS = FileKind("answers about tests", HistoryError, "correct or remove it", maximum_bytes=1_000_000)

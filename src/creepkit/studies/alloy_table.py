@@ -18,10 +18,10 @@ from pathlib import Path
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
 from creepkit.files.delimited_text import Dialect, is_number, parse_number
-from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.column_names import split_written_name, unit_suffix
 from creepkit.readers.spreadsheets import read_sheets
-from creepkit.readers.text_grids import read_text_grid
+from creepkit.readers.table import CellTable
+from creepkit.readers.text_files import read_text_table
 from creepkit.readers.vocabulary import plain_name
 from creepkit.records import Specimen, dimensions_of
 from creepkit.records.quantities import LENGTH, MODULUS, QuantityKind
@@ -121,7 +121,7 @@ def _same(first: str, second: str) -> bool:
 
 def read_alloy_table(path: Path, specimen: Specimen) -> AlloyTable:
     """Read a table of alloys; HistoryError, with file and row, says what is wrong with another."""
-    grid = read_sheets(path)[0] if path.suffix.lower() == ".xlsx" else read_text_grid(path)
+    grid = read_sheets(path)[0] if path.suffix.lower() == ".xlsx" else read_text_table(path)
     heads = _heads(grid, specimen)
     rows: list[Dimple] = []
     for row in grid.rows[1:]:
@@ -147,7 +147,7 @@ class _Head:
     written: str
 
 
-def _heads(grid: CellGrid, specimen: Specimen) -> list[_Head]:
+def _heads(grid: CellTable, specimen: Specimen) -> list[_Head]:
     if not grid.rows:
         raise HistoryError(f"{grid.place}: has no heads; write camera, dimple, alloy, ...")
     place = grid.location(grid.rows[0].line)
@@ -238,7 +238,7 @@ def looks_like_alloys(path: Path, specimen: Specimen) -> bool:
     if path.suffix.lower() not in (".csv", ".xlsx", ".txt", ".tsv"):
         return False
     with suppress(CreepkitError, OSError):
-        grid = read_sheets(path)[0] if path.suffix.lower() == ".xlsx" else read_text_grid(path)
+        grid = read_sheets(path)[0] if path.suffix.lower() == ".xlsx" else read_text_table(path)
         _heads(grid, specimen)
         return not any(is_number(cell, grid.dialect) for cell in grid.rows[0].cells)
     return False

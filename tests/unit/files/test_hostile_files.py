@@ -188,10 +188,10 @@ def test_long_names_take_no_time(tmp_path, name):
 
 
 def test_a_table_of_a_million_texts_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr("creepkit.readers.table_limits.MAXIMUM_TEXTS", 100)
+    monkeypatch.setattr("creepkit.readers.text_files.MAXIMUM_TEXTS", 100)
     path = tmp_path / "x.csv"
     path.write_text("# stress_MPa: 5\ntime_h,strain_pct,remark\n" + "".join(f"{k},{k},x\n" for k in range(40)))
-    with pytest.raises(HistoryError, match="a table of 123 cells or more that are not all numbers.*CREEPKIT_LIMITS=2"):
+    with pytest.raises(HistoryError, match="number of cells that are not all numbers 123.*CREEPKIT_LIMITS=2"):
         ck.read_histories(path)
 
 

@@ -210,7 +210,7 @@ REFUSED = [
     ),
     (
         "Time (h);A1 strain (%);A2 strain (%)\n0;0;0\n1;1\n",
-        "x.csv:5: number of cells 2, of columns 3; write one cell a column, empty ones too",
+        "x.csv:5: number of cells 2, of columns 3; write one cell a column, separated by semicolons, empty",
     ),
     (
         "Time (h);A1 strain (%);A2 strain (%)\n0;0;\n1;1;\n",
