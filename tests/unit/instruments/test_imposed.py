@@ -45,20 +45,6 @@ def test_noise_is_not_followed_and_its_size_is_stated() -> None:
     assert found.load.times.size < 60
 
 
-def test_a_simulation_takes_what_was_imposed() -> None:
-    found = ck.imposed(record(), "D1", FRAMES, ClockAlignment.stated(0.0))
-    history = ck.History(
-        "D1",
-        (FRAMES - found.time_zero)[found.time_zero + 1.0 < FRAMES],
-        {},
-        ck.RecordedLoading(found.load, "pressure"),
-        found.temperature,
-        "bulge",
-        ck.Elastic(150e3),
-    )
-    assert history.loading.program().values.max() == pytest.approx(8.0, abs=0.02)
-
-
 def test_a_record_in_the_zone_of_the_frames_needs_no_alignment() -> None:
     known = InstrumentRecord("test", TIMES, record().channels, 1.7e9, record().channel_patterns)
     assert ck.imposed(known, "D1", FRAMES + 1.7e9).time_zero == pytest.approx(1.7e9 + 500.0, abs=1.5)
