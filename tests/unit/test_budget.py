@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 140,
     "modules": 785,
     "quality": 1467,
-    "readers": 5980,
+    "readers": 5785,
     "records": 1985,
     "registry": 620,
     "reports": 8060,
