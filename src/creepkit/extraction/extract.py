@@ -99,13 +99,13 @@ def extract_surfaces(
     problems: dict[str, str] = {}
     groups: dict[str, Ints] = {}
     for name, center in found.items():
-        with _kept(problems, name, failed):
+        with problem_kept(problems, name, failed):
             groups[name] = _group(plate, center, region, list(found.values()), name)
     read = read_series(frames, plate, list(groups.values()))
     request = ExtractionRequest(operator or region.operator, rest, subset, load, centers is not None)
     extracted = []
     for name, series in zip(groups, read.series, strict=True):
-        with _kept(problems, name, failed):
+        with problem_kept(problems, name, failed):
             piece = _Piece(name, found[name], plate, read, series)
             extracted.append(_extract_one(frames, specimen, request, piece))
     if not extracted:
@@ -116,8 +116,8 @@ def extract_surfaces(
 
 
 @contextmanager
-def _kept(problems: dict[str, str], name: str, failed: object) -> Iterator[None]:
-    """What is wrong with one test piece is kept beside the others, where someone asks for it."""
+def problem_kept(problems: dict[str, str], name: str, failed: object) -> Iterator[None]:
+    """What is wrong with one test piece is kept beside the others; a HistoryError where `failed` is None."""
     try:
         yield
     except HistoryError as error:

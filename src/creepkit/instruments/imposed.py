@@ -95,7 +95,12 @@ def imposed(
     if times.ndim != 1 or times.size < 2 or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
         raise HistoryError(f"{record.origin}: the times of the frames must be finite and increase; give at least two")
     if alignment is None:
-        alignment = _agreeing(record, times)
+        if record.start is None or times[0] < 1e8:
+            raise HistoryError(
+                f"{record.origin}: the clocks of frames and record are not known to agree; give the alignment of "
+                "align_clocks(), or ck.ClockAlignment.stated(lag)"
+            )
+        alignment = ClockAlignment.stated(0.0, zero=record.start)
     names = channel_names(record, specimen) if isinstance(specimen, str) else specimen
     load, temperature = (record.channel(name) for name in names)
     notes = _checked_channels(record, load, temperature)
@@ -119,15 +124,6 @@ def imposed(
         alignment,
         tuple(notes),
     )
-
-
-def _agreeing(record: InstrumentRecord, times: Floats) -> ClockAlignment:
-    if record.start is None or times[0] < 1e8:
-        raise HistoryError(
-            f"{record.origin}: the clocks of frames and record are not known to agree; give the alignment of "
-            "align_clocks(), or ck.ClockAlignment.stated(lag)"
-        )
-    return ClockAlignment.stated(0.0, zero=record.start)
 
 
 def named_specimens(record: InstrumentRecord, pattern: str = "") -> list[str]:
@@ -181,14 +177,9 @@ def _checked_channels(record: InstrumentRecord, load: Channel, temperature: Chan
             f"{record.origin}: whether the channel '{load.name}' holds gauge or absolute pressures is not stated; "
             "state pressure_reference='gauge' or 'absolute' to read_record()"
         )
-    notes = []
-    for channel in (load, temperature):
-        if channel.missing:
-            notes.append(
-                f"{channel.missing} of {channel.values.size} readings of '{channel.name}' are missing; the program is "
-                "straight across"
-            )
-    return notes
+    missing = ((one.missing, one.values.size, one.name) for one in (load, temperature) if one.missing)
+    text = "{} of {} readings of '{}' are missing; the program is straight across"
+    return [text.format(*one) for one in missing]
 
 
 def _check_overlap(record: InstrumentRecord, alignment: ClockAlignment, times: Floats) -> None:
