@@ -18,9 +18,9 @@ from creepkit.readers.creep_schema_json import CREEP_SCHEMA
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.readers.questions import ANSWERS_FILE, collected, raise_all
-from creepkit.readers.rate_and_rupture_tables import TEST_TABLE
 from creepkit.readers.spreadsheets import SPREADSHEET
 from creepkit.readers.tests_file import answers_of
+from creepkit.readers.tests_in_rows import TEST_TABLE
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, Reader, accepts_path, histories_in
 

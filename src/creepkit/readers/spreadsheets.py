@@ -42,6 +42,9 @@ from creepkit.readers.table_layouts import names_time, tests_in
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 
+SPREADSHEET_SUFFIXES = (".xlsx", ".xlsm")
+
+
 SPREADSHEET_FILE = FileKind("a spreadsheet of tests", HistoryError, "save the sheet as .xlsx or CSV", 100_000_000)
 
 
@@ -306,7 +309,7 @@ class SpreadsheetReader:
 
     def accepts(self, path: Path) -> bool:
         """Say whether `path` is a file .xlsx."""
-        return path.suffix.lower() in (".xlsx", ".xlsm") and path.is_file()
+        return path.suffix.lower() in SPREADSHEET_SUFFIXES and path.is_file()
 
     def read(self, path: Path) -> list[History]:
         """Return the histories in all sheets."""

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from creepkit.readers.column_names import KnownNames
-from creepkit.readers.columns_of_tests import key_of_column
+from creepkit.readers.columns_of_tests import column_called
 from creepkit.readers.history_csv import HISTORY_CSV
-from creepkit.readers.rate_and_rupture_tables import TEST_TABLE, columns_of_tests
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
 from creepkit.readers.table import CellTable
 from creepkit.readers.table_layouts import names_time, tests_in
 from creepkit.readers.tests_file import answers_of
+from creepkit.readers.tests_in_rows import TEST_TABLE
 from creepkit.readers.text_files import read_text_table
 from creepkit.readers.vocabulary import HeaderVocabulary
 
@@ -39,10 +39,11 @@ def summarise_tables(path: Path, ignored: Collection[str] = ()) -> list[TableSum
     ignored : columns that are left out.
     """
     vocabulary = answers_of(path).added_to(HeaderVocabulary(ignored=ignored))
-    if replace(TEST_TABLE, vocabulary=vocabulary).accepts(path):
+    reader = replace(TEST_TABLE, vocabulary=vocabulary)
+    if reader.accepts(path):
         return [
-            TableSummary(str(path), "", "", {name: key_of_column(name)[0] or name for name in names}, rows)
-            for names, rows in columns_of_tests(path, vocabulary)
+            TableSummary(str(path), "", "", {n: column_called(n).quantity or n for n in table.names}, len(table.rows))
+            for table in reader.tables(path, [])
         ]
     if SPREADSHEET.accepts(path):
         grids = [grid for grid in read_sheets(path) if names_time(grid, vocabulary)]
