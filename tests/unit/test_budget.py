@@ -14,20 +14,20 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 349,
+    "api": 342,
     "app": 630,
-    "cameras": 976,
+    "cameras": 958,
     "cli": 2385,
     "core": 70,
     "dataset": 811,
     "discovery": 1488,
     "experiments": 1694,
     "exporters": 2680,
-    "extraction": 1352,
+    "extraction": 1326,
     "fem": 1841,
     "files": 1420,
     "forecasts": 1505,
-    "instruments": 1288,
+    "instruments": 1286,
     "integration": 782,
     "inverse": 12320,
     "jobs": 254,
@@ -44,13 +44,13 @@ BUDGET = {
     "sampling": 1069,
     "screening": 740,
     "specimens": 3598,
-    "studies": 3121,
+    "studies": 3116,
     "surrogates": 1784,
     "testing": 1892,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34693
+TESTS = 34690
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
