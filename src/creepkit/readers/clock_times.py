@@ -16,9 +16,9 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve
-from creepkit.readers.column_names import KnownNames, words_of
+from creepkit.readers.column_names import split_unit, words_of
 from creepkit.readers.table import CellTable, NumberRows, SourceText, TableRow, cells_of
-from creepkit.readers.vocabulary import split_unit
+from creepkit.readers.vocabulary import Terms
 
 _ELAPSED = re.compile(r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d{1,9})?)", re.ASCII)
 
@@ -29,7 +29,7 @@ _ELAPSED_NAME = re.compile(r"elapsed|test time|creep time|laufzeit|h:mm|\[h|hh:m
 _OF_DAY = ("time of day", "clock", "clock time", "uhrzeit")
 
 
-def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: KnownNames) -> CellTable:
+def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: Terms) -> CellTable:
     """The table with its times as numbers; takes `date_order` and `time_zone` from what is stated."""
     order, zone = stated.pop("date_order", None), stated.pop("time_zone", None)
     if order is not None and order.text not in DATE_ORDERS:

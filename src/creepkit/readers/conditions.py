@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
-from creepkit.readers.column_names import unit_suffix
+from creepkit.readers.column_names import plain_name, split_unit, unit_suffix
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
@@ -27,15 +27,7 @@ from creepkit.readers.ends_of_tests import (
 )
 from creepkit.readers.questions import Question
 from creepkit.readers.table import SourceText
-from creepkit.readers.vocabulary import (
-    CLOSE_SPELLING,
-    SPECIMEN_NAME_PATTERN,
-    HeaderVocabulary,
-    Terms,
-    is_misspelling,
-    plain_name,
-    split_unit,
-)
+from creepkit.readers.vocabulary import CLOSE_SPELLING, SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms, is_misspelling
 from creepkit.records import Program
 from creepkit.records.quantities import LENGTH, TIME, QuantityKind
 
@@ -98,7 +90,7 @@ class StatedConditions:
         self.stated: dict[str, Program] = {}
         self._vocabulary = vocabulary
         stated = entries["specimen"].text.casefold() if "specimen" in entries else ""
-        self.terms = vocabulary.terms(stated or vocabulary.default_texts.get("specimen", ""))
+        self.terms = vocabulary.terms(stated)
         self.default_specimen = vocabulary.default_texts.get("specimen", "")
         self._kinds = self.terms.condition_kinds
         self._text_keys = self.terms.text_keys

@@ -22,9 +22,9 @@ from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.json_documents import read_json
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
-from creepkit.readers.column_names import unit_suffix
+from creepkit.readers.column_names import plain_name, unit_suffix
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width
-from creepkit.readers.vocabulary import HeaderVocabulary, plain_name
+from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 from creepkit.records.quantities import STRAIN, STRESS, TEMPERATURE, TIME, QuantityKind
 

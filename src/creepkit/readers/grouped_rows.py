@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
-from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
+from creepkit.readers.column_names import TEST_NAME_COLUMNS, words_of
 from creepkit.readers.frames import unknown_text
 from creepkit.readers.table import CellTable, NumberRows, SourceText, TableRow, cells_of, grouped, with_columns
+from creepkit.readers.vocabulary import Terms
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class TabulatedTest:
     table: CellTable
 
 
-def refuse_twice(entries: Mapping[str, SourceText], header: Mapping[str, SourceText], known: KnownNames) -> None:
+def refuse_twice(entries: Mapping[str, SourceText], header: Mapping[str, SourceText], known: Terms) -> None:
     """HistoryError where what the header states is stated anew."""
     given = {known.condition(key) for key in header}
     for key, entry in entries.items():
@@ -60,7 +61,7 @@ _DATES = frozenset(("date", "datum", "day", "jour", "heure"))
 """Names of columns of days, in small letters, and of the clock times beside them."""
 
 
-def without_clocks(table: CellTable, known: KnownNames) -> CellTable:
+def without_clocks(table: CellTable, known: Terms) -> CellTable:
     """The table without dates and times of a clock, where a column of elapsed times in a unit is beside them."""
     if isinstance(table.rows, NumberRows) or not table.rows:
         return table
@@ -83,7 +84,7 @@ _GROUP = "test no"
 """Name of the column that numbers the tests of a table whose times begin anew."""
 
 
-def with_groups(table: CellTable, known: KnownNames) -> CellTable:
+def with_groups(table: CellTable, known: Terms) -> CellTable:
     """The table with conditions and names of tests in all rows of a group, where they stand in its first row alone.
 
     A group begins where time falls. Groups that no name tells apart, but a condition does, get numbers.
@@ -100,7 +101,7 @@ def with_groups(table: CellTable, known: KnownNames) -> CellTable:
     stated = keys + [
         k
         for k, name in enumerate(table.columns)
-        if known.quantity(name) in (None, "temperature", *known.terms.number_kinds) and known.is_condition(name)
+        if known.quantity(name) in (None, "temperature", *known.number_kinds) and known.is_condition(name)
     ]
     filled = {k: [row for row, cell in enumerate(cells_of(table.rows, k)) if not is_missing(cell)] for k in stated}
     sparse = [
@@ -122,7 +123,7 @@ def with_groups(table: CellTable, known: KnownNames) -> CellTable:
     return replace(result, columns=[_GROUP, *result.columns], rows=rows, positions=places)
 
 
-def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: KnownNames) -> list[TabulatedTest]:
+def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Terms) -> list[TabulatedTest]:
     """The tests of a table in which a column of names tells them apart; columns of words state conditions of a test."""
     foreign = [
         k for k, column in enumerate(table.columns) if column not in known.declared and not known.quantity(column)
@@ -153,7 +154,7 @@ def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Kno
     return tests
 
 
-def _states_condition(table: CellTable, column: int, rows: Sequence[TableRow], known: KnownNames) -> bool:
+def _states_condition(table: CellTable, column: int, rows: Sequence[TableRow], known: Terms) -> bool:
     """Whether a column holds one condition, or one text, in all rows of a test."""
     cells = cells_of(rows, column)
     first = next(cells)
@@ -162,9 +163,7 @@ def _states_condition(table: CellTable, column: int, rows: Sequence[TableRow], k
     return not is_number(first, table.dialect) or known.is_condition(table.columns[column])
 
 
-def _entries_of_columns(
-    table: CellTable, columns: Sequence[int], row: TableRow, known: KnownNames
-) -> dict[str, SourceText]:
+def _entries_of_columns(table: CellTable, columns: Sequence[int], row: TableRow, known: Terms) -> dict[str, SourceText]:
     entries = {}
     for k in columns:
         name = table.columns[k]

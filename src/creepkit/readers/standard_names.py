@@ -16,10 +16,17 @@ import numpy as np
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.readers.clock_times import with_elapsed_times
-from creepkit.readers.column_names import STATED_BY_NAME, KnownNames, split_written_name, unit_suffix, words_of
+from creepkit.readers.column_names import (
+    STATED_BY_NAME,
+    plain_name,
+    split_unit,
+    split_written_name,
+    unit_suffix,
+    words_of,
+)
 from creepkit.readers.questions import Question
 from creepkit.readers.table import CellTable, NumberRows, SourceText, TableRow
-from creepkit.readers.vocabulary import HeaderVocabulary, plain_name, split_unit
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 
 SURELY_PER_CENT, SURELY_FRACTION = 1.0, 1e-3
 """Largest strain above which, and below which, a strain without unit is decided by its values."""
@@ -44,7 +51,7 @@ def in_standard_names(
     entries: Mapping[str, SourceText], table: CellTable, vocabulary: HeaderVocabulary
 ) -> tuple[dict[str, SourceText], CellTable]:
     """Entries and columns of one test under creepkit's names, with units, and a strain whose unit is decided."""
-    known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
+    known = vocabulary.terms(specimen_named(entries, vocabulary))
     stated = in_standard_keys(entries, known)
     for key, entry in _stated_by_columns(table):
         if stated.setdefault(key, entry).text != entry.text:
@@ -64,7 +71,7 @@ def specimen_named(entries: Mapping[str, SourceText], vocabulary: HeaderVocabula
     return next(named, "")
 
 
-def in_standard_keys(entries: Mapping[str, SourceText], known: KnownNames) -> dict[str, SourceText]:
+def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[str, SourceText]:
     """Entries under creepkit's names of their keys, with the units that stand in their texts."""
     stated: dict[str, SourceText] = {}
     for key, entry in entries.items():
@@ -91,7 +98,7 @@ def _stated_by_columns(table: CellTable) -> list[tuple[str, SourceText]]:
     ]
 
 
-def _without_per_cent_signs(table: CellTable, known: KnownNames) -> CellTable:
+def _without_per_cent_signs(table: CellTable, known: Terms) -> CellTable:
     """The table without the signs in cells such as `1.2 %`, whose columns are in per cent, as their names must say."""
     if isinstance(table.rows, NumberRows):
         return table
@@ -122,14 +129,14 @@ def _rows_without_signs(table: CellTable, signed: Collection[int]) -> Iterator[T
         yield TableRow(row.line, cells)
 
 
-def _kind(name: str, known: KnownNames) -> bool:
+def _kind(name: str, known: Terms) -> bool:
     """Whether a column holds a quantity that may be in per cent."""
     found = split_unit(name, known.columns.kinds)
     return found is not None and "pct" in known.columns.kinds[found[0]].units
 
 
 def _with_decided_strains(
-    stated: dict[str, SourceText], table: CellTable, known: KnownNames, written: Mapping[str, SourceText]
+    stated: dict[str, SourceText], table: CellTable, known: Terms, written: Mapping[str, SourceText]
 ) -> tuple[dict[str, SourceText], CellTable]:
     """The columns and entries that have no unit, though it matters, under names with one."""
     unit = stated.pop("strain_unit", None)
@@ -161,7 +168,7 @@ def _with_decided_strains(
     )
 
 
-def _is_undecided(name: str, known: KnownNames) -> bool:
+def _is_undecided(name: str, known: Terms) -> bool:
     if name in known.declared:
         return False
     kinds = known.columns.kinds

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
-from creepkit.readers.column_names import KnownNames, split_written_name, unit_suffix
+from creepkit.readers.column_names import split_written_name, unit_suffix
 from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
 from creepkit.readers.table import CellTable, SourceText, TableRow
+from creepkit.readers.vocabulary import Terms
 
 _MAXIMUM_HEAD_ROWS, MAXIMUM_ROWS_BELOW = 60, 6
 """Rows among which the names of the columns are looked for, and rows of a head below them."""
@@ -56,7 +57,7 @@ _NOT_TESTS = frozenset(
 """Words beside a quantity that tell another quantity or another sensor, not another test."""
 
 
-def test_and_column(cell: str, known: KnownNames) -> tuple[str, str]:
+def test_and_column(cell: str, known: Terms) -> tuple[str, str]:
     """Name of the test and of the column in `A1 strain (%)` or `Strain A1 (%)`; ("", cell) where there are not both."""
     if known.quantity(cell) or known.is_condition(cell):
         return "", cell
@@ -70,12 +71,12 @@ def test_and_column(cell: str, known: KnownNames) -> tuple[str, str]:
     return "", cell
 
 
-def is_time(cell: str, known: KnownNames) -> bool:
+def is_time(cell: str, known: Terms) -> bool:
     """Whether a name of a column is a time, perhaps that of a test, as in `Time A1 (h)`."""
     return known.quantity(test_and_column(cell, known)[1]) == "time"
 
 
-def row_of_names(grid: CellTable, known: KnownNames) -> int:
+def row_of_names(grid: CellTable, known: Terms) -> int:
     """The first row that names a time among texts alone; the first of all where there is none."""
     for k, row in enumerate(grid.rows[:_MAXIMUM_HEAD_ROWS]):
         cells = [cell for cell in row.cells if cell]
@@ -86,7 +87,7 @@ def row_of_names(grid: CellTable, known: KnownNames) -> int:
     return 0
 
 
-def head_of(grid: CellTable, known: KnownNames) -> Head:
+def head_of(grid: CellTable, known: Terms) -> Head:
     """The head of a grid; HistoryError for rows of numbers that nothing names."""
     at = row_of_names(grid, known)
     rows = list(grid.rows[: at + MAXIMUM_ROWS_BELOW])
@@ -116,7 +117,7 @@ def is_frame(row: TableRow, grid: CellTable) -> bool:
     return any(numbers) and all(one or is_missing(cell) for one, cell in zip(numbers, cells, strict=True))
 
 
-def _belongs_to_head(row: TableRow, times: Sequence[int], grid: CellTable, known: KnownNames) -> bool:
+def _belongs_to_head(row: TableRow, times: Sequence[int], grid: CellTable, known: Terms) -> bool:
     """Whether a row below the names is one of units, names, conditions or notes, and no frame."""
     filled = [cell for cell in row.cells if cell]
     at_times = [row.cells[k] for k in times if k < len(row.cells) and row.cells[k]]
@@ -151,7 +152,7 @@ def _fill_names(cells: list[str], below: Sequence[TableRow], first: Sequence[str
 
 
 def heads_of_tests(
-    grid: CellTable, head: Sequence[TableRow], tests: Sequence[Sequence[int]], key_columns: set[int], known: KnownNames
+    grid: CellTable, head: Sequence[TableRow], tests: Sequence[Sequence[int]], key_columns: set[int], known: Terms
 ) -> list[HeadOfTest]:
     """What the rows of a head say of each test.
 
@@ -206,7 +207,7 @@ def _add_row(
     key: str,
     key_columns: set[int],
     grid: CellTable,
-    known: KnownNames,
+    known: Terms,
 ) -> None:
     """Add a row of a key and values, of pairs of key and value, or of names."""
     place, first = grid.location(row.line), min(filled)
@@ -237,7 +238,7 @@ def _add_row(
             result.sources += conditions_in_text(values[0][1], place, known)
 
 
-def _add_title(result: HeadOfTest, text: str, row: TableRow, grid: CellTable, known: KnownNames) -> None:
+def _add_title(result: HeadOfTest, text: str, row: TableRow, grid: CellTable, known: Terms) -> None:
     """Keep a title; what it states is a weak source, but for `key: value`."""
     place = grid.location(row.line)
     key, colon, value = (part.strip() for part in text.partition(":"))
@@ -248,7 +249,7 @@ def _add_title(result: HeadOfTest, text: str, row: TableRow, grid: CellTable, kn
     result.sources += conditions_in_text(text, place, known)
 
 
-def head_of_one_test(grid: CellTable, head: Sequence[TableRow], known: KnownNames) -> HeadOfTest:
+def head_of_one_test(grid: CellTable, head: Sequence[TableRow], known: Terms) -> HeadOfTest:
     """What rows of a head say of the only test: keys, each with its value and perhaps a unit behind it; titles."""
     result = HeadOfTest()
     for row in head:
@@ -289,10 +290,10 @@ def head_of_one_test(grid: CellTable, head: Sequence[TableRow], known: KnownName
     return result
 
 
-def _key_or_label(key: str, known: KnownNames) -> str:
+def _key_or_label(key: str, known: Terms) -> str:
     """A key of a head; one that is no condition, nor nearly one, is that of a label."""
     plain = key.rstrip(": ")
-    if known.is_condition(plain) or known.terms.misspelt(plain):
+    if known.is_condition(plain) or known.misspelt(plain):
         return key
     return f"label {plain}"
 
@@ -308,9 +309,7 @@ def _with_unit(key: str, unit: str, place: str) -> str:
     return key if stated else f"{key.rstrip(': ')} ({unit})"
 
 
-def put_entry(
-    entries: dict[str, SourceText], key: str, text: str, place: str, grid: CellTable, known: KnownNames
-) -> None:
+def put_entry(entries: dict[str, SourceText], key: str, text: str, place: str, grid: CellTable, known: Terms) -> None:
     """Add an entry under creepkit's name of its key; HistoryError where it is there already."""
     written = key.rstrip(": ")
     key = known.condition(written)

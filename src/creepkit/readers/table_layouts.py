@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing, is_number
-from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, unit_suffix, words_of
+from creepkit.readers.column_names import TEST_NAME_COLUMNS, split_written_name, unit_suffix, words_of
 from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
 from creepkit.readers.grouped_rows import (
     TabulatedTest,
@@ -46,7 +46,7 @@ from creepkit.readers.table_heads import (
     row_of_names,
     test_and_column,
 )
-from creepkit.readers.vocabulary import HeaderVocabulary
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records.quantities import STRAIN
 
 
@@ -68,7 +68,7 @@ class HeadedGrid:
     grid: CellTable
     head: Head
     times: Sequence[int]
-    known: KnownNames
+    known: Terms
     whole: Sequence[TableRow]
 
 
@@ -89,7 +89,7 @@ def tests_in(grid: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTes
             raise HistoryError(f"{place}: {key} is '{quoted(text)}', and {grid.header[key].location} says another one")
     grid = replace(grid, header={**grid.header, **{key: SourceText(*one) for key, one in vocabulary.stated.items()}})
     stated = grid.header.get("specimen")
-    known = KnownNames.of(vocabulary, stated.text if stated else "")
+    known = vocabulary.terms(stated.text if stated else "")
     names_at = row_of_names(grid, known)
     names_line, all_rows = grid.rows[names_at].line, list(grid.rows[: names_at + MAXIMUM_ROWS_BELOW])
     grid = without_ignored(_with_comments(grid, names_line, known), names_at, vocabulary.ignored)
@@ -106,7 +106,7 @@ def tests_in(grid: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTes
 
 def names_time(grid: CellTable, vocabulary: HeaderVocabulary) -> bool:
     """Whether some row of a grid names a time, as that above frames does."""
-    known = KnownNames.of(vocabulary)
+    known = vocabulary.terms()
     row = grid.rows[row_of_names(grid, known)]
     return any(is_time(cell, known) for cell in row.cells)
 
@@ -168,7 +168,7 @@ LAYOUTS: Sequence[Layout] = (
 """The first that matches is the layout of a table."""
 
 
-def _with_comments(grid: CellTable, names_line: int, known: KnownNames) -> CellTable:
+def _with_comments(grid: CellTable, names_line: int, known: Terms) -> CellTable:
     """The grid with the entries of comments between its first row and its names.
 
     A condition in a comment below the names is refused, for it must not go unread; remarks may stand anywhere.
@@ -248,7 +248,7 @@ def _columns_beside(headed: HeadedGrid, time: int) -> list[TestColumns]:
     return results
 
 
-def _pairs(grid: CellTable, times: Sequence[int], known: KnownNames) -> list[TestColumns]:
+def _pairs(grid: CellTable, times: Sequence[int], known: Terms) -> list[TestColumns]:
     """Columns of each test side by side, each beginning with its time."""
     names = grid.rows[0]
     place = grid.location(names.line)

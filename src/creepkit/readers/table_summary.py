@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from creepkit.readers.column_names import KnownNames
 from creepkit.readers.columns_of_tests import column_called
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
@@ -55,7 +54,7 @@ def summarise_tables(path: Path, ignored: Collection[str] = ()) -> list[TableSum
 
 
 def _summaries(grid: CellTable, vocabulary: HeaderVocabulary) -> list[TableSummary]:
-    known = KnownNames.of(vocabulary, grid.header["specimen"].text if "specimen" in grid.header else "")
+    known = vocabulary.terms(grid.header["specimen"].text if "specimen" in grid.header else "")
     return [
         TableSummary(
             grid.place,
