@@ -51,10 +51,7 @@ def without_remarks(table: CellTable, notes: dict[str, SourceText]) -> CellTable
     for row in table.rows:
         if text := "; ".join(row.cells[k] for k in columns if row.cells[k]):
             notes[f"label line {row.line}"] = SourceText(text, table.location(row.line))
-    kept = [k for k in range(len(table.columns)) if k not in columns]
-    places = [(table.positions or range(len(table.columns)))[k] for k in kept]
-    rows = with_columns(table.rows, kept)
-    return replace(table, columns=[table.columns[k] for k in kept], rows=rows, positions=places)
+    return table.keeping([k for k in range(len(table.columns)) if k not in columns])
 
 
 _DATES = frozenset(("date", "datum", "day", "jour", "heure"))
@@ -72,12 +69,9 @@ def without_clocks(table: CellTable, known: Terms) -> CellTable:
     clocks = [k for k in {*times, *dates} if is_clock_time(first[k])]
     if not elapsed or not clocks:
         return table
-    kept = [k for k in range(len(table.columns)) if k not in clocks]
     names = " ".join(f"'{table.columns[k]}'" for k in sorted(clocks))
-    note = f"{names} not used beside '{table.columns[elapsed[0]]}'"
-    places = [(table.positions or range(len(table.columns)))[k] for k in kept]
-    columns, rows = [table.columns[k] for k in kept], with_columns(table.rows, kept)
-    return replace(table, columns=columns, rows=rows, positions=places, assumptions=(*table.assumptions, note))
+    table = table.assuming(f"{names} not used beside '{table.columns[elapsed[0]]}'")
+    return table.keeping([k for k in range(len(table.columns)) if k not in clocks])
 
 
 _GROUP = "test no"

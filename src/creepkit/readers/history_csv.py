@@ -38,8 +38,8 @@ from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.grouped_rows import TabulatedTest
 from creepkit.readers.noise_correlation import noise_correlation_text
 from creepkit.readers.table import CellTable
-from creepkit.readers.table_heads import is_frame
-from creepkit.readers.table_layouts import names_time, tests_in
+from creepkit.readers.table_heads import is_frame, names_time
+from creepkit.readers.table_layouts import tests_in
 from creepkit.readers.text_files import peek_table, read_head_alone, read_text_table
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (

@@ -38,7 +38,8 @@ from creepkit.readers.table import (
     refuse_long_cells,
     without_ignored,
 )
-from creepkit.readers.table_layouts import names_time, tests_in
+from creepkit.readers.table_heads import names_time
+from creepkit.readers.table_layouts import tests_in
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 

@@ -10,7 +10,8 @@ from creepkit.readers.columns_of_tests import column_called
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
 from creepkit.readers.table import CellTable
-from creepkit.readers.table_layouts import names_time, tests_in
+from creepkit.readers.table_heads import names_time
+from creepkit.readers.table_layouts import tests_in
 from creepkit.readers.tests_file import answers_of
 from creepkit.readers.tests_in_rows import TEST_TABLE
 from creepkit.readers.text_files import read_text_table
