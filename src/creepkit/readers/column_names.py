@@ -61,18 +61,8 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
-        *(
-            "remaining stress",
-            "residual stress",
-            "relaxed stress",
-            "restspannung",
-            "spannung",
-            "prüfspannung",
-            "nennspannung",
-            "anfangsspannung",
-            "contrainte",
-            "contrainte initiale",
-        ),
+        *("remaining stress", "residual stress", "relaxed stress", "restspannung", "spannung", "prüfspannung"),
+        *("nennspannung", "anfangsspannung", "contrainte", "contrainte initiale"),
     ),
     "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
     "strain": (
@@ -87,12 +77,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("längenänderung", "allongement"),
     ),
     "modulus": (
-        "young's modulus",
-        "youngs modulus",
-        "elastic modulus",
-        "e modul",
-        "elastizitätsmodul",
-        "module d'young",
+        *("young's modulus", "youngs modulus", "elastic modulus", "e modul", "elastizitätsmodul", "module d'young"),
     ),
     "poisson": ("poisson's ratio", "poissons ratio", "poisson ratio"),
     "rupture": ("rupture time", "time to rupture", "rupture life", "bruchzeit", "standzeit", "temps à rupture"),
@@ -244,16 +229,7 @@ class NameTable:
 
 
 TEST_NAME_COLUMNS = (
-    "test",
-    "test id",
-    "test name",
-    "test no",
-    "test number",
-    "sample",
-    "sample id",
-    "specimen id",
-    "versuch",
-    "probe",
-    "probennummer",
+    *("test", "test id", "test name", "test no", "test number", "sample", "sample id", "specimen id", "versuch"),
+    *("probe", "probennummer"),
 )
 """Names, in small letters, of columns and rows that tell which test it is where a table holds several."""

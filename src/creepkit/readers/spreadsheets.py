@@ -26,7 +26,6 @@ from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, words_of
 from creepkit.readers.frames import unknown_text
-from creepkit.readers.grouped_rows import TabulatedTest
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.table import (
     CellTable,
@@ -39,7 +38,7 @@ from creepkit.readers.table import (
     without_ignored,
 )
 from creepkit.readers.table_heads import names_time
-from creepkit.readers.table_layouts import tests_in
+from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 
