@@ -68,13 +68,6 @@ def code_words(tree: ast.Module) -> Iterator[tuple[int, str]]:
                 yield line, value
 
 
-def test_the_names_of_shipped_specimens_are_those_of_their_records() -> None:
-    assert {"bulge", "dimple", "uniaxial", "relaxation"} <= names_of_shipped_specimens()
-    assert {"amplitude", "width", "apex_thickness", "thickness", "window", "P1", "Tj"} <= names_of_shipped_specimens()
-    found = dict(code_words(ast.parse('"""bulge"""\nP1 = f(width=dimple.apex_thickness["the amplitude of"])')))
-    assert found.keys() == {2}
-
-
 @pytest.mark.parametrize("package", PACKAGES_FOR_ANY_SPECIMEN)
 def test_a_package_for_any_specimen_names_none(package: str) -> None:
     """Also as parts of longer names, such as LEAST_WIDTH or bulge_stress."""
