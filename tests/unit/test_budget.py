@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 136,
     "modules": 782,
     "quality": 1467,
-    "readers": 5785,
+    "readers": 5490,
     "records": 1979,
     "registry": 616,
     "reports": 8060,
