@@ -39,30 +39,20 @@ def _check(code: int) -> None:
 class CovarianceFactor:
     """The covariance C = L L' of every test; L^-1 r is white.
 
-    series : of the observations. components : (5 outputs + 3,) as NoiseModel.components has them. counts : (tests,
-    observations) how often the square of each whitened value counts, or None for once.
+    series : of the observations. components : (5 outputs + 3,) as NoiseModel.components has them.
     """
 
     series: ObservationSeries
     components: Floats
-    counts: Floats | None = None
 
     @classmethod
     def of_residuals(cls, residuals: Residuals, noise_model: NoiseModel) -> CovarianceFactor:
         """The covariance of residuals under a noise model."""
         return cls(residuals.series, noise_model.components)
 
-    def with_counts(self, counts: Floats) -> CovarianceFactor:
-        """The same with squares of whitened values counted (tests, observations) times."""
-        return replace(self, counts=counts)
-
     def whiten(self, values: Floats) -> Floats:
         """L^-1 v of values (tests, observations[, columns]), of the same shape; observations without data stay."""
-        whitened = self._transformed(values, inverse=False)[0]
-        if self.counts is None:
-            return whitened
-        roots = np.sqrt(self.counts)
-        return np.asarray(whitened * (roots if values.ndim == 2 else roots[..., None]))
+        return self._transformed(values, inverse=False)[0]
 
     def inverse_times(self, values: Floats) -> Floats:
         """C^-1 v of values (tests, observations[, columns]), of the same shape; observations without data stay."""
