@@ -14,43 +14,43 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 349,
+    "api": 342,
     "app": 630,
-    "cameras": 976,
+    "cameras": 949,
     "cli": 2385,
     "core": 70,
     "dataset": 811,
     "discovery": 1488,
     "experiments": 1694,
     "exporters": 2680,
-    "extraction": 1352,
+    "extraction": 1314,
     "fem": 1841,
     "files": 1420,
     "forecasts": 1505,
-    "instruments": 1288,
+    "instruments": 1286,
     "integration": 782,
     "inverse": 12320,
     "jobs": 254,
-    "kernels": 1705,
-    "language": 1515,
+    "kernels": 1703,
+    "language": 1506,
     "laws": 136,
     "modules": 782,
     "quality": 1467,
-    "readers": 5785,
+    "readers": 5490,
     "records": 1979,
     "registry": 616,
     "reports": 8060,
     "rupture_assessment": 1878,
     "sampling": 1069,
     "screening": 740,
-    "specimens": 3605,
-    "studies": 3121,
+    "specimens": 3598,
+    "studies": 3094,
     "surrogates": 1784,
-    "testing": 1895,
+    "testing": 1892,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34789
+TESTS = 34690
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
