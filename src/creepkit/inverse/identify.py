@@ -47,6 +47,7 @@ from creepkit.inverse.iterative_estimation import (
     estimate_iteratively,
     linearised,
     starting_point,
+    under_errors_of_tests,
 )
 from creepkit.inverse.judged_residuals import at_own_rates, at_rates
 from creepkit.inverse.kept_fits import kept_where_asked
@@ -54,7 +55,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbation import unmodelled_note
-from creepkit.inverse.perturbations import perturbations, usual_scatter
+from creepkit.inverse.perturbations import at_optimum, error_covariances, errors_of_tests, perturbations
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
@@ -66,14 +67,15 @@ from creepkit.inverse.single_values import LawAtTests, contradicting_values
 from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.inverse.uncertainty.laplace_approximation import (
+    covariance_of_values,
     cut_interval_notes,
     interval_quantile,
     parameter_estimates,
     positive_semidefinite,
+    restricted_covariance,
 )
-from creepkit.inverse.uncertainty.of_estimation import uncertainty_of
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.working_noise import WorkingNoiseEstimator
+from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor, Status, is_length_nuisance, is_logarithmic
 
@@ -191,6 +193,7 @@ def identify_values(
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
+        best = under_errors_of_tests(best)
         fit = _result(histories, best, search_outcome, numerical_error)
     return replace(fit, notes=(*left_out, *fit.notes))
 
@@ -293,19 +296,22 @@ def _result(
     law, coordinates, count = problem.law, problem.coordinates, problem.parameter_count
     u = x[:count]
     working_estimator = _working_estimator(problem, numerical_error)
-    noise_model, covariance, freedom = uncertainty_of(best, working_estimator, len(histories))
-    linear = best.linearised or linearised(problem, x, residuals)
-    working_noise = None if best.linearised is not None else best.working_noise
-    unmodelled = perturbations(problem, x, linear, noise_model, histories, working_noise)
+    linear, by_likelihood = best.linearised, working_estimator.by_likelihood
+    noise_model = working_estimator.final(linear, best.working_noise)
+    unestimated = working_estimator.unestimated_drift_components(noise_model)
+    covariance, freedom = restricted_covariance(linear, noise_model, problem.settings.nuisances, unestimated, count)
+    working_noise = None
+    if not by_likelihood:
+        working_noise = with_single_value_weight(best.working_noise, problem.observations)
+        covariance = covariance_of_values(linear, noise_model, working_noise)
+    errors = best.errors if by_likelihood else errors_of_tests(problem, x, linear, noise_model)
+    unmodelled = perturbations(problem, x, linear, noise_model, histories, errors, working_noise)
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     judged = at_own_rates(problem, x, linear, noise_model)
     rates = RateExplanations(problem, x, judged, noise_model)
-    by_scatter = usual_scatter(problem, x, linear, noise_model, rates.rates.contrasts, working_noise)
-    included = [e for e in unmodelled if e.included]
-    common = np.concatenate([np.zeros((0, x.size)), *(e.value_change for e in included if e.common)])[:, :count]
-    own = np.concatenate([by_scatter, *(e.value_change for e in included if not e.common)])[:, :count]
-    of_unknowns = np.pad(common.T @ common, (0, x.size - count)) if included else None
-    scatter = rate_scatter(problem, x, residuals, noise_model, lengths, of_unknowns)
+    of_errors, of_common = error_covariances(linear, noise_model, errors, working_noise)
+    by_tests = linear if best.errors is None else at_optimum(linear, noise_model)
+    scatter = rate_scatter(problem, by_tests, noise_model, lengths, of_common)
     prediction = predict(
         problem.predictor,
         law,
@@ -318,7 +324,7 @@ def _result(
     prediction = with_correction_at_frames(problem, histories, prediction)
     # Their size is known, so that their interval is a normal one whatever the degrees of freedom of the tests are.
     quantile = interval_quantile(freedom)
-    error_covariance = (interval_quantile(1e9) / quantile) ** 2 * (common.T @ common + own.T @ own)
+    error_covariance = (interval_quantile(1e9) / quantile) ** 2 * of_errors[:count, :count]
     law_covariance = positive_semidefinite(covariance[:count, :count]) + error_covariance
     values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)

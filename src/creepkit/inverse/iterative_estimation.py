@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.noise_covariance import CovarianceFactor, log_likelihood
+from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.inverse.perturbations import TestErrors, errors_of_tests
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
-from creepkit.inverse.uncertainty.laplace_approximation import marginal_log_likelihood, normal_matrix
 from creepkit.inverse.variance_components import (
     BOUND_TOLERANCE,
     LinearisedProblem,
@@ -29,6 +29,10 @@ PRIOR_STEPS = 30
 LIKELIHOOD_TOLERANCE = 1e-5
 """Relative change of a chi-square that ends a refinement by likelihood: some thousandth of one, well inside an interval
 and above what the steps of a solver leave."""
+
+
+MOST_ERROR_STEPS, ERROR_STEP = 4, 0.02
+"""Steps of values under the errors of tests, and the largest one left out, in standard deviations."""
 
 
 CONVERGED_GAIN = 0.02
@@ -57,7 +61,8 @@ class EstimationResult:
     """The end of an iterative estimation: values and working noise that agree, and their log-likelihood.
 
     problem : with the priors of nuisance parameters as they were estimated; minimum : its optimum; residuals : there,
-    with the weights of tests; linearised : the problem made linear there, of estimates by likelihood.
+    with the weights of tests; linearised : the problem made linear there; errors : of tests in the covariance under
+    which the values of estimates by likelihood were found in the end, None for none.
     """
 
     problem: LeastSquaresProblem
@@ -65,7 +70,8 @@ class EstimationResult:
     residuals: Residuals
     working_noise: NoiseModel
     log_likelihood: float
-    linearised: LinearisedProblem | None = None
+    linearised: LinearisedProblem
+    errors: TestErrors | None = None
 
 
 def estimate_iteratively(
@@ -100,7 +106,7 @@ def estimate_iteratively(
         minimum = problem.minimise(x, tolerances=Tolerances(limits.steps, tolerance))
         x = minimum.x
         residuals = problem.residuals(x).with_test_weights(test_weights)
-        current = _round_result(problem, minimum, residuals, working_noise, working_estimator.by_likelihood)
+        current = _round_result(problem, minimum, residuals, working_noise)
         problem = current.problem
         if progress is not None:
             progress("round", round_index + 1, limits.rounds)
@@ -110,6 +116,35 @@ def estimate_iteratively(
             break
     assert best is not None
     return best
+
+
+def under_errors_of_tests(result: EstimationResult) -> EstimationResult:
+    """An estimate by likelihood with its values under the covariance that holds the errors of tests.
+
+    By Gauss-Newton steps from the optimum without them, with errors and residuals made linear at each.
+    """
+    settings = result.problem.settings
+    if settings.weights != "likelihood" or not settings.included_errors:
+        return result
+    problem, weights, bounds = result.problem, result.residuals.test_weights, result.problem.bounds
+    x, linear, noise = result.minimum.x, result.linearised, result.working_noise
+    errors: TestErrors | None = None
+    for _ in range(MOST_ERROR_STEPS):
+        errors = errors_of_tests(problem, x, linear, noise)
+        assert errors is not None
+        factor = CovarianceFactor.of_residuals(errors.within(linear.residuals), noise)
+        solution, moved = linear.solve(factor), x.copy()
+        moved[linear.free] += solution.step
+        moved = bounds.clip(moved)
+        if (np.abs(moved - x)[linear.free] <= ERROR_STEP * np.sqrt(np.diag(solution.covariance))).all():
+            break
+        residuals = problem.residuals(moved).with_test_weights(weights)
+        assert residuals.jacobian is not None
+        if not (np.isfinite(residuals.values).all() and np.isfinite(residuals.jacobian).all()):
+            break
+        x, linear = moved, replace(linearised(problem, moved, residuals), free=linear.free)
+    minimum = replace(result.minimum, x=x)
+    return replace(result, minimum=minimum, residuals=linear.residuals, linearised=linear, errors=errors)
 
 
 def _covariance_factor(
@@ -147,33 +182,18 @@ def linearised(problem: LeastSquaresProblem, x: Floats, residuals: Residuals) ->
 
 
 def _round_result(
-    problem: LeastSquaresProblem, minimum: Minimum, residuals: Residuals, working_noise: NoiseModel, restricted: bool
+    problem: LeastSquaresProblem, minimum: Minimum, residuals: Residuals, working_noise: NoiseModel
 ) -> EstimationResult:
     """The end of a round, with the prior standard deviations that its residuals show."""
     nuisances = problem.nuisance_parameters
-    if restricted:
-        nuisances = _with_estimated_priors(nuisances, residuals, working_noise, minimum.x)
+    if any(n.sd is None for n in nuisances.nuisances):
+        assert residuals.jacobian is not None
+        whitened = CovarianceFactor.of_residuals(residuals, working_noise).whiten(residuals.jacobian)
+        nuisances = _with_prior_sd(nuisances, np.einsum("tfp,tfq->pq", whitened, whitened), minimum.x)
         problem = problem.with_nuisances(nuisances)
-        linear = linearised(problem, minimum.x, residuals)
-        likelihood = restricted_log_likelihood(linear, working_noise)
-        return EstimationResult(problem, minimum, residuals, working_noise, likelihood, linear)
-    likelihood = log_likelihood(residuals, working_noise)
-    if not nuisances.size:
-        return EstimationResult(problem, minimum, residuals, working_noise, likelihood)
-    information = normal_matrix(residuals, working_noise)
-    nuisances = _with_estimated_priors(nuisances, residuals, working_noise, minimum.x)
-    e = minimum.x[-nuisances.size :]
-    likelihood = marginal_log_likelihood(likelihood, information, e, nuisances)
-    return EstimationResult(problem.with_nuisances(nuisances), minimum, residuals, working_noise, likelihood)
-
-
-def _with_estimated_priors(
-    nuisance_parameters: NuisanceParameters, residuals: Residuals, working_noise: NoiseModel, x: Floats
-) -> NuisanceParameters:
-    """The nuisance parameters, with those prior standard deviations estimated that were not given."""
-    if all(n.sd is not None for n in nuisance_parameters.nuisances):
-        return nuisance_parameters
-    return _with_prior_sd(nuisance_parameters, normal_matrix(residuals, working_noise), x)
+    linear = linearised(problem, minimum.x, residuals)
+    likelihood = restricted_log_likelihood(linear, working_noise)
+    return EstimationResult(problem, minimum, residuals, working_noise, likelihood, linear)
 
 
 def _with_prior_sd(nuisance_parameters: NuisanceParameters, normal_matrix: Floats, x: Floats) -> NuisanceParameters:

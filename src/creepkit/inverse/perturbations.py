@@ -1,16 +1,17 @@
 """Perturbations of the tests of an identification: what nobody models, and what it changes.
 
 A dimple may be thicker than its drawing, a camera may have moved, a furnace may drift; a thermocouple, a load cell or a
-micrometer may be off in every test. Where no nuisance parameter stands for it, the values take it as exactly known.
-Its effect on the residuals, s (one standard deviation of the usual size), moves them by
+micrometer may be off in every test. Where no nuisance parameter stands for it, it is a perturbation.
+Those that the settings name (settings.usual_errors) are in the covariance under which values are found by likelihood:
+with s their effects on the residuals, one standard deviation of the usual size each,
 
-    du = -(J'C^-1 J + P)^-1 J'C^-1 s
+    C = C0 + sum of s s',
 
-to first order, and with it the rate. C is the covariance under which values are found. Independent errors of tests add
-in quadrature; where the scatter of rates is estimated from the tests, they are found as such scatter: C then holds the
-scatter that they make, and each test weighs as much as any other, however small the scatter is without them. An error
-common to all tests makes no scatter, and tests repeated on one rig do not average it out: what it does to each adds up.
-So du du' of the errors that the settings name is in the covariance of the values, beside what the tests say themselves.
+one s for each test of what its tests have independently, one s over all tests of what an instrument has in all of them,
+which no number of tests averages out. So tests count by how exactly they are known, and the covariance of the values,
+(J'C^-1 J + P)^-1, includes the errors; a further test never widens it. The noise model, and what a law is judged by, is
+C0. Values that are not found by likelihood stay as they are, and their covariance is that under C. An error that is not
+included moves values, to first order, by -(J'C^-1 J + P)^-1 J'C^-1 s.
 
 A temperature or load that is off changes the creep rate of each test by its own factor. Of tests under an imposed
 strain or displacement the stress is E (strain - creep strain): a modulus or a strain that is off moves it from the
@@ -24,7 +25,7 @@ with them (inverse.chi_square_test), and whether the choice of a law rests on th
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,15 +34,16 @@ import sympy
 from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for, supports_nuisance
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
+from creepkit.inverse.noise_model import NoiseModel, Residuals, components_fixed_by_priors
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.rate_perturbations import RatePerturbations
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.settings import USUAL_ERRORS
+from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
-from creepkit.inverse.working_noise import with_single_value_weight
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import (
@@ -83,36 +85,80 @@ LOWEST_USUAL_TEMPERATURE = 1000.0
 """K, below which the rate of a law that knows no temperature is taken to change by as much per K as there."""
 
 
+@dataclass(frozen=True, eq=False)
+class TestErrors:
+    """The errors that an identification includes.
+
+    perturbations : of lengths and instruments, of which those count that are included. scatter : (tests,) standard
+    deviation of ln rate, by temperatures and loads that are off in each test by itself, beyond what was estimated.
+    """
+
+    __test__ = False  # not a test case, whatever its name says to pytest
+
+    perturbations: tuple[Perturbation, ...]
+    scatter: Floats
+
+    def common(self) -> Floats:
+        """(tests, observations, errors) effects on the residuals of what all tests have alike."""
+        return self._stacked([e.residual_change for e in self.perturbations if e.included and e.common])
+
+    def own(self, residuals: Residuals) -> Floats:
+        """(tests, observations, errors) of what each test has by itself."""
+        of_rates = [self.scatter[:, None] * residuals.log_rate_sensitivity] if self.scatter.any() else []
+        own = [e.residual_change for e in self.perturbations if e.included and not e.common]
+        return self._stacked([*own, *of_rates])
+
+    def within(self, residuals: Residuals) -> Residuals:
+        """The residuals with the errors in their covariance."""
+        return residuals.with_effects(self.own(residuals), self.common())
+
+    def _stacked(self, effects: Sequence[Floats]) -> Floats:
+        return np.stack(effects, axis=-1) if effects else np.zeros((self.scatter.size, 0, 0))
+
+
+def errors_of_tests(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
+) -> TestErrors | None:
+    """The errors that the settings include, at x (unknowns,); None where they include none."""
+    if not problem.settings.included_errors:
+        return None
+    found = _of_lengths_and_instruments(problem, x, linear)
+    return TestErrors(found, _usual_scatter(problem, x, linear, noise_model))
+
+
 def perturbations(
     problem: LeastSquaresProblem,
     x: Floats,
     linear: LinearisedProblem,
     noise_model: NoiseModel,
     full_histories: Sequence[History],
+    errors: TestErrors | None = None,
     working_noise: NoiseModel | None = None,
 ) -> tuple[Perturbation, ...]:
-    """Those that no nuisance parameter of the problem stands for; x : (unknowns,) its optimum.
+    """Those that no nuisance parameter of the problem stands for, with what they do to the rate.
 
-    working_noise : under which the values were found where that is not `noise_model`, as of frames of equal weight.
+    x : (unknowns,) the optimum. errors : that are in the covariance under which the values were found.
+    working_noise : under which values were found that are not by likelihood.
     """
-    fitting_noise = None if working_noise is None else with_single_value_weight(working_noise, problem.observations)
     factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
+    fitted = (
+        linear
+        if errors is None or working_noise is not None
+        else replace(linear, residuals=errors.within(linear.residuals))
+    )
     reference = problem.coordinates.reference
     slope = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature)
     found, without_energy = [], not problem.law.uses(temperature)
-    for one in _all(problem, x, linear, full_histories):
-        change, noise = one.residual_change, fitting_noise or noise_model
-        if not one.common and fitting_noise is None:
+    for one in _all(problem, x, linear, full_histories, errors):
+        change, noise = one.residual_change, working_noise or noise_model
+        if not (one.common or one.included) and working_noise is None:
             noise = _with_scatter_of(change, problem, linear, noise_model)
-        if one.kind == "modulus" or one.kind.startswith("imposed "):
-            noise = _with_offset_of(change, problem, linear, noise)
         if one.kind == DRIFT:
             noise = _with_misfit_of(change, problem, noise)
-        moved = value_changes(linear, noise, change)
+        moved = value_changes(fitted, noise, change)
         moved = moved.sum(axis=0, keepdims=True) if one.common else moved
         by_error = moved[:, : problem.parameter_count] @ _log_rate_gradient(problem, x)
-        size = float(by_error[0] if one.common else np.sqrt((by_error**2).sum()))
-        one = replace(one, rate_change=size, value_change=moved)
+        one = replace(one, rate_change=float(by_error[0] if one.common else np.sqrt((by_error**2).sum())))
         if one.kind == DRIFT:
             ratio, correlation = _likeness_of_hardening(problem, x, linear, factor, change)
             one = replace(one, like_hardening=one.size * ratio, hardening_correlation=correlation)
@@ -122,39 +168,30 @@ def perturbations(
     return tuple(found)
 
 
-def usual_scatter(
-    problem: LeastSquaresProblem,
-    x: Floats,
-    linear: LinearisedProblem,
-    noise_model: NoiseModel,
-    redundant: int,
-    working_noise: NoiseModel | None = None,
+def _usual_scatter(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
 ) -> Floats:
-    """(tests, unknowns) changes of x by temperatures and loads that are off in each test by itself.
+    """(tests,) standard deviation of ln rate by temperatures and loads that are off in each test by itself.
 
-    x : (unknowns,) the optimum. redundant : combinations of rates of tests that the law does not move, by which their
-    scatter was estimated. The standard deviation that the usual errors make is that of a prior of the scatter, half of
-    a normal distribution: what is added is its mean square, given the estimate, beyond that; all of it where no test is
-    redundant. Nothing is added where the settings state the scatter, and in one test, whose error is the common one.
-    working_noise : as of perturbations().
+    x : (unknowns,) the optimum. The standard deviation that the usual errors make is that of a prior of the scatter,
+    half of a normal distribution: what is added is its mean square, given the estimate, beyond that; all of it where no
+    test is redundant: where no combination of rates of tests is left that the law does not move. Nothing is added where
+    the settings state the scatter, and in one test, whose error is the common one.
     """
-    included, settings, tests = problem.settings.included_errors, problem.settings, range(len(problem.histories))
+    included, settings, tests = problem.settings.included_errors, problem.settings, len(problem.histories)
+    if tests == 1 or ("", "rate") in components_fixed_by_priors(settings.nuisances, list(noise_model.outputs)):
+        return np.zeros(tests)
     own = any(n.kind == "temperature" for n in settings.nuisances)
-    if len(tests) == 1 or ("", "rate") in components_fixed_by_priors(settings.nuisances, list(noise_model.outputs)):
-        return np.zeros((0, x.size))
-    kelvin = 0.0 if own else included.get("temperature", 0.0)
-    load, variances = included.get("load", 0.0), []
-    for test in tests:
+    kelvin, load = 0.0 if own else included.get("temperature", 0.0), included.get("load", 0.0)
+    redundant = RatePerturbations(linear, noise_model, scatter_known=True).contrasts if noise_model.rate > 0 else 0
+    added = []
+    for test in range(tests):
         per_kelvin = log_rate_per_kelvin(problem, x, *_conditions(problem, test))
         loaded = problem.histories[test].loading.quantity in LOADS
         exponent = _stress_exponent(problem, x, test) if loaded else 0.0
-        variances.append((per_kelvin * kelvin) ** 2 + (exponent * load) ** 2)
-    redundant = redundant if noise_model.rate > 0 else 0
-    added = np.sqrt([_mean_square(variance, noise_model.rate, redundant) for variance in variances])
-    change = added[:, None] * linear.residuals.log_rate_sensitivity
-    if working_noise is not None:
-        return value_changes(linear, with_single_value_weight(working_noise, problem.observations), change)
-    return value_changes(linear, _with_scatter_of(change, problem, linear, noise_model), change)
+        usual = (per_kelvin * kelvin) ** 2 + (exponent * load) ** 2
+        added.append(_mean_square(usual, noise_model.rate, redundant))
+    return np.asarray(np.sqrt(added))
 
 
 def _mean_square(usual: float, estimate: float, redundant: int) -> float:
@@ -169,10 +206,8 @@ def _mean_square(usual: float, estimate: float, redundant: int) -> float:
 
 def with_random_effects(linear: LinearisedProblem, effects: Sequence[Perturbation]) -> LinearisedProblem:
     """The linear problem with these perturbations as random effects of each test in its covariance."""
-    columns = [effect.residual_change[..., None] for effect in effects]
-    present = linear.residuals.random_effect_sensitivities
-    stacked = np.concatenate([*([present] if present is not None else []), *columns], axis=-1)
-    return replace(linear, residuals=replace(linear.residuals, random_effect_sensitivities=stacked))
+    stacked = np.stack([effect.residual_change for effect in effects], axis=-1)
+    return replace(linear, residuals=linear.residuals.with_effects(stacked))
 
 
 def with_unknown_effects(linear: LinearisedProblem, changes: Floats) -> LinearisedProblem:
@@ -211,25 +246,40 @@ def sizes_of_effect(
 
 
 def _all(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, full_histories: Sequence[History]
+    problem: LeastSquaresProblem,
+    x: Floats,
+    linear: LinearisedProblem,
+    full_histories: Sequence[History],
+    errors: TestErrors | None,
 ) -> Iterator[Perturbation]:
     """Errors that the tests have independently of one another: lengths, offsets, drifts; then those common to all."""
-    nuisances = problem.settings.nuisances
-    kinds, shared = {n.kind for n in nuisances}, {n.kind for n in nuisances if n.scope != "test"}
-    lengths = []
-    for dimension in tolerated_dimensions(problem):
-        if shared.isdisjoint(dimension.names):
-            found = _length(problem, x, linear, dimension.names[-1])
-            yield from found if kinds.isdisjoint(dimension.names) else ()
-            lengths += found
+    kinds = {n.kind for n in problem.settings.nuisances}
+    known = _of_lengths_and_instruments(problem, x, linear) if errors is None else errors.perturbations
+    yield from (one for one in known if not one.common)
     if "offset" not in kinds:
         yield from _offsets(problem, linear)
     recorded = any(isinstance(h.temperature, Program) for h in full_histories)
     # A drift changes curves, and no single value.
     if any(h.outputs for h in full_histories) and not recorded and kinds.isdisjoint({DRIFT, "rate drift"}):
         yield _drift(problem, x, linear)
-    yield from common_errors(problem, x, linear)
-    yield from (replace(one, common=True) for one in lengths if one.tests > 1)
+    yield from (one for one in known if one.common)
+
+
+def _of_lengths_and_instruments(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem
+) -> tuple[Perturbation, ...]:
+    """Lengths that are off in each test by itself, errors common to all tests, and lengths that are off in all alike.
+
+    Those for which no nuisance parameter stands.
+    """
+    nuisances, own, common = problem.settings.nuisances, list[Perturbation](), list[Perturbation]()
+    kinds, shared = {n.kind for n in nuisances}, {n.kind for n in nuisances if n.scope != "test"}
+    for dimension in tolerated_dimensions(problem):
+        if shared.isdisjoint(dimension.names):
+            found = _length(problem, x, linear, dimension.names[-1])
+            own += found if kinds.isdisjoint(dimension.names) else []
+            common += [replace(one, common=True) for one in found if one.tests > 1]
+    return (*own, *common_errors(problem, x, linear), *common)
 
 
 def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> list[Perturbation]:
@@ -426,6 +476,44 @@ def value_changes(linear: LinearisedProblem, noise_model: NoiseModel, change: Fl
     return moved
 
 
+def error_covariances(
+    linear: LinearisedProblem, noise_model: NoiseModel, errors: TestErrors | None, working_noise: NoiseModel | None
+) -> tuple[Floats, Floats]:
+    """(unknowns, unknowns) what errors of tests add to the covariance of x: all of them, and those common to all tests.
+
+    working_noise : under which values were found that are not by likelihood.
+    """
+    size = linear.precision.size
+    if errors is None:
+        return np.zeros((size, size)), np.zeros((size, size))
+    own, common = errors.own(linear.residuals), errors.common()
+    without, with_common, with_all = (
+        covariance_of_values(replace(linear, residuals=residuals), noise_model, working_noise)
+        for residuals in (
+            linear.residuals,
+            linear.residuals.with_effects(own[..., :0], common),
+            linear.residuals.with_effects(own, common),
+        )
+    )
+    return _excess(with_all, without), _excess(with_common, without)
+
+
+def _excess(covariance: Floats, least: Floats) -> Floats:
+    """(unknowns, unknowns) what a covariance is more than another, without eigenvalues below zero by rounding."""
+    scale = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh((covariance - least) / np.outer(scale, scale))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale))
+
+
+def at_optimum(linear: LinearisedProblem, noise_model: NoiseModel) -> LinearisedProblem:
+    """The linear problem about its own optimum, where errors of tests in the covariance have moved the values from."""
+    solution = linear.solve(CovarianceFactor.of_residuals(linear.residuals, noise_model))
+    prior_residual = linear.prior_residual.copy()
+    prior_residual[linear.free] += solution.step
+    moved = replace(linear.residuals, values=solution.residuals)
+    return replace(linear, residuals=moved, prior_residual=prior_residual)
+
+
 def _log_rate_gradient(problem: LeastSquaresProblem, x: Floats) -> Floats:
     """(parameters,) derivatives of ln of the rate at the reference point to u."""
     coordinates, count = problem.coordinates, problem.parameter_count
@@ -462,28 +550,6 @@ def _with_misfit_of(change: Floats, problem: LeastSquaresProblem, noise_model: N
         if name in noise_model.outputs and mask.any():
             size = float(np.hypot(noise_model[name].drift, np.sqrt(np.mean(change[mask] ** 2))))
             noise_model = noise_model.with_output(name, drift=size, correlation_length=1.0)
-    return noise_model
-
-
-def _with_offset_of(
-    change: Floats, problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel
-) -> NoiseModel:
-    """The noise model with the offsets of tests that an error common to them would be estimated as.
-
-    change : (tests, observations) -, of the residuals. Of each output the mean of a test, in its unit, counts.
-    """
-    fixed = components_fixed_by_priors(problem.settings.nuisances, list(noise_model.outputs))
-    observations, slopes = problem.observations, linear.residuals.offset_sensitivity
-    if not any(n.kind == "offset" for n in problem.settings.nuisances):
-        return noise_model
-    for position, name in enumerate(observations.outputs):
-        if (name, "offset") in fixed or name not in noise_model.outputs:
-            continue
-        mask = linear.residuals.present & (observations.output_index == position)
-        weights = np.where(mask, slopes**2, 0.0).sum(axis=1)
-        means = np.where(mask, change * slopes, 0.0).sum(axis=1) / np.maximum(weights, 1e-300)
-        offset = float(np.sqrt(np.mean(means[weights > 0] ** 2))) if (weights > 0).any() else 0.0
-        noise_model = noise_model.with_output(name, offset=float(np.hypot(noise_model[name].offset, offset)))
     return noise_model
 
 

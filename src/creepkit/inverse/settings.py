@@ -84,7 +84,7 @@ class IdentificationSettings(Options, title="settings of an identification", err
         example="thickness=0.4935:0.027",
     )
     weights: OutputWeights = option(
-        "noise", "Of outputs; equal: Eq. (4), paper: Eq. (S3).", example="amplitude=0.99,width=0.005"
+        "likelihood", "Of outputs; equal: Eq. (4), paper: Eq. (S3).", example="amplitude=0.99,width=0.005"
     )
     test_loss: Literal["gaussian", "student"] = option(
         "gaussian", "Of whole tests; with student one far from its replicates weighs less."
@@ -106,8 +106,8 @@ class IdentificationSettings(Options, title="settings of an identification", err
         super().__post_init__()
         if self.weights == "likelihood" and self.loss != "linear":
             raise FitError(
-                f"loss '{self.loss}' does not go with weights 'likelihood', which judges values, noise and laws; "
-                "leave one of them out, or set test_loss='student' against tests that are far off"
+                f"loss '{self.loss}' does not go with weights 'likelihood', the default, which judges values, noise and "
+                "laws; give weights='noise' beside it, or set test_loss='student' against tests that are far off"
             )
         for nuisance in self.nuisances:
             _check_nuisance(nuisance)

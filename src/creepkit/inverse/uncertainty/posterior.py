@@ -30,9 +30,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predictor_for_law
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import determined_parameters
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import MINIMUM_TESTS, NoiseModel
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
 from creepkit.inverse.uncertainty.mixture_distribution import INTERVAL_PROBABILITIES
@@ -51,23 +49,6 @@ TESTS_ALONE = "by the tests alone: their temperatures, loads and dimensions are 
 
 REFIT_TOLERANCES = Tolerances(max_steps=25, tolerance=1e-7)
 """Of minima about an optimum that is known."""
-
-
-def interval_noise_model(fit: Identification) -> NoiseModel:
-    """The noise model of a fit, with the scatter of the rate as its Laplace intervals have it.
-
-    That scatter, found by maximum likelihood from T tests beside K parameters, is too small by a factor of
-    T / (T - K) in variance (see inverse.uncertainty); restricted likelihood, and a given scatter, are not.
-    """
-    test_count = len(fit.histories)
-    is_rate_given = test_count < MINIMUM_TESTS or any(
-        n.kind == "rate" and n.sd is not None for n in fit.settings.nuisances
-    )
-    if is_rate_given or fit.settings.weights == "likelihood" or fit.noise_model.rate == 0:
-        return fit.noise_model
-    determined_count = determined_parameters(fit.residuals_of(fit.least_squares_problem), fit.u.size)
-    rate_scatter = fit.noise_model.rate * float(np.sqrt(test_count / max(test_count - max(determined_count, 1), 1)))
-    return replace(fit.noise_model, rate=rate_scatter)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +79,7 @@ class Posterior:
     @classmethod
     def from_identification(cls, fit: Identification) -> Posterior:
         """The posterior of an identification, about its optimum."""
-        problem, noise_model = fit.least_squares_problem, interval_noise_model(fit)
+        problem, noise_model = fit.least_squares_problem, fit.noise_model
         residuals, nuisances, count = fit.residuals_of(problem), problem.nuisance_parameters, fit.u.size
         assert residuals.jacobian is not None
         e = fit.x[count:]
