@@ -55,7 +55,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbation import unmodelled_note
-from creepkit.inverse.perturbations import at_optimum, error_covariances, errors_of_tests, perturbations
+from creepkit.inverse.perturbations import error_covariances, errors_of_tests, perturbations
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
@@ -147,7 +147,7 @@ def _beside_the_others(fit: Identification, without: Identification, test: int, 
     problem, x, log_factors = fit.least_squares_problem, fit.x.copy(), np.zeros(len(fit.histories))
     x[: len(without.u)] = without.u
     log_factors[test] = found.size
-    linear = at_rates(problem, x, linearised(problem, x, problem.residuals(x)), log_factors)
+    linear = at_rates(problem, linearised(problem, x, problem.residuals(x)), log_factors)
     others = RateExplanations(problem, x, linear, without.noise_model)
     logarithmic = all(map(is_logarithmic, problem.observations.outputs))
     sizes = others.rates.median_log_factors if logarithmic else others.rates.own_log_factors
@@ -292,7 +292,8 @@ def _result(
     numerical_error: NumericalError | None,
 ) -> Identification:
     """Noise model, intervals and goodness of fit at the optimum."""
-    problem, residuals, x = best.problem, best.residuals, best.minimum.x
+    problem, x = best.problem, best.x
+    residuals = problem.residuals(x).with_test_weights(best.residuals.test_weights)
     law, coordinates, count = problem.law, problem.coordinates, problem.parameter_count
     u = x[:count]
     working_estimator = _working_estimator(problem, numerical_error)
@@ -304,14 +305,13 @@ def _result(
     if not by_likelihood:
         working_noise = with_single_value_weight(best.working_noise, problem.observations)
         covariance = covariance_of_values(linear, noise_model, working_noise)
-    errors = best.errors if by_likelihood else errors_of_tests(problem, x, linear, noise_model)
-    unmodelled = perturbations(problem, x, linear, noise_model, histories, errors, working_noise)
+    errors = best.errors if by_likelihood else errors_of_tests(problem, linear.x, linear, noise_model)
+    unmodelled = perturbations(problem, linear, noise_model, histories, errors, working_noise)
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
-    judged = at_own_rates(problem, x, linear, noise_model)
-    rates = RateExplanations(problem, x, judged, noise_model)
+    judged = at_own_rates(problem, linear, noise_model)
+    rates = RateExplanations(problem, linear.x, judged, noise_model)
     of_errors, of_common = error_covariances(linear, noise_model, errors, working_noise)
-    by_tests = linear if best.errors is None else at_optimum(linear, noise_model)
-    scatter = rate_scatter(problem, by_tests, noise_model, lengths, of_common)
+    scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
     prediction = predict(
         problem.predictor,
         law,
@@ -352,7 +352,7 @@ def _result(
         noise_model=noise_model,
         rms=pooled_log_strain_rms(tests),
         log_likelihood=best.log_likelihood,
-        effective_frames=effective_sample_size(residuals, noise_model),
+        effective_frames=effective_sample_size(best.residuals, noise_model),
         freedom=freedom,
         tests=tests,
         ranges=fitted_ranges(problem),
@@ -385,7 +385,7 @@ def _result(
         search_trace=search_outcome.trace,
         linearised=best.linearised,
         problem=replace(
-            problem, covariance_factor=CovarianceFactor.of_residuals(residuals, noise_model), loss="linear"
+            problem, covariance_factor=CovarianceFactor.of_residuals(best.residuals, noise_model), loss="linear"
         ),
     )
 

@@ -61,8 +61,8 @@ class EstimationResult:
     """The end of an iterative estimation: values and working noise that agree, and their log-likelihood.
 
     problem : with the priors of nuisance parameters as they were estimated; minimum : its optimum; residuals : there,
-    with the weights of tests; linearised : the problem made linear there; errors : of tests in the covariance under
-    which the values of estimates by likelihood were found in the end, None for none.
+    with the weights of tests; linearised : the problem made linear there. x : (unknowns,) the values: the optimum, from
+    where errors of tests move those by likelihood; errors : that were in the covariance, None for none.
     """
 
     problem: LeastSquaresProblem
@@ -71,6 +71,7 @@ class EstimationResult:
     working_noise: NoiseModel
     log_likelihood: float
     linearised: LinearisedProblem
+    x: Floats
     errors: TestErrors | None = None
 
 
@@ -123,28 +124,25 @@ def under_errors_of_tests(result: EstimationResult) -> EstimationResult:
 
     By Gauss-Newton steps from the optimum without them, with errors and residuals made linear at each.
     """
-    settings = result.problem.settings
-    if settings.weights != "likelihood" or not settings.included_errors:
+    problem, linear, noise = result.problem, result.linearised, result.working_noise
+    if problem.settings.weights != "likelihood" or not problem.settings.included_errors:
         return result
-    problem, weights, bounds = result.problem, result.residuals.test_weights, result.problem.bounds
-    x, linear, noise = result.minimum.x, result.linearised, result.working_noise
-    errors: TestErrors | None = None
-    for _ in range(MOST_ERROR_STEPS):
-        errors = errors_of_tests(problem, x, linear, noise)
+    for step in range(MOST_ERROR_STEPS):
+        errors = errors_of_tests(problem, linear.x, linear, noise)
         assert errors is not None
-        factor = CovarianceFactor.of_residuals(errors.within(linear.residuals), noise)
-        solution, moved = linear.solve(factor), x.copy()
-        moved[linear.free] += solution.step
-        moved = bounds.clip(moved)
-        if (np.abs(moved - x)[linear.free] <= ERROR_STEP * np.sqrt(np.diag(solution.covariance))).all():
+        result = replace(result, errors=errors) if step == 0 else result
+        solution = linear.solve(CovarianceFactor.of_residuals(errors.within(linear.residuals), noise))
+        x = linear.x.copy()
+        x[linear.free] += solution.step
+        x = problem.bounds.clip(x)
+        if (np.abs(x - linear.x)[linear.free] <= ERROR_STEP * np.sqrt(np.diag(solution.covariance))).all():
             break
-        residuals = problem.residuals(moved).with_test_weights(weights)
+        residuals = problem.residuals(x).with_test_weights(result.residuals.test_weights)
         assert residuals.jacobian is not None
         if not (np.isfinite(residuals.values).all() and np.isfinite(residuals.jacobian).all()):
             break
-        x, linear = moved, replace(linearised(problem, moved, residuals), free=linear.free)
-    minimum = replace(result.minimum, x=x)
-    return replace(result, minimum=minimum, residuals=linear.residuals, linearised=linear, errors=errors)
+        linear = replace(linearised(problem, x, residuals), free=linear.free)
+    return replace(result, x=linear.x)
 
 
 def _covariance_factor(
@@ -178,7 +176,9 @@ def linearised(problem: LeastSquaresProblem, x: Floats, residuals: Residuals) ->
     prior_residual = np.concatenate([np.zeros(count), x[count:] - nuisances.mean[: x.size - count]])
     tolerance = BOUND_TOLERANCE * bounds.width
     free = (x > bounds.lower + tolerance) & (x < bounds.upper - tolerance)
-    return LinearisedProblem(residuals, precision, prior_residual, free, np.stack([bounds.lower - x, bounds.upper - x]))
+    return LinearisedProblem(
+        residuals, precision, prior_residual, free, np.stack([bounds.lower - x, bounds.upper - x]), x
+    )
 
 
 def _round_result(
@@ -193,7 +193,7 @@ def _round_result(
         problem = problem.with_nuisances(nuisances)
     linear = linearised(problem, minimum.x, residuals)
     likelihood = restricted_log_likelihood(linear, working_noise)
-    return EstimationResult(problem, minimum, residuals, working_noise, likelihood, linear)
+    return EstimationResult(problem, minimum, residuals, working_noise, likelihood, linear, minimum.x)
 
 
 def _with_prior_sd(nuisance_parameters: NuisanceParameters, normal_matrix: Floats, x: Floats) -> NuisanceParameters:

@@ -119,24 +119,20 @@ NOTEWORTHY_FACTOR = 0.03
 """Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
 
 
-def at_own_rates(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
-) -> LinearisedProblem:
-    """The problem made linear at x (unknowns,) and where the rate of each test is its own, by which a law is judged."""
+def at_own_rates(problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel) -> LinearisedProblem:
+    """The linear problem with every test about a rate of its own, by which a law is judged."""
     log_factors = predicted_random_effects(linear.residuals, noise_model)[1]
-    return linear if np.abs(log_factors).max() < NOTEWORTHY_FACTOR else at_rates(problem, x, linear, log_factors)
+    return linear if np.abs(log_factors).max() < NOTEWORTHY_FACTOR else at_rates(problem, linear, log_factors)
 
 
-def at_rates(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, log_factors: Floats
-) -> LinearisedProblem:
-    """The problem made linear at x (unknowns,) and where rates of tests have factors; log_factors : (tests,) their ln.
+def at_rates(problem: LeastSquaresProblem, linear: LinearisedProblem, log_factors: Floats) -> LinearisedProblem:
+    """The linear problem about rates of tests with factors; log_factors : (tests,) their ln.
 
     As `linear`, which is about the law's rates, where some rate has no coefficient or nothing is predicted there.
     """
     if not problem.coordinates.every_rate_has_coefficient:
         return linear
-    there = problem.residuals_at_rates(x, log_factors)
+    there = problem.residuals_at_rates(linear.x, log_factors)
     values = there.values - log_factors[:, None] * there.log_rate_sensitivity
     finite = np.isfinite(values).all() and there.jacobian is not None and np.isfinite(there.jacobian).all()
     residuals = replace(
@@ -149,7 +145,7 @@ def judged_residuals_of(fit: Identification) -> JudgedResiduals | None:
     """The same of an identification with its histories, as its adequacy was judged; None where no noise is known."""
     problem = fit.least_squares_problem
     linear = fit.linearised or linearised(problem, fit.x, problem.residuals(fit.x))
-    linear = at_own_rates(problem, fit.x, linear, fit.noise_model)
+    linear = at_own_rates(problem, linear, fit.noise_model)
     error = fit.numerical_error
     errors = prediction_errors_of(problem.predictor) if error is None else error.remaining
     known = KnownNoise.of_histories(problem.observations, fit.histories)

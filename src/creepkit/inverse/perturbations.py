@@ -10,8 +10,9 @@ with s their effects on the residuals, one standard deviation of the usual size 
 one s for each test of what its tests have independently, one s over all tests of what an instrument has in all of them,
 which no number of tests averages out. So tests count by how exactly they are known, and the covariance of the values,
 (J'C^-1 J + P)^-1, includes the errors; a further test never widens it. The noise model, and what a law is judged by, is
-C0. Values that are not found by likelihood stay as they are, and their covariance is that under C. An error that is not
-included moves values, to first order, by -(J'C^-1 J + P)^-1 J'C^-1 s.
+C0. Values that are not found by likelihood stay as they are, and their covariance is that under C. What an error would do
+to values that do not know of it is, to first order, -(J'C0^-1 J + P)^-1 J'C0^-1 s: C0 then as it would be found, with the
+scatter of rates, the offsets or the misfit that the error makes.
 
 A temperature or load that is off changes the creep rate of each test by its own factor. Of tests under an imposed
 strain or displacement the stress is E (strain - creep strain): a modulus or a strain that is off moves it from the
@@ -128,18 +129,18 @@ def errors_of_tests(
 
 def perturbations(
     problem: LeastSquaresProblem,
-    x: Floats,
     linear: LinearisedProblem,
     noise_model: NoiseModel,
     full_histories: Sequence[History],
     errors: TestErrors | None = None,
     working_noise: NoiseModel | None = None,
 ) -> tuple[Perturbation, ...]:
-    """Those that no nuisance parameter of the problem stands for, with what they do to the rate.
+    """Those that no nuisance parameter of the problem stands for, with what they do to the rate, about the optimum.
 
-    x : (unknowns,) the optimum. errors : that are in the covariance under which the values were found.
+    errors : those of lengths and instruments, where they have been simulated already.
     working_noise : under which values were found that are not by likelihood.
     """
+    x = linear.x
     factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
     fitted = (
         linear
@@ -151,11 +152,13 @@ def perturbations(
     found, without_energy = [], not problem.law.uses(temperature)
     for one in _all(problem, x, linear, full_histories, errors):
         change, noise = one.residual_change, working_noise or noise_model
-        if not (one.common or one.included) and working_noise is None:
+        if not one.common and working_noise is None:
             noise = _with_scatter_of(change, problem, linear, noise_model)
+        if (one.kind == "modulus" or one.kind.startswith("imposed ")) and working_noise is None:
+            noise = _with_offset_of(change, problem, linear, noise)
         if one.kind == DRIFT:
             noise = _with_misfit_of(change, problem, noise)
-        moved = value_changes(fitted, noise, change)
+        moved = value_changes(linear, noise, change)
         moved = moved.sum(axis=0, keepdims=True) if one.common else moved
         by_error = moved[:, : problem.parameter_count] @ _log_rate_gradient(problem, x)
         one = replace(one, rate_change=float(by_error[0] if one.common else np.sqrt((by_error**2).sum())))
@@ -505,15 +508,6 @@ def _excess(covariance: Floats, least: Floats) -> Floats:
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale))
 
 
-def at_optimum(linear: LinearisedProblem, noise_model: NoiseModel) -> LinearisedProblem:
-    """The linear problem about its own optimum, where errors of tests in the covariance have moved the values from."""
-    solution = linear.solve(CovarianceFactor.of_residuals(linear.residuals, noise_model))
-    prior_residual = linear.prior_residual.copy()
-    prior_residual[linear.free] += solution.step
-    moved = replace(linear.residuals, values=solution.residuals)
-    return replace(linear, residuals=moved, prior_residual=prior_residual)
-
-
 def _log_rate_gradient(problem: LeastSquaresProblem, x: Floats) -> Floats:
     """(parameters,) derivatives of ln of the rate at the reference point to u."""
     coordinates, count = problem.coordinates, problem.parameter_count
@@ -550,6 +544,28 @@ def _with_misfit_of(change: Floats, problem: LeastSquaresProblem, noise_model: N
         if name in noise_model.outputs and mask.any():
             size = float(np.hypot(noise_model[name].drift, np.sqrt(np.mean(change[mask] ** 2))))
             noise_model = noise_model.with_output(name, drift=size, correlation_length=1.0)
+    return noise_model
+
+
+def _with_offset_of(
+    change: Floats, problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel
+) -> NoiseModel:
+    """The noise model with the offsets of tests that an error common to them would be estimated as.
+
+    change : (tests, observations) -, of the residuals. Of each output the mean of a test, in its unit, counts.
+    """
+    fixed = components_fixed_by_priors(problem.settings.nuisances, list(noise_model.outputs))
+    observations, slopes = problem.observations, linear.residuals.offset_sensitivity
+    if not any(n.kind == "offset" for n in problem.settings.nuisances):
+        return noise_model
+    for position, name in enumerate(observations.outputs):
+        if (name, "offset") in fixed or name not in noise_model.outputs:
+            continue
+        mask = linear.residuals.present & (observations.output_index == position)
+        weights = np.where(mask, slopes**2, 0.0).sum(axis=1)
+        means = np.where(mask, change * slopes, 0.0).sum(axis=1) / np.maximum(weights, 1e-300)
+        offset = float(np.sqrt(np.mean(means[weights > 0] ** 2))) if (weights > 0).any() else 0.0
+        noise_model = noise_model.with_output(name, offset=float(np.hypot(noise_model[name].offset, offset)))
     return noise_model
 
 

@@ -58,7 +58,8 @@ def test_what_is_common_to_all_tests_adds_in_quadrature_and_no_number_of_tests_a
     fit = identify(AT_TEMPERATURES, tests, Steady(), settings=SETTINGS)
     expected = np.hypot(half_width(fit.by_tests_alone), NORMAL * np.linalg.norm(shifts_of_rate(tests, fit)))
     assert fit.noise_model.rate > 0.13  # more than temperatures and loads off by so much would make
-    assert half_width(fit) == pytest.approx(expected, rel=0.02)
+    # six tests tell a little of what they share, which a sum of squares does not know
+    assert 0.95 * expected < half_width(fit) < 1.01 * expected
     again = identify(AT_TEMPERATURES, tests, Steady(), settings=SETTINGS.changed({"usual_errors": "none"}))
     assert half_width(again) == pytest.approx(half_width(fit.by_tests_alone), rel=1e-3)
     assert again.rate(70.0, 1000.0)[0] == pytest.approx(fit.rate(70.0, 1000.0)[0], rel=0.03)
