@@ -10,9 +10,9 @@ with s their effects on the residuals, one standard deviation of the usual size 
 one s for each test of what its tests have independently, one s over all tests of what an instrument has in all of them,
 which no number of tests averages out. So tests count by how exactly they are known, and the covariance of the values,
 (J'C^-1 J + P)^-1, includes the errors; a further test never widens it. The noise model, and what a law is judged by, is
-C0. Values that are not found by likelihood stay as they are, and their covariance is that under C. What an error would do
-to values that do not know of it is, to first order, -(J'C0^-1 J + P)^-1 J'C0^-1 s: C0 then as it would be found, with the
-scatter of rates, the offsets or the misfit that the error makes.
+C0. Values that are not found by likelihood stay as they are, and their covariance is that under C. What an error would
+do to values that do not know of it is, to first order, -(J'C0^-1 J + P)^-1 J'C0^-1 s: C0 then as it would be found,
+with the scatter of rates, the offsets or the misfit that the error makes.
 
 A temperature or load that is off changes the creep rate of each test by its own factor. Of tests under an imposed
 strain or displacement the stress is E (strain - creep strain): a modulus or a strain that is off moves it from the
@@ -142,11 +142,6 @@ def perturbations(
     """
     x = linear.x
     factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
-    fitted = (
-        linear
-        if errors is None or working_noise is not None
-        else replace(linear, residuals=errors.within(linear.residuals))
-    )
     reference = problem.coordinates.reference
     slope = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature)
     found, without_energy = [], not problem.law.uses(temperature)
