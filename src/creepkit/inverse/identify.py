@@ -184,8 +184,6 @@ def identify_values(
             search_outcome = SearchOutcome([np.clip(start.u, lower, upper)], 0, None)
         else:
             search_outcome = initial_search(problem, through, search or MultiStart(), progress)
-        if search_outcome.dropped_terms:
-            return _without_terms(problem, histories, search_outcome, progress)
         best, numerical_error = _best_estimate(
             problem, search_outcome, through, start or StartingEstimate(None), progress
         )
@@ -204,22 +202,6 @@ def _gradient(best: EstimationResult) -> Floats:
     assert residuals.jacobian is not None
     factor = CovarianceFactor.of_residuals(residuals, best.working_noise)
     return np.asarray(np.einsum("te,tep->p", factor.inverse_times(residuals.values), residuals.jacobian))
-
-
-def _without_terms(
-    problem: LeastSquaresProblem,
-    histories: Sequence[History],
-    search_outcome: SearchOutcome,
-    progress: IterationCallback | None,
-) -> Identification:
-    """The identification of what the search left of a sum: a term that is off must not come back as a small one."""
-    law, dropped_terms = problem.law, search_outcome.dropped_terms
-    reduced_law = law.without(*dropped_terms)
-    kept_positions = [law.names.index(name) for name in reduced_law.names]
-    start = StartingEstimate(search_outcome.starts[0][kept_positions], reference=problem.coordinates.reference)
-    fit = identify(reduced_law, histories, problem.predictor, settings=problem.settings, start=start, progress=progress)
-    note = f"the search left out {' and '.join(dropped_terms)} of law '{law.name}'"
-    return replace(fit, search_trace=search_outcome.trace, notes=(*fit.notes, note))
 
 
 def _best_estimate(
