@@ -204,7 +204,7 @@ class Identification(
         return problem.residuals(self.x).with_test_weights(np.array([m.weight for m in self.tests]))
 
     def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
-        """Value and 95 % interval of a quantity at points; of ln rate with what the law misses there."""
+        """Value and 95 % interval of a quantity, of ln rate with what the law misses there; point : {name: (...,)}."""
         function = quantity(self.coordinates, **point)
         value, low, high = self.interval_of(function)
         if quantity is not log_rate:

@@ -27,6 +27,7 @@ from creepkit.inverse.defect_correction import (
     shift_of_values,
     with_correction_at_frames,
 )
+from creepkit.inverse.errors_of_tests import error_covariances, errors_of_tests
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
@@ -44,18 +45,19 @@ from creepkit.inverse.iterative_estimation import (
     SIMULATION_LIMITS,
     EstimationResult,
     IterationLimits,
+    at_own_rates,
+    at_rates,
     estimate_iteratively,
     linearised,
     starting_point,
     under_errors_of_tests,
 )
-from creepkit.inverse.judged_residuals import at_own_rates, at_rates
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbation import unmodelled_note
-from creepkit.inverse.perturbations import error_covariances, errors_of_tests, perturbations
+from creepkit.inverse.perturbations import perturbations
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
@@ -287,12 +289,14 @@ def _result(
     if not by_likelihood:
         working_noise = with_single_value_weight(best.working_noise, problem.observations)
         covariance = covariance_of_values(linear, noise_model, working_noise)
-    errors = best.errors if by_likelihood else errors_of_tests(problem, linear.x, linear, noise_model)
-    unmodelled = perturbations(problem, linear, noise_model, histories, errors, working_noise)
-    lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     judged = at_own_rates(problem, linear, noise_model)
+    errors = best.errors if by_likelihood else errors_of_tests(problem, linear.x, judged, noise_model)
+    unmodelled = perturbations(
+        problem, linear, noise_model, histories, None if errors is None else errors.perturbations, working_noise
+    )
+    lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     rates = RateExplanations(problem, linear.x, judged, noise_model)
-    of_errors, of_common = error_covariances(linear, noise_model, errors, working_noise)
+    of_errors, of_common = error_covariances(judged, noise_model, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
     prediction = predict(
         problem.predictor,
@@ -314,7 +318,7 @@ def _result(
     random_effects = predicted_random_effects(residuals, noise_model)
     tests = test_fits(problem, residuals, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
-        problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
+        problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance + of_errors))[count:]
     )
     implausible = implausible_nuisances(problem, random_effects, nuisance_estimates)
     failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]

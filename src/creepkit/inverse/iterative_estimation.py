@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.errors_of_tests import TestErrors, errors_of_tests
+from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.perturbations import TestErrors, errors_of_tests
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
 from creepkit.inverse.variance_components import (
@@ -122,16 +122,18 @@ def estimate_iteratively(
 def under_errors_of_tests(result: EstimationResult) -> EstimationResult:
     """An estimate by likelihood with its values under the covariance that holds the errors of tests.
 
-    By Gauss-Newton steps from the optimum without them, with errors and residuals made linear at each.
+    By Gauss-Newton steps from the optimum without them, with errors and residuals made linear at each, and every test
+    about a rate of its own: where readings are far more exact than rates are alike, residuals are not linear in these.
     """
     problem, linear, noise = result.problem, result.linearised, result.working_noise
     if problem.settings.weights != "likelihood" or not problem.settings.included_errors:
         return result
     for step in range(MOST_ERROR_STEPS):
-        errors = errors_of_tests(problem, linear.x, linear, noise)
+        about = at_own_rates(problem, linear, noise)
+        errors = errors_of_tests(problem, linear.x, about, noise)
         assert errors is not None
         result = replace(result, errors=errors) if step == 0 else result
-        solution = linear.solve(CovarianceFactor.of_residuals(errors.within(linear.residuals), noise))
+        solution = about.solve(CovarianceFactor.of_residuals(errors.within(about.residuals), noise))
         x = linear.x.copy()
         x[linear.free] += solution.step
         x = problem.bounds.clip(x)
@@ -143,6 +145,32 @@ def under_errors_of_tests(result: EstimationResult) -> EstimationResult:
             break
         linear = replace(linearised(problem, x, residuals), free=linear.free)
     return replace(result, x=linear.x)
+
+
+NOTEWORTHY_FACTOR = 0.03
+"""Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
+
+
+def at_own_rates(problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel) -> LinearisedProblem:
+    """The linear problem with every test about a rate of its own, by which a law is judged."""
+    log_factors = predicted_random_effects(linear.residuals, noise_model)[1]
+    return linear if np.abs(log_factors).max() < NOTEWORTHY_FACTOR else at_rates(problem, linear, log_factors)
+
+
+def at_rates(problem: LeastSquaresProblem, linear: LinearisedProblem, log_factors: Floats) -> LinearisedProblem:
+    """The linear problem about rates of tests with factors; log_factors : (tests,) their ln.
+
+    As `linear`, which is about the law's rates, where some rate has no coefficient or nothing is predicted there.
+    """
+    if not problem.coordinates.every_rate_has_coefficient:
+        return linear
+    there = problem.residuals_at_rates(linear.x, log_factors)
+    values = there.values - log_factors[:, None] * there.log_rate_sensitivity
+    finite = np.isfinite(values).all() and there.jacobian is not None and np.isfinite(there.jacobian).all()
+    residuals = replace(
+        there, values=values, present=linear.residuals.present, test_weights=linear.residuals.test_weights
+    )
+    return replace(linear, residuals=residuals) if finite else linear
 
 
 def _covariance_factor(

@@ -61,7 +61,11 @@ class Residuals:
         return replace(self, test_weights=test_weights)
 
     def with_effects(self, own: Floats, common: Floats | None = None) -> Residuals:
-        """The same with further random effects, (tests, observations, effects), own of each test or common to all."""
+        """The same with further random effects.
+
+        own, common : (tests, observations, effects) -, one standard deviation of those of each test, and of those that
+        all tests have alike.
+        """
 
         def joined(present: Floats | None, more: Floats | None) -> Floats | None:
             added = [one for one in (present, more) if one is not None and one.shape[-1]]

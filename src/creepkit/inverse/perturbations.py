@@ -2,17 +2,9 @@
 
 A dimple may be thicker than its drawing, a camera may have moved, a furnace may drift; a thermocouple, a load cell or a
 micrometer may be off in every test. Where no nuisance parameter stands for it, it is a perturbation.
-Those that the settings name (settings.usual_errors) are in the covariance under which values are found by likelihood:
-with s their effects on the residuals, one standard deviation of the usual size each,
-
-    C = C0 + sum of s s',
-
-one s for each test of what its tests have independently, one s over all tests of what an instrument has in all of them,
-which no number of tests averages out. So tests count by how exactly they are known, and the covariance of the values,
-(J'C^-1 J + P)^-1, includes the errors; a further test never widens it. The noise model, and what a law is judged by, is
-C0. Values that are not found by likelihood stay as they are, and their covariance is that under C. What an error would
-do to values that do not know of it is, to first order, -(J'C0^-1 J + P)^-1 J'C0^-1 s: C0 then as it would be found,
-with the scatter of rates, the offsets or the misfit that the error makes.
+What an error does to values that do not know of it is, to first order, du = -(J'C^-1 J + P)^-1 J'C^-1 s, with s its
+effect on the residuals and C the covariance as it would be found: with the scatter of rates, the offsets or the misfit
+that the error makes. Those that the settings name are in the covariance instead (see inverse.errors_of_tests).
 
 A temperature or load that is off changes the creep rate of each test by its own factor. Of tests under an imposed
 strain or displacement the stress is E (strain - creep strain): a modulus or a strain that is off moves it from the
@@ -26,7 +18,7 @@ with them (inverse.chi_square_test), and whether the choice of a law rests on th
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -35,14 +27,12 @@ import sympy
 from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for, supports_nuisance
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, Residuals, components_fixed_by_priors
+from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.rate_perturbations import RatePerturbations
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.settings import USUAL_ERRORS
-from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
 from creepkit.language import CreepLaw, strain, temperature, time
@@ -66,10 +56,6 @@ USUAL_DRIFT = 5.0
 """K over a test: what furnaces drift where nobody looks."""
 
 
-SCATTER_NODES = 60
-"""Standard deviations over which the scatter by errors of single tests is averaged."""
-
-
 LOADS, IMPOSED = ("stress", "pressure", "force"), ("strain", "displacement")
 """Quantities of a loading that an instrument sets, and those under which the stress follows from the stiffness."""
 
@@ -86,58 +72,17 @@ LOWEST_USUAL_TEMPERATURE = 1000.0
 """K, below which the rate of a law that knows no temperature is taken to change by as much per K as there."""
 
 
-@dataclass(frozen=True, eq=False)
-class TestErrors:
-    """The errors that an identification includes.
-
-    perturbations : of lengths and instruments, of which those count that are included. scatter : (tests,) standard
-    deviation of ln rate, by temperatures and loads that are off in each test by itself, beyond what was estimated.
-    """
-
-    __test__ = False  # not a test case, whatever its name says to pytest
-
-    perturbations: tuple[Perturbation, ...]
-    scatter: Floats
-
-    def common(self) -> Floats:
-        """(tests, observations, errors) effects on the residuals of what all tests have alike."""
-        return self._stacked([e.residual_change for e in self.perturbations if e.included and e.common])
-
-    def own(self, residuals: Residuals) -> Floats:
-        """(tests, observations, errors) of what each test has by itself."""
-        of_rates = [self.scatter[:, None] * residuals.log_rate_sensitivity] if self.scatter.any() else []
-        own = [e.residual_change for e in self.perturbations if e.included and not e.common]
-        return self._stacked([*own, *of_rates])
-
-    def within(self, residuals: Residuals) -> Residuals:
-        """The residuals with the errors in their covariance."""
-        return residuals.with_effects(self.own(residuals), self.common())
-
-    def _stacked(self, effects: Sequence[Floats]) -> Floats:
-        return np.stack(effects, axis=-1) if effects else np.zeros((self.scatter.size, 0, 0))
-
-
-def errors_of_tests(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
-) -> TestErrors | None:
-    """The errors that the settings include, at x (unknowns,); None where they include none."""
-    if not problem.settings.included_errors:
-        return None
-    found = _of_lengths_and_instruments(problem, x, linear)
-    return TestErrors(found, _usual_scatter(problem, x, linear, noise_model))
-
-
 def perturbations(
     problem: LeastSquaresProblem,
     linear: LinearisedProblem,
     noise_model: NoiseModel,
     full_histories: Sequence[History],
-    errors: TestErrors | None = None,
+    known: Sequence[Perturbation] | None = None,
     working_noise: NoiseModel | None = None,
 ) -> tuple[Perturbation, ...]:
     """Those that no nuisance parameter of the problem stands for, with what they do to the rate, about the optimum.
 
-    errors : those of lengths and instruments, where they have been simulated already.
+    known : those of lengths and instruments, where they have been simulated already.
     working_noise : under which values were found that are not by likelihood.
     """
     x = linear.x
@@ -145,7 +90,7 @@ def perturbations(
     reference = problem.coordinates.reference
     slope = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature)
     found, without_energy = [], not problem.law.uses(temperature)
-    for one in _all(problem, x, linear, full_histories, errors):
+    for one in _all(problem, x, linear, full_histories, known):
         change, noise = one.residual_change, working_noise or noise_model
         if not one.common and working_noise is None:
             noise = _with_scatter_of(change, problem, linear, noise_model)
@@ -164,42 +109,6 @@ def perturbations(
             one = replace(one, per_kelvin=slope, assumed=without_energy)
         found.append(replace(one, residual_change=np.zeros((0, 0))) if one.common else one)
     return tuple(found)
-
-
-def _usual_scatter(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
-) -> Floats:
-    """(tests,) standard deviation of ln rate by temperatures and loads that are off in each test by itself.
-
-    x : (unknowns,) the optimum. The standard deviation that the usual errors make is that of a prior of the scatter,
-    half of a normal distribution: what is added is its mean square, given the estimate, beyond that; all of it where no
-    test is redundant: where no combination of rates of tests is left that the law does not move. Nothing is added where
-    the settings state the scatter, and in one test, whose error is the common one.
-    """
-    included, settings, tests = problem.settings.included_errors, problem.settings, len(problem.histories)
-    if tests == 1 or ("", "rate") in components_fixed_by_priors(settings.nuisances, list(noise_model.outputs)):
-        return np.zeros(tests)
-    own = any(n.kind == "temperature" for n in settings.nuisances)
-    kelvin, load = 0.0 if own else included.get("temperature", 0.0), included.get("load", 0.0)
-    redundant = RatePerturbations(linear, noise_model, scatter_known=True).contrasts if noise_model.rate > 0 else 0
-    added = []
-    for test in range(tests):
-        per_kelvin = log_rate_per_kelvin(problem, x, *_conditions(problem, test))
-        loaded = problem.histories[test].loading.quantity in LOADS
-        exponent = _stress_exponent(problem, x, test) if loaded else 0.0
-        usual = (per_kelvin * kelvin) ** 2 + (exponent * load) ** 2
-        added.append(_mean_square(usual, noise_model.rate, redundant))
-    return np.asarray(np.sqrt(added))
-
-
-def _mean_square(usual: float, estimate: float, redundant: int) -> float:
-    """Mean square of ln rate by scatter of which `usual` is the prior variance, beyond the square of its estimate."""
-    if not usual > 0:
-        return 0.0
-    s = np.geomspace(1e-3, 5.0, SCATTER_NODES) * np.sqrt(usual)
-    log_weight = (1 - redundant) * np.log(s) - 0.5 * redundant * (estimate / s) ** 2 - 0.5 * s**2 / usual
-    weight = np.exp(log_weight - log_weight.max())
-    return max(float(weight @ s**2 / weight.sum()) - estimate**2, 0.0)
 
 
 def with_random_effects(linear: LinearisedProblem, effects: Sequence[Perturbation]) -> LinearisedProblem:
@@ -248,11 +157,11 @@ def _all(
     x: Floats,
     linear: LinearisedProblem,
     full_histories: Sequence[History],
-    errors: TestErrors | None,
+    known: Sequence[Perturbation] | None,
 ) -> Iterator[Perturbation]:
     """Errors that the tests have independently of one another: lengths, offsets, drifts; then those common to all."""
     kinds = {n.kind for n in problem.settings.nuisances}
-    known = _of_lengths_and_instruments(problem, x, linear) if errors is None else errors.perturbations
+    known = of_lengths_and_instruments(problem, x, linear) if known is None else known
     yield from (one for one in known if not one.common)
     if "offset" not in kinds:
         yield from _offsets(problem, linear)
@@ -263,7 +172,7 @@ def _all(
     yield from (one for one in known if one.common)
 
 
-def _of_lengths_and_instruments(
+def of_lengths_and_instruments(
     problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem
 ) -> tuple[Perturbation, ...]:
     """Lengths that are off in each test by itself, errors common to all tests, and lengths that are off in all alike.
@@ -303,10 +212,10 @@ def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedPro
         return np.asarray(linear.residuals.offset_sensitivity * slope * size)
 
     if "temperature" not in shared:
-        slopes = [log_rate_per_kelvin(problem, x, *_conditions(problem, test)) for test in tests]
+        slopes = [log_rate_per_kelvin(problem, x, *test_conditions(problem, test)) for test in tests]
         add("temperature", sizes["temperature"], "K", of_rates(slopes, sizes["temperature"]))
     if any(loaded):
-        exponents = [_stress_exponent(problem, x, test) if known else 0.0 for test, known in enumerate(loaded)]
+        exponents = [stress_exponent(problem, x, test) if known else 0.0 for test, known in enumerate(loaded)]
         add("load", 100 * sizes["load"], "%", of_rates(exponents, sizes["load"]))
     if any(moved):
         imposed = [h for h, counts in zip(histories, moved, strict=True) if counts]
@@ -450,11 +359,12 @@ def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, stress: float, 
     return 0.5 * (up - down)
 
 
-def _stress_exponent(problem: LeastSquaresProblem, x: Floats, test: int) -> float:
-    return float(local_exponent(problem.coordinates, *_conditions(problem, test))(x[: problem.parameter_count]))
+def stress_exponent(problem: LeastSquaresProblem, x: Floats, test: int) -> float:
+    """Of the law at the condition of a test by its position; x : (unknowns,)."""
+    return float(local_exponent(problem.coordinates, *test_conditions(problem, test))(x[: problem.parameter_count]))
 
 
-def _conditions(problem: LeastSquaresProblem, test: int) -> tuple[float, float]:
+def test_conditions(problem: LeastSquaresProblem, test: int) -> tuple[float, float]:
     """MPa and K, of a test by its position."""
     history = problem.histories[test]
     stresses = reference_stresses(history, problem.predictor)
@@ -472,35 +382,6 @@ def value_changes(linear: LinearisedProblem, noise_model: NoiseModel, change: Fl
     moved = np.zeros((len(change), linear.free.size))
     moved[:, linear.free] = -np.einsum("tep,te->tp", solution.weighted_jacobian, change) @ solution.covariance
     return moved
-
-
-def error_covariances(
-    linear: LinearisedProblem, noise_model: NoiseModel, errors: TestErrors | None, working_noise: NoiseModel | None
-) -> tuple[Floats, Floats]:
-    """(unknowns, unknowns) what errors of tests add to the covariance of x: all of them, and those common to all tests.
-
-    working_noise : under which values were found that are not by likelihood.
-    """
-    size = linear.precision.size
-    if errors is None:
-        return np.zeros((size, size)), np.zeros((size, size))
-    own, common = errors.own(linear.residuals), errors.common()
-    without, with_common, with_all = (
-        covariance_of_values(replace(linear, residuals=residuals), noise_model, working_noise)
-        for residuals in (
-            linear.residuals,
-            linear.residuals.with_effects(own[..., :0], common),
-            linear.residuals.with_effects(own, common),
-        )
-    )
-    return _excess(with_all, without), _excess(with_common, without)
-
-
-def _excess(covariance: Floats, least: Floats) -> Floats:
-    """(unknowns, unknowns) what a covariance is more than another, without eigenvalues below zero by rounding."""
-    scale = np.sqrt(np.diag(covariance))
-    values, vectors = np.linalg.eigh((covariance - least) / np.outer(scale, scale))
-    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale))
 
 
 def _log_rate_gradient(problem: LeastSquaresProblem, x: Floats) -> Floats:

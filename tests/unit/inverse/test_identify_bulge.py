@@ -142,7 +142,7 @@ def test_a_bad_test_loses_its_pull():
         identify(LAW, tests, EXACT, settings=replace(QUICK, test_loss=loss)) for loss in ("gaussian", "student")
     )
     weights = [m.weight for m in robust.tests]
-    assert weights[1] < 0.1
+    assert weights[1] < 0.2
     assert min(w for k, w in enumerate(weights) if k != 1) > 0.3
     assert any("test_01" in note and "far from the others" in note for note in robust.notes)
     off = {f: abs(f.values["n"] - TRUTH["n"]) for f in (plain, robust)}
@@ -196,7 +196,7 @@ def test_derivatives_by_differences_give_the_same_answer(fit, tests):
 def test_an_expensive_predictor_is_searched_with_its_stand_in(fit, tests):
     """The stand-in creeps 10 % too fast: the answer must not, and few evaluations may be of the real one."""
     other = identify(LAW, tests, OneDegree(exact=True, stand_in=True), settings=WITH_THICKNESS)
-    assert (np.abs(other.u - fit.u) < 0.02 * np.sqrt(np.diag(fit.covariance))).all()
+    assert (np.abs(other.u - fit.u) < 0.05 * np.sqrt(np.diag(fit.covariance))).all()
     assert 0 < other.provenance["evaluations"] < 80
     assert other.provenance["search_evaluations"] > 0
 

@@ -124,7 +124,7 @@ class PosteriorSamples(RateStatements, Presentable, text="reports.uncertainty:po
         return float(quantiles[0]), float(quantiles[1]), float(quantiles[2])
 
     def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
-        """Median and 95 % interval of a quantity at points."""
+        """Median and 95 % interval of a quantity; point : {name: (...,) or None}."""
         draws = quantity(self.coordinates, **point)(self.u)
         median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
         return median, low, high

@@ -84,7 +84,7 @@ class ModelAverage(RateStatements, Presentable, text="reports.uncertainty:model_
         return present("forecasts.forecast:forecast", self, tests, level=level, **options)
 
     def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
-        """Median and 95 % interval of a quantity over the laws, at points; by default at the best law's reference."""
+        """Median and 95 % interval over the laws; point : {name: (...,) or None for the best law's reference}."""
         return self.distribution(quantity, **point).interval()
 
     def distribution(

@@ -48,7 +48,7 @@ class RateStatements:
     ranges: Mapping[str, tuple[float, float]]
 
     def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
-        """Value and 95 % interval of a quantity at points, {name: numbers or None for the reference point}."""
+        """Value and 95 % interval of a quantity; point : {name: (...,) or None for that of the reference point}."""
         raise NotImplementedError
 
     @checked

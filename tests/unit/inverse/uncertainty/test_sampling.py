@@ -51,7 +51,7 @@ def test_intervals_of_rate_and_exponent(samples, tests):
     best, covariance = least_squares(tests, SD)
     way = np.array([1.0, np.log(100.0)])
     middle, half = float(way @ best), 1.96 * float(np.sqrt(way @ covariance @ way))
-    rate, low, high = samples.rate([50.0, 100.0])
+    rate, low, high = samples.rate([50.0, 100.0], warn=False)
     assert np.log(low[1]) == pytest.approx(middle - half, abs=0.15 * half)
     assert np.log(high[1]) == pytest.approx(middle + half, abs=0.15 * half)
     assert samples.interval(rate_at(100.0)) == pytest.approx((rate[1], low[1], high[1]))
