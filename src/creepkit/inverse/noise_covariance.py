@@ -55,7 +55,9 @@ class CovarianceFactor:
     @classmethod
     def of_residuals(cls, residuals: Residuals, noise_model: NoiseModel) -> CovarianceFactor:
         """The covariance of residuals under a noise model."""
-        return cls(residuals.series, noise_model.components, common=residuals.common_effects)
+        common = residuals.common_effects
+        weighted = None if common is None else common / np.sqrt(residuals.test_weights)[:, None, None]
+        return cls(residuals.series, noise_model.components, common=weighted)
 
     def with_counts(self, counts: Floats) -> CovarianceFactor:
         """The same with squares of whitened values counted (tests, observations) times."""
