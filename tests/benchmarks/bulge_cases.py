@@ -22,10 +22,10 @@ from creepkit.arrays import Floats
 from creepkit.fem.simulation import Simulation, simulate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Loading, PressureJump, Program, RecordedLoading
-from creepkit.specimens.bulge.finite_elements import solver_settings
+from creepkit.specimens.bulge.finite_elements import BulgeTest
 from creepkit.specimens.bulge.geometry import DimpleGeometry
-from creepkit.specimens.bulge.setup import BulgeSetup, set_up_test
 from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.specimens.finite_element_tests import solver_settings
 
 BENCHMARKS = Path(__file__).resolve().parents[2].parent / "shared/data/benchmarks"
 HOUR = 3600.0
@@ -65,10 +65,10 @@ class Case:
             elastic=ck.Elastic(self.E),
         )
 
-    def simulation(self, end: float, **changes: float) -> tuple[Simulation, BulgeSetup]:
+    def simulation(self, end: float, **changes: float) -> tuple[Simulation, BulgeTest]:
         """A run until `end`, s, by the specimen with some settings changed."""
         specimen = self.specimen.replace(**changes)
-        setup = set_up_test(specimen, self.history(np.array([end])), {})
+        setup = BulgeTest.of(specimen, self.history(np.array([end])), {})
         kernel = kernels.lower(self.model, "compiled")
         theta = self.model.to_internal(self.model.values(self.values))[0]
         return simulate(kernel, theta, setup.model, setup.load_history, settings=solver_settings(specimen)), setup

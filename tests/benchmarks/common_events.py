@@ -20,7 +20,7 @@ from planted_bulge_tests import SIGMA, drawn_sum, drawn_values
 import creepkit as ck
 from creepkit.errors import CreepkitError
 from creepkit.quality import check_data_quality
-from creepkit.quality.rig_flags import temperature_step
+from creepkit.quality.rig import temperature_step
 from creepkit.records import History, Program
 
 SEED = 14

@@ -23,7 +23,7 @@ import creepkit as ck
 from creepkit.inverse.cross_validation import times_to_rupture
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures
 from creepkit.inverse.selection import rank
-from creepkit.quality.comparison import duplicate_tests
+from creepkit.quality.copies import duplicate_tests
 
 HEADS = (
     "law",

@@ -71,10 +71,10 @@ def simulated(planned: PlannedDimple, schedule: Schedule) -> Dimple:
         planned.law, ck.specimen("bulge").replace(refinement=2.0, apex_thickness=planned.thickness), planned.values,
         loading=loading, times=loaded, temperature=planned.temperature, elastic=ck.Elastic(E=planned.modulus),
     )  # fmt: skip
-    top = run.setup.model.top
+    top = run.test.model.top
     rise, widening = (run._at(np.asarray(run.simulation.displacements[:, top, k]), loaded) for k in (1, 0))
     still = np.zeros((schedule.frames - loaded.size, rise.shape[1]))
-    return Dimple(schedule.times, run.setup.radii, np.vstack([still, rise]), np.vstack([still, widening]))
+    return Dimple(schedule.times, run.test.radii, np.vstack([still, rise]), np.vstack([still, widening]))
 
 
 def grid(count: int, columns: int) -> list[tuple[float, float]]:

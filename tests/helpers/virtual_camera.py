@@ -42,12 +42,12 @@ def simulated_dimple(
         loading=ck.PressureJump(pressure, pressure, 1e9),
         temperature=temperature, elastic=ck.Elastic(E=1e5, nu=0.3),
     )  # fmt: skip
-    top = run.setup.model.top
+    top = run.test.model.top
     rise = run._at(np.asarray(run.simulation.displacements[:, top, 1]), loaded)
     widening = run._at(np.asarray(run.simulation.displacements[:, top, 0]), loaded)
     zeros = np.zeros((rest, rise.shape[1]))
     times = interval * np.arange(frames)
-    return Dimple(times, run.setup.radii, np.vstack([zeros, rise]), np.vstack([zeros, widening]))
+    return Dimple(times, run.test.radii, np.vstack([zeros, rise]), np.vstack([zeros, widening]))
 
 
 @dataclass(frozen=True)

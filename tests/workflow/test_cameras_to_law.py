@@ -31,11 +31,11 @@ def laboratory(tmp_path_factory):
         "norton", ck.specimen("bulge").replace(refinement=1.25), LAW, loading=loading, times=seen,
         temperature=TEMPERATURE + 273.15, elastic=ck.Elastic(E=1.5e5, nu=0.3),
     )  # fmt: skip
-    top = run.setup.model.top
+    top = run.test.model.top
     rise, widening = (run._at(np.asarray(run.simulation.displacements[:, top, k]), seen) for k in (1, 0))
     still = np.zeros((REST, rise.shape[1]))
     times = INTERVAL * np.arange(REST + LOADED)
-    dimple = Dimple(times, run.setup.radii, np.vstack([still, rise]), np.vstack([still, widening]))
+    dimple = Dimple(times, run.test.radii, np.vstack([still, rise]), np.vstack([still, widening]))
     write_frames(folder / "frames", VirtualCamera(seed=21, points=1700).frames(dimple))
     stamps = "".join(f"{k},{1e3 * (START + t):.0f}\n" for k, t in enumerate(times))
     (folder / "times.csv").write_text("index,time\n" + stamps)

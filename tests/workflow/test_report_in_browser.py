@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from creepkit.reports.html import report_html
-from helpers.browser import SETTLED
 from helpers.browser import browser as chromium
 from helpers.report_pages import contents
 
@@ -69,35 +68,6 @@ def test_the_answer_is_one_screen(browser, tmp_path) -> None:
     assert page.locator(".cautions li").count() <= 3
     assert len(page.locator("body").inner_text().split()) <= 700
     assert page.evaluate("document.documentElement.scrollHeight") <= 4 * 900
-    page.context.close()
-
-
-@pytest.mark.parametrize("width", WIDTHS)
-def test_the_law_answers_to_its_sliders(browser, address, width) -> None:
-    page, _, said = opened(browser, address, viewport={"width": width, "height": 900})
-    assert page.locator("#sliders h2").count() == page.locator("h1").count() == 1
-    page.locator("#sliders summary").first.click()
-    curves = "[...document.querySelectorAll('#sliders path.line')].map(path => path.getAttribute('d')).join()"
-    for _ in range(500):
-        if page.evaluate(SETTLED) and page.evaluate(curves):
-            break
-        page.wait_for_timeout(20)
-    before = page.evaluate(curves)
-    assert before
-    for drawing in page.locator("#sliders .panel svg").all():  # not cut by what surrounds it
-        if not drawing.is_visible():
-            continue
-        inner, outer = drawing.bounding_box(), drawing.locator("xpath=ancestor::figure").bounding_box()
-        assert inner["x"] + inner["width"] <= outer["x"] + outer["width"] + 1
-    page.locator("#sliders input[type=range]").first.focus()
-    for _ in range(20):
-        page.keyboard.press("ArrowRight")
-    for _ in range(500):
-        if page.evaluate(curves) != before:
-            break
-        page.wait_for_timeout(20)
-    assert page.evaluate(curves) != before
-    assert said == []
     page.context.close()
 
 

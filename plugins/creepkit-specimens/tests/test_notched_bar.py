@@ -25,7 +25,7 @@ def simulated(bar: NotchedBar, values: dict[str, float], loading, times, elastic
 def last_rates(bar: NotchedBar, values: dict[str, float], force: float, time: float) -> np.ndarray:
     """Rates (2,) of elongation and contraction in the last accepted step, mm/s."""
     run = simulated(bar, values, ck.constant_load("force", force), [time])
-    quantities = run.test.body.quantities(run.simulation)
+    quantities = run.test.quantities(run.simulation)
     change = np.diff(quantities[-2:], axis=0)[0] / np.diff(run.simulation.times[-2:])[0]
     radial = [number % 2 for number in run.test.body.order].index(0)
     return np.array([2.0 * change[1 - radial], -2.0 * change[radial]])

@@ -25,7 +25,7 @@ def simulated(specimen: ck.Axisymmetric, values: dict[str, float], pressure, tim
 
 def last_rate(run) -> float:
     """Of the observed displacement in the last accepted step, mm/s."""
-    quantities = run.test.body.quantities(run.simulation)
+    quantities = run.test.quantities(run.simulation)
     return float(np.diff(quantities[-2:, 0])[0] / np.diff(run.simulation.times[-2:])[0])
 
 

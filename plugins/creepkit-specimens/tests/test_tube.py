@@ -40,7 +40,7 @@ def simulated(tube: Tube, values: dict[str, float], pressure: float, times, elas
 
 def last_rate(run) -> float:
     """Growth of the outer diameter per second in the last accepted step."""
-    quantities = run.test.body.quantities(run.simulation)
+    quantities = run.test.quantities(run.simulation)
     return 2.0 * float(np.diff(quantities[-2:, 0])[0] / np.diff(run.simulation.times[-2:])[0])
 
 

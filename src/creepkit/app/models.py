@@ -9,7 +9,6 @@ import base64
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Literal
 
@@ -20,11 +19,11 @@ from creepkit.errors import CreepkitError, SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.mesh import SIDES, outline
 from creepkit.records import History, Specimen
-from creepkit.specimens.bulge.finite_elements import solver_settings
+from creepkit.specimens.bulge.finite_elements import BulgeTest, radii_of_top
 from creepkit.specimens.bulge.gaussian_fit import GaussianFit
 from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
-from creepkit.specimens.bulge.setup import model_of_specimen
 from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.specimens.finite_element_tests import solver_settings
 
 PackedType = Literal["float64", "float32", "int32"]
 
@@ -78,14 +77,11 @@ def rom_data(predictor: BulgeReducedOrderModel, lengths: Mapping[str, float] | N
     lengths : {name: mm} of another dimple, such as {"apex_thickness": 0.53}, as a history may state them.
     Trains the model where that has not been done. SolveError where rings are observed, which have no fit.
     """
-    setup = predictor.own_setup()
-    if lengths:
-        geometry = setup.geometry.replace(**lengths)
-        setup = replace(setup, model=model_of_specimen(predictor.specimen, geometry), geometry=geometry)
-    fit = setup.observation.sampling(setup.radii).fit
+    piece = predictor.specimen.replace(**(lengths or {}))
+    fit = piece.observation.sampling(radii_of_top(BulgeTest.model_of(piece))).fit
     if not isinstance(fit, GaussianFit):
         raise SolveError("a page shows amplitude, width and shape of a dimple; observe a profile or a field, not rings")
-    model = predictor.reduced_model_of(setup)
+    model = predictor.reduced_model_of(piece)
     mesh, basis, compiled = model.model, model.basis, model.compiled
     settings = solver_settings(predictor.specimen)
     settings = settings._replace(newton=min(settings.newton, 1e-3 * settings.tolerance))
@@ -93,10 +89,10 @@ def rom_data(predictor: BulgeReducedOrderModel, lengths: Mapping[str, float] | N
         "title": predictor.title,
         "modes": len(basis.modes),
         "limited": compiled.structure.limited,
-        "window": setup.observation.window,
+        "window": piece.observation.window,
         "grid": [fit.grid.log_radius.size, fit.grid.angular.size],
         "settings": settings._asdict(),
-        "lengths": {name: float(getattr(setup.geometry, name)) for name in setup.geometry.lengths},
+        "lengths": {name: float(getattr(piece.geometry, name)) for name in piece.geometry.lengths},
         "arrays": {
             "modes": packed(basis.modes, "float32"),  # to draw the body by
             "places": packed(mesh.nodes, "float64"),

@@ -13,9 +13,8 @@ import numpy as np
 
 from creepkit.errors import CreepkitError
 from creepkit.fem import simulation
-from creepkit.integration import batch_integration
-from creepkit.integration.core_structures import SettingsStructure
-from creepkit.integration.step_control import IntegrationSettings
+from creepkit.integration import core_structures
+from creepkit.integration.core_structures import IntegrationSettings, SettingsStructure
 from creepkit.integration.time_discretisation import SDIRK4, SMALLEST_EXPONENT
 from creepkit.records import Status
 from creepkit.specimens.bulge.reduced_order_model import SEARCH_GROWTH, SEARCH_MODES, SEARCH_TOLERANCE
@@ -62,7 +61,7 @@ def _constants() -> dict[str, Any]:
         "bar": {
             "settings": {name: getattr(settings, name) for name, *_ in SettingsStructure._fields_},
             "tableau": {"sizes": [*SDIRK4.dense.shape, SDIRK4.error_order], "numbers": numbers},
-            "endings": _endings(batch_integration.REASONS, batch_integration.STATUS),
+            "endings": _endings(core_structures.REASONS, core_structures.STATUS),
         },
         "body": {
             "search": {"modes": SEARCH_MODES, "settings": tolerance},

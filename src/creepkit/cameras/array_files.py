@@ -1,63 +1,37 @@
 """Frames in binary files: arrays of MATLAB (versions 5 and 7.3), and packed rows without a head.
 
-Only numeric arrays are read; objects, cells, functions and text in such a file are passed over. The layout of version 5
-is that of MathWorks, MAT-File Format (2024). Names and shapes are read first; of a frame its own columns alone are
-unpacked, and no more than their sizes say.
+Names and shapes are read first; of a frame its own columns alone are unpacked. Real arrays of numbers count; objects,
+cells, functions and text in such a file are passed over.
 """
 
 from __future__ import annotations
 
+import io
 import math
-import struct
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.cameras.text_files import FRAME_FILE
-from creepkit.errors import HistoryError, quoted
-from creepkit.files.limits import how_to_raise, raised
+from creepkit.errors import CreepkitError, HistoryError
 from creepkit.files.reading import read_bytes
 
-LARGEST_FRAME = 20_000_000
-"""Numbers of a frame in all its columns."""
+MATLAB_5, MATLAB_7, HDF5 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", b"\x89HDF\r\n\x1a\n"
 
 
-MOST_ELEMENTS = 10_000
-"""Arrays and other elements in one file."""
-
-
-_HEAD_BYTES = 4096
-"""In which kind, shape and name of an array stand."""
-
-
-MATLAB_5, HDF5 = b"MATLAB 5.0 MAT-file", b"\x89HDF\r\n\x1a\n"
-
-
-MATLAB_7 = b"MATLAB 7.3 MAT-file"
-
-
-_MATRIX, _COMPRESSED = 14, 15
-
-
-_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-"""{data type of an element: NumPy's}."""
-
-
-_NUMERIC_CLASSES = range(6, 16)
+_NO_NUMBERS = ("char", "cell", "struct", "object", "opaque", "function", "sparse", "unknown")
+"""Classes of MATLAB's arrays, as scipy.io.whosmat calls them, that are no real numbers."""
 
 
 @dataclass(frozen=True)
 class ArrayTable:
     """Columns of one frame that are arrays in a file.
 
-    shapes : {name: shape}. load : the arrays of some names, each (points,); only what is asked for is read.
+    shapes : {name: shape}. load : of some names, the arrays (...,) of these shapes; others are not read.
     """
 
     path: Path
@@ -72,18 +46,16 @@ class ArrayTable:
     def numbers(self, positions: Sequence[int]) -> Floats:
         """(points, positions) the numbers of some arrays; HistoryError where they differ in shape."""
         chosen = [self.names[k] for k in positions]
-        shapes = {name: tuple(size for size in self.shapes[name] if size != 1) for name in chosen}
-        if len(set(shapes.values())) > 1:
+        shapes = {tuple(size for size in self.shapes[name] if size != 1) for name in chosen}
+        if len(shapes) > 1:
             listed = ", ".join(f"{name} has {' x '.join(map(str, self.shapes[name]))}" for name in chosen)
             raise HistoryError(f"{self.path}: its arrays differ in their number of points ({listed}); is it damaged?")
-        count = sum(math.prod(self.shapes[name]) for name in chosen)
-        if count > (most := raised(LARGEST_FRAME)):
-            raise HistoryError(
-                f"{self.path}: a frame of {count} numbers, of at most {most}; is it damaged? "
-                f"{how_to_raise(count, most)}"
-            )
         arrays = self.load(chosen)
-        return np.stack([arrays[name] for name in chosen], axis=1)
+        return np.stack([np.asarray(arrays[name], dtype=float).ravel() for name in chosen], axis=1)
+
+    def first_row(self) -> ArrayTable:
+        """The table itself, of which no part is cheaper to read."""
+        return self
 
     def location(self, row: int) -> str:
         """Where a point stands."""
@@ -99,30 +71,32 @@ def matlab_table(path: Path) -> ArrayTable:
     """The numeric arrays of a MATLAB file."""
     if not read_bytes(path, FRAME_FILE, first=len(MATLAB_5)).startswith(MATLAB_5):
         return _hdf5_table(path)
-    content = memoryview(read_bytes(path, FRAME_FILE))
-    stored: dict[str, _Stored] = {}
+    from scipy.io import loadmat, whosmat
+
+    content = read_bytes(path, FRAME_FILE)
     with _damage_reported(path):
-        for array in _stored_arrays(content):
-            if array.name in stored:
-                raise HistoryError(f"{path}: two of its arrays are called '{quoted(array.name)}'; keep one of them")
-            stored[array.name] = array
+        arrays = whosmat(io.BytesIO(content))
+    shapes = {name: shape for name, shape, kind in arrays if kind not in _NO_NUMBERS and math.prod(shape) > 0}
 
-    def load(names: Sequence[str]) -> dict[str, Floats]:
+    def load(names: Sequence[str]) -> Mapping[str, Floats]:
         with _damage_reported(path):
-            return {name: stored[name].numbers() for name in names}
+            found = loadmat(io.BytesIO(content), variable_names=names)
+            if complex_ones := [name for name in names if np.iscomplexobj(found[name])]:
+                raise HistoryError(f"{path}: '{complex_ones[0]}' holds complex numbers; a length is a real one")
+            return {name: found[name] for name in names}
 
-    return ArrayTable(path, {name: array.shape for name, array in stored.items()}, load)
+    return ArrayTable(path, shapes, load)
 
 
 @contextmanager
 def _damage_reported(path: Path) -> Iterator[None]:
     try:
         yield
-    except (struct.error, zlib.error, ValueError, IndexError, OverflowError) as error:
+    except CreepkitError:
+        raise
+    except Exception as error:  # SciPy raises errors of many kinds of a damaged file
         words = " ".join(str(error).split())
         raise HistoryError(f"{path}: cannot be read as arrays of MATLAB, it seems damaged ({words})") from None
-    except MemoryError:
-        raise HistoryError(f"{path}: holds more than there is memory for; is it damaged?") from None
 
 
 def _hdf5_table(path: Path) -> ArrayTable:
@@ -131,116 +105,13 @@ def _hdf5_table(path: Path) -> ArrayTable:
 
     from creepkit.files.hdf5_files import open_hdf5
 
-    def load(names: Sequence[str]) -> dict[str, Floats]:
+    def load(names: Sequence[str]) -> Mapping[str, Floats]:
         with open_hdf5(path, FRAME_FILE) as file:
-            return {name: np.asarray(file[name][()], dtype=float).T.ravel() for name in names}
+            return {name: file[name][()].T for name in names}
 
     with open_hdf5(path, FRAME_FILE) as file:
-        shapes = {
-            name: item.shape[::-1]
-            for name, item in file.items()
-            if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and 0 < item.size <= raised(LARGEST_FRAME)
-        }
-    return ArrayTable(path, shapes, load)
-
-
-class _Element(NamedTuple):
-    kind: int
-    data: memoryview
-
-
-class _Stored(NamedTuple):
-    """An array in a file of version 5. data : its element; unpacked only when its numbers are asked for."""
-
-    name: str
-    shape: tuple[int, ...]
-    data: memoryview
-    is_compressed: bool
-    order: str
-
-    def numbers(self) -> Floats:
-        """(points,)."""
-        count = math.prod(self.shape)
-        data = _unpacked(self.data, self.order, 8 * count + _HEAD_BYTES) if self.is_compressed else self.data
-        values = next(islice(_elements(data, self.order), 3, None), None)
-        if values is None or values.kind not in _TYPES:
-            raise ValueError("an array has no numbers")
-        numbers = np.frombuffer(values.data, dtype=np.dtype(self.order + _TYPES[values.kind]))
-        if numbers.size != count:
-            raise ValueError(f"the array {quoted(self.name)} has {numbers.size} numbers in the place of {count}")
-        return numbers.astype(float).reshape(self.shape, order="F").ravel()
-
-
-def _stored_arrays(content: memoryview) -> Iterator[_Stored]:
-    """The real numeric arrays in a file of version 5, of which no more than their heads is unpacked."""
-    order = {b"IM": "<", b"MI": ">"}.get(bytes(content[126:128]))
-    if order is None:
-        raise ValueError("its mark of the order of bytes is missing")
-    for number, element in enumerate(_elements(content[128:], order)):
-        if number == MOST_ELEMENTS:
-            raise ValueError(f"more than {MOST_ELEMENTS} elements")
-        is_compressed = element.kind == _COMPRESSED
-        if not is_compressed and element.kind != _MATRIX:
-            continue
-        head = _unpacked(element.data, order, _HEAD_BYTES, whole=False) if is_compressed else element.data
-        described = _described(head[:_HEAD_BYTES], order)
-        if described is not None:
-            yield _Stored(*described, element.data, is_compressed, order)
-
-
-def _elements(data: memoryview, order: str) -> Iterator[_Element]:
-    """The elements that lie one behind the other in some bytes."""
-    position = 0
-    while position + 8 <= len(data):
-        kind, size = struct.unpack_from(f"{order}II", data, position)
-        small = kind >> 16
-        if small:
-            if small > 4:
-                raise ValueError("an element is larger than its place")
-            yield _Element(kind & 0xFFFF, data[position + 4 : position + 4 + small])
-            position += 8
-            continue
-        start, end = position + 8, position + 8 + size
-        if end > len(data):
-            raise ValueError("it ends amid an element")
-        yield _Element(kind, data[start:end])
-        position = end if kind == _COMPRESSED else end + -size % 8
-
-
-def _unpacked(data: memoryview, order: str, most: int, whole: bool = True) -> memoryview:
-    """The inside of the one matrix that a compressed element holds, at most so many bytes; nothing of others.
-
-    whole : whether less than its head says is an error.
-    """
-    stream = zlib.decompressobj()
-    head = stream.decompress(data, 8)
-    kind, size = struct.unpack(f"{order}II", head)
-    if kind != _MATRIX:
-        return memoryview(b"")
-    if whole and size > most:
-        raise ValueError("a compressed array is larger than its shape says")
-    inside = stream.decompress(stream.unconsumed_tail, min(size, most)) if size else b""
-    if whole and len(inside) < size:
-        raise ValueError("a compressed array is cut off")
-    return memoryview(inside)
-
-
-def _described(head: memoryview, order: str) -> tuple[str, tuple[int, ...]] | None:
-    """Name and shape of the array whose matrix begins so; None for what is no real array of numbers."""
-    parts = _elements(head, order)
-    try:
-        flags, shape, name = next(parts, None), next(parts, None), next(parts, None)
-    except ValueError:  # they are longer than those of any frame
-        return None
-    if flags is None or shape is None or name is None or flags.kind != 6 or len(flags.data) < 4:
-        return None
-    (word,) = struct.unpack_from(f"{order}I", flags.data)
-    if word & 0xFF not in _NUMERIC_CLASSES or word & 0x0800 or shape.kind != 5:
-        return None
-    sizes = struct.unpack(f"{order}{len(shape.data) // 4}i", shape.data[: len(shape.data) // 4 * 4])
-    if not 0 < len(sizes) <= 32 or min(sizes) < 1 or math.prod(sizes) > raised(LARGEST_FRAME):
-        return None
-    return bytes(name.data).decode("ascii", errors="replace").rstrip("\0"), sizes
+        numeric = {n: one for n, one in file.items() if isinstance(one, h5py.Dataset) and one.dtype.kind in "fiu"}
+        return ArrayTable(path, {name: one.shape[::-1] for name, one in numeric.items() if one.size}, load)
 
 
 def row_table(path: Path, layout: Sequence[tuple[str, str]]) -> ArrayTable:
@@ -259,5 +130,6 @@ def row_table(path: Path, layout: Sequence[tuple[str, str]]) -> ArrayTable:
             raise HistoryError(
                 f"{path}, point {k + 1}: '{name}' is {rows[name][k]}, where 0 or 1 must be; it is of another layout"
             )
-    shapes = {name: rows.shape for name, _ in layout}
-    return ArrayTable(path, shapes, lambda names: {name: rows[name].astype(float) for name in names})
+    return ArrayTable(
+        path, {name: rows.shape for name, _ in layout}, lambda names: {name: rows[name] for name in names}
+    )

@@ -28,7 +28,8 @@ LARGEST_LENGTH = 1e6
 """mm; what is beyond is no coordinate of a test piece."""
 
 
-OPTIONAL = ("confidence", "time")
+CONFIDENCE = "confidence"
+OPTIONAL = (CONFIDENCE, "time")
 
 
 COMPARISONS: dict[str, Callable[[Floats, float], Bools]] = {
@@ -61,34 +62,43 @@ class FrameColumns:
         return self.names[self.positions[place]]
 
 
+Places = Mapping[str, Sequence[tuple[int, ColumnName]]]
+
+
+def _places(version: Mapping[str, Sequence[str]], names: Sequence[str], any_case: bool = True) -> Places:
+    """{quantity: position and spelling of each column of its names}; in other capitals where there is no other."""
+    parsed, found = [ColumnName.of(name) for name in names], {}
+    for quantity, spellings in version.items():
+        for fold in (str, str.casefold) if any_case else (str,):
+            words = [(ColumnName.of(word), fold(ColumnName.of(word).name)) for word in spellings]
+            same = [(k, word) for word, text in words for k, one in enumerate(parsed) if fold(one.name) == text]
+            if same:
+                found[quantity] = same
+                break
+    return found
+
+
+def _lacking(version: Mapping[str, Sequence[str]], places: Places) -> str:
+    """The first quantity without a column of those that a frame needs; "" for none."""
+    return next((one for one in version if one not in OPTIONAL and one not in places), "")
+
+
 def fits(format: CameraFormat, names: Sequence[str], any_case: bool = False) -> bool:
     """Whether a table with columns of these names is one of the format; by the letter unless any_case."""
-    return _version_of(format, [ColumnName.of(name).name for name in names], any_case) is not None
+    return any(not _lacking(version, _places(version, names, any_case)) for version in format.versions)
 
 
 def count_of_columns(format: CameraFormat, names: Sequence[str]) -> int:
     """How many of the format's columns are among these names, by the letter, of its nearest version."""
-    known = {ColumnName.of(name).name for name in names}
-    return max(
-        sum(any(ColumnName.of(word).name in known for word in spellings) for spellings in version.values())
-        for version in format.versions
-    )
+    return max(len(_places(version, names, any_case=False)) for version in format.versions)
 
 
 def looks_planar(format: CameraFormat, names: Sequence[str]) -> bool:
     """Whether these are the columns of a two-dimensional correlation of the system."""
-    known = {ColumnName.of(name).name for name in names}
-
-    def has(spellings: Sequence[str]) -> bool:
-        return any(ColumnName.of(word).name in known for word in spellings)
-
-    if format.planar and all(has((name,)) for name in format.planar):
+    if format.planar and len(_places({name: (name,) for name in format.planar}, names, False)) == len(format.planar):
         return True
-    return any(
-        has(version["u"]) and has(version["v"]) and not (has(version["z"]) or has(version["w"]))
-        for version in format.versions
-        if "w" in version
-    )
+    found = [_places(version, names, any_case=False) for version in format.versions if "w" in version]
+    return any({"u", "v"} <= {*one} and not {"z", "w"} & {*one} for one in found)
 
 
 def columns_of(format: CameraFormat, names: Sequence[str], location: str) -> FrameColumns:
@@ -96,40 +106,38 @@ def columns_of(format: CameraFormat, names: Sequence[str], location: str) -> Fra
 
     A spelling with other capitals is taken where it is the only one.
     """
-    parsed = [ColumnName.of(name) for name in names]
-    version = _version_of(format, [one.name for one in parsed]) or _nearest_version(format, parsed)
-    places: dict[str, int] = {}
-    spelt: dict[str, ColumnName] = {}
-    for quantity, spellings in version.items():
-        found = [(k, word) for word in spellings for k in _matches(parsed, word)]
+    by_letter = [_lacking(version, _places(version, names, False)) == "" for version in format.versions]
+    each = [_places(version, names) for version in format.versions]
+    nearest = max(range(len(each)), key=lambda k: (by_letter[k], len(each[k])))
+    version, places = format.versions[nearest], each[nearest]
+    units = [ColumnName.of(name).unit for name in names]
+    wanted: dict[str, tuple[int, ColumnName]] = {}
+    for quantity, found in places.items():
         if len({k for k, _ in found}) > 1:  # the same in the image and on the surface, as of pyvale
-            found = [(k, word) for k, word in found if parsed[k].unit.casefold() not in PIXELS] or found
-        if len({k for k, _ in found}) > 1:
-            both = " and ".join(f"'{quoted(names[k])}'" for k in sorted({k for k, _ in found})[:2])
+            found = [(k, word) for k, word in found if units[k].casefold() not in PIXELS] or found
+        positions = sorted({k for k, _ in found})
+        if len(positions) > 1:
+            both = " and ".join(f"'{quoted(names[k])}'" for k in positions[:2])
             raise HistoryError(f"{location}: {both} both are the column {quantity} of {format}; keep one of them")
-        if found:
-            places[quantity], spelt[quantity] = found[0][0], ColumnName.of(found[0][1])
-        elif quantity not in OPTIONAL:
-            raise HistoryError(f"{location}: {_missing(format, names, quantity, spellings)}")
-    wanted = {q: k for q, k in places.items() if q not in ("image_x", "image_y")}
-    units = {q: parsed[k].unit or spelt[q].unit for q, k in wanted.items()}
-    factors = {
-        q: _factor(format, q, units[q], quoted(names[k]), location) for q, k in wanted.items() if q != "confidence"
-    }
-    positions = list(wanted.values())
+        wanted[quantity] = found[0]
+    if lacking := _lacking(version, places):
+        raise HistoryError(f"{location}: {_missing(format, names, lacking, version[lacking])}")
+    wanted = {quantity: one for quantity, one in wanted.items() if quantity not in ("image_x", "image_y")}
+    stated = {quantity: units[k] or word.unit for quantity, (k, word) in wanted.items()}
+    read = [k for k, _ in wanted.values()]
     rules = []
     for rule in format.lost_rules:
-        for k in _matches(parsed, rule.column):
-            if k not in positions:
-                positions.append(k)
-            rules.append((positions.index(k), rule.comparison, rule.value))
+        for k, _ in _places({"": (rule.column,)}, names).get("", ()):
+            read += [k] if k not in read else []
+            rules.append((read.index(k), rule.comparison, rule.value))
+    lengths = {quantity: k for quantity, (k, _) in wanted.items() if quantity != CONFIDENCE}
     return FrameColumns(
         tuple(names),
-        tuple(positions),
-        {q: positions.index(k) for q, k in wanted.items()},
-        factors,
+        tuple(read),
+        {quantity: read.index(k) for quantity, (k, _) in wanted.items()},
+        {one: _factor(format, one, stated[one], quoted(names[k]), location) for one, k in lengths.items()},
         tuple(rules),
-        units.get("confidence", "") or (format.confidence_unit if "confidence" in wanted else ""),
+        stated.get(CONFIDENCE, "") or (format.confidence_unit if CONFIDENCE in wanted else ""),
     )
 
 
@@ -155,9 +163,8 @@ def frame_of(
             lengths[:, :3] -= lengths[:, 3:]
     valid &= ~np.isnan(lengths).any(axis=1)
     _check_sizes(columns, values, lengths, valid, locate)
-    confidence = np.full(len(values), np.nan)
-    if "confidence" in columns.quantities:
-        confidence = values[:, columns.quantities["confidence"]]
+    column = columns.quantities.get(CONFIDENCE)
+    confidence = np.full(len(values), np.nan) if column is None else values[:, column]
     return CameraFrame(lengths[:, :3], lengths[:, 3:], valid, confidence, time, source)
 
 
@@ -184,35 +191,6 @@ def _check_sizes(
         f"{locate(row)}: '{quoted(columns.name_of(place))}' is {values[row, place]:g}; a length is a finite number of "
         f"at most {LARGEST_LENGTH:g} mm, or nan for a lost point"
     )
-
-
-def _matches(parsed: Sequence[ColumnName], word: str) -> list[int]:
-    """Positions of the columns of a name; where there is none, those with other capitals."""
-    wanted = ColumnName.of(word)
-    found = [k for k, one in enumerate(parsed) if one.name == wanted.name]
-    return found or [k for k, one in enumerate(parsed) if one.name.casefold() == wanted.name.casefold()]
-
-
-def _version_of(
-    format: CameraFormat, names: Sequence[str], any_case: bool = False
-) -> Mapping[str, tuple[str, ...]] | None:
-    """The first version of the system all of whose columns are there."""
-    fold = str.casefold if any_case else str
-    known = {fold(name) for name in names}
-    for version in format.versions:
-        needed = (spellings for quantity, spellings in version.items() if quantity not in OPTIONAL)
-        if all(any(fold(ColumnName.of(word).name) in known for word in spellings) for spellings in needed):
-            return version
-    return None
-
-
-def _nearest_version(format: CameraFormat, parsed: Sequence[ColumnName]) -> Mapping[str, tuple[str, ...]]:
-    """The version of which most columns are there."""
-
-    def count(version: Mapping[str, tuple[str, ...]]) -> int:
-        return sum(any(_matches(parsed, word) for word in spellings) for spellings in version.values())
-
-    return max(format.versions, key=count)
 
 
 def _missing(format: CameraFormat, names: Sequence[str], quantity: str, spellings: Sequence[str]) -> str:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
-from functools import cached_property
 from glob import glob
 from pathlib import Path
 from typing import Any
@@ -17,16 +17,7 @@ from creepkit.cameras.array_files import ArrayTable
 from creepkit.cameras.columns import FrameColumns, columns_of, frame_of, time_in
 from creepkit.cameras.recognition import Recognised, recognise
 from creepkit.cameras.sequences import in_order, last_number, missing_numbers, skeleton
-from creepkit.cameras.text_files import (
-    FRAME_FILE,
-    FrameText,
-    TextHead,
-    frame_ranges,
-    head_bytes,
-    is_remark,
-    table_in_file,
-    table_in_range,
-)
+from creepkit.cameras.text_files import FRAME_FILE, HEAD_BYTES, FrameText, frame_ranges, head_bytes, table_in_range
 from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.reading import read_bytes
@@ -42,9 +33,6 @@ FormatLike = CameraFormat | str | Mapping[str, Any] | None
 
 
 FramePath = str | Path | Iterable[str | Path]
-
-
-Table = FrameText | ArrayTable
 
 
 def read_frames(
@@ -67,11 +55,11 @@ def _frames(
     candidates = _candidates(format, formats)
     files = _files(path, candidates, chosen=format is not None)
     first = recognise(files[0], candidates, chosen=format is not None)
-    tables = _tables(files, first)
-    columns = columns_of(first.format, tables.names, tables.place)
+    tables = _Tables.of(files, first)
+    columns = columns_of(first.format, first.head.names, tables.place)
     name = str(path) if isinstance(path, (str, Path)) else str(files[0].parent)
     listed = read_frame_times(times) if isinstance(times, (str, Path)) else times
-    stated = _checked_times(name if listed is times else str(times), len(tables.files), listed)
+    stated = _checked_times(name if listed is times else str(times), len(tables), listed)
     moments = _times_of_files(first.format, tables, columns) if stated is None else stated
 
     def frame(index: int) -> CameraFrame:
@@ -100,10 +88,6 @@ def _candidates(format: FormatLike, formats: Sequence[CameraFormat]) -> tuple[Ca
     if isinstance(format, Mapping):
         return (CameraFormat("columns", "columns named by the user", format),)
     known = {one.name: one for one in formats}
-    if not isinstance(format, str):
-        raise HistoryError(
-            f"format is {quoted(repr(format), 60)}; give a name, {{quantity: column}} or ck.CameraFormat(...)"
-        )
     if format not in known:
         raise HistoryError(f"no camera format is called '{format}'; {nearest(str(format), known)}")
     return (known[format],)
@@ -115,7 +99,12 @@ def _candidates(format: FormatLike, formats: Sequence[CameraFormat]) -> tuple[Ca
 def _files(path: FramePath, formats: Sequence[CameraFormat], chosen: bool) -> list[Path]:
     """The files of a sequence in order; one file may hold all of it."""
     if not isinstance(path, (str, Path)):
-        return _listed_files(path)
+        listed = [Path(one).expanduser() for one in path]
+        if not listed:
+            raise HistoryError("no files are given to read frames from; name a folder, a file or a list of files")
+        if twice := [one for k, one in enumerate(listed) if one.absolute() in {p.absolute() for p in listed[:k]}]:
+            raise HistoryError(f"{twice[0]}: stands twice in the list of frames; name each file once")
+        return listed
     place = Path(path).expanduser()
     if place.is_dir():
         return in_order(_frames_in_folder(place, formats, chosen))
@@ -125,24 +114,6 @@ def _files(path: FramePath, formats: Sequence[CameraFormat], chosen: bool) -> li
     if not matches:
         raise HistoryError(f"{path}: no file matches this pattern; name a folder of frames or a file")
     return in_order(matches)
-
-
-def _listed_files(paths: object) -> list[Path]:
-    """The files of a list, in its order; HistoryError for what is none, and for a file that stands in it twice."""
-    given = list(paths) if isinstance(paths, Iterable) else None
-    if given is None or not all(isinstance(one, (str, Path)) for one in given):
-        raise HistoryError(
-            f"read_frames() takes a folder, a file, a pattern or a list of files, found {quoted(repr(paths), 60)}"
-        )
-    if not given:
-        raise HistoryError("no files are given to read frames from; name a folder, a file or a list of files")
-    listed = [Path(one).expanduser() for one in given]
-    seen: set[Path] = set()
-    for one in listed:
-        if one.absolute() in seen:
-            raise HistoryError(f"{one}: stands twice in the list of frames; name each file once")
-        seen.add(one.absolute())
-    return listed
 
 
 def _frames_in_folder(folder: Path, formats: Sequence[CameraFormat], chosen: bool) -> list[Path]:
@@ -191,90 +162,47 @@ def _has_a_frame(
 
 
 @dataclass(frozen=True)
-class _FileSequence:
-    """One frame a file."""
+class _Tables:
+    """The tables of a sequence: one frame a file, or several images in one file of text.
+
+    ranges : bytes of the images in the one file; () where each frame has a file of its own.
+    """
 
     files: Sequence[Path]
     first: Recognised
+    ranges: Sequence[tuple[int, int]] = ()
 
-    @cached_property
+    @classmethod
+    def of(cls, files: Sequence[Path], first: Recognised) -> _Tables:
+        if len(files) > 1 or not first.is_text:
+            return cls(files, first)
+        mark = read_bytes(files[0], FRAME_FILE, first=3)
+        if mark[:2] in (b"\xff\xfe", b"\xfe\xff"):  # in UTF-16: bytes of the file are not those of the text
+            return cls(files, first)
+        return cls(files, first, frame_ranges(files[0], first.head, 3 if mark == b"\xef\xbb\xbf" else 0))
+
+    def __len__(self) -> int:
+        return len(self.ranges or self.files)
+
+    @property
     def place(self) -> str:
         """Where the names of columns stand."""
-        head = self.first.head
-        return str(self.first.path) if head is None else head.location(self.first.path)
+        return self.first.head.location(self.first.path)
 
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        return self.table(0).names if self.first.head is None else self.first.head.names
-
-    def table(self, index: int) -> Table:
-        path = self.files[index]
-        if self.first.head is None:
-            return self.first.array_table(path)
-        return table_in_file(path, lambda content: self.first.find_head(content, path))
-
-    def beginning(self, index: int) -> Table:
-        """The table, of text only its first rows."""
-        path = self.files[index]
-        if self.first.head is None:
-            return self.table(index)
-        content = head_bytes(path)
-        head = self.first.find_head(content, path)
-        return FrameText(path, _first_row(content[head.end :]), head.delimiter, head.names, lambda: head.number + 1)
+    def table(self, index: int, *, beginning: bool = False) -> FrameText | ArrayTable:
+        """The table of a frame, or its first row."""
+        if self.ranges:
+            start, end = self.ranges[index]
+            last = index == len(self.ranges) - 1 or beginning
+            end = min(end, start + HEAD_BYTES) if beginning else end
+            found: FrameText | ArrayTable = table_in_range(self.files[0], self.first.head, start, end, last)
+        else:
+            found = self.first.table(self.files[index], beginning=beginning)
+        return found.first_row() if beginning else found
 
     def source(self, index: int) -> str:
-        return str(self.files[index])
-
-
-@dataclass(frozen=True)
-class _ImagesInFile:
-    """Several images in one file of text, each below a line of columns."""
-
-    path: Path
-    head: TextHead
-    ranges: Sequence[tuple[int, int]]
-
-    @property
-    def files(self) -> Sequence[tuple[int, int]]:
-        return self.ranges
-
-    @property
-    def place(self) -> str:
-        return self.head.location(self.path)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.head.names
-
-    def table(self, index: int) -> Table:
-        start, end = self.ranges[index]
-        return table_in_range(self.path, self.head, start, end, index == len(self.ranges) - 1)
-
-    def beginning(self, index: int) -> Table:
-        start, end = self.ranges[index]
-        table = table_in_range(self.path, self.head, start, min(end, start + 65536), is_last=True)
-        return FrameText(self.path, _first_row(table.rows), table.delimiter, table.names, table.first_line)
-
-    def source(self, index: int) -> str:
-        return str(self.path) if len(self.ranges) == 1 else f"{self.path}, image {index + 1}"
-
-
-_Tables = _FileSequence | _ImagesInFile
-
-
-def _tables(files: Sequence[Path], first: Recognised) -> _Tables:
-    if len(files) > 1 or first.head is None:
-        return _FileSequence(files, first)
-    mark = read_bytes(files[0], FRAME_FILE, first=3)
-    if mark[:2] in (b"\xff\xfe", b"\xfe\xff"):  # in UTF-16: bytes of the file are not those of the text
-        return _FileSequence(files, first)
-    ranges = frame_ranges(files[0], first.head, 3 if mark == b"\xef\xbb\xbf" else 0)
-    return _ImagesInFile(files[0], first.head, ranges)
-
-
-def _first_row(rows: bytes) -> bytes:
-    lines = (line for line in rows.splitlines(keepends=True) if line.strip() and not is_remark(line))
-    return next(lines, b"")
+        """What a frame is called in messages."""
+        return f"{self.files[0]}, image {index + 1}" if len(self.ranges) > 1 else str(self.files[index])
 
 
 # ---- times ---------------------------------------------------------------------------------------------------------
@@ -309,10 +237,10 @@ def _times_of_files(format: CameraFormat, tables: _Tables, columns: FrameColumns
     """(frames,) s, as columns, heads or names of the files say; NaN where any does not."""
     read = _time_source(format, tables, columns)
     if read is None:
-        return np.full(len(tables.files), np.nan)
-    moments = np.array([read(index) for index in range(len(tables.files))])
+        return np.full(len(tables), np.nan)
+    moments = np.array([read(index) for index in range(len(tables))])
     if np.isnan(moments).any():
-        return np.full(len(tables.files), np.nan)
+        return np.full(len(tables), np.nan)
     _check_increasing(tables.place, moments)
     return moments
 
@@ -320,7 +248,7 @@ def _times_of_files(format: CameraFormat, tables: _Tables, columns: FrameColumns
 def _time_source(format: CameraFormat, tables: _Tables, columns: FrameColumns) -> Callable[[int], float] | None:
     if "time" in columns.quantities:
         return lambda index: _time_in_column(format, tables, index)
-    if not format.time or (isinstance(tables, _ImagesInFile) and len(tables.files) > 1):
+    if not format.time or len(tables.ranges) > 1:
         return None
     source, key, unit = format.time
     factor = TIME_UNITS[unit]
@@ -332,7 +260,7 @@ def _time_source(format: CameraFormat, tables: _Tables, columns: FrameColumns) -
 def _time_in_column(format: CameraFormat, tables: _Tables, index: int) -> float:
     """The time in the first row of a frame; NaN of one that cannot be read, which says so when it is asked for."""
     try:
-        table = tables.beginning(index)
+        table = tables.table(index, beginning=True)
         own = columns_of(format, table.names, tables.source(index))
         return time_in(own, table.numbers(own.positions))
     except HistoryError:
@@ -341,16 +269,9 @@ def _time_in_column(format: CameraFormat, tables: _Tables, index: int) -> float:
 
 def _number_above(tables: _Tables, index: int, key: str) -> float:
     """The number of a line `key: value` above the columns; NaN where there is none."""
-    path = Path(tables.source(index))
     try:
-        lines = head_bytes(path).decode("utf-8", errors="replace").splitlines()
-    except HistoryError:
+        text = head_bytes(Path(tables.source(index))).decode("utf-8", errors="replace")
+        found = re.search(rf"^[#*; \t]*{re.escape(key)}[ \t]*:[ \t]*(\S+)", text, re.IGNORECASE | re.MULTILINE)
+        return float("nan") if found is None else float(found[1])
+    except (HistoryError, ValueError):
         return float("nan")
-    for line in lines:
-        found, sign, value = line.strip().lstrip("#*; ").partition(":")
-        if sign and found.strip().casefold() == key.casefold():
-            try:
-                return float(value.split()[0])
-            except (ValueError, IndexError):
-                return float("nan")
-    return float("nan")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import ctypes
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from creepkit import core
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import ERROR_VALUES, Dialect, decode_text, split_line
-from creepkit.files.reading import FileKind, read_bytes, read_range
+from creepkit.files.reading import FileKind, open_binary, read_bytes, read_range
 
 FRAME_FILE = FileKind("a frame of cameras", HistoryError, "name a table of points", maximum_bytes=200_000_000)
 
@@ -56,7 +57,8 @@ SAMPLE_ROWS = 50
 class TextHead:
     """The line of columns of a text file.
 
-    line : as it stands in the file, without its end. number : of that line, from 1. end : first byte behind it.
+    line : as it stands in the file, without its end. number : of that line, from 1; 0 of the names of arrays. end :
+    first byte behind it.
     """
 
     line: bytes
@@ -66,8 +68,14 @@ class TextHead:
     names: tuple[str, ...]
 
     def location(self, path: Path) -> str:
-        """Where it stands, 'file:line'."""
-        return f"{path}:{self.number}"
+        """Where it stands, 'file:line'; the names of arrays have no line."""
+        return f"{path}:{self.number}" if self.number else str(path)
+
+    @property
+    def again(self) -> re.Pattern[bytes]:
+        """A whole line that is the same."""
+        line = re.escape(self.line)  # which comes first, so that a search looks for its bytes
+        return re.compile(line + rb"(?<=[\r\n]" + line + rb")(?=[\r\n]|\Z)")
 
 
 def is_remark(line: bytes) -> bool:
@@ -174,25 +182,19 @@ class FrameText:
             number += 1
         return f"{self.path}:{number}"
 
-    def _decimal(self, positions: Sequence[int]) -> str:
-        """The decimal sign: a comma where the cells of the first rows have one, which only another delimiter allows."""
-        if self.delimiter == "," or b"," not in self.rows:
-            return "," if self.delimiter == "," and self._has_quoted_commas(positions) else "."
-        for line in self.rows[:HEAD_BYTES].splitlines()[:SAMPLE_ROWS]:
-            cells = _names(_decoded(line), self.delimiter)
-            wanted = [cells[k] for k in positions if k < len(cells)]
-            if any("," in cell for cell in wanted):
-                return ","
-            if any("." in cell for cell in wanted):
-                return "."
-        return ","
+    def first_row(self) -> FrameText:
+        """The table of its first row alone."""
+        lines = (line for line in self.rows.splitlines(keepends=True) if line.strip() and not is_remark(line))
+        return replace(self, rows=next(lines, b""))
 
-    def _has_quoted_commas(self, positions: Sequence[int]) -> bool:
-        """Whether numbers stand in quotes, with decimal commas: "1,5","2,5"."""
-        first = self.rows[:HEAD_BYTES].splitlines()[:SAMPLE_ROWS]
-        if b'"' not in self.rows[:HEAD_BYTES]:
-            return False
-        return any("," in c for line in first for c in _cells_at(_names(_decoded(line), ","), positions))
+    def _decimal(self, positions: Sequence[int]) -> str:
+        """The decimal sign: that in the first of the cells that have one, which between commas stand in quotes."""
+        sample = self.rows[:HEAD_BYTES]
+        if b"," not in self.rows or (self.delimiter == "," and b'"' not in sample):
+            return "."
+        rows = [_names(_decoded(line), self.delimiter) for line in sample.splitlines()[:SAMPLE_ROWS]]
+        wanted = (cells[k] for cells in rows for k in positions if k < len(cells))
+        return next((sign for cell in wanted for sign in ",." if sign in cell), "." if self.delimiter == "," else ",")
 
     def _problem(self, kind: int, where: list[int], decimal: str) -> str:
         first, last, column = where
@@ -212,32 +214,19 @@ class FrameText:
         )
 
 
-def _cells_at(cells: Sequence[str], positions: Sequence[int]) -> list[str]:
-    return [cells[k] for k in positions if k < len(cells)]
-
-
-def table_in_file(path: Path, find: Callable[[bytes], TextHead]) -> FrameText:
-    """The table of a file with one frame.
+def table_in_file(path: Path, find: Callable[[bytes], TextHead], *, beginning: bool = False) -> FrameText:
+    """The table of a file with one frame, or its beginning.
 
     find : the line of columns in the beginning of a file; HistoryError where it has none.
     """
-    content = plain_bytes(read_bytes(path, FRAME_FILE), path)
+    content = head_bytes(path) if beginning else plain_bytes(read_bytes(path, FRAME_FILE), path)
     head = find(content[:HEAD_BYTES])
-    again = content.find(head.line, head.end)
-    if again >= 0 and _is_line(content, again, head.line):
+    if again := head.again.search(content, head.end):
         raise HistoryError(
-            f"{path}:{content[:again].count(10) + 1}: the line of columns comes again, as in a file of several images; "
-            "give such a file by its own name, or one image a file"
+            f"{path}:{content[: again.start()].count(10) + 1}: the line of columns comes again, as in a file of "
+            "several images; give such a file by its own name, or one image a file"
         )
     return FrameText(path, content[head.end :], head.delimiter, head.names, lambda: head.number + 1)
-
-
-def _is_line(content: bytes, start: int, line: bytes) -> bool:
-    end = start + len(line)
-    return content[start - 1 : start] in (b"\n", b"\r") and content[end : end + 1] in (b"\n", b"\r", b"")
-
-
-CHUNK_BYTES = 4_000_000
 
 
 def frame_ranges(path: Path, head: TextHead, mark: int) -> list[tuple[int, int]]:
@@ -245,19 +234,10 @@ def frame_ranges(path: Path, head: TextHead, mark: int) -> list[tuple[int, int]]
 
     mark : bytes of a byte order mark before the text.
     """
-    starts, position, overlap = [head.end + mark], head.end + mark, len(head.line) + 2
-    heads: list[int] = []
-    while True:
-        chunk = read_range(path, FRAME_FILE, position, CHUNK_BYTES + overlap)
-        found = chunk.find(head.line, 1)
-        while 0 <= found < CHUNK_BYTES:
-            if _is_line(chunk, found, head.line):
-                heads.append(position + found)
-                starts.append(position + found + len(head.line))
-            found = chunk.find(head.line, found + 1)
-        if len(chunk) < CHUNK_BYTES + overlap:
-            return list(zip(starts, [*heads, position + len(chunk)], strict=True))
-        position += CHUNK_BYTES - 1
+    with open_binary(path, FRAME_FILE, any_size=True) as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as text:
+        heads = [found.span() for found in head.again.finditer(text, head.end + mark)]
+        starts = [head.end + mark, *(end for _, end in heads)]
+        return list(zip(starts, [*(start for start, _ in heads), len(text)], strict=True))
 
 
 def table_in_range(path: Path, head: TextHead, start: int, end: int, is_last: bool) -> FrameText:
@@ -269,11 +249,8 @@ def table_in_range(path: Path, head: TextHead, start: int, end: int, is_last: bo
         rows = _without_titles(rows, head)
 
     def first_line() -> int:
-        places = range(0, start, CHUNK_BYTES)
-        pieces = (read_range(path, FRAME_FILE, k, min(CHUNK_BYTES, start - k)) for k in places)
-        counts = [(piece.count(b"\n"), piece.count(b"\r")) for piece in pieces]
-        feeds, returns = (sum(pair[k] for pair in counts) for k in (0, 1))
-        return 1 + (feeds or returns)
+        before = read_range(path, FRAME_FILE, 0, start)
+        return 1 + (before.count(b"\n") or before.count(b"\r"))
 
     return FrameText(path, rows, head.delimiter, head.names, first_line)
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from creepkit.errors import CreepkitError, HistoryError, printable
 from creepkit.files.writing import write_text
 from creepkit.readers.ends_of_tests import LABEL
+from creepkit.readers.frames import UNUSED
 from creepkit.readers.questions import ANSWERS_FILE, Question, single_errors, toml_value
 from creepkit.readers.tests_file import read_answers, with_answer
-from creepkit.readers.text_tables import UNUSED
 from creepkit.reports.terminal import tell
 
 LEAVE_OPEN = "?"

@@ -54,7 +54,7 @@ def command(
     """
     import creepkit as ck
     from creepkit.readers.questions import single_errors
-    from creepkit.readers.table_summary import summarise_tables
+    from creepkit.readers.reading import summarise_tables
     from creepkit.reports import histories as report
     from creepkit.reports.data_quality import data_quality_to_json
 
@@ -183,7 +183,7 @@ def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
     Where a reader takes a table with clock times for tests, it is none.
     """
     import creepkit as ck
-    from creepkit.instruments.record_tables import find_head, has_clock, numbered_lines
+    from creepkit.instruments.record_tables import find_head
     from creepkit.registry import default_registry
 
     formats = [entry.value for entry in default_registry().instruments().values()]
@@ -193,9 +193,9 @@ def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
         return []
     special = [one for one in formats if one.required]
     try:
-        heads = [find_head(path, next(numbered_lines(path), [])).names for path in files]
-        if not all(any(one.accepts(names) for one in special) for names in heads):
-            if not all(has_clock(path) for path in files):
+        heads = [find_head(path) for path in files]
+        if not all(any(one.accepts(head.names) for one in special) for head in heads):
+            if not all(head.has_clock for head in heads):
                 return []
             try:
                 ck.read_histories(files)

@@ -27,10 +27,6 @@ MOST_LABELS, LARGEST_LABEL = 10_000_000, 10**15
 """Numbers in one range of a set, and the largest number of a node or an element."""
 
 
-MOST_MEMBERS = 5_000_000
-"""Members of all sets and ranges that a deck names in sets, surfaces, supports and loads, together."""
-
-
 NAMED_SUPPORTS = {"ENCASTRE": (True, True), "PINNED": (True, True), "XSYMM": (True, False), "YSYMM": (False, True)}
 """Whether r and z are held by the supports that Abaqus knows by name."""
 
@@ -53,54 +49,29 @@ class KeywordCard:
 
 @dataclass
 class InputDeck:
-    """A draft and the sets and surfaces of its deck, by name in capitals.
-
-    named : what has been done with sets already, with their sizes, for it need not be done again; members : of those.
-    """
+    """A draft and the sets and surfaces of its deck, by name in capitals."""
 
     draft: MeshBuilder
     node_sets: dict[str, dict[int, None]] = field(default_factory=dict)
     element_sets: dict[str, dict[int, None]] = field(default_factory=dict)
     surfaces: dict[str, set[tuple[int, int]]] = field(default_factory=dict)
-    named: set[tuple[object, ...]] = field(default_factory=set)
-    members: int = 0
 
-    def nodes(self, place: str, cell: str, use: tuple[object, ...]) -> Iterable[int]:
-        """The node of a number, or those of a set; none of a set that has been used so before, and has not grown."""
-        return self._labels(place, cell, use, self.node_sets, self.draft.nodes, "node")
+    def nodes(self, place: str, cell: str) -> Iterable[int]:
+        """The node of a number, or those of a set."""
+        return _labels(place, cell, self.node_sets, self.draft.nodes, "node")
 
-    def elements(self, place: str, cell: str, use: tuple[object, ...]) -> Iterable[int]:
-        """The element of a number, or those of a set, as nodes()."""
-        return self._labels(place, cell, use, self.element_sets, self.draft.elements, "element")
+    def elements(self, place: str, cell: str) -> Iterable[int]:
+        """The element of a number, or those of a set."""
+        return _labels(place, cell, self.element_sets, self.draft.elements, "element")
 
-    def _labels(
-        self,
-        place: str,
-        cell: str,
-        use: tuple[object, ...],
-        sets: Mapping[str, dict[int, None]],
-        known: Mapping[int, object],
-        what: str,
-    ) -> Iterable[int]:
-        """One number, or the members of a set."""
-        if cell.isascii() and cell.isdigit():
-            return [_known_label(place, parse_index(place, what, cell), known, what)]
-        labels = _named(place, cell, sets, f"{what} set")
-        key = (what, id(labels), len(labels), *use)
-        if key in self.named:
-            return ()
-        self.named.add(key)
-        self.count(place, len(labels))
-        return tuple(labels)
 
-    def count(self, place: str, members: int) -> None:
-        """SolveError where these, with all before, are more members of sets than the limit."""
-        self.members += members
-        if self.members > MOST_MEMBERS:
-            raise SolveError(
-                f"{place}: the sets and ranges named up to here have more than {MOST_MEMBERS} members together (the "
-                "limit MOST_MEMBERS); name each set only where it is needed"
-            )
+def _labels(
+    place: str, cell: str, sets: Mapping[str, dict[int, None]], known: Mapping[int, object], what: str
+) -> Iterable[int]:
+    """One number, or the members of a set."""
+    if cell.isascii() and cell.isdigit():
+        return [_known_label(place, parse_index(place, what, cell), known, what)]
+    return tuple(_named(place, cell, sets, f"{what} set"))
 
 
 def builder_from_deck(path: Path, pressed: str | None, top: str | None) -> MeshBuilder:
@@ -185,11 +156,10 @@ def _set(deck: InputDeck, card: KeywordCard) -> None:
     for place, cells in card.rows:
         if "GENERATE" in card.options:
             labels = _generated(place, cells)
-            deck.count(place, min(len(labels), len(known)))
             _collect(sets, name, (_known_label(place, label, known, what) for label in labels))
             continue
         for cell in filter(None, cells):
-            _collect(sets, name, members(place, cell, (card.name, name)))
+            _collect(sets, name, members(place, cell))
 
 
 def _generated(place: str, cells: list[str]) -> range:
@@ -209,7 +179,7 @@ def _surface(deck: InputDeck, card: KeywordCard) -> None:
     if card.options.get("TYPE", "ELEMENT") == "ELEMENT":
         for place, cells in card.rows:
             side = _face(place, cells, "S")
-            sides |= {(element, side) for element in deck.elements(place, cells[0], ("SURFACE", name, side))}
+            sides |= {(element, side) for element in deck.elements(place, cells[0])}
 
 
 def _boundary(deck: InputDeck, card: KeywordCard) -> None:
@@ -226,20 +196,17 @@ def _boundary(deck: InputDeck, card: KeywordCard) -> None:
                     f"{place}: a motion of {quoted(motion)} mm is prescribed; only nodes at rest are read, with 0"
                 )
             r, z = 1 in directions, 2 in directions
-        deck.draft.hold(deck.nodes(place, cells[0], ("BOUNDARY", r, z)), r, z)
+        deck.draft.hold(deck.nodes(place, cells[0]), r, z)
 
 
 def _distributed(deck: InputDeck, card: KeywordCard) -> None:
     for place, cells in card.rows:
         label = cells[1].upper() if len(cells) > 1 else ""
         if card.name == "DSLOAD" and label == "P":
-            sides = _named(place, cells[0], deck.surfaces, "surface")
-            if ("DSLOAD", id(sides)) not in deck.named:
-                deck.named.add(("DSLOAD", id(sides)))
-                deck.draft.pressed |= sides
+            deck.draft.pressed |= _named(place, cells[0], deck.surfaces, "surface")
         elif card.name == "DLOAD" and label[:1] == "P":
             side = _face(place, cells, "P")
-            deck.draft.pressed |= {(element, side) for element in deck.elements(place, cells[0], ("DLOAD", side))}
+            deck.draft.pressed |= {(element, side) for element in deck.elements(place, cells[0])}
 
 
 def _include(deck: InputDeck, card: KeywordCard) -> None:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, Ints
-from creepkit.checked_arguments import checked_with_own_words
-from creepkit.errors import HistoryError, quoted
+from creepkit.checked_arguments import checked
+from creepkit.errors import HistoryError
 from creepkit.instruments.response_likelihood import (
     DrivingRecord,
     Response,
@@ -136,7 +136,7 @@ class _Task:
         return replace(self, times=self.times[kept], displacements=self.displacements[kept])
 
 
-@checked_with_own_words("record", "channel", "frame_times", "displacement", "search", "drift", "camera_start")
+@checked
 def align_clocks(
     record: InstrumentRecord,
     channel: str | Sequence[str],
@@ -162,14 +162,16 @@ def align_clocks(
     left aside where others decide. HistoryError where no change of load decides, or where several lags fit about as
     well.
     """
-    pieces = _pieces(channel, displacement)
-    search = _checked_arguments(record, pieces[0][0], search, (drift, camera_start))
-    zero, tasks, problem = 0.0, list[_Task](), HistoryError("")
-    for name, values in pieces:
+    camera, rows = np.asarray(frame_times, dtype=float), np.atleast_2d(np.asarray(displacement, dtype=float))
+    names = [channel] * len(rows) if isinstance(channel, str) else [*channel]
+    if len(names) != len(rows) or not rows.size:
+        raise HistoryError(f"{len(names)} channels and displacements of {len(rows)} test pieces; give one of each")
+    zero = nominal_zero(record, camera, camera_start)
+    still = camera[np.asarray(unloaded, dtype=int)] - zero
+    tasks, problem = list[_Task](), HistoryError("")
+    for name, values in zip(names, rows, strict=True):
         try:
-            times, displacements = _checked_frames(record, frame_times, values)
-            zero = nominal_zero(record, np.asarray(frame_times, dtype=float), camera_start)
-            still = np.asarray(frame_times, dtype=float)[np.asarray(unloaded, dtype=int)] - zero
+            times, displacements = _checked_frames(record, camera, values)
             tasks.append(_task(record, name, times - zero, displacements, still))
         except HistoryError as error:
             problem = error
@@ -190,59 +192,21 @@ def align_clocks(
     return _posterior(tasks, lag, drift, (low, high), ClockAlignment(zero=zero, channel=channels, frames=frames))
 
 
-def _pieces(channel: object, displacement: ArrayLike) -> list[tuple[str, ArrayLike]]:
-    """Channel and displacements (frames,) of each test piece."""
-    if np.ndim(displacement) != 2:
-        return [(channel, displacement)]  # type: ignore[list-item]
-    rows: list[ArrayLike] = list(np.asarray(displacement))
-    names = [channel] * len(rows) if isinstance(channel, str) else list(channel)  # type: ignore[call-overload]
-    if len(names) != len(rows) or not rows:
-        raise HistoryError(f"{len(names)} channels and displacements of {len(rows)} test pieces; give one of each")
-    return list(zip(names, rows, strict=True))
-
-
 def _task(record: InstrumentRecord, channel: str, times: Floats, displacements: Floats, unloaded: Floats) -> _Task:
-    task = _Task(
-        driving_record(record, channel),
-        times,
-        displacements,
-        max(noise_of_readings(displacements), 1e-4 * float(np.ptp(displacements))),
-        float(np.median(np.diff(times))),
-        f"{record.origin}: channel '{channel}'",
-        channel,
-        unloaded,
-    )
-    _check_range(task, record.readings(channel)[1])
-    return task
-
-
-def _checked_arguments(
-    record: object, channel: object, search: object, numbers: tuple[object, object]
-) -> tuple[float, float] | None:
-    """The range of the search; HistoryError where an argument is of another type."""
-    if not isinstance(record, InstrumentRecord) or not isinstance(channel, str):
-        found = f"{type(record).__name__} and {quoted(repr(channel))}"
+    name, values = f"{record.origin}: channel '{channel}'", record.readings(channel)[1]
+    size, reading_noise = float(np.ptp(values)), noise_of_readings(values)
+    if not size > LEAST_RANGE * reading_noise:
         raise HistoryError(
-            f"align_clocks() takes a record and the name of a channel, found {found}; see ck.read_record(path)"
+            f"{name} changes by {size:g}, with noise of {reading_noise:g}: there is no step to align clocks on; give "
+            "the record of a time in which the load changes, or state the lag by ck.ClockAlignment.stated(lag)"
         )
-    drift, start = numbers
-    for name, value in (("drift", drift), ("camera_start", 0.0 if start is None else start)):
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-            raise HistoryError(f"{name} is {quoted(repr(value))}; give a number")
-    if search is None:
-        return None
-    given = tuple(search) if isinstance(search, (tuple, list, np.ndarray)) else ()
-    if len(given) != 2 or not all(isinstance(one, (int, float, np.number)) for one in given):
-        raise HistoryError(f"search is {quoted(repr(search))}; give the least and the largest lag, s")
-    return float(given[0]), float(given[1])
+    driving, interval = driving_record(record, channel), float(np.median(np.diff(times)))
+    noise = max(noise_of_readings(displacements), 1e-4 * float(np.ptp(displacements)))
+    return _Task(driving, times, displacements, noise, interval, name, channel, unloaded)
 
 
-def _checked_frames(record: InstrumentRecord, frame_times: ArrayLike, displacement: ArrayLike) -> tuple[Floats, Floats]:
+def _checked_frames(record: InstrumentRecord, times: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Times and displacements of the frames that hold one, without spikes of single frames."""
-    try:
-        times, values = np.asarray(frame_times, dtype=float), np.asarray(displacement, dtype=float)
-    except (TypeError, ValueError):
-        raise HistoryError("frame_times and displacement must be arrays of numbers, s and mm; give both") from None
     if times.ndim != 1 or times.shape != values.shape:
         raise HistoryError(f"frame_times and displacement have the shapes {times.shape} and {values.shape}; give both")
     seen = np.isfinite(values)
@@ -275,15 +239,6 @@ def nominal_zero(record: InstrumentRecord, times: Floats, camera_start: float | 
     if record.start is not None and (absolute or camera_start is not None):
         return record.start - (camera_start or 0.0)
     return float(times[0]) if absolute else 0.0
-
-
-def _check_range(task: _Task, values: Floats) -> None:
-    size, noise = float(np.ptp(values)), noise_of_readings(values)
-    if not size > LEAST_RANGE * noise:
-        raise HistoryError(
-            f"{task.name} changes by {size:g}, with noise of {noise:g}: there is no step to align clocks on; give the "
-            "record of a time in which the load changes, or state the lag by ck.ClockAlignment.stated(lag)"
-        )
 
 
 def _thinned(task: _Task, lag: float | None) -> _Task:
@@ -465,8 +420,6 @@ def _joint(terms: Floats, lags: Floats, inner: Floats, offsets: Floats, gains: F
 
     Frames are taken in blocks, each at the time of those in it that decide most.
     """
-    if gains.size == 1:
-        return np.asarray(terms[:, np.isin(lags, inner)].sum(axis=0)[None])
     edges = np.unique(np.linspace(0, len(terms), BLOCKS + 1).astype(int))[:-1]
     weights = np.ptp(terms, axis=1) + 1e-12
     centres = np.add.reduceat(weights * offsets, edges) / np.add.reduceat(weights, edges)

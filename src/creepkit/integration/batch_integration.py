@@ -14,47 +14,22 @@ from creepkit.arrays import Floats, Ints, frozen
 from creepkit.core import function
 from creepkit.errors import SolveError
 from creepkit.integration.core_structures import (
+    STATUS,
     UNIAXIAL,
     Axes,
+    AxesStructure,
     BatchStructure,
-    axes_structure,
+    IntegrationSettings,
     check_call,
+    checked_times,
     refusal,
     settings_structure,
     tableau_structure,
     write_addresses,
 )
-from creepkit.integration.event_location import (
-    DIVERGED,
-    REACHED_END,
-    STATE_LIMIT,
-    STEP_TOO_SMALL,
-    STRAIN_LIMIT,
-    TOO_MANY_STEPS,
-)
-from creepkit.integration.step_control import IntegrationSettings
 from creepkit.integration.time_discretisation import SDIRK4, Tableau, merge_programs
 from creepkit.kernels.interface import CompiledLaw
-from creepkit.records import Program, Status
-
-REASONS = {
-    REACHED_END: "",
-    STRAIN_LIMIT: "creep strain reached the strain limit",
-    STATE_LIMIT: "an internal variable reached its limit",
-    DIVERGED: "the creep rate diverged",
-    STEP_TOO_SMALL: "the time step became too small",
-    TOO_MANY_STEPS: "the cap on steps was reached",
-}
-"""What each ending means, in words."""
-
-
-STATUS = np.full(len(REASONS), int(Status.NOT_CONVERGED))
-
-
-STATUS[REACHED_END] = Status.COMPLETE
-
-
-STATUS[[STRAIN_LIMIT, STATE_LIMIT, DIVERGED]] = Status.RUPTURED
+from creepkit.records import Program
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,15 +50,12 @@ class PointTest:
     until: float = 0.0
 
     def __post_init__(self) -> None:
-        times = frozen(np.atleast_1d(self.times))
-        if not np.isfinite(times).all() or (np.diff(times) < 0).any() or (times < 0).any():
-            raise SolveError("output times must be finite, at or after 0 s, and must not decrease")
+        object.__setattr__(self, "times", checked_times(self.times))
         if self.stiffness < 0 or (self.stiffness > 0 and self.constant_load):
             raise SolveError("stiffness must not be negative, and goes with prescribed strain, not with constant load")
         levels = frozen(np.atleast_1d(self.levels))
         if not np.isfinite(levels).all() or (np.diff(levels) < 0).any() or (levels <= 0).any():
             raise SolveError("levels of creep strain must be finite, above 0, and must not decrease")
-        object.__setattr__(self, "times", times)
         object.__setattr__(self, "levels", levels)
 
     @cached_property
@@ -166,7 +138,7 @@ def integrate(
         parameters=theta.shape[1],
         states=law.states,
         with_sensitivities=int(jacobian),
-        axes=axes_structure(axes),
+        axes=AxesStructure(*axes),
         settings=settings_structure(settings or IntegrationSettings()),
         tableau=tableau_structure(tableau),
     )

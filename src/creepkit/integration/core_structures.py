@@ -1,4 +1,4 @@
-"""The structures of `src/core` that the integrators are called with, field by field; arrays go as addresses."""
+"""What the integrators of `src/core` are called with, field by field, and how an integration ends."""
 
 from __future__ import annotations
 
@@ -6,18 +6,59 @@ import ctypes
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from creepkit.arrays import Floats, Ints
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats, Ints, frozen
 from creepkit.core import address
 from creepkit.errors import SolveError
-from creepkit.integration.step_control import IntegrationSettings
 from creepkit.integration.time_discretisation import Tableau
 from creepkit.kernels.interface import CompiledLaw
+from creepkit.records import Status
 
 _NUMBER, _COUNT, _POINTER = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
 
 
+REACHED_END, STRAIN_LIMIT, STATE_LIMIT, DIVERGED, STEP_TOO_SMALL, TOO_MANY_STEPS = range(6)
+"""Codes of an ending, as in `event_location.hpp`; whatever it is, the history so far is kept."""
+
+
+REASONS = {
+    REACHED_END: "",
+    STRAIN_LIMIT: "creep strain reached the strain limit",
+    STATE_LIMIT: "an internal variable reached its limit",
+    DIVERGED: "the creep rate diverged",
+    STEP_TOO_SMALL: "the time step became too small",
+    TOO_MANY_STEPS: "the cap on steps was reached",
+}
+"""What each ending means, in words."""
+
+
+STATUS = np.full(len(REASONS), int(Status.NOT_CONVERGED))
+STATUS[REACHED_END] = Status.COMPLETE
+STATUS[[STRAIN_LIMIT, STATE_LIMIT, DIVERGED]] = Status.RUPTURED
+
+
 MAX_STATES = 16
 """Internal variables of a law, at most."""
+
+
+class IntegrationSettings(NamedTuple):
+    """How accurately, and how far, to integrate.
+
+    rtol : local error allowed in a step, relative to strain and to each state.
+    smallest : strain below which the error is relative to this instead.
+    strain_limit : creep strain at which the point has burst.
+    max_steps : cap on steps, accepted and rejected, of one history, beside 20 for each further straight piece of its
+        programs.
+    first, longest : first and longest step, as shares of a segment (in its transformed time).
+    """
+
+    rtol: float = 1e-5
+    smallest: float = 1e-7
+    strain_limit: float = 1.0
+    max_steps: int = 2000
+    first: float = 0.02
+    longest: float = 0.2
 
 
 class Axes(NamedTuple):
@@ -93,9 +134,33 @@ class TensorStructure(ctypes.Structure):
     ]
 
 
-def axes_structure(axes: Axes) -> AxesStructure:
-    """Axes as the core reads them."""
-    return AxesStructure(*axes)
+class FibreModelStructure(ctypes.Structure):
+    """FibreModel of `fibre_stage.hpp`, where every field's shape is given."""
+
+    _fields_ = [
+        *((name, _COUNT) for name in ("fibres", "modes", "loads", "rows", "inputs")),
+        *((name, _POINTER) for name in ("stress", "strain", "mode_strains", "projection", "observed")),
+        *((name, _POINTER) for name in ("stress_change", "strain_change", "mode_change", "projection_change")),
+        ("offsets", _POINTER),
+    ]
+
+
+class FibreCallStructure(ctypes.Structure):
+    """FibreCall, where every field's shape is given."""
+
+    _fields_ = [
+        *((name, _POINTER) for name in ("update", "sensitivity")),
+        *((name, _COUNT) for name in ("states", "parameters", "with_sensitivities", "follows_stress")),
+        *((name, _COUNT) for name in ("segment_count", "time_count")),
+        *((name, _POINTER) for name in ("theta", "initial", "limits", "segments", "times")),
+        ("beta", _NUMBER),
+        ("model", FibreModelStructure),
+        ("settings", SettingsStructure),
+        ("tableau", TableauStructure),
+        *((name, _POINTER) for name in ("recorded", "jacobian")),
+        *((name, _COUNT) for name in ("ending", "steps", "rejected")),
+        ("end_time", _NUMBER),
+    ]
 
 
 def settings_structure(settings: IntegrationSettings) -> SettingsStructure:
@@ -130,6 +195,14 @@ def refusal(law: CompiledLaw, theta: Floats) -> str:
         found = theta.shape[-1]
         return f"theta has {found} numbers, but the law needs {len(law.names)}: {', '.join(law.names)}"
     return ""
+
+
+def checked_times(times: ArrayLike) -> Floats:
+    """Output times (times,), s, frozen; SolveError unless they are finite, not negative and do not decrease."""
+    checked: Floats = frozen(np.atleast_1d(np.asarray(times, dtype=float)))
+    if not np.isfinite(checked).all() or (np.diff(checked) < 0).any() or (checked < 0).any():
+        raise SolveError("output times must be finite, at or after 0 s, and must not decrease")
+    return checked
 
 
 def check_call(code: int) -> None:

@@ -1,4 +1,4 @@
-"""Integration of models of fibres in the compiled core, and single steps of fibres whose strains are given.
+"""Integration of models of fibres in the compiled core.
 
 The implicit method, its error control and the transformed time are those of a single point; Newton's method in the
 amplitudes of the modes rests on the consistent tangents of the fibres. A fibre creeps at the law's rate at the size of
@@ -14,21 +14,23 @@ from functools import lru_cache
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats, frozen
+from creepkit.arrays import Floats, frozen
 from creepkit.core import function
 from creepkit.errors import SolveError
-from creepkit.integration.batch_integration import REASONS
 from creepkit.integration.core_structures import (
+    REASONS,
+    STATUS,
+    FibreCallStructure,
+    FibreModelStructure,
+    IntegrationSettings,
     check_call,
+    checked_times,
     refusal,
     settings_structure,
     tableau_structure,
     write_addresses,
 )
-from creepkit.integration.event_location import REACHED_END, STEP_TOO_SMALL, TOO_MANY_STEPS
 from creepkit.integration.fibre_model import FibreInput, FibreModel
-from creepkit.integration.fibre_structures import FibreCallStructure, FibreModelStructure, FibreStepStructure
-from creepkit.integration.step_control import IntegrationSettings
 from creepkit.integration.time_discretisation import SDIRK4, Tableau, merge_programs
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.records import Program, Status
@@ -55,9 +57,9 @@ class FibreTest:
     follows_stress: bool = False
 
     def __post_init__(self) -> None:
-        times = frozen(np.atleast_1d(self.times))
-        if not times.size or not np.isfinite(times).all() or (np.diff(times) < 0).any() or (times < 0).any():
-            raise SolveError("output times must be finite, at or after 0 s, must not decrease, and there must be one")
+        object.__setattr__(self, "times", checked_times(self.times))
+        if not self.times.size:
+            raise SolveError("a test of fibres has no output times; give one at least")
         if len(self.loads) != len(self.model.stress) or len(self.loads) > MAX_LOADS:
             raise SolveError(
                 f"a test of fibres has {len(self.loads)} programs of loads; its model needs {len(self.model.stress)}, "
@@ -65,7 +67,6 @@ class FibreTest:
             )
         if not (self.modulus.values > 0).all():
             raise SolveError(f"a modulus of {self.modulus.values.min():g} MPa is not above zero")
-        object.__setattr__(self, "times", times)
 
     @property
     def segments(self) -> Floats:
@@ -99,9 +100,7 @@ class FibreHistory:
     @property
     def status(self) -> Status:
         """How it ended."""
-        if self.termination == REACHED_END:
-            return Status.COMPLETE
-        return Status.NOT_CONVERGED if self.termination in (STEP_TOO_SMALL, TOO_MANY_STEPS) else Status.RUPTURED
+        return Status(int(STATUS[self.termination]))
 
     @property
     def reason(self) -> str:
@@ -181,90 +180,3 @@ def _model_structure(model: FibreModel, inputs: Sequence[FibreInput]) -> tuple[F
     )
     write_addresses(structure, arrays)
     return structure, list(arrays.values())
-
-
-@dataclass(frozen=True, eq=False)
-class FibreState:
-    """Where fibres are.
-
-    creep : (fibres,) signed creep strains. path : (fibres,) lengths of their paths.
-    state : (fibres, S) internal variables of the law.
-    """
-
-    creep: Floats
-    path: Floats
-    state: Floats
-
-    @classmethod
-    def virgin(cls, law: CompiledLaw, fibres: int) -> FibreState:
-        """Fibres that have not crept."""
-        return cls(np.zeros(fibres), np.zeros(fibres), np.tile(np.asarray(law.initial, float), (fibres, 1)))
-
-
-@dataclass(frozen=True, eq=False)
-class FibreResponse:
-    """What a step of fibres gives.
-
-    stress : (fibres,) MPa. tangent : (fibres,) MPa, d(stress)/d(total strain), both at the end of the step.
-    state : the fibres after it.
-    """
-
-    stress: Floats
-    tangent: Floats
-    state: FibreState
-
-
-def step_fibres(
-    law: CompiledLaw,
-    theta: Floats,
-    strain: ArrayLike,
-    before: FibreState,
-    interval: tuple[float, float],
-    *,
-    temperature: float,
-    modulus: float,
-) -> FibreResponse:
-    """One step of the backward Euler method for fibres whose total strains are given, with consistent tangents.
-
-    theta : (P,) internal parameters. strain : (fibres,) total mechanical strains at the end of the step.
-    interval : start and end of the step, s; temperature, K, and modulus, MPa, are those at the end.
-    SolveError where a fibre has no solution: take a shorter step.
-    """
-    theta, strain = np.array(theta, dtype=float), np.array(strain, dtype=float)
-    if sentence := refusal(law, theta):
-        raise SolveError(sentence)
-    start, end = interval
-    if not (end > start >= 0.0 and modulus > 0.0 and np.isfinite([end, modulus, temperature]).all()):
-        raise SolveError(
-            f"a step of fibres from {start:g} to {end:g} s with a modulus of {modulus:g} MPa; time must increase from "
-            "0 s or later, and the modulus must be above zero"
-        )
-    fibres, shape = strain.size, (strain.size, law.states)
-    arrays = {"theta": theta, "strain": strain}
-    for name, size in (("creep", (fibres,)), ("path", (fibres,)), ("state", shape)):
-        array = np.array(getattr(before, name), dtype=float)
-        if array.shape != size or strain.ndim != 1 or not fibres:
-            raise SolveError(f"a step of {fibres} fibres: {name} has shape {array.shape}; it needs {size}")
-        arrays[name] = array
-    results = {name: np.zeros(fibres) for name in ("stress", "tangent", "new_creep", "new_path")}
-    results["new_state"] = np.zeros(shape)
-    step = FibreStepStructure(
-        update=law.update.address,
-        fibres=fibres,
-        states=law.states,
-        time=end,
-        length=end - start,
-        temperature=temperature,
-        modulus=modulus,
-    )
-    write_addresses(step, {**arrays, **results})
-    solved = function("creepkit_step_fibres")(ctypes.byref(step))
-    if solved < 0:
-        raise MemoryError("no memory for a step of fibres")
-    if solved < fibres:
-        raise SolveError(
-            f"fibre {solved + 1} of {fibres} has no solution at the end of a step of {end - start:g} s; "
-            "take a shorter step"
-        )
-    after = FibreState(results["new_creep"], results["new_path"], results["new_state"])
-    return FibreResponse(results["stress"], results["tangent"], after)

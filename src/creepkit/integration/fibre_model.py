@@ -68,18 +68,6 @@ class FibreModel:
         return cls(stress, np.zeros_like(stress), np.stack([np.ones_like(y), -y], axis=1), projection, projection)
 
     @classmethod
-    def strained_section(cls, places: ArrayLike, areas: ArrayLike) -> FibreModel:
-        """A section whose axial strain and curvature, 1/mm, are the loads; strain of a fibre = e - curvature y.
-
-        Recorded are the axial force and the bending moment that creep takes away, over E: mm^2 and mm^3.
-        places : (fibres,) mm, y, from the axis; areas : (fibres,) mm^2.
-        """
-        y, weights = _section(places, areas)
-        strain = np.stack([np.ones_like(y), -y])
-        nothing = np.zeros((y.size, 0))
-        return cls(np.zeros_like(strain), strain, nothing, nothing.T, np.stack([weights, -weights * y]))
-
-    @classmethod
     def side_by_side(cls, models: Sequence[FibreModel]) -> FibreModel:
         """Independent models under the same loads as one; what they record is added up."""
         sizes, ranks = [m.stress.shape[1] for m in models], [m.modes.shape[1] for m in models]
@@ -160,18 +148,13 @@ def gauss_fibres(height: float, fibres: int) -> tuple[Floats, Floats]:
     return np.concatenate([-half[::-1], half]), np.concatenate([lengths[::-1], lengths])
 
 
-def _section(places: ArrayLike, areas: ArrayLike) -> tuple[Floats, Floats]:
+def _centred(places: ArrayLike, areas: ArrayLike) -> tuple[Floats, Floats, float, float]:
+    """Places from the centroid, areas, their sum and the second moment of area."""
     y, weights = np.asarray(places, float), np.asarray(areas, float)
     if y.ndim != 1 or y.shape != weights.shape or y.size == 0 or not (weights > 0).all():
         raise SolveError(
             f"a section of fibres needs as many areas above zero as places, found {weights.size} and {y.size}"
         )
-    return y, weights
-
-
-def _centred(places: ArrayLike, areas: ArrayLike) -> tuple[Floats, Floats, float, float]:
-    """Places from the centroid, areas, their sum and the second moment of area."""
-    y, weights = _section(places, areas)
     area = float(weights.sum())
     y = y - float(weights @ y) / area
     inertia = float(weights @ y**2)

@@ -13,23 +13,22 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Bools, Floats, frozen
 from creepkit.core import function
 from creepkit.errors import SolveError
-from creepkit.integration.batch_integration import REASONS
 from creepkit.integration.core_structures import (
+    REASONS,
+    STATUS,
+    IntegrationSettings,
     TensorStructure,
     check_call,
+    checked_times,
     refusal,
     settings_structure,
     tableau_structure,
     write_addresses,
 )
-from creepkit.integration.event_location import DIVERGED, REACHED_END, STATE_LIMIT, STRAIN_LIMIT
-from creepkit.integration.step_control import IntegrationSettings
 from creepkit.integration.tensor_point import EQUIVALENT_STRAIN
 from creepkit.integration.time_discretisation import SDIRK2, Tableau, merge_programs
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.records import TENSOR_COMPONENTS, Program, Status
-
-_BURST = (STRAIN_LIMIT, STATE_LIMIT, DIVERGED)
 
 
 @dataclass(frozen=True)
@@ -87,9 +86,14 @@ def integrate_tensor_point(
     theta : (P,) internal parameters, see CompiledLaw. elastic : E in MPa, and nu.
     controls : by component; those not named are free of stress. temperature : K. times : (times,) s, non-decreasing.
     """
-    outputs = np.array(times, dtype=float, ndmin=1)
-    theta = np.array(theta, dtype=float).reshape(-1)
-    _check(law, theta, elastic, controls, outputs)
+    outputs, theta = checked_times(times), np.array(theta, dtype=float).reshape(-1)
+    if sentence := refusal(law, theta):
+        raise SolveError(sentence)
+    if not (0 < elastic[0] < inf and -1 < elastic[1] < 0.5):
+        raise SolveError(f"E is {elastic[0]:g} MPa and nu {elastic[1]:g}; allowed are E above 0 and nu in (-1, 0.5)")
+    for name in controls:
+        if name not in TENSOR_COMPONENTS:
+            raise SolveError(f"there is no component '{name}' to drive; allowed are {', '.join(TENSOR_COMPONENTS)}")
     component_controls = [controls.get(name, prescribed_stress(0.0)) for name in TENSOR_COMPONENTS]
     held = np.array([control.quantity == "strain" for control in component_controls])
     programs = [*(c.program for c in component_controls), prescribed_stress(temperature).program]
@@ -118,7 +122,6 @@ def integrate_tensor_point(
     code, rows, reached = call.ending, arrays["history"][: call.reached], outputs[: call.reached]
     imposed = np.stack([c.program.at(reached) for c in component_controls], axis=-1)
     stress, strain = _elastic_response(elastic, held, imposed, rows[:, :6])
-    status = Status.COMPLETE if code == REACHED_END else Status.RUPTURED if code in _BURST else Status.NOT_CONVERGED
     return PointTrajectory(
         times=frozen(reached),
         stress=frozen(stress),
@@ -126,7 +129,7 @@ def integrate_tensor_point(
         creep_strain=frozen(rows[:, :6]),
         equivalent=frozen(rows[:, EQUIVALENT_STRAIN]),
         states=frozen(rows[:, EQUIVALENT_STRAIN + 1 :]),
-        status=status,
+        status=Status(int(STATUS[code])),
         end_time=float(call.end_time),
         reason=REASONS[code],
         steps=int(call.steps),
@@ -145,22 +148,3 @@ def _elastic_response(
     known = (strain - creep) @ stiffness
     strain[:, free] = np.linalg.solve(stiffness[np.ix_(free, free)], (imposed - known)[:, free].T).T
     return np.where(free, imposed, (strain - creep) @ stiffness), strain
-
-
-def _check(
-    law: CompiledLaw,
-    theta: Floats,
-    elastic: tuple[float, float],
-    controls: Mapping[str, ComponentControl],
-    outputs: Floats,
-) -> None:
-    """One sentence for what cannot be driven."""
-    if not np.isfinite(outputs).all() or (np.diff(outputs) < 0).any() or (outputs < 0).any():
-        raise SolveError("output times must be finite, at or after 0 s, and must not decrease")
-    if sentence := refusal(law, theta):
-        raise SolveError(sentence)
-    if not (0 < elastic[0] < inf and -1 < elastic[1] < 0.5):
-        raise SolveError(f"E is {elastic[0]:g} MPa and nu {elastic[1]:g}; allowed are E above 0 and nu in (-1, 0.5)")
-    for name in controls:
-        if name not in TENSOR_COMPONENTS:
-            raise SolveError(f"there is no component '{name}' to drive; allowed are {', '.join(TENSOR_COMPONENTS)}")

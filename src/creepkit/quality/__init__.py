@@ -10,14 +10,13 @@ idle time in which nothing crept.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import get_args
 
 import numpy as np
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
-from creepkit.quality.common_changes import common_rate_changes, find_jumps
 from creepkit.quality.comparison import (
     first_frame_deviations,
     modulus_trend_outliers,
@@ -26,10 +25,17 @@ from creepkit.quality.comparison import (
 )
 from creepkit.quality.copies import copied_tests, repeated_rows
 from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ranges_text
-from creepkit.quality.frames import FlaggedFrames, decreasing_frames, outlier_frames, unloading_frames
+from creepkit.quality.frames import decreasing_frames, outlier_frames, unloading_frames
 from creepkit.quality.idle_time import idle_flags
 from creepkit.quality.loading_strain import unstated_loading_strain
-from creepkit.quality.rig_flags import ACTIVATION_ENERGY, jump_flags, rate_change_flag, record_flags
+from creepkit.quality.rig import (
+    ACTIVATION_ENERGY,
+    common_rate_changes,
+    find_jumps,
+    jump_flags,
+    rate_change_flag,
+    record_flags,
+)
 from creepkit.records import CUT_LABEL, History, Predictor
 
 __all__ = [
@@ -62,39 +68,58 @@ def check_data_quality(
     """
     if not (np.isfinite(activation_energy) and activation_energy > 0):
         raise HistoryError(f"an activation energy of {activation_energy:g} J/mol is not above zero; try 400e3")
-    results = [[*_frame_flags(history, FRAME_FLAG_KINDS)] for history in histories]
-    copies = copied_tests(histories)
-    test_checks: list[tuple[FlagKind, dict[int, str]]] = [
-        ("copy", {k: copy_reason(histories[original]) for k, original in copies.items()}),
-        ("replicate", _row_reasons(histories) | replicate_deviations(histories)),
-        ("temperature", temperature_trend_outliers(histories)),
-        ("modulus", modulus_trend_outliers(histories)),
-        ("unit", _large_strains(histories)),
-    ]
-    results = [[*flags, *_cut_flags(history)] for flags, history in zip(results, histories, strict=True)]
+    framed = [_frame_flags(history, FRAME_FLAG_KINDS) for history in histories]
+    flags = [flag for each in framed for flag in each]
+    flags += [flag for rule in TEST_RULES for flag in rule(histories)]
     if specimen is not None:
-        test_checks.append(("first frame", first_frame_deviations(histories, specimen)))
-    for kind, reasons in test_checks:
-        for k, reason in reasons.items():
-            frames = (int(np.argmax(histories[k].used)),) if kind == "first frame" else ()
-            results[k].append(QualityFlag((histories[k].name,), kind, frames, reason))
-    flags = [flag for each in results for flag in each]
+        flags += first_frame_deviations(histories, specimen)
+    order = {history.name: k for k, history in enumerate(histories)}
+    flags.sort(key=lambda flag: order[flag.tests[0]])
     sound = [
-        _with_frames_unused(h, [k for flag in each for k in flag.frames if flag.kind in FRAME_FLAG_KINDS])
-        for h, each in zip(histories, results, strict=True)
+        _with_frames_unused(history, [k for flag in each for k in flag.frames])
+        for history, each in zip(histories, framed, strict=True)
     ]
     flags += check_loading_strain(sound)
     flags += check_rig(sound, activation_energy=activation_energy)
     return DataQuality(tuple(flags), len(histories))
 
 
-def _cut_flags(history: History) -> list[QualityFlag]:
+def _cut_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
     """That the file of a test may end within its last number."""
-    if CUT_LABEL not in history.labels:
-        return []
     advice = "compare it with its source; if it is whole, end its last line with a line end"
-    frames = (history.times.size - 1,)
-    return [QualityFlag((history.name,), "cut", frames, history.labels[CUT_LABEL], proposal=advice)]
+    for history in histories:
+        if CUT_LABEL in history.labels:
+            last, reason = (history.times.size - 1,), history.labels[CUT_LABEL]
+            yield QualityFlag((history.name,), "cut", last, reason, proposal=advice)
+
+
+def _copy_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
+    for k, original in copied_tests(histories).items():
+        yield QualityFlag((histories[k].name,), "copy", (), copy_reason(histories[original]))
+
+
+def _replicate_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
+    """Replicates that differ, and rows of tables that repeat others."""
+    differing = list(replicate_deviations(histories))
+    yield from differing
+    for k, reason in _row_reasons(histories).items():
+        if histories[k].name not in [flag.history for flag in differing]:
+            yield QualityFlag((histories[k].name,), "replicate", (), reason)
+
+
+def _large_strains(histories: Sequence[History]) -> Iterator[QualityFlag]:
+    """Histories whose strain exceeds one, as percent do that were read as fractions."""
+    for history in histories:
+        strain = np.abs(history.outputs.get("strain", np.zeros(1)))
+        if (strain > 1.0).any():
+            reason = f"the strain reaches {100 * np.nanmax(strain):.4g} %; look whether its unit is right"
+            yield QualityFlag((history.name,), "unit", (), reason)
+
+
+TEST_RULES: tuple[Callable[[Sequence[History]], Iterable[QualityFlag]], ...] = (
+    *(_cut_flags, _copy_flags, _replicate_flags, temperature_trend_outliers, modulus_trend_outliers, _large_strains),
+)
+"""What questions whole tests, each by itself or beside the others."""
 
 
 def copy_reason(original: History) -> str:
@@ -130,23 +155,7 @@ def _row_reasons(histories: Sequence[History]) -> dict[int, str]:
 
 def check_loading_strain(histories: Sequence[History]) -> list[QualityFlag]:
     """Histories whose strain seems to hold strain of loading that nothing states; whole, for no frame is to blame."""
-    found = [(history.name, unstated_loading_strain(history)) for history in histories]
-    advice = "state loading_strain_pct, with loading_time_s where frames were taken before, or includes_loading"
-    return [
-        QualityFlag((name,), "loading", (finding[0],), finding[1], proposal=advice)
-        for name, finding in found
-        if finding is not None
-    ]
-
-
-def _large_strains(histories: Sequence[History]) -> dict[int, str]:
-    """Histories whose strain exceeds one, as percent do that were read as fractions."""
-    strains = {k: np.abs(one.outputs["strain"]) for k, one in enumerate(histories) if "strain" in one.outputs}
-    return {
-        k: f"the strain reaches {100 * np.nanmax(strain):.4g} %; look whether its unit is right"
-        for k, strain in strains.items()
-        if (strain > 1.0).any()
-    }
+    return [flag for history in histories if (flag := unstated_loading_strain(history)) is not None]
 
 
 def check_rig(histories: Sequence[History], *, activation_energy: float = ACTIVATION_ENERGY) -> list[QualityFlag]:
@@ -179,22 +188,10 @@ def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] 
 
 def _frame_flags(history: History, kinds: Collection[str]) -> list[QualityFlag]:
     """Suspect frames of a history; each check uses the frames that those before it have left."""
-    result, remaining = [], history
-    kind_findings: list[tuple[FlagKind, FlaggedFrames]] = []
+    result: list[QualityFlag] = []
     for kind, search in zip(FRAME_FLAG_KINDS, (unloading_frames, decreasing_frames, outlier_frames), strict=True):
         if kind in kinds:
-            kind_findings = [(kind, finding) for finding in search(remaining)]
-            result += [
-                QualityFlag(
-                    (history.name,),
-                    kind,
-                    finding.frames,
-                    finding.reason,
-                    time=float(history.times[min(finding.frames)]),
-                )
-                for kind, finding in kind_findings
-            ]
-            remaining = _with_frames_unused(remaining, [k for _, finding in kind_findings for k in finding.frames])
+            result += search(_with_frames_unused(history, [k for flag in result for k in flag.frames]))
     return result
 
 

@@ -93,6 +93,25 @@ def repeated_rows(histories: Sequence[History]) -> dict[int, int]:
     return {k: earlier for k, earlier in repeated.items() if k not in single or len(single) > 1}
 
 
+END_OF_TIME, END_OF_OUTPUT = 1e-5, 1e-4
+"""Relative roundings of the last frame of a test that is published twice: two times of six digits differ by 1e-5."""
+
+
+def duplicate_tests(histories: Sequence[History]) -> list[tuple[str, str]]:
+    """The names of every two histories that seem to be one test: the same condition and the same end.
+
+    Records of one test may differ elsewhere, since sources thin them in their own ways.
+    """
+    pairs = combinations([(history, _Condition.of(history)) for history in histories], 2)
+    return [(a.name, b.name) for (a, one), (b, other) in pairs if one.is_that_of(other) and _same_end(a, b)]
+
+
+def _same_end(a: History, b: History) -> bool:
+    if a.outputs.keys() != b.outputs.keys() or abs(a.times[-1] - b.times[-1]) > END_OF_TIME * abs(b.times[-1]):
+        return False
+    return all(np.isclose(a.outputs[k][-1], b.outputs[k][-1], rtol=END_OF_OUTPUT, atol=0.0) for k in a.outputs)
+
+
 def _first(copies: dict[int, int], position: int) -> int:
     while position in copies:
         position = copies[position]

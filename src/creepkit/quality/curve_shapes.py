@@ -17,8 +17,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
-from creepkit.arrays import Floats
-from creepkit.quality.frames import load_segments
+from creepkit.arrays import Floats, Ints
+from creepkit.quality.frames import block_means, load_segments
 from creepkit.records import History, growing_output
 
 LEAST_RISE = 1.5
@@ -50,11 +50,8 @@ def shows_tertiary_creep(history: History) -> bool:
     segments = load_segments(history)
     if not segments or not segments[-1].load_increased:
         return False
-    frames = segments[-1].frames
-    times, values = history.times[frames], history.outputs[growing_output(history)][frames]
-    if np.ptp(times) <= 0 or values[-1] < values[0]:
-        return False
-    return _rises_in_a_part(times, values, PARTS)
+    times, values = _curve(history, segments[-1].frames)
+    return bool(np.ptp(times) > 0 and values[-1] >= values[0] and _rises_in_a_part(times, values, PARTS))
 
 
 def shows_primary_creep(history: History) -> bool:
@@ -62,11 +59,13 @@ def shows_primary_creep(history: History) -> bool:
     segments = load_segments(history)
     if not segments or not segments[0].is_first:
         return False
-    frames = segments[0].frames
-    times, values = history.times[frames], history.outputs[growing_output(history)][frames]
-    if np.ptp(times) <= 0 or not values[-1] > values[0]:
-        return False
-    return _rises_in_a_part(values, times, PARTS_OF_STRAIN)
+    times, values = _curve(history, segments[0].frames)
+    return bool(np.ptp(times) > 0 and values[-1] > values[0] and _rises_in_a_part(values, times, PARTS_OF_STRAIN))
+
+
+def _curve(history: History, frames: Ints) -> tuple[Floats, Floats]:
+    """Times and values of the output that grows."""
+    return history.times[frames], history.outputs[growing_output(history)][frames]
 
 
 def _rises_in_a_part(x: Floats, y: Floats, parts: Sequence[tuple[float, float]]) -> bool:
@@ -79,7 +78,7 @@ def _rises_in_a_part(x: Floats, y: Floats, parts: Sequence[tuple[float, float]])
 
 def _rises(x: Floats, y: Floats, significance: float) -> bool:
     """Whether the slope of y over x rises by more than chance, and by LEAST_RISE."""
-    x, y = _means(x, y)
+    x, y = block_means(MOST_MEANS, x, y)
     x = 2.0 * (x - x[0]) / np.ptp(x) - 1.0
     parabola = np.linalg.lstsq(np.vander(x, 3), y, rcond=None)[0]
     curvature, slope = parabola[:2]
@@ -106,12 +105,3 @@ def _correlation(left: Floats, unknowns: int) -> float:
     variance = float((left**2).sum())
     r = float((left[1:] * left[:-1]).sum()) / variance if variance > 0 else 0.0
     return float(np.clip((r + unknowns / left.size) / (1.0 - unknowns / left.size), 0.0, 0.9))
-
-
-def _means(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """At most MOST_MEANS means over neighbouring frames."""
-    if x.size <= MOST_MEANS:
-        return x, y
-    edges = np.linspace(0, x.size, MOST_MEANS + 1).astype(int)
-    counts = np.diff(edges)
-    return np.add.reduceat(x, edges[:-1]) / counts, np.add.reduceat(y, edges[:-1]) / counts

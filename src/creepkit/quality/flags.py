@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
 
 from creepkit.presentation import Presentable
+from creepkit.records import History
 
 FlagKind = Literal[
     "unloading",
@@ -61,6 +62,12 @@ class QualityFlag:
     def __post_init__(self) -> None:
         for name in ("rate_factors", "factor_errors", "temperature_steps", "jumps"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @classmethod
+    def of_frames(cls, history: History, kind: FlagKind, frames: Iterable[int], reason: str) -> QualityFlag:
+        """Of some frames of a history, at the time of the first."""
+        chosen = tuple(int(k) for k in frames)
+        return cls((history.name,), kind, chosen, reason, time=float(history.times[min(chosen)]))
 
     @property
     def history(self) -> str:

@@ -9,7 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
+from creepkit.quality.flags import QualityFlag
 from creepkit.records import History, growing_output, output_named
+from creepkit.records.recorded_programs import running_median
 from creepkit.records.units import time_text, times_text
 
 OUTLIER_THRESHOLD = 6.0
@@ -54,13 +56,6 @@ _MOST_OUTLIERS = 0.05
 """Largest fraction of frames that are outliers; more are not outliers."""
 
 
-class FlaggedFrames(NamedTuple):
-    """Frames and a sentence about them."""
-
-    frames: tuple[int, ...]
-    reason: str
-
-
 class LoadSegment(NamedTuple):
     """Frames under one load and temperature.
 
@@ -79,7 +74,7 @@ def grows(history: History) -> bool:
     return output_named(growing_output(history), history.specimen).grows if history.outputs else False
 
 
-def unloading_frames(history: History) -> Iterator[FlaggedFrames]:
+def unloading_frames(history: History) -> Iterator[QualityFlag]:
     """Frames after the end of the test, and a sudden fall in its last used frames."""
     if not grows(history):
         return
@@ -87,16 +82,14 @@ def unloading_frames(history: History) -> Iterator[FlaggedFrames]:
     later_frames = np.flatnonzero(~history.used)
     later_frames = later_frames[later_frames > usable[-1]] if usable.size else later_frames[:0]
     if later_frames.size and "frames_after_end" in history.labels:
-        yield FlaggedFrames(
-            tuple(map(int, later_frames)),
-            f"from {time_text(float(history.times[later_frames[0]]))} on, after the end of the test",
-        )
+        reason = f"from {time_text(float(history.times[later_frames[0]]))} on, after the end of the test"
+        yield QualityFlag.of_frames(history, "unloading", later_frames, reason)
     segments = [part for part in load_segments(history) if part.frames.size > FEWEST_FRAMES]
     if segments and segments[-1].frames[-1] == usable[-1]:
         yield from _unloaded_end(history, segments[-1].frames)
 
 
-def _unloaded_end(history: History, frames: Ints) -> Iterator[FlaggedFrames]:
+def _unloaded_end(history: History, frames: Ints) -> Iterator[QualityFlag]:
     t, y = history.times[frames], history.outputs[growing_output(history)][frames]
     sigma = noise_standard_deviation(t, y)
     for count in range(min(MOST_UNLOADING_FRAMES, frames.size - FEWEST_FRAMES), 0, -1):
@@ -110,7 +103,7 @@ def _unloaded_end(history: History, frames: Ints) -> Iterator[FlaggedFrames]:
                 f"{END_FIT_FRAMES} frames before it lead to, "
                 f"{shortfall / sigma:.0f} times the noise: the load was taken off"
             )
-            yield FlaggedFrames(tuple(map(int, frames[-count:])), reason)
+            yield QualityFlag.of_frames(history, "unloading", frames[-count:], reason)
             return
 
 
@@ -129,7 +122,7 @@ def _extrapolate(t: Floats, y: Floats, time: float) -> tuple[float, float]:
     )
 
 
-def decreasing_frames(history: History) -> Iterator[FlaggedFrames]:
+def decreasing_frames(history: History) -> Iterator[QualityFlag]:
     """Frames of a part in which the amplitude falls though the load is held or was raised.
 
     They begin at the highest frame; after a raise of the load with the raise, for whatever makes a dimple or a bar fall
@@ -141,30 +134,29 @@ def decreasing_frames(history: History) -> Iterator[FlaggedFrames]:
         if segment.frames.size < FEWEST_FRAMES or not segment.load_increased:
             continue
         t, y = history.times[segment.frames], history.outputs[growing_output(history)][segment.frames]
-        smoothed = _running_median(y)
+        smoothed, noise = running_median(y), noise_standard_deviation(t, y)
         highest = int(np.argmax(smoothed))
         decrease = float(smoothed[highest] - smoothed[highest:].min())
-        if decrease > max(
-            DECREASE_THRESHOLD * noise_standard_deviation(t, y), DECREASE_FRACTION * float(np.abs(smoothed).max())
-        ):
+        if decrease > max(DECREASE_THRESHOLD * noise, DECREASE_FRACTION * float(np.abs(smoothed).max())):
             lowest = highest + int(np.argmin(smoothed[highest:]))
             change = "is held at" if segment.is_first else "was raised to"
             load_text = f"{history.loading.quantity} {change} {segment.load:g} MPa"
             reason = (
                 f"falls by {_difference_text(history, decrease)} from "
                 f"{times_text(float(t[highest]), float(t[lowest]))}, "
-                f"{decrease / noise_standard_deviation(t, y):.0f} times the noise, though the {load_text}"
+                f"{decrease / noise:.0f} times the noise, though the {load_text}"
             )
-            yield FlaggedFrames(tuple(map(int, segment.frames[highest if segment.is_first else 0 :])), reason)
+            falling = segment.frames[highest if segment.is_first else 0 :]
+            yield QualityFlag.of_frames(history, "falling", falling, reason)
 
 
-def outlier_frames(history: History) -> Iterator[FlaggedFrames]:
+def outlier_frames(history: History) -> Iterator[QualityFlag]:
     """Single frames that miss the cubic through their four neighbours, largest first."""
     for segment in load_segments(history):
         frames, values = segment.frames, history.outputs[growing_output(history)]
-        sigma = (
-            noise_standard_deviation(history.times[frames], values[frames]) if frames.size >= FEWEST_FRAMES else np.inf
-        )
+        if frames.size < FEWEST_FRAMES:
+            continue
+        sigma = noise_standard_deviation(history.times[frames], values[frames])
         for _ in range(int(_MOST_OUTLIERS * segment.frames.size) + 1):
             if frames.size < FEWEST_FRAMES:
                 break
@@ -181,8 +173,16 @@ def outlier_frames(history: History) -> Iterator[FlaggedFrames]:
                 f"at {time_text(float(history.times[frame]))} off its neighbours by {deviation_text}, "
                 f"{standardised[worst]:.0f} times the noise"
             )
-            yield FlaggedFrames((frame,), reason)
+            yield QualityFlag.of_frames(history, "outlier", [frame], reason)
             frames = np.delete(frames, worst + 2)
+
+
+def block_means(most: int, *series: Floats) -> tuple[Floats, ...]:
+    """At most so many means over neighbouring frames of each of the series (frames,)."""
+    if series[0].size <= most:
+        return series
+    edges = np.linspace(0, series[0].size, most + 1).astype(int)
+    return tuple(np.add.reduceat(values, edges[:-1]) / np.diff(edges) for values in series)
 
 
 def load_segments(history: History) -> list[LoadSegment]:
@@ -243,11 +243,8 @@ def _local_scale(residuals: Floats) -> Floats:
     """The size of misses about each frame, without it and its neighbours: large where a curve bends sharply."""
     padded = np.pad(np.abs(residuals), 7, constant_values=np.nan)
     beside = np.r_[0:5, 10:15]  # from seven to three frames before and after
-    neighbours = np.sort(np.lib.stride_tricks.sliding_window_view(padded, 15)[:, beside], axis=1)
-    count = np.isfinite(neighbours).sum(axis=1)
-    rows = np.arange(residuals.size)
-    middle = 0.5 * (neighbours[rows, np.maximum(count - 1, 0) // 2] + neighbours[rows, np.minimum(count // 2, 9)])
-    return np.where(count > 0, 1.4826 * middle, 0.0)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 15)[:, beside]
+    return np.asarray(1.4826 * np.nanmedian(windows, axis=1))
 
 
 def _isolated(residuals: Floats) -> Bools:
@@ -258,11 +255,6 @@ def _isolated(residuals: Floats) -> Bools:
     neighbours = -np.sign(residuals)[:, None] * np.stack([np.roll(residuals, 1), np.roll(residuals, -1)], axis=1)
     neighbours[0, 0] = neighbours[-1, 1] = np.inf
     return np.asarray((neighbours > OPPOSITE_NEIGHBOUR_FRACTION * np.abs(residuals)[:, None]).all(axis=1))
-
-
-def _running_median(values: Floats, width: int = 5) -> Floats:
-    padded = np.pad(values, width // 2, mode="reflect", reflect_type="odd")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=-1))
 
 
 def _has_value(history: History) -> Bools:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.quality.flags import QualityFlag
 from creepkit.quality.frames import noise_standard_deviation
 from creepkit.records import History, Program
 
@@ -37,8 +38,8 @@ ELASTIC_RANGE = (0.9, 1.15)
 """Ratios of a strain to the stress over the modulus at which it is elastic alone."""
 
 
-def unstated_loading_strain(history: History) -> tuple[int, str] | None:
-    """The frame at which loading seems to end, and what is seen; None where nothing of loading is left.
+def unstated_loading_strain(history: History) -> QualityFlag | None:
+    """A flag at the frame at which loading seems to end; None where nothing of loading is left.
 
     A strain that includes the elastic one is questioned where it differs from the stress over the modulus.
     """
@@ -58,10 +59,12 @@ def unstated_loading_strain(history: History) -> tuple[int, str] | None:
     growth = 3 ** _exponent(times, values, k, _after(times, k)) - 1
     about = "" if ratio is None else f", {ratio:.2f} of stress over modulus"
     part = "more than the elastic part" if history.includes_elastic and ratio and ratio > 1 else "loading strain"
-    return int(frames[k]), (
+    reason = (
         f"the strain is {values[k]:.3g} at {times[k]:.4g} s{about}, and grows by {100 * growth:.0f} % while time "
         f"trebles: it looks like {part}"
     )
+    advice = "state loading_strain_pct, with loading_time_s where frames were taken before, or includes_loading"
+    return QualityFlag((history.name,), "loading", (int(frames[k]),), reason, proposal=advice)
 
 
 def _end_of_jump(times: Floats, values: Floats) -> int | None:

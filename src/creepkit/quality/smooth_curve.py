@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import ndtri, stdtr
 
 from creepkit.arrays import Bools, Floats
+from creepkit.quality.frames import block_means
 
 MOST_POINTS = 150
 """Points of a curve; longer ones are averaged over neighbouring frames."""
@@ -37,11 +38,7 @@ _NOISE_FLOOR = 5e-4
 """Least noise, as a fraction of the range of the values: no spline follows a law more closely."""
 
 
-_CLOCKS: dict[str, Callable[[Floats], Floats]] = {
-    "t": lambda t: t,
-    "sqrt t": lambda t: np.asarray(np.sqrt(t)),
-    "ln t": lambda t: np.asarray(np.log(t)),
-}
+_CLOCKS: dict[str, Callable[[Floats], Floats]] = {"t": np.positive, "sqrt t": np.sqrt, "ln t": np.log}
 
 
 class RateStep(NamedTuple):
@@ -215,7 +212,7 @@ def smooth_curve(
 
     times : (frames,) s, after `start`. values : (frames,) in the unit of the output.
     """
-    times, values = _averaged(times, values)
+    times, values = block_means(MOST_POINTS, times, values)
     curves = [_fit(times, values, start, clock, tuple(level_shifts), tuple(slope_changes)) for clock in _CLOCKS]
     return max(curves, key=lambda pair: pair[0])[1]
 
@@ -257,15 +254,6 @@ def _fit(
 def _beside(times: Floats, time: float) -> Bools:
     """(points - 1,) which gaps between points touch a time."""
     return np.asarray((times[:-1] <= time) & (times[1:] >= time))
-
-
-def _averaged(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """At most MOST_POINTS means over neighbouring frames."""
-    if times.size <= MOST_POINTS:
-        return times, values
-    edges = np.linspace(0, times.size, MOST_POINTS + 1).astype(int)
-    counts = np.diff(edges)
-    return tuple(np.add.reduceat(x, edges[:-1]) / counts for x in (times, values))  # type: ignore[return-value]
 
 
 def _normal_score(ratio: Floats, freedom: int) -> Floats:

@@ -21,7 +21,7 @@ error.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -33,15 +33,13 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
-from creepkit.readers.cell_grids import CellGrid
 from creepkit.readers.condition_texts import sources_of_names
+from creepkit.readers.conditions import noise_correlation_text
 from creepkit.readers.cut_files import CutNumber
-from creepkit.readers.grouped_rows import TabulatedTest
-from creepkit.readers.noise_correlation import noise_correlation_text
-from creepkit.readers.table_heads import is_frame
-from creepkit.readers.table_layouts import names_time, tests_in
-from creepkit.readers.text_grids import peek_grid, read_head_alone, read_text_grid
-from creepkit.readers.text_tables import TextTable
+from creepkit.readers.table import CellTable
+from creepkit.readers.table_heads import is_frame, names_time
+from creepkit.readers.table_layouts import TabulatedTest, tests_in
+from creepkit.readers.text_files import peek_table, read_head_alone, read_text_table
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
     CUT_LABEL,
@@ -88,7 +86,7 @@ class HistoryCsvReader:
             return False
         if not self.columns and path.suffix.lower() in TABLE_SUFFIXES:
             return True
-        grid = peek_grid(path)
+        grid = peek_table(path)
         if self.columns:
             return grid is not None and set(self.columns) <= set(grid.rows[0].cells)
         return grid is not None and _has_numbers(grid) and names_time(grid, self.vocabulary)
@@ -98,19 +96,19 @@ class HistoryCsvReader:
         head = read_head_alone(path)
         if head and any(key.startswith(("minimum_rate", "rupture", "ended")) for key in head):
             return [assemble_without_frames(path.stem, head, self.vocabulary, location=str(path), source=str(path))]
-        grid = read_text_grid(path)
+        grid = read_text_table(path)
         with _errors_of_format(grid):
-            return histories_of_tests([(grid, test) for test in tests_in(grid, self.vocabulary)], path, self.vocabulary)
+            return histories_of_tests(tests_in(grid, self.vocabulary), path, self.vocabulary)
 
 
-def _has_numbers(grid: CellGrid) -> bool:
+def _has_numbers(grid: CellTable) -> bool:
     """Whether some row holds numbers alone, with either decimal sign."""
     signs = [replace(grid, dialect=replace(grid.dialect, decimal=sign)) for sign in ".,"]
     return any(is_frame(row, one) for one in signs for row in grid.rows)
 
 
 @contextmanager
-def _errors_of_format(grid: CellGrid) -> Iterator[None]:
+def _errors_of_format(grid: CellTable) -> Iterator[None]:
     """Say of errors about a LabVIEW measurement where its names and units stand."""
     try:
         yield
@@ -133,26 +131,26 @@ TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv", ".lvm"), (".txt", ".dat", ".asc
 HISTORY_CSV = HistoryCsvReader("csv", "a table as text: `# key: value` lines, then columns such as time_s,strain_pct")
 
 
-def histories_of_tests(
-    found: Sequence[tuple[CellGrid, TabulatedTest]], path: Path, vocabulary: HeaderVocabulary
-) -> list[History]:
+def histories_of_tests(found: Iterable[TabulatedTest], path: Path, vocabulary: HeaderVocabulary) -> list[History]:
     """The histories of the tests in one file; those without a name have that of their sheet or of the file."""
-    sheets = {grid.sheet for grid, _ in found}
-    names = [test.name or (grid.sheet if len(sheets) > 1 else path.stem) for grid, test in found]
+    tests = list(found)
+    sheets = {test.table.sheet for test in tests}
+    names = [test.name or (test.table.sheet if len(sheets) > 1 else path.stem) for test in tests]
     histories = []
-    for (grid, test), name in zip(found, names, strict=True):
-        unique = f"{grid.sheet}/{name}" if len(set(names)) < len(names) and grid.sheet else name
-        parts = [f"sheet {grid.sheet}"] * bool(grid.sheet) + [test.name] * bool(test.name)
-        source = f"{path} ({', '.join(parts)})" if parts and len(found) > 1 else str(path)
-        table = replace(test.table, sources=(*test.table.sources, *sources_of_names(grid, vocabulary)))
-        history = assemble_history(unique, test.entries, table, vocabulary, location=grid.place, source=source)
-        if grid.cut is not None and _holds_number(test.table, grid.cut):
-            history = history.replace(labels={**history.labels, CUT_LABEL: str(grid.cut)})
+    for test, name in zip(tests, names, strict=True):
+        table = test.table
+        unique = f"{table.sheet}/{name}" if len(set(names)) < len(names) and table.sheet else name
+        parts = [f"sheet {table.sheet}"] * bool(table.sheet) + [test.name] * bool(test.name)
+        source = f"{path} ({', '.join(parts)})" if parts and len(tests) > 1 else str(path)
+        table = replace(table, sources=(*table.sources, *sources_of_names(table, vocabulary)))
+        history = assemble_history(unique, test.entries, table, vocabulary, location=table.place, source=source)
+        if table.cut is not None and _holds_number(table, table.cut):
+            history = history.replace(labels={**history.labels, CUT_LABEL: str(table.cut)})
         histories.append(history)
     return histories
 
 
-def _holds_number(table: TextTable, number: CutNumber) -> bool:
+def _holds_number(table: CellTable, number: CutNumber) -> bool:
     """Whether the last row of a test ends with this number of the file."""
     return int(table.lines[-1]) == number.line and number.column in (table.positions or [number.column])
 

@@ -15,7 +15,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 from creepkit.readers.conditions import StatedConditions, StatedNumber, TimeValuePairs, errors_located_at
-from creepkit.readers.text_tables import TableFrames
+from creepkit.readers.frames import TableFrames
 from creepkit.readers.vocabulary import COMPONENT_LOADING_KINDS, Terms
 from creepkit.records import Loading, PointLoading, Program, TwoLevels, loading_of
 from creepkit.records.quantities import TEMPERATURE, QuantityKind

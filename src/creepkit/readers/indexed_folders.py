@@ -7,15 +7,14 @@ the index that are no condition known by name become labels, as they stand; one 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.readers.assembly import assemble_history
-from creepkit.readers.column_names import KnownNames
-from creepkit.readers.table_rows import TableRow, grouped
-from creepkit.readers.text_grids import peek_columns, read_table
-from creepkit.readers.text_tables import SourceText, TextTable, unknown_text
+from creepkit.readers.frames import unknown_text
+from creepkit.readers.table import CellTable, SourceText, TableRow, grouped
+from creepkit.readers.text_files import peek_table, read_table
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 
@@ -40,7 +39,8 @@ class IndexedFolderReader:
         folder = path if path.is_dir() else path.parent
         if path.is_file() and path.name != self.index_file and not path.match(self._pattern):
             return False
-        return self.key_column in peek_columns(folder / self.index_file) and bool(self._frame_files(folder))
+        index = peek_table(folder / self.index_file)
+        return index is not None and self.key_column in index.rows[0].cells and bool(self._frame_files(folder))
 
     def read(self, path: Path) -> list[History]:
         """Return the histories in the folder, in the order of the index; of one file of frames, when it is named."""
@@ -65,7 +65,7 @@ class IndexedFolderReader:
     def _frame_files(self, folder: Path) -> list[Path]:
         return sorted(path for path in folder.glob(self._pattern) if path.name != self.index_file)
 
-    def _index_rows(self, index: TextTable) -> dict[str, TableRow]:
+    def _index_rows(self, index: CellTable) -> dict[str, TableRow]:
         """The rows of the index by key."""
         k = index.column(self.key_column)
         tests: dict[str, TableRow] = {}
@@ -81,8 +81,8 @@ class IndexedFolderReader:
         return tests
 
     def _split_common_file(
-        self, table: TextTable, index: TextTable, tests: dict[str, TableRow]
-    ) -> Iterator[tuple[str, TextTable]]:
+        self, table: CellTable, index: CellTable, tests: dict[str, TableRow]
+    ) -> Iterator[tuple[str, CellTable]]:
         """Key and frames of every test, cut from one table."""
         k = table.column(self.key_column)
 
@@ -97,11 +97,11 @@ class IndexedFolderReader:
             part = rows.get(key)
             if part is None:
                 raise HistoryError(f"{index.location(tests[key].line)}: test '{key}' has no frames in {table.path}")
-            yield key, table.with_rows(part)
+            yield key, replace(table, rows=part)
 
     def _read_files(
-        self, folder: Path, index: TextTable, tests: dict[str, TableRow], only: Path | None
-    ) -> Iterator[tuple[str, TextTable]]:
+        self, folder: Path, index: CellTable, tests: dict[str, TableRow], only: Path | None
+    ) -> Iterator[tuple[str, CellTable]]:
         """Key and frames of every test, each in a file of its own; of the one whose file is named, if any."""
         files = {key: folder / self.frames_file.replace("{key}", key) for key in tests}
         for path in self._frame_files(folder):
@@ -115,14 +115,14 @@ class IndexedFolderReader:
             if only is None or path == only:
                 yield key, self._frames(path)
 
-    def _frames(self, path: Path) -> TextTable:
+    def _frames(self, path: Path) -> CellTable:
         return read_table(path, self.vocabulary.ignored)
 
-    def _history(self, index: TextTable, row: TableRow, key: str, frames: TextTable) -> History:
+    def _history(self, index: CellTable, row: TableRow, key: str, frames: CellTable) -> History:
         entries = {name: entry for name, entry in index.entries(row).items() if name != self.key_column}
         location = index.location(row.line)
         entries.setdefault("alloy", SourceText(frames.path.absolute().parent.name, location))
-        known = KnownNames.of(self.vocabulary)
+        known = self.vocabulary.terms()
         unknown = [name for name in index.empty_columns(row) if known.is_condition(name) and name not in entries]
         if unknown and "label assumed" not in entries:
             entries["label assumed"] = SourceText(", ".join(map(unknown_text, unknown)), location)

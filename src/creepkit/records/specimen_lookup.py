@@ -155,7 +155,19 @@ def check_load(predictor: object, history: StatedTest) -> None:
         return
     name = getattr(_specimen_behind(predictor), "name", type(predictor).__name__)
     allowed = " or ".join(f"{load.name} ({load.unit})" if load.unit else load.name for load in loads)
-    raise SolveError(f"{history.origin}: specimen '{name}' is loaded by {allowed}, found {history.loading.quantity}")
+    advice = " or ".join(_LOADINGS[load.quantity] for load in loads if load.quantity in _LOADINGS)
+    raise SolveError(
+        f"{history.origin}: specimen '{name}' is loaded by {allowed}, found {history.loading.quantity}; use "
+        f"{advice or 'load_steps or constant_load'}"
+    )
+
+
+_LOADINGS = {
+    "stress": "StressSteps or constant_stress",
+    "strain": "StrainSteps or constant_strain",
+    "pressure": "PressureJump",
+}
+"""{quantity of a load: how it is written}."""
 
 
 def check_geometry(predictor: object, names: Iterable[str], where: str) -> None:

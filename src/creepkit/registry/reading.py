@@ -47,7 +47,7 @@ def read_those_that_can_be(
     return read, tests, errors
 
 
-@checked_with_own_words("path", "times")
+@checked_with_own_words("times")
 def read_frames(
     path: camera_reading.FramePath,
     format: camera_reading.FormatLike = None,
@@ -74,7 +74,7 @@ def frame_files(path: camera_reading.FramePath, format: camera_reading.FormatLik
 
 
 @takes_options(RecordOptions)
-@checked_with_own_words("format", "path", "options")
+@checked_with_own_words("options")
 def read_record(path: str | Path, format: str | None = None, **options: Any) -> InstrumentRecord:
     """Read the record of an instrument: channels of pressure, temperature and others over one clock.
 

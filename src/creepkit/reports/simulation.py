@@ -48,7 +48,7 @@ def section_figure(run: BulgeRun, time: float | None, name: str, path: str | Pat
 
     time = float(run.times[-1]) if time is None else float(time)
     field = run.field(name, time)
-    body = run.setup.model
+    body = run.test.model
     moved = body.nodes + run._at(run.simulation.displacements, time)
     figure = empty_figure(9.0, 3.1)
     axes = figure.subplots()
@@ -61,7 +61,7 @@ def section_figure(run: BulgeRun, time: float | None, name: str, path: str | Pat
         _draw_outline(axes, body.nodes, body.elements, side, color=_GREY, lw=0.8, ls=(0, (4, 3)))
         _draw_outline(axes, moved, body.elements, side, color="black", lw=0.9)
     figure.colorbar(coloured, ax=axes, label=_LABELS.get(name, name), shrink=0.8, pad=0.01, aspect=18)
-    pressure = float(run.setup.load_history.pressure.at(time))
+    pressure = float(run.test.load_history.pressure.at(time))
     axes.set(aspect="equal", xlabel="r, mm", ylabel="z, mm")
     axes.set_title(f"{run.name}: {_duration(time)}, {pressure:.3g} MPa (dashed: at rest)", fontsize=10)
     axes.spines[["top", "right"]].set_visible(False)
@@ -83,7 +83,7 @@ def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
         axes.set_ylabel(group[0].label if len(group) == 1 else f"{group[0].quantity}, {group[0].unit}")
         if len(group) > 1:
             axes.legend(fontsize=8, frameon=False)
-    program = run.setup.load_history.pressure
+    program = run.test.load_history.pressure
     inside = program.times[program.times < run.end_time]
     knots = np.unique(np.concatenate([inside, [0.0, run.end_time]]))
     panels[-1].plot(knots / 3600.0, program.at(knots), lw=1.5, color="tab:red")

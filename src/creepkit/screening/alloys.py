@@ -23,8 +23,8 @@ from creepkit.errors import FitError, HistoryError, nearest
 from creepkit.files.delimited_text import parse_number
 from creepkit.inverse.composite_predictor import CompositePredictor, predictor_for
 from creepkit.inverse.reference_conditions import detect_creep, distinct_loads
-from creepkit.readers.text_grids import read_table
-from creepkit.readers.text_tables import TextTable
+from creepkit.readers.table import CellTable
+from creepkit.readers.text_files import read_table
 from creepkit.records import History, Predictor, is_logarithmic, outputs_of_test
 
 
@@ -187,7 +187,7 @@ def read_compositions(path: str | Path) -> Compositions:
     return Compositions(compositions, str(path))
 
 
-def _composition_unit(table: TextTable) -> str:
+def _composition_unit(table: CellTable) -> str:
     entry = table.header.get("unit")
     if entry is None or entry.text not in COMPOSITION_UNITS:
         problem = "no line '# unit: ...'" if entry is None else f"unit '{entry.text}'"
@@ -196,7 +196,7 @@ def _composition_unit(table: TextTable) -> str:
     return entry.text
 
 
-def _element_columns(table: TextTable) -> list[str]:
+def _element_columns(table: CellTable) -> list[str]:
     table.column("alloy")
     elements = [name for name in table.columns if name != "alloy"]
     for name in elements:

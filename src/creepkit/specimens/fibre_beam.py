@@ -21,6 +21,7 @@ from creepkit import integration, kernels
 from creepkit.arrays import Floats, frozen
 from creepkit.errors import SolveError
 from creepkit.integration import FibreInput, FibreModel, FibreTest, IntegrationSettings
+from creepkit.integration.time_discretisation import SDIRK4_TEXT
 from creepkit.records import History, Load, NuisanceValues, Output, Prediction, Program, Status
 from creepkit.records.prediction_assembly import (
     HistoryPrediction,
@@ -29,8 +30,8 @@ from creepkit.records.prediction_assembly import (
     check_nuisances,
 )
 from creepkit.specimens.bar import SEARCH_TOLERANCE
-from creepkit.specimens.fibre_beam_text import fibre_beam_text
 from creepkit.specimens.run import Run, run_from_outputs
+from creepkit.specimens.settings_checks import check_ranges
 from creepkit.specimens.test_piece import TestPiece
 
 if TYPE_CHECKING:
@@ -87,19 +88,20 @@ class FibreBeam(TestPiece, ABC):
     """Whether the deflection is prescribed and the force observed."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (("stations", 1, 100), ("fibres", 1, 100), ("max_steps", 10, 10_000_000)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or int(value) != value or not low <= value <= high:
-                raise SolveError(f"specimen '{self.name}': {name} is {value!r}; allowed are {low} to {high}")
-        for name, least, most in (("tolerance", 1e-13, 1e-2), ("strain_limit", 1e-6, 10.0)):
-            value = getattr(self, name)
-            if not least <= value <= most:
-                raise SolveError(f"specimen '{self.name}': {name} is {value!r}; allowed are {least:g} to {most:g}")
+        ranges = {
+            "stations": (1, 100), "fibres": (1, 100), "max_steps": (10, 10_000_000), "tolerance": (1e-13, 1e-2),
+            "strain_limit": (1e-6, 10.0),
+        }  # fmt: skip
+        check_ranges(self, ranges, whole=("stations", "fibres", "max_steps"))
 
     def model_text(self, histories: Sequence[History]) -> str:
         """How the beam is simulated, in sentences for a paper."""
-        return fibre_beam_text(
-            len(self.beam_stations().moments), len(self.section()[0]), self.tolerance, self.strain_limit
+        return (
+            f"The beam has {len(self.beam_stations().moments)} sections of {len(self.section()[0])} fibres each, all "
+            "of them uniaxial material points; plane sections stay plane, deflections are small, shear is left out, "
+            "and deflections follow from the curvatures by virtual work. Fibres are integrated in time together by "
+            f"{SDIRK4_TEXT}, with a local error of at most {self.tolerance:g} in a step; the beam ruptures where a "
+            f"fibre reaches a creep strain of {self.strain_limit:g}."
         )
 
     @abstractmethod

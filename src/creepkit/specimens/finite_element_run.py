@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
+from creepkit import kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import FiniteElementModel
@@ -25,10 +27,12 @@ from creepkit.kernels.interface import (
 )
 from creepkit.kernels.rate_jumps import find_rate_jump
 from creepkit.records import Program, Status
-from creepkit.specimens.run import Run
+from creepkit.specimens.finite_element_tests import FiniteElementTest, Reduction, solver_settings
+from creepkit.specimens.run import Run, run_from_outputs
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
+    from creepkit.language import CreepLaw
 
 
 STRESS_FIELD, CREEP_STRAIN_FIELD = "stress", "creep strain"
@@ -52,16 +56,25 @@ class FiniteElementRun(Run):
     result; a time after the end is refused, for nothing is known there. At the time of a sudden change of load the
     state before it is meant.
 
-    simulation : the accepted steps. states : names of the law's internal variables.
+    test : the test piece with its lengths, its finite elements and its load history. simulation : the accepted steps.
+    states : names of the law's internal variables.
     """
 
+    test: FiniteElementTest = field(repr=False)
     simulation: Simulation = field(repr=False)
     states: tuple[str, ...] = ()
 
     @property
     def model(self) -> FiniteElementModel:
         """The finite elements."""
-        raise NotImplementedError
+        return self.test.model
+
+    def displacements(self, times: ArrayLike | None = None) -> Floats:
+        """Displacements of all nodes, (times, nodes, 2) mm, u_r and u_z.
+
+        times : number or (times,) s, by default those of the frames.
+        """
+        return self._at(self.simulation.displacements, times)
 
     def field(self, name: str = STRESS_FIELD, times: ArrayLike | None = None) -> FieldValues:
         """Von Mises "stress" (MPa), equivalent "creep strain" or a state of the law by its name, at all points.
@@ -105,6 +118,34 @@ class FiniteElementRun(Run):
             )
         rows = self.simulation.at(steps, wanted)
         return rows if wanted.ndim else np.asarray(rows[0])
+
+
+_RunType = TypeVar("_RunType", bound=FiniteElementRun)
+
+
+def run_test(
+    kind: type[_RunType],
+    test: FiniteElementTest,
+    law: CreepLaw,
+    values: Mapping[str, float],
+    reduction: Reduction | None = None,
+) -> _RunType:
+    """Simulate one test and keep all of it; by a reduced-order model, displacements alone."""
+    kernel = kernels.lower(law, "compiled")
+    theta = law.to_internal(law.values(values))[0]
+    if reduction is None:
+        simulation = test.simulate(kernel, theta, solver_settings(test.piece), keep_points=True)
+    else:
+        simulation = test.simulate(kernel, theta, reduction.settings, reduction.model_of(test.piece))
+    status, end_time, reason = simulation.status, simulation.end_time, simulation.reason
+    if reduction is None:
+        rate_failure = rate_failure_of(kernel, theta, simulation, test.load_history.temperature)
+        if rate_failure is not None:
+            status, end_time, reason = Status.NOT_CONVERGED, *rate_failure
+    return run_from_outputs(
+        kind, test.stated_history(), test.outputs, simulation.at(test.observed(simulation), test.history.times),
+        status, end_time, reason, test=test, simulation=simulation, states=tuple(map(str, law.states)),
+    )  # fmt: skip
 
 
 def uniaxial_points(stresses: Floats, strains: Floats, states: Floats, time: float, temperature: float) -> Floats:
@@ -164,12 +205,12 @@ def rate_jump_message(law: CompiledLaw, theta: Floats, point: Floats, stresses: 
 
 
 def rate_failure_of(
-    kernel: CompiledLaw, theta: Floats, simulation: Simulation, temperature: Program, stress: float
+    kernel: CompiledLaw, theta: Floats, simulation: Simulation, temperature: Program
 ) -> tuple[float, str] | None:
     """Until when the law had a creep rate, s, and where it has none: at any step, and beyond an early end.
 
-    theta : (parameters,) internal values. stress : MPa, that stands for the test. None where it always has one.
-    A simulation that stopped was on its way to other stresses, at most a few times those that stand for the test.
+    theta : (parameters,) internal values. None where it always has one.
+    A simulation that stopped was on its way to other stresses, at most a few times those that it had.
     """
     assert simulation.values is not None
     temperatures = temperature.at(simulation.times)
@@ -183,7 +224,7 @@ def rate_failure_of(
             return float(simulation.times[k - 1]), reason
     if simulation.status is Status.COMPLETE:
         return None
-    stresses = np.geomspace(0.1, 4.0, 9) * stress
+    stresses = np.geomspace(0.1, 4.0, 9) * float(np.max(simulation.mises, initial=1.0))
     worst = simulation.values[-1, np.argmax(simulation.values[-1, :, EQUIVALENT_STRAIN])]
     strains, states = np.full(9, worst[EQUIVALENT_STRAIN]), np.tile(worst[EQUIVALENT_STRAIN + 1 :], (9, 1))
     reason = missing_rate_message(

@@ -9,8 +9,8 @@ central differences.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -25,16 +25,14 @@ from creepkit.records import (
     History,
     HistoryPrediction,
     Load,
-    NuisanceValues,
     Output,
     PointLoading,
     Prediction,
     Specimen,
     assemble_prediction,
 )
-from creepkit.specimens.bar import NUISANCES, isothermal_elasticity, predict_with_nuisances
+from creepkit.specimens.point_specimen import PointSpecimen, isothermal_elasticity
 from creepkit.specimens.run import Run, run_from_outputs
-from creepkit.specimens.settings_checks import check_number, check_whole_number
 
 if TYPE_CHECKING:
     from creepkit.integration.tensor_integration import PointTrajectory
@@ -59,35 +57,14 @@ DEFAULT_ELASTICITY = (150e3, 0.3)
 
 
 @dataclass(frozen=True)
-class MaterialPoint:
-    """A material point.
-
-    tolerance : relative local error of a step of the integration. strain_limit : equivalent creep strain at which the
-    point has ruptured. max_steps : cap on the steps of one history, beside those for its frames and each row of its
-    programs.
-    """
-
-    tolerance: float = 1e-5
-    strain_limit: float = 1.0
-    max_steps: int = 2000
+class MaterialPoint(PointSpecimen):
+    """A material point; the cap on steps is beside those for its frames and each row of its programs."""
 
     name: ClassVar[str] = "point"
     title: ClassVar[str] = "Material point under prescribed stresses and strains of any components"
     outputs: ClassVar[tuple[Output, ...]] = OUTPUTS
     loads: ClassVar[tuple[Load, ...]] = (Load("components", "number"),)
-    nuisances: ClassVar[tuple[str, ...]] = NUISANCES
-    """Kinds of explicit nuisances that predict() understands."""
-
-    def __post_init__(self) -> None:
-        check_number(self.name, "tolerance", self.tolerance, "1e-10 to 1e-2")
-        check_number(self.name, "strain_limit", self.strain_limit, "above 0, up to 10")
-        check_whole_number(self.name, "max_steps", self.max_steps, "10 to 10 000 000")
-        in_range = 1e-10 <= self.tolerance <= 1e-2 and 0 < self.strain_limit <= 10
-        if not (in_range and 10 <= self.max_steps <= 10_000_000):
-            raise SolveError(
-                f"point specimen: tolerance {self.tolerance:g}, strain_limit {self.strain_limit:g}, max_steps "
-                f"{self.max_steps}; allowed are 1e-10 to 1e-2, above 0 up to 10, and 10 to 10 000 000"
-            )
+    least_tolerance: ClassVar[float] = 1e-10
 
     def model_text(self, histories: Sequence[History]) -> str:
         """How the point is simulated, in sentences for a paper."""
@@ -97,27 +74,6 @@ class MaterialPoint:
             f"integrated in time by {SDIRK2_TEXT}, with a local error of at most {self.tolerance:g} of the strain in a "
             f"step, and ruptures at an equivalent creep strain of {self.strain_limit:g}."
         )
-
-    def replace(self, **changes: float) -> MaterialPoint:
-        """The same specimen with some fields changed."""
-        return replace(self, **changes)  # type: ignore[arg-type]
-
-    def predict(
-        self,
-        law: CreepLaw,
-        theta: Floats,
-        histories: Sequence[History],
-        *,
-        nuisances: NuisanceValues | None = None,
-        sensitivities: bool = False,
-    ) -> Prediction:
-        """Predict all components of each history at its times; see records.Predictor.
-
-        theta : (candidates, parameters) internal values.
-        nuisances : "temperature" (K above what the history says) and "modulus" (relative change).
-        """
-        predict_plain = partial(self._predict, law)
-        return predict_with_nuisances(predict_plain, theta, histories, nuisances, sensitivities, specimen=self.name)
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
         """Run one test, keeping all tensors and the states of the law; see PointRun."""
@@ -139,7 +95,10 @@ class MaterialPoint:
 
     # ---- one history at a time -------------------------------------------------------------------------------------
 
-    def _predict(self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool) -> Prediction:
+    def predict_plain(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool
+    ) -> Prediction:
+        """Predict histories without nuisances; theta : (candidates, parameters) internal values."""
         kernel = kernels.lower(law, "compiled")
         steps = DIFFERENCE_STEP * np.array([1.0 if p.scale == "log" else np.inf for p in law.params.values()])
         steps = np.where(np.isinf(steps), DIFFERENCE_STEP * np.maximum(1.0, np.abs(theta)), steps)
@@ -171,7 +130,12 @@ class MaterialPoint:
         """One history whose stress keeps its direction: what is shown is a straight line in the creep strain."""
         test = integration.PointTest(path.driving, history.temperature_program(), history.times, path.stiffness)
         result = integration.integrate(
-            kernel, theta, [test], settings=self._settings(history), jacobian=jacobian, axes=path.axes
+            kernel,
+            theta,
+            [test],
+            settings=self.integration_settings(history.times.size),
+            jacobian=jacobian,
+            axes=path.axes,
         )
         stress, stress_derivative = (
             _imposed(history) + np.outer(path.driving.at(history.times), path.along),
@@ -195,7 +159,7 @@ class MaterialPoint:
         stress_only = not loading.strain and not history.includes_elastic
         elastic = DEFAULT_ELASTICITY if stress_only and history.elastic is None else _elastic(history)
         temperature = history.temperature_program()
-        settings = self._settings(history)
+        settings = self.integration_settings(history.times.size)
         return integrate_tensor_point(
             kernel, theta, elastic, controls, temperature, history.times, settings=settings, tableau=SDIRK4
         )
@@ -210,10 +174,6 @@ class MaterialPoint:
             )
             slopes[:, :, p] = (up - down) / (2 * steps[p])
         return slopes
-
-    def _settings(self, history: History) -> integration.IntegrationSettings:
-        most = int(self.max_steps) + history.times.size
-        return integration.IntegrationSettings(rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=most)
 
 
 def _loading(history: History) -> PointLoading:

@@ -21,7 +21,8 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
 from creepkit.records import History, Load, Output, Program, Specimen
-from creepkit.specimens.bar import Bar, isothermal_elasticity
+from creepkit.specimens.bar import Bar
+from creepkit.specimens.point_specimen import isothermal_elasticity
 
 if TYPE_CHECKING:
     from creepkit.integration import PointTest
@@ -69,7 +70,7 @@ class Relaxation(Bar):
 
         output : (times,) MPa.
         """
-        from creepkit.integration.event_location import STEP_TOO_SMALL
+        from creepkit.integration.core_structures import STEP_TOO_SMALL
 
         driving, moment = point_test(history).driving, 1e-9 * max(end, 1e-3)
         compressed = "the stress falls below zero, and a compressed bar needs the specimen point"

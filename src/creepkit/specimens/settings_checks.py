@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from numbers import Real
 from typing import Any
 
 from creepkit.errors import SolveError
 
 
-def is_finite_number(value: Any) -> bool:
-    """Whether a setting is one finite number, which True and False are not."""
-    return not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
+def check_ranges(
+    specimen: Any, ranges: Mapping[str, tuple[float, float]], whole: tuple[str, ...] = ("max_steps", "threads")
+) -> None:
+    """SolveError unless settings are finite numbers within their ranges, whole ones where they count.
 
-
-def is_whole_number(value: Any) -> bool:
-    """Whether a setting is a finite number without a fraction: 1000 is, and so is 1e3."""
-    return is_finite_number(value) and bool(value == int(value))
-
-
-def check_number(specimen: str, name: str, value: object, allowed: str) -> None:
-    """SolveError unless a setting is a finite number; allowed : the range, in words."""
-    if not is_finite_number(value):
-        raise SolveError(f"{specimen} specimen: {name} is {value!r}; allowed are finite numbers, {allowed}")
-
-
-def check_whole_number(specimen: str, name: str, value: object, allowed: str) -> None:
-    """SolveError unless a setting is a whole number; allowed : the range, in words."""
-    if not is_whole_number(value):
-        raise SolveError(f"{specimen} specimen: {name} is {value!r}; allowed are whole numbers, {allowed}")
+    ranges : {setting: (lowest, highest)}, both allowed but for a lowest of zero.
+    """
+    for name, (low, high) in ranges.items():
+        value = getattr(specimen, name)
+        number = not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
+        if not (number and low <= value <= high and value != 0.0 and (name not in whole or value == int(value))):
+            kind = "whole" if name in whole else "finite"
+            allowed = f"{low:.15g} to {high:.15g}" if low > 0.0 else f"above 0, up to {high:.15g}"
+            raise SolveError(f"{specimen.name} specimen: {name} is {value!r}; allowed are {kind} numbers, {allowed}")

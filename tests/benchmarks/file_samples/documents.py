@@ -101,7 +101,7 @@ def samples() -> Iterator[ReaderSample]:
     yield ReaderSample(**{**study.__dict__, "repeated": keys})
     files = [Attachment("study.toml", STUDY.encode()), Attachment("data/a.csv", NODES.encode())]
     report = f"<!doctype html><html><body>{embed(files)}</body></html>".encode()
-    yield document("report", "x.html", report, read_attachments, '"files" "sha256" data-number')
+    yield document("report", "x.html", report, read_attachments)
     mesh = {"nodes.csv": NODES.encode(), "elements.csv": ELEMENTS.encode(), "sets.json": SETS.encode()}
     for file, keys_of in (("nodes.csv", "r_mm z_mm"), ("elements.csv", "n1 n4"), ("sets.json", '"top"')):
         others = {name: content for name, content in mesh.items() if name != file}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from creepkit.integration import IntegrationSettings, PointTest, integrate
-from creepkit.integration.event_location import DIVERGED, REACHED_END, STATE_LIMIT, STRAIN_LIMIT, TOO_MANY_STEPS
+from creepkit.integration.core_structures import DIVERGED, REACHED_END, STATE_LIMIT, STRAIN_LIMIT, TOO_MANY_STEPS
 from creepkit.integration.time_discretisation import SDIRK2
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Param, State, parameters, stress

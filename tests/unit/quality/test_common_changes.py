@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creepkit.quality import check_data_quality
-from creepkit.quality.rig_flags import temperature_step
+from creepkit.quality.rig import temperature_step
 from creepkit.quality.smooth_curve import smooth_curve
 from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, PressureJump

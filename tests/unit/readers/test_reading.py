@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from creepkit.errors import HistoryError
-from creepkit.quality.comparison import duplicate_tests
+from creepkit.quality.copies import duplicate_tests
 from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, Program, constant_stress
 

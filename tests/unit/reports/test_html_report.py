@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import re
 from dataclasses import replace
 from functools import cache
@@ -56,24 +54,13 @@ def test_it_is_html_of_known_elements_alone(page: str) -> None:
     found = elements(parsed(page))
     assert {tag(e) for e in found} <= set(TAGS.split())
     assert not [name for e in found for name in e.attrib if str(name).startswith("on")]
-    scripts = [e.get("type") for e in found if tag(e) == "script"]
-    assert set(scripts) == {None, "application/json", "application/x-creepkit-attachment"}
+    assert [e.get("type") for e in found if tag(e) == "script"] == ["application/zip"]  # data: none is run
 
 
-def test_the_policy_names_each_script_that_is_run_and_no_other(page: str) -> None:
-    found = elements(parsed(page))
-    (policy,) = (e.get("content") for e in found if e.get("http-equiv") == "Content-Security-Policy")
-    run = [e.text or "" for e in found if tag(e) == "script" and e.get("type") is None]
-    hashes = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in run]
-    (stated,) = re.findall(r"script-src ([^;]*);", policy)
-    assert stated.split() == ["'wasm-unsafe-eval'", *(f"'sha256-{one}'" for one in hashes)]  # the core, compiled
+def test_no_script_may_run(page: str) -> None:
+    (policy,) = (e.get("content") for e in elements(parsed(page)) if e.get("http-equiv") == "Content-Security-Policy")
     assert "default-src 'none'" in policy
-
-
-def test_without_a_law_no_script_is_run() -> None:
-    page = report_html(ReportContents(title="nothing", notes=("a note",)))
-    assert "script-src" not in page
-    assert not [e for e in elements(parsed(page)) if tag(e) == "script" and e.get("type") is None]
+    assert "script-src" not in policy
 
 
 @pytest.mark.parametrize(

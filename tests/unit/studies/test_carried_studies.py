@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-import json
+import base64
+import io
+import re
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -56,10 +59,14 @@ def test_a_report_gives_back_study_lock_and_data_alone(study: Path, tmp_path: Pa
     "name", ["../stolen.csv", "inputs/../../stolen.csv", "/stolen.csv", "C:/stolen.csv", "..\\stolen.csv"]
 )
 def test_a_forged_report_writes_nothing_outside_its_folder_or_inside(study: Path, tmp_path: Path, name: str) -> None:
-    """Its list of files is altered in the page: no name is followed, and not even the sound files are written."""
-    page, before = tmp_path / "page.html", sorted(tmp_path.rglob("*"))
-    sound = embed([Attachment("study.toml", STUDY.encode()), Attachment("inputs/data/one.csv", b"x")])
-    page.write_text(sound.replace('"inputs/data/one.csv"', json.dumps(name)))
+    """A file of its archive is renamed: no name is followed, and not even the sound files are written."""
+    page, before, archive = tmp_path / "page.html", sorted(tmp_path.rglob("*")), io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as packed:
+        packed.writestr("study.toml", STUDY)
+        packed.writestr(name, "x")
+    sound = embed([Attachment("study.toml", b"")])
+    forged = base64.b64encode(archive.getvalue()).decode()
+    page.write_text(re.sub(">.*<", lambda found: f">{forged}<", sound))
     with pytest.raises(CreepkitError, match="cannot be trusted: the name .* is not a plain path") as caught:
         study_of_report(page, tmp_path / "made")
     assert "\n" not in str(caught.value)

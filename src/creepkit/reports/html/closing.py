@@ -33,10 +33,8 @@ if TYPE_CHECKING:
     from creepkit.reports.html.findings import GroupFindings
 
 
-def closing_sections(
-    contents: ReportContents, found: Sequence[GroupFindings], before_provenance: Sequence[PageSection] = ()
-) -> list[PageSection]:
-    """Exports, methods, what stands before provenance, provenance, and what is missing."""
+def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -> list[PageSection]:
+    """Exports, methods, provenance, and what is missing."""
     return [
         _exports_section(contents, found),
         PageSection(
@@ -45,7 +43,6 @@ def closing_sections(
             _methods_blocks(contents, found) if found or contents.rupture else [],
             result="for a paper, with equations and references",
         ),
-        *before_provenance,
         PageSection(
             "provenance", "How to repeat", _provenance_blocks(contents), result="commands, settings, versions, inputs"
         ),

@@ -89,14 +89,6 @@ class Downloads:
 
 
 @dataclass(frozen=True)
-class Fragment:
-    """Markup of our own with scripts in it, which the policy of the page names by their hashes; not printed."""
-
-    kind: ClassVar[str] = "fragment"
-    markup: Markup
-
-
-@dataclass(frozen=True)
 class Answer:
     """The first screen: headline, picture, and a card with the law, its key figures, cautions and files.
 
@@ -115,7 +107,7 @@ class Answer:
     files: Sequence[tuple[str, str, str]] = ()
 
 
-Block: TypeAlias = Answer | Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads | Fragment
+Block: TypeAlias = Answer | Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads
 
 
 @dataclass(frozen=True)

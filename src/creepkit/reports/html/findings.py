@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.quality.flags import DataQuality
     from creepkit.reports.contents import ReportGroup
-    from creepkit.reports.html.page_figures import PageFigures
+    from creepkit.reports.html.svg import PageFigures
 
 
 REJECTED = (

@@ -28,7 +28,7 @@ from creepkit.reports.html.findings import GroupFindings, values_section
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import correlation_table, titled_law
 from creepkit.reports.html.methods_identification import rate_scatter_sentence
-from creepkit.reports.html.page_figures import PageFigures
+from creepkit.reports.html.svg import PageFigures
 from creepkit.reports.identification_text import rejected, rupture_rows, scatter_of_rates
 from creepkit.reports.judged_readings import LAW_RATE_MEANING, OWN_RATE_CHI_SQUARE, judged_readings
 from creepkit.reports.load_programs import SECONDS_PER_HOUR

@@ -18,8 +18,8 @@ from creepkit.reports.contents import ReportGroup
 from creepkit.reports.html.elements import Block, Formula, Paragraph, Table, Verbatim, number
 from creepkit.reports.html.findings import answer_block, findings_of
 from creepkit.reports.html.groups import ranking_blocks
-from creepkit.reports.html.page_figures import PageFigures
 from creepkit.reports.html.stage_sections import forecast_blocks
+from creepkit.reports.html.svg import PageFigures
 from creepkit.reports.html.templates import template
 
 STYLE = (

@@ -20,9 +20,8 @@ from creepkit.reports.html.findings import GroupFindings, answer_block, findings
 from creepkit.reports.html.groups import group_sections
 from creepkit.reports.html.law_names import LawNames, title_in_sentence
 from creepkit.reports.html.law_tables import law_title
-from creepkit.reports.html.page_figures import PageFigures
-from creepkit.reports.html.sliders import fragment_style, script_policy, slider_sections
 from creepkit.reports.html.stage_sections import stage_sections, strength_blocks
+from creepkit.reports.html.svg import PageFigures
 from creepkit.reports.html.templates import resource, template
 from creepkit.reports.identification_text import rejected
 from creepkit.reports.plate_figure import plate_figure
@@ -43,8 +42,7 @@ MOST_RANKINGS_DRAWN = 12
 def report_html(contents: ReportContents) -> str:
     """The page: the answer on one screen, and folded behind it values, tests, laws, data, other stages and methods.
 
-    It holds everything itself, loads nothing, and is the same text for the same contents. Only the sliders need
-    scripts, and no others run.
+    It holds everything itself, loads nothing, runs no scripts, and is the same text for the same contents.
     """
     contents = dataclasses.replace(contents, groups=tuple(map(with_histories, contents.groups)))
     figures = PageFigures()
@@ -54,16 +52,14 @@ def report_html(contents: ReportContents) -> str:
         *_group_sections(found, figures),
         data_section(contents, found),
         *stage_sections(contents, figures, LawNames.of(fit for one in found for fit in one.fits)),
-        *closing_sections(contents, found, slider_sections(found)),
+        *closing_sections(contents, found),
     ]
     shown = [section for section in map(_without_empty, sections) if not section.empty]
     return template("page.html").render(
         title=printable(contents.title, 200) or "Report",
         summary=_summary(contents, found),
-        script_policy=Markup(script_policy(shown)),
         sections=shown,
         style=Markup(resource("style.css")),
-        fragment_style=Markup(fragment_style(shown)),
         attachments=Markup(embed(contents.attachments)),
         version=version("creepkit"),
     )

@@ -30,7 +30,7 @@ from creepkit.reports.html.elements import (
 from creepkit.reports.html.findings import findings_of
 from creepkit.reports.html.law_names import LawNames
 from creepkit.reports.html.law_tables import LAW_REJECTED
-from creepkit.reports.html.page_figures import PageFigures
+from creepkit.reports.html.svg import PageFigures
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.rupture import rupture_text, strength_rows
 from creepkit.reports.rupture_plot import rupture_figure

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
-from creepkit.records import History, NuisanceValues, Prediction
 from creepkit.specimens.axisymmetric.settings import AxisymmetricSettings
+from creepkit.specimens.finite_element_specimen import FiniteElementSpecimen
 
 if TYPE_CHECKING:
-    from creepkit.language import CreepLaw
-    from creepkit.specimens.axisymmetric.run import AxisymmetricRun
+    from creepkit.specimens.axisymmetric.finite_elements import AxisymmetricTest
 
 
 @checked
 @dataclass(frozen=True, kw_only=True)
-class Axisymmetric(AxisymmetricSettings):
+class Axisymmetric(AxisymmetricSettings, FiniteElementSpecimen):
     """A body of revolution in creep at finite strain, simulated by finite elements.
 
     A subclass is a frozen dataclass whose lengths are fields made by `ck.dimension`. It states `name`, `title`,
@@ -35,33 +32,9 @@ class Axisymmetric(AxisymmetricSettings):
     threads : simulations that run at the same time; None for one on each core.
     """
 
-    def predict(
-        self,
-        law: CreepLaw,
-        theta: Floats,
-        histories: Sequence[History],
-        *,
-        nuisances: NuisanceValues | None = None,
-        sensitivities: bool = False,
-    ) -> Prediction:
-        """Predict the outputs of each history at its times; see records.Predictor.
+    @property
+    def test_kind(self) -> type[AxisymmetricTest]:
+        """See AxisymmetricTest."""
+        from creepkit.specimens.axisymmetric.finite_elements import AxisymmetricTest
 
-        theta : (candidates, parameters) internal values.
-        """
-        from creepkit.specimens.axisymmetric.finite_elements import predict_axisymmetric
-
-        return predict_axisymmetric(self, law, theta, histories, nuisances or {}, sensitivities)
-
-    def model_text(self, histories: Sequence[History]) -> str:
-        """How the body is simulated, in sentences for a paper."""
-        from creepkit.specimens.axisymmetric.finite_elements import prepared_section, solver_settings
-        from creepkit.specimens.finite_element_tests import finite_element_text
-
-        load = histories[0].loading.quantity if histories else self.loads[0].name
-        return finite_element_text(prepared_section(self, load).model, solver_settings(self))
-
-    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> AxisymmetricRun:
-        """Run one test, keeping displacements, stresses and strains of the whole body; see AxisymmetricRun."""
-        from creepkit.specimens.axisymmetric.run import run_axisymmetric
-
-        return run_axisymmetric(self, law, values, plan)
+        return AxisymmetricTest

@@ -7,7 +7,7 @@ it was trained for, and the derivatives to a thickness are exact; another basis 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar
 
@@ -17,7 +17,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.reduced_order_model import ReducedOrderModel
-from creepkit.fem.simulation import LoadHistory, simulate
+from creepkit.fem.simulation import simulate
 from creepkit.fem.solver import SolverSettings
 from creepkit.records import (
     PROGRAM_NUISANCES,
@@ -26,15 +26,14 @@ from creepkit.records import (
     Output,
     Prediction,
     Predictor,
-    Program,
     SupportsRefinement,
 )
-from creepkit.specimens.bulge.finite_elements import predict_bulge, solver_settings
+from creepkit.specimens.bulge.finite_elements import BulgeTest, model_of_geometry, radii_of_top
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import DEFAULT_WINDOW, Observation
 from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
 from creepkit.specimens.bulge.settings import BulgeSettings
-from creepkit.specimens.bulge.setup import BulgeSetup, model_of_geometry, model_of_specimen
+from creepkit.specimens.finite_element_tests import Reduction, predict_tests, solver_settings
 from creepkit.specimens.reduced_order_training import MODES, RAMP, power_law_runs, trained_basis
 
 if TYPE_CHECKING:
@@ -79,16 +78,20 @@ class BulgeReducedOrderModel:
     modes: int = MODES
     points: int | None = None
     searching: bool = False
-    name: str = field(default="bulge, reduced-order model", init=False)
-    title: str = field(default="Bulge test in a reduced-order model, for searches", init=False)
-    outputs: tuple[Output, ...] = field(default=OBSERVED, init=False)
-
+    name: ClassVar[str] = "bulge, reduced-order model"
+    title: ClassVar[str] = "Bulge test in a reduced-order model, for searches"
     optional_outputs: ClassVar[tuple[Output, ...]] = (*OBSERVED, *RING_OUTPUTS)
-    nuisances: ClassVar[tuple[str, ...]] = BulgeSettings.nuisances
     program_nuisances: ClassVar[tuple[str, ...]] = PROGRAM_NUISANCES
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "outputs", self.specimen.observation.outputs)
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """As the specimen's."""
+        return self.specimen.outputs
+
+    @property
+    def nuisances(self) -> tuple[str, ...]:
+        """As the specimen's."""
+        return self.specimen.nuisances
 
     def outputs_of_test(self, history: History) -> tuple[Output, ...]:
         """As the specimen's."""
@@ -107,9 +110,9 @@ class BulgeReducedOrderModel:
 
         theta : (candidates, parameters) internal values.
         """
-        return predict_bulge(
-            self.specimen, law, theta, histories, nuisances or {}, sensitivities, self.reduced_model_of,
-            self._settings(sensitivities),
+        return predict_tests(
+            BulgeTest, self.specimen, law, theta, histories, nuisances or {}, sensitivities,
+            Reduction(self.reduced_model_of, self._settings(sensitivities)),
         )  # fmt: skip
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
@@ -117,10 +120,11 @@ class BulgeReducedOrderModel:
 
         A field of the run is a SolveError.
         """
-        from creepkit.specimens.bulge.run import ReducedSimulation, run_bulge
+        from creepkit.specimens.bulge.run import BulgeRun
+        from creepkit.specimens.finite_element_run import run_test
 
-        reduced = ReducedSimulation(self.reduced_model_of, self._settings(False))
-        return run_bulge(self.specimen, law, values, plan, reduced)
+        reduction = Reduction(self.reduced_model_of, self._settings(False))
+        return run_test(BulgeRun, BulgeTest.of(self.specimen, plan, {}), law, values, reduction)
 
     def for_search(self) -> BulgeReducedOrderModel:
         """The same model in longer steps."""
@@ -135,25 +139,14 @@ class BulgeReducedOrderModel:
         newton = 1e-3 * tolerance  # with and without derivatives, so that values are the same
         return settings._replace(tolerance=tolerance, newton=newton, growth=SEARCH_GROWTH)
 
-    def reduced_model_of(self, setup: BulgeSetup) -> ReducedOrderModel:
-        """The reduced-order model of a test that is set up."""
-        if setup.refinement is None:
-            basis = trained_basis([setup.model], solver_settings(self.specimen), modes=self.modes, points=self.points)
-            return ReducedOrderModel(setup.model, basis)
-        model = _model_of_geometry(self.specimen, setup.geometry, setup.refinement, self.modes, self.points)
-        return _with_leading_modes(model, SEARCH_MODES) if self.searching else model
-
-    def own_setup(self) -> BulgeSetup:
-        """The specimen's own dimple without a load, set up."""
-        specimen, unloaded, stiffness = self.specimen, Program.constant(0.0), Program.constant(1.0)
-        refinement = specimen.refinement if specimen.mesh is None else None
-        return BulgeSetup(
-            model_of_specimen(specimen),
-            LoadHistory(unloaded, unloaded, stiffness, 1.0),
-            specimen.geometry,
-            specimen.observation,
-            refinement,
-        )
+    def reduced_model_of(self, piece: BulgeSettings) -> ReducedOrderModel:
+        """The reduced-order model of a test piece."""
+        if piece.mesh is not None:
+            model = BulgeTest.model_of(piece)
+            basis = trained_basis([model], solver_settings(self.specimen), modes=self.modes, points=self.points)
+            return ReducedOrderModel(model, basis)
+        reduced = _model_of_geometry(self.specimen, piece.geometry, self.modes, self.points)
+        return _with_leading_modes(reduced, SEARCH_MODES) if self.searching else reduced
 
     def train(self) -> str:
         """Train the model of the specimen's own dimple, and keep it on disk; its modes and points, in words."""
@@ -162,7 +155,7 @@ class BulgeReducedOrderModel:
 
     def cubature_model(self) -> ReducedOrderModel:
         """The model of the specimen's own dimple, whose points can be drawn."""
-        return self.reduced_model_of(self.own_setup())
+        return self.reduced_model_of(self.specimen)
 
     def prediction_error(
         self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, nuisances: NuisanceValues | None = None
@@ -172,7 +165,7 @@ class BulgeReducedOrderModel:
         theta : (candidates, parameters) internal values. Costs a simulation each; NaN where either has ended.
         """
         reduced = self.predict(law, theta, histories, nuisances=nuisances)
-        exact = predict_bulge(self.specimen, law, theta, histories, nuisances or {}, False)
+        exact = predict_tests(BulgeTest, self.specimen, law, theta, histories, nuisances or {}, False)
         return np.asarray(reduced.values - exact.values)
 
     @property
@@ -203,11 +196,11 @@ def _output_errors(predictor: BulgeReducedOrderModel) -> tuple[float, ...]:
     On the specimen's own dimple, in its own window.
     """
     specimen = predictor.specimen
-    setup = predictor.own_setup()
-    model, reduced = setup.model, predictor.reduced_model_of(setup)
+    model, reduced = BulgeTest.model_of(specimen), predictor.reduced_model_of(specimen)
+    radii = radii_of_top(model)
     fit = specimen.observation
     if fit.form == "rings":
-        fit = Observation(window=min(DEFAULT_WINDOW, float(setup.radii[-1])))
+        fit = Observation(window=min(DEFAULT_WINDOW, float(radii[-1])))
     runs = power_law_runs([model], TESTED_RUNS, seed=1)
     settings, errors = solver_settings(specimen), []
     for run in runs:
@@ -216,7 +209,7 @@ def _output_errors(predictor: BulgeReducedOrderModel) -> tuple[float, ...]:
         times = made[0].times[(made[0].times > RAMP) & (made[0].times <= end)]
         profiles = [each.displacements[:, model.top, 1] for each in made]
         exact, found = (
-            np.hstack([fit.observe_at_times(setup.radii, profile, each.timeline, times), each.at(profile, times)])
+            np.hstack([fit.observe_at_times(radii, profile, each.timeline, times), each.at(profile, times)])
             for each, profile in zip(made, profiles, strict=True)
         )
         errors.append(np.abs(found - exact))
@@ -231,9 +224,10 @@ def _with_leading_modes(model: ReducedOrderModel, count: int) -> ReducedOrderMod
 
 @lru_cache(maxsize=256)
 def _model_of_geometry(
-    specimen: BulgeSettings, geometry: DimpleGeometry, refinement: float, modes: int, points: int | None
+    specimen: BulgeSettings, geometry: DimpleGeometry, modes: int, points: int | None
 ) -> ReducedOrderModel:
     """The reduced-order model of a dimple; kept, for a fit needs it a thousand times."""
+    refinement = specimen.refinement
     model = model_of_geometry(geometry, refinement)
     candidates = _thicknesses(nominal_geometry(specimen.geometry, geometry), refinement)
     alike = [each for each in candidates if _same_numbering(model, each)] or [model]

@@ -23,11 +23,11 @@ from creepkit.records import (
     SurfaceRegion,
 )
 from creepkit.specimens.bulge.camera_points import observe_surface, surface_center
-from creepkit.specimens.bulge.geometry import LENGTH_RANGE, DimpleGeometry
+from creepkit.specimens.bulge.geometry import LENGTH_RANGE, REFINEMENT_RANGE, DimpleGeometry
 from creepkit.specimens.bulge.observation import Observation
 from creepkit.specimens.bulge.outputs import OBSERVED, PLOT_RADII, RING_OUTPUTS, profile_displacement
+from creepkit.specimens.finite_element_settings import FiniteElementSettings
 from creepkit.specimens.load_scaling import LoadScaling
-from creepkit.specimens.settings_checks import check_number, check_whole_number, is_whole_number
 
 if TYPE_CHECKING:
     from creepkit.fem.mesh import Mesh
@@ -41,16 +41,8 @@ _CLAMPED = {"bottom": "at the underside of the plate outside the cavity", "rim":
 """Where a clamped edge is."""
 
 
-_RANGES = {
-    "tolerance": (1e-6, 0.1),
-    "deflection_limit": (1e-3, 1e3),
-    "strain_limit": (1e-3, 10.0),
-    "max_steps": (10, 100_000),
-}
-
-
 @dataclass(frozen=True)
-class BulgeSettings:
+class BulgeSettings(FiniteElementSettings):
     """A dimple under gas pressure, its observation and the limits of its simulation.
 
     geometry : the dimple; its fields may be given to `replace` directly. A history's own geometry (such as its
@@ -68,16 +60,18 @@ class BulgeSettings:
     geometry: DimpleGeometry = field(default_factory=DimpleGeometry)
     observation: Observation = field(default_factory=Observation)
     mesh: Mesh | None = None
-    refinement: float = 1.0
     tolerance: float = 1e-2
+    resolution: float = 0.01
     deflection_limit: float = 3.0
-    strain_limit: float = 1.0
-    max_steps: int = 1000
-    threads: int | None = None
 
-    nuisances: ClassVar[tuple[str, ...]] = (*("thickness", "modulus", "temperature", "window"), *DimpleGeometry.lengths)
-    """Kinds of explicit nuisances that predict() understands."""
+    name: ClassVar[str] = "bulge"  # type: ignore[misc]
+    title: ClassVar[str] = "Bulge test of a dimple under gas pressure, by finite elements"
+    optional_outputs: ClassVar[tuple[Output, ...]] = (*OBSERVED, *RING_OUTPUTS)
+    """Those that a test has whose operator says so."""
 
+    ranges: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
+        {**FiniteElementSettings.ranges, "refinement": REFINEMENT_RANGE, "deflection_limit": (1e-3, 1e3)}
+    )
     loads: ClassVar[tuple[Load, ...]] = (Load("pressure", "pressure", "gas pressure", ramp=5.0),)
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {"pressure": (3.0, 25.0), "modulus": (50e3, 300e3)}
@@ -93,16 +87,10 @@ class BulgeSettings:
     frame_interval: ClassVar[float] = 150.0
     """s between frames of a planned test, as the paper's cameras took them."""
 
-    def __post_init__(self) -> None:
-        for name, (low, high) in _RANGES.items():
-            value = getattr(self, name)
-            check = check_whole_number if name == "max_steps" else check_number
-            check("bulge", name, value, f"{low:g} to {high:g}")
-            if not low <= value <= high:
-                raise SolveError(f"bulge specimen: {name} is {value:g}; allowed are {low:g} to {high:g}")
-        if self.threads is not None and not (is_whole_number(self.threads) and self.threads >= 1):
-            allowed = "whole numbers above zero, or None for all cores"
-            raise SolveError(f"bulge specimen: threads is {self.threads!r}; allowed are {allowed}")
+    @property
+    def outputs(self) -> tuple[Output, ...]:  # type: ignore[override]
+        """What the operator of the specimen observes."""
+        return self.observation.outputs
 
     def replace(self, **changes: Any) -> Self:
         """The same specimen with some fields, or lengths of its geometry, changed: replace(apex_thickness=0.48).
@@ -111,14 +99,27 @@ class BulgeSettings:
         """
         if isinstance(changes.get("observation"), str):
             changes["observation"] = Observation.from_text(changes["observation"])
-        own_fields = {f.name for f in fields(self) if f.init}
-        known = own_fields | {f.name for f in fields(self.geometry)}
+        own_fields = {f.name for f in fields(self)}
+        known = own_fields | {"window", *(f.name for f in fields(self.geometry))}
         for name in changes.keys() - known:
             raise SolveError(f"a bulge specimen has no field '{name}'; {nearest(name, known)}")
+        if "window" in changes:
+            changes["observation"] = changes.get("observation", self.observation).within(changes.pop("window"))
         geometry_changes = {name: changes.pop(name) for name in list(changes) if name not in own_fields}
         if geometry_changes:
             changes["geometry"] = changes.get("geometry", self.geometry).replace(**geometry_changes)
         return replace(self, **changes)
+
+    def of_test(self, history: History, nuisances: Mapping[str, float]) -> tuple[Self, History]:
+        """As of every test piece, with the operator of the test."""
+        stated = [name for name in history.geometry if name in DimpleGeometry.lengths]
+        if self.mesh is not None and stated:
+            raise SolveError(
+                f"{history.origin} has a geometry of its own ({', '.join(stated)}), which a specimen with a mesh from "
+                "files cannot follow; use one without mesh="
+            )
+        piece = replace(self, observation=self.observation_of(history))
+        return FiniteElementSettings.of_test(piece, history, nuisances)
 
     @property
     def boundary_text(self) -> str:
@@ -159,10 +160,10 @@ class BulgeSettings:
 
     @property
     def dimensions(self) -> tuple[Dimension, ...]:
-        """The lengths of the dimple, and the window within which it is observed."""
+        """The lengths of the dimple, unless its mesh is from elsewhere, and the window within which it is observed."""
         lengths = tuple(
             Dimension(name, getattr(self.geometry, name), LENGTH_RANGE, **_LENGTHS.get(name, {}))
-            for name in DimpleGeometry.lengths
+            for name in (DimpleGeometry.lengths if self.mesh is None else ())
         )
         return (*lengths, Dimension("window", self.observation.window, LENGTH_RANGE, of_piece=False))
 

@@ -7,73 +7,44 @@ first pressure ramp; creep acts during ramps.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from creepkit.arrays import Floats
 from creepkit.hookspecs import hookimpl
-from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Output, Prediction, Predictor, Specimen
-from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
+from creepkit.records import History, Predictor, Specimen
 from creepkit.specimens.bulge.settings import BulgeSettings
+from creepkit.specimens.finite_element_specimen import FiniteElementSpecimen
 
 if TYPE_CHECKING:
-    from creepkit.language import CreepLaw
+    from creepkit.specimens.bulge.finite_elements import BulgeTest
     from creepkit.specimens.bulge.run import BulgeRun
 
 
 @dataclass(frozen=True)
-class Bulge(BulgeSettings):
+class Bulge(BulgeSettings, FiniteElementSpecimen):
     """A dimple under gas pressure, simulated by finite elements; its fields are those of BulgeSettings."""
-
-    name: str = field(default="bulge", init=False)
-    title: str = field(default="Bulge test of a dimple under gas pressure, by finite elements", init=False)
-    outputs: tuple[Output, ...] = field(default=OBSERVED, init=False)
-
-    optional_outputs: ClassVar[tuple[Output, ...]] = (*OBSERVED, *RING_OUTPUTS)
-    """Those that a test has whose operator says so."""
 
     draws_section: ClassVar[bool] = True
     """Whether its runs can draw their section."""
 
-    program_nuisances: ClassVar[tuple[str, ...]] = PROGRAM_NUISANCES
-    """Kinds of nuisances of a history's programs that predict() differentiates itself."""
+    @property
+    def test_kind(self) -> type[BulgeTest]:
+        """See BulgeTest."""
+        from creepkit.specimens.bulge.finite_elements import BulgeTest
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "outputs", self.observation.outputs)
+        return BulgeTest
 
-    def predict(
-        self,
-        law: CreepLaw,
-        theta: Floats,
-        histories: Sequence[History],
-        *,
-        nuisances: NuisanceValues | None = None,
-        sensitivities: bool = False,
-    ) -> Prediction:
-        """Predict what is observed of each history at its times; see records.Predictor.
+    @property
+    def run_kind(self) -> type[BulgeRun]:
+        """See BulgeRun."""
+        from creepkit.specimens.bulge.run import BulgeRun
 
-        theta : (candidates, parameters) internal values.
-        """
-        from creepkit.specimens.bulge.finite_elements import predict_bulge
-
-        return predict_bulge(self, law, theta, histories, nuisances or {}, sensitivities)
+        return BulgeRun
 
     def model_text(self, histories: Sequence[History]) -> str:
         """How the dimple is simulated, in sentences for a paper."""
-        from creepkit.specimens.bulge.finite_elements import solver_settings
-        from creepkit.specimens.bulge.setup import model_of_specimen
-        from creepkit.specimens.finite_element_tests import finite_element_text
-
-        text = finite_element_text(model_of_specimen(self), solver_settings(self))
-        return f"{text} {self.boundary_text}"
-
-    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
-        """Run one test, keeping displacements, stresses and strains of the whole dimple; see BulgeRun."""
-        from creepkit.specimens.bulge.run import run_bulge
-
-        return run_bulge(self, law, values, plan)
+        return f"{super().model_text(histories)} {self.boundary_text}"
 
     def reduced_order_model(self) -> Predictor:
         """The same finite elements in few modes and points, for global searches."""
@@ -86,8 +57,8 @@ class Bulge(BulgeSettings):
 
         Its error is a tenth of this one's in the median (docs/measured/dimple_accuracy.md says how large that is).
         """
-        refinement = self.refinement if self.mesh is not None else 2.0 * self.refinement
-        return self.replace(refinement=refinement, tolerance=max(0.1 * self.tolerance, 1e-6))
+        refined = super().refined()
+        return refined if self.mesh is None else refined.replace(refinement=self.refinement)
 
 
 @hookimpl

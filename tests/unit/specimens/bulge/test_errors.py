@@ -29,9 +29,10 @@ def program(*pressures: float) -> RecordedLoading:
 
 
 MISTAKES = [
-    (SolveError, {"elastic": None}, f"{WHERE}: a bulge test needs elastic data; set elastic=Elastic(E=...), E in MPa"),
+    (SolveError, {"elastic": None},
+     f"{WHERE}: specimen 'bulge' needs elastic data; set elastic=Elastic(E=...), E in MPa"),
     (SolveError, {"loading": ck.constant_stress(100.0)},
-     f"{WHERE}: a bulge specimen is loaded by pressure, found stress; use PressureJump"),
+     f"{WHERE}: specimen 'bulge' is loaded by pressure (MPa), found stress; use PressureJump"),
     (SolveError, {"using": "uniaxial"},
      f"{WHERE}: a uniaxial specimen is loaded by stress, found pressure; use StressSteps or constant_stress"),
     (SolveError, {"loading": program(0.0, 8.0, -2.0)},

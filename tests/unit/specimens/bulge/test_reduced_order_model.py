@@ -17,11 +17,11 @@ from creepkit.language import Elastic, parameters, principal_stress, strain, str
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, PressureJump, Status
-from creepkit.specimens.bulge.finite_elements import solver_settings
+from creepkit.specimens.bulge.finite_elements import BulgeTest
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel, nominal_geometry
-from creepkit.specimens.bulge.setup import set_up_test
 from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.specimens.finite_element_tests import solver_settings
 from helpers.fem_cases import lowered
 from helpers.literature_laws import RATE, damage, law, number, omega
 
@@ -89,13 +89,13 @@ def test_thickness() -> None:
     """u_z of the top to the apex thickness on nodes that move, at the very same steps: within 1e-6 of the largest."""
     creep, values = CASES["combined"]
     theta = creep.to_internal(values)[0]
-    setup = set_up_test(SPECIMEN, history(), {})
+    setup = BulgeTest.of(SPECIMEN, history(), {})
     settings = solver_settings(SPECIMEN, exact=True)._replace(newton=1e-12)
-    mesh, velocity = setup.geometry.mesh(1.0), setup.geometry.mesh_velocity("apex_thickness", 1.0)
+    mesh, velocity = setup.piece.geometry.mesh(1.0), setup.piece.geometry.mesh_velocity("apex_thickness", 1.0)
     along = sensitivity_directions(
         setup.model, setup.load_history, velocities=[(geometry_derivative(mesh, velocity), velocity)]
     )
-    model = REDUCED.reduced_model_of(setup)
+    model = REDUCED.reduced_model_of(SPECIMEN)
     base = simulate(lowered(creep), theta, model, setup.load_history, settings=settings, directions=along)
 
     def top(step: float):
@@ -104,7 +104,7 @@ def test_thickness() -> None:
         return run.displacements[:, setup.model.top, 1]
 
     difference = (top(1e-5) - top(-1e-5)) / 2e-5
-    np.testing.assert_allclose(base.sensitivities.surface[:, :, -1], difference, atol=1e-6 * np.abs(difference).max())
+    np.testing.assert_allclose(base.sensitivities[:, :, -1], difference, atol=1e-6 * np.abs(difference).max())
 
 
 @pytest.mark.long_when_sanitized

@@ -1,0 +1,352 @@
+"""One table: cells with where they stand (file, sheet, row, column), whatever they come from.
+
+`text_files.read_text_table` reads a text of any dialect and `spreadsheets.read_sheets` the sheets of an .xlsx into a
+`CellTable`. Its `rows` are then all rows that hold something, in which names, units and titles stand anywhere;
+`named_columns` makes the table whose `columns` are named by the first of them. Cells stay text, with their place, until
+`CellTable.numbers` makes numbers of a column; `column_names` knows what names and units mean.
+
+    table = read_table(Path("alloys.csv"))
+    thickness = table.numbers("thickness (mm)")
+    table.location(table.rows[0].line)  # alloys.csv:2
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NamedTuple, overload
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints
+from creepkit.errors import HistoryError, quoted
+from creepkit.files.delimited_text import ERROR_VALUES, Dialect, is_missing, is_number, parse_number, parse_numbers
+from creepkit.files.limits import how_to_raise, raised
+from creepkit.readers.column_names import plain_name, split_written_name
+from creepkit.readers.cut_files import CutNumber
+
+MAXIMUM_COLUMNS, MAXIMUM_CELL, MAXIMUM_TEXTS = 2000, 10_000, 40_000_000
+"""Columns of a table; characters of a cell, in which units are looked for; cells that are not all numbers."""
+
+
+_POINT_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
+"""Beside decimal commas 1.234 may be 1234."""
+
+
+@dataclass(frozen=True)
+class SourceText:
+    """One piece of text and its place, 'file:line'.
+
+    decimal : the decimal sign of the table that it stands beside; a decimal point is understood in any case.
+    key : the key or column as it was written, where it is known by another name; "" else.
+    """
+
+    text: str
+    location: str
+    decimal: str = "."
+    key: str = ""
+
+    def number(self, name: str) -> float:
+        """The text as a finite number; `name` says in the error what it was meant to be."""
+        dialect = Dialect(decimal=self.decimal)
+        if self.decimal == "," and not is_number(self.text, dialect) and not _POINT_OF_THOUSANDS.fullmatch(self.text):
+            dialect = Dialect()
+        return parse_number(self.text, dialect, self.location, name)
+
+
+class TableRow(NamedTuple):
+    """The cells of one line of a table; a tuple, for a table has up to millions."""
+
+    line: int
+    cells: Sequence[str]
+
+
+@dataclass(frozen=True)
+class NumberRows(Sequence[TableRow]):
+    """The rows of a large table that holds numbers alone below its names, whose text is not kept.
+
+    numbers : (rows, columns). lines : (rows,) of the file. decimal : the sign of the table, in the text of its rows.
+    above : rows of text before those of numbers.
+    """
+
+    numbers: Floats
+    lines: Ints
+    decimal: str = "."
+    above: tuple[TableRow, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.above) + len(self.numbers)
+
+    @overload
+    def __getitem__(self, index: int) -> TableRow: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[TableRow]: ...
+    def __getitem__(self, index: int | slice) -> TableRow | Sequence[TableRow]:
+        above = len(self.above)
+        if isinstance(index, slice):
+            start, stop, _ = index.indices(len(self))
+            if stop <= above:
+                return self.above[index]
+            rows = slice(max(start - above, 0), stop - above)
+            return NumberRows(self.numbers[rows], self.lines[rows], self.decimal, self.above[start:])
+        row = range(len(self))[index] - above
+        if row < 0:
+            return self.above[row + above]
+        return TableRow(int(self.lines[row]), [repr(float(x)).replace(".", self.decimal) for x in self.numbers[row]])
+
+
+def joined(above: Sequence[TableRow], rows: Sequence[TableRow]) -> Sequence[TableRow]:
+    """Rows above others."""
+    return replace(rows, above=(*above, *rows.above)) if isinstance(rows, NumberRows) else [*above, *rows]
+
+
+def with_columns(rows: Sequence[TableRow], kept: Sequence[int]) -> Sequence[TableRow]:
+    """The rows with some of their columns."""
+    if isinstance(rows, NumberRows):
+        above = tuple(with_columns(rows.above, kept))
+        return replace(rows, numbers=rows.numbers[:, list(kept)], above=above)
+    return [TableRow(row.line, [row.cells[k] for k in kept if k < len(row.cells)]) for row in rows]
+
+
+def cells_of(rows: Sequence[TableRow], column: int) -> Iterator[str]:
+    """The cells of one column."""
+    return (row.cells[column] for row in rows)
+
+
+def grouped(
+    rows: Sequence[TableRow], column: int, check: Callable[[TableRow], object]
+) -> dict[str, Sequence[TableRow]]:
+    """{cell of a column: the rows that have it}, in the order of the first ones; check : is called for each row."""
+    found: dict[str, list[TableRow]] = {}
+    for row in rows:
+        check(row)
+        found.setdefault(row.cells[column], []).append(row)
+    return dict(found)
+
+
+def some_of(names: Sequence[str], count: int = 12) -> str:
+    """Names as messages list them: the first ones, each not longer than 40, and how many there are."""
+    shown = ", ".join(quoted(name, 40) for name in names[:count])
+    return shown if len(names) <= count else f"{shown} and {len(names) - count} more"
+
+
+def refuse_more(place: str, found: int, usual: int, noun: str, advice: str) -> None:
+    """Refuse a table that is larger than tables of tests are."""
+    if found > usual and found > (most := raised(usual)):
+        what = f"number of {noun} {found}, more than {most}"
+        raise HistoryError(f"{place}: {what}; {advice}, or {how_to_raise(found, most)}")
+
+
+def refuse_long_cells(place: str, cells: Sequence[str]) -> None:
+    """Refuse more columns than a table has, and a cell that is no name, number or remark."""
+    refuse_more(place, len(cells), MAXIMUM_COLUMNS, "columns", "write the tests to several files")
+    if len(longest := max(cells, key=len, default="")) > MAXIMUM_CELL:
+        what = f"a cell of {len(longest)} characters, more than {MAXIMUM_CELL}"
+        raise HistoryError(f"{place}: {what}; is a quote or a line missing?")
+
+
+@dataclass(frozen=True)
+class CellTable:
+    """Cells with where they stand; all still text.
+
+    rows : those that hold something and are no comment. sheet : of a spreadsheet, "" of a text. header : the entries of
+    `# key: value` lines. comments : line, key and entry of those below the first row. columns : their names, in
+    `columns_line`, where they are known. positions : the column of the file, from 0, in which each column stands, where
+    errors must tell it. written : the columns as they were written, where they were given creepkit's names.
+    assumptions : what was assumed of the table, for the label "assumed". sources : what titles and names of sheets and
+    files state of its test, which must agree with what else does. cut : the last number of the file, where the file may
+    have been cut in it. merged : row and column, from 0, of cells that are merged with one above them.
+    """
+
+    path: Path
+    rows: Sequence[TableRow]
+    sheet: str = ""
+    dialect: Dialect = field(default_factory=Dialect)
+    header: Mapping[str, SourceText] = field(default_factory=dict)
+    comments: Sequence[tuple[int, str, SourceText]] = ()
+    columns: Sequence[str] = ()
+    columns_line: int = 0
+    positions: Sequence[int] = ()
+    written: Sequence[str] = ()
+    assumptions: tuple[str, ...] = ()
+    sources: tuple[SourceText, ...] = ()
+    cut: CutNumber | None = None
+    merged: frozenset[tuple[int, int]] = frozenset()
+
+    @property
+    def place(self) -> str:
+        """The file, and the sheet in it."""
+        return f"{self.path}, sheet '{self.sheet}'" if self.sheet else str(self.path)
+
+    def location(self, line: int, column: int | None = None) -> str:
+        """Where a line stands, 'file:line', or 'file, sheet 'creep', row 3' in a spreadsheet; or a cell of it."""
+        place = f"{self.place}, row {line}" if self.sheet else f"{self.path}:{line}"
+        return place if column is None or not self.positions else f"{place}, column {self._column_label(column)}"
+
+    def column(self, name: str) -> int:
+        """The number of a column that must be there."""
+        if name not in self.columns:
+            result = some_of(self.columns)
+            raise HistoryError(f"{self.location(self.columns_line)}: missing column '{name}'; found: {result}")
+        return self.columns.index(name)
+
+    def as_written(self, column: int) -> str:
+        """The name of a column as the file has it."""
+        return (self.written or self.columns)[column]
+
+    def numbers(self, name: str) -> Floats:
+        """(rows,) One column as numbers."""
+        k = self.column(name)
+        if isinstance(self.rows, NumberRows):
+            return self.rows.numbers[:, k]
+        cells = list(cells_of(self.rows, k))
+        return parse_numbers(cells, self.dialect, lambda row: self.location(self.rows[row].line, k), self.as_written(k))
+
+    @property
+    def lines(self) -> Ints:
+        """(rows,) The line of the file in which each row stands."""
+        if isinstance(self.rows, NumberRows):
+            return self.rows.lines
+        return np.array([row.line for row in self.rows], dtype=int)
+
+    def entries(self, row: TableRow) -> dict[str, SourceText]:
+        """The cells of one row by column, those left empty excepted."""
+        place, cells = self.location(row.line), zip(self.columns, row.cells, strict=True)
+        return {name: SourceText(cell, place, self.dialect.decimal) for name, cell in cells if not is_missing(cell)}
+
+    def empty_columns(self, row: TableRow) -> list[str]:
+        """The columns whose cell in one row is empty: what they would say of it is unknown."""
+        return [name for name, cell in zip(self.columns, row.cells, strict=True) if is_missing(cell)]
+
+    def renamed(self, columns: Sequence[str]) -> CellTable:
+        """The table with other names of its columns, which keeps those that were written."""
+        return replace(self, columns=columns, written=self.written or self.columns)
+
+    def keeping(self, kept: Sequence[int]) -> CellTable:
+        """The table with some of its columns."""
+        places = [(self.positions or range(len(self.columns)))[k] for k in kept]
+        columns = [self.columns[k] for k in kept]
+        return replace(self, columns=columns, rows=with_columns(self.rows, kept), positions=places)
+
+    def assuming(self, *assumptions: str) -> CellTable:
+        """The table with more that was assumed of it."""
+        return replace(self, assumptions=(*self.assumptions, *assumptions))
+
+    def _column_label(self, column: int) -> str:
+        """The letters of a spreadsheet's column, elsewhere its number from 1."""
+        number, letters = self.positions[column] + 1, ""
+        if not self.sheet:
+            return str(number)
+        while number:
+            number, digit = divmod(number - 1, 26)
+            letters = chr(ord("A") + digit) + letters
+        return letters
+
+
+# ---- comments ------------------------------------------------------------------------------------------------------
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line, or the first cell of a row, is a comment."""
+    text = line.lstrip(' \t"\ufeff')
+    return text.startswith(("#", "//")) and not text.startswith(ERROR_VALUES)
+
+
+def entry_of(line: str) -> tuple[str, bool, str]:
+    """Key, whether there is a colon, and text of a comment, which a spreadsheet may have put in quotes."""
+    text = line.strip().strip("\ufeff")
+    if text.startswith('"') and text.endswith('"'):
+        text = text[1:-1].replace('""', '"')
+    key, colon, value = text.lstrip("#/").partition(":")
+    return key.strip(), bool(colon), value.strip()
+
+
+# ---- columns -------------------------------------------------------------------------------------------------------
+
+
+def without_ignored(table: CellTable, names_at: int, ignored: Collection[str]) -> CellTable:
+    """The table without the columns that its key `ignore` names, all of which must be there, and those in `ignored`.
+
+    names_at : the row of the names. A name is told as it is written; else but for capitals and its unit.
+    """
+    key = next((key for key in table.header if plain_name(key) == "ignore"), None)
+    cells = table.rows[names_at].cells
+    left_out = {k for name in ignored for k in _columns_called(name, cells)}
+    if key is not None:
+        entry = table.header[key]
+        names = [name.strip() for name in entry.text.split(";" if ";" in entry.text else ",")]
+        for name in [entry.text] if entry.text in cells else names:
+            found = _columns_called(name, cells)
+            if not found:
+                raise HistoryError(
+                    f"{entry.location}: ignore names '{quoted(name)}', which is no column; the columns are: "
+                    f"{some_of(list(filter(None, cells)))}"
+                )
+            left_out.update(found)
+    header = {name: entry for name, entry in table.header.items() if name != key}
+    if not left_out:
+        return replace(table, header=header)
+    is_text = not isinstance(table.rows, NumberRows)
+    width = max(len(row.cells) for row in (table.rows if is_text else table.rows[:1]))
+    kept = [k for k in range(width) if k not in left_out]
+    rows = with_columns(table.rows, kept)
+    rows = [row for row in rows if any(row.cells)] if is_text else rows
+    return replace(table, header=header, rows=rows, positions=kept)
+
+
+def _columns_called(name: str, cells: Sequence[str]) -> list[int]:
+    """The columns of a name as it is written, else of one that differs in capitals, or lacks the unit."""
+    plain = plain_name(name)
+    filled = [k for k, cell in enumerate(cells) if cell]
+    exact = [k for k in filled if cells[k] == name]
+    alike = exact or [k for k in filled if plain_name(cells[k]) == plain]
+    return alike or [k for k in filled if plain_name(split_written_name(cells[k])[0]) == plain]
+
+
+def check_columns(location: str, columns: Sequence[str]) -> None:
+    """Refuse a column without a name, and a name that stands there twice."""
+    if "" in columns:
+        raise HistoryError(f"{location}: a column has no name; name every column, such as time_s,strain_pct")
+    twice = next((name for k, name in enumerate(columns) if name in columns[:k]), None)
+    if twice is not None:
+        raise HistoryError(f"{location}: the column '{twice}' stands there twice; keep one of them")
+
+
+def named_columns(table: CellTable) -> CellTable:
+    """The table whose first row names its columns."""
+    names, rows = table.rows[0], table.rows[1:]
+    width = max((k for k, cell in enumerate(names.cells, 1) if cell), default=0)
+    place = table.location(names.line)
+    check_columns(place, names.cells[:width])
+    if not isinstance(rows, NumberRows):
+        rows = [TableRow(row.line, cells_of_width(table, row, width)) for row in rows]
+    if not rows:
+        raise HistoryError(f"{place}: no rows below the line of columns; a table needs at least one")
+    return replace(table, columns=names.cells[:width], columns_line=names.line, rows=rows)
+
+
+def cells_of_width(table: CellTable, row: TableRow, width: int, *, beside: bool = False) -> Sequence[str]:
+    """As many cells of a row as there are columns; empty ones behind them are none, in a sheet also those that lack.
+
+    beside : whether more cells may stand behind the columns.
+    """
+    cells = row.cells
+    if len(cells) > width and not beside and not any(cells[width:]):
+        cells = cells[:width]
+    if len(cells) < width and table.sheet:  # empty cells at the end of a sheet's row are not stored
+        cells = [*cells, *[""] * (width - len(cells))]
+    if len(cells) == width or (beside and len(cells) > width):
+        return cells
+    place = table.location(row.line)
+    if table.sheet:
+        foreign = quoted(next(filter(None, cells[width:])))
+        raise HistoryError(f"{place}: '{foreign}' stands in a column without a name; name it or remove it")
+    delimiter = str(table.dialect).partition(",")[0]  # a cell lost within a line of text moves those behind it
+    advice = ", empty ones too" * (len(cells) < width)
+    advice += "; decimal commas need another delimiter, such as ;" * (table.dialect.delimiter == ",")
+    raise HistoryError(
+        f"{place}: number of cells {len(cells)}, of columns {width}; write one cell a column, separated by "
+        f"{delimiter}{advice}"
+    )

@@ -1,0 +1,275 @@
+"""A text of any encoding, delimiter and decimal sign as a table, with the `# key: value` lines above it.
+
+A large table of numbers alone is read as numbers at once; else the cells are kept as texts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from creepkit.errors import HistoryError, quoted
+from creepkit.files.delimited_text import (
+    Dialect,
+    decode_text,
+    detect_dialect,
+    is_number,
+    parts_of_lines,
+    split_line,
+    split_lines,
+    table_of_numbers,
+    text_lines,
+)
+from creepkit.files.labview import is_labview, table_of_labview
+from creepkit.files.reading import FileKind, read_bytes
+from creepkit.files.time_stamps import is_clock_time
+from creepkit.readers.column_names import plain_name
+from creepkit.readers.cut_files import cut_number
+from creepkit.readers.table import (
+    MAXIMUM_CELL,
+    MAXIMUM_COLUMNS,
+    MAXIMUM_TEXTS,
+    CellTable,
+    NumberRows,
+    SourceText,
+    TableRow,
+    entry_of,
+    is_comment,
+    named_columns,
+    refuse_long_cells,
+    refuse_more,
+    without_ignored,
+)
+
+TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
+
+
+DECIMAL_SIGNS: Mapping[str, str] = {".": ".", ",": ",", "point": ".", "comma": ","}
+"""What `# decimal:` may say."""
+
+
+_LARGE_TEXT, _HEAD_LINES = 65_536, 1000
+"""Characters above which rows are read as numbers at once where they hold nothing else; lines of a head above them."""
+
+
+_BEFORE_COMMENT = frozenset(' \t"\ufeff#/')
+"""Characters with which a comment may begin."""
+
+
+def read_table(path: Path, ignored: Collection[str] = ()) -> CellTable:
+    """Read a file of one table: its first row names the columns, whatever they are, but those left out."""
+    return named_columns(without_ignored(read_text_table(path), 0, ignored))
+
+
+def read_text_table(path: Path) -> CellTable:
+    """Read a text table of any delimiter, decimal sign and encoding; HistoryError where it holds no table."""
+    return _table_of(path, decode_text(read_bytes(path, TABLE_FILE), path))
+
+
+def peek_table(path: Path) -> CellTable | None:
+    """The beginning of a text as a table; None where it is no table; never raises for what it holds."""
+    try:
+        return _table_of(path, decode_text(_beginning(path), path), decimal=".")
+    except HistoryError:
+        return None
+
+
+def _beginning(path: Path) -> bytes:
+    """The whole lines with which a file begins."""
+    content = read_bytes(path, TABLE_FILE, first=_LARGE_TEXT)
+    if len(content) < _LARGE_TEXT:
+        return content
+    end = content.rfind(b"\n") + 1  # not within a character: a line feed of UTF-16 has two bytes
+    return content[: end + end % 2] if content[:2] in (b"\xff\xfe", b"\xfe\xff") else content[:end]
+
+
+def read_head_alone(path: Path) -> dict[str, SourceText]:
+    """The entries of a file that holds `# key: value` lines and no table; {} where it holds one."""
+    start = read_bytes(path, TABLE_FILE, first=_LARGE_TEXT)
+    lines = text_lines(decode_text(start, path)) if len(start) < _LARGE_TEXT else [" a table"]
+    if any(line.strip() and not is_comment(line) for line in lines):
+        return {}
+    return _head_entries(path, lines, (), Dialect(decimal=_stated_decimal(path, lines) or "."))
+
+
+def _table_of(path: Path, text: str, decimal: str | None = None) -> CellTable:
+    """The table of a text; decimal : its sign, where it does not matter or is known."""
+    if "\r" in text:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if is_labview(text):
+        text = table_of_labview(text)
+    text, head, offset = _with_names_behind_marks(text, *_head_of(text))
+    if offset == len(text):
+        problem = "holds a header but no table" if any(line.strip() for line in head) else "is empty"
+        raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain_pct, then rows")
+    comments, first = list[tuple[int, str]](), len(head) + 1
+    decimal = decimal or _stated_decimal(path, head)
+    is_large = len(text) > _LARGE_TEXT and len(head) < _HEAD_LINES
+    rows: Sequence[TableRow] | None = None
+    if is_large:
+        rows, dialect = _rows_of_numbers(path, text, offset, first, decimal, comments)
+    if rows is None:
+        dialect = detect_dialect((line for _, line in _numbered(text, offset, first)), str(path), decimal)
+        width = len(split_line(next(_numbered(text, offset, first))[1], dialect, f"{path}:{first}"))
+        cells = text.count("\n", offset) * max(width, 2)  # a table has two columns or more
+        refuse_more(str(path), cells, MAXIMUM_TEXTS, "cells that are not all numbers", "keep its numbers alone")
+        rows = list(_rows_of_texts(_numbered(text, offset, first, comments), dialect, path))
+    if not rows:
+        raise HistoryError(f"{path}:{first}: no cell holds anything; write a line of columns, then rows")
+    return CellTable(
+        path,
+        rows,
+        dialect=dialect,
+        header=_head_entries(path, head, rows[0].cells, dialect),
+        comments=[
+            (line, key, SourceText(entry, f"{path}:{line}", dialect.decimal))
+            for line, comment in comments
+            for key, colon, entry in [entry_of(comment)]
+            if colon
+        ],
+        cut=cut_number(text, dialect),
+    )
+
+
+def _numbered(
+    text: str, offset: int, first: int, comments: list[tuple[int, str]] | None = None
+) -> Iterator[tuple[int, str]]:
+    """Number and text of each line that is neither empty nor a comment, from character `offset` on, in line `first`.
+
+    comments : to which those with a colon are added.
+    """
+    for part in parts_of_lines(text, offset):
+        lines = part.split("\n")
+        for k, line in enumerate(lines, first):
+            if not line or line.isspace():
+                continue
+            if not (line[0] in _BEFORE_COMMENT and is_comment(line)):
+                yield k, line
+            elif comments is not None and ":" in line:
+                comments.append((k, line))
+        first += len(lines)
+
+
+def _rows_of_texts(numbered: Iterator[tuple[int, str]], dialect: Dialect, path: Path) -> Iterator[TableRow]:
+    """The rows in which a cell holds something; HistoryError for what no table holds."""
+    for number, line, cells in split_lines(numbered, dialect, path):
+        if len(cells) > MAXIMUM_COLUMNS or len(line) > MAXIMUM_CELL:
+            refuse_long_cells(f"{path}:{number}", cells)
+        if cells[0] or any(cells):
+            yield TableRow(number, cells)
+
+
+def _rows_of_numbers(
+    path: Path, text: str, offset: int, first: int, decimal: str | None, comments: list[tuple[int, str]]
+) -> tuple[NumberRows | None, Dialect]:
+    """The rows of a table that holds numbers alone below its names, None of any other, and its dialect."""
+    sample = [line for _, line in islice(_numbered(text, offset, first), _HEAD_LINES)]
+    try:
+        dialect = detect_dialect(sample, decimal=decimal)
+    except HistoryError:  # told by who reads line by line
+        return None, Dialect()
+    if dialect.delimiter == " " or '"' in sample[0]:
+        return None, dialect
+    body = text[offset + len(sample[0]) + 1 :].rstrip("\n")
+    lines = first + 1 + np.arange(body.count("\n") + 1)
+    found = list[tuple[int, str]]()
+    if "\n\n" in body or body.startswith("\n") or "#" in body or "/" in body:
+        kept = list(_numbered(body, 0, first + 1, found))
+        body, lines = "\n".join(line for _, line in kept), np.array([number for number, _ in kept], dtype=int)
+    numbers = table_of_numbers(body, dialect) if body.strip() else None
+    names = split_line(sample[0], dialect, f"{path}:{first}")
+    if numbers is None or numbers.shape != (lines.size, len(names)) or not np.isfinite(numbers).all():
+        return None, dialect
+    refuse_long_cells(f"{path}:{first}", names)
+    comments += found
+    return NumberRows(numbers, lines, dialect.decimal, (TableRow(first, names),)), dialect
+
+
+# ---- the head ------------------------------------------------------------------------------------------------------
+
+
+def _head_of(text: str) -> tuple[list[str], int]:
+    """The lines above the first row, and the character with which that begins."""
+    head, offset = list[str](), 0
+    while offset < len(text):
+        end = text.find("\n", offset)
+        line = text[offset : len(text) if end < 0 else end]
+        if line.strip() and not is_comment(line):
+            break
+        head.append(line)
+        offset += len(line) + 1
+    return head, min(offset, len(text))
+
+
+def _with_names_behind_marks(text: str, head: list[str], offset: int) -> tuple[str, list[str], int]:
+    """The text with names of columns, that stand behind a mark of comments above rows of numbers, as its first row.
+
+    numpy.savetxt and digitisers write them so. They are the first of the last comments that have as many cells as the
+    row below has; further ones are rows of the head too.
+    """
+    sample = [line for line in text[offset : offset + _LARGE_TEXT].split("\n")[:50] if line.strip()]
+    try:
+        dialect = detect_dialect(sample, decimal=".")
+        first = split_line(sample[0], dialect) if sample else []
+    except HistoryError:
+        return text, head, offset
+    comma = Dialect(dialect.delimiter, ",")
+    numeric = [is_number(cell, dialect) or is_number(cell, comma) or is_clock_time(cell) for cell in first if cell]
+    if len(first) < 2 or not numeric or not all(numeric):
+        return text, head, offset
+    names = list[str]()
+    for line in reversed(head):
+        cells = _names_behind_mark(line, len(first), dialect)
+        if not cells:
+            break
+        names.insert(0, dialect.delimiter.join(f'"{c}"' if dialect.delimiter in c else c for c in cells))
+    kept = head[: len(head) - len(names)]
+    start = sum(len(line) + 1 for line in kept)
+    return ("\n".join([*kept, *names, text[offset:]]), kept, start) if names else (text, head, offset)
+
+
+def _names_behind_mark(line: str, count: int, dialect: Dialect) -> list[str]:
+    """The cells of a comment, as many as a row has and none of them a number; [] of any other line."""
+    body = line.strip().lstrip("#/ ")
+    for delimiter in dict.fromkeys((dialect.delimiter, "\t", ";", ",", "|", " ")):
+        try:
+            cells = split_line(body, Dialect(delimiter))
+        except HistoryError:
+            continue
+        if len(cells) == count and all(cells) and not any(is_number(cell, Dialect(delimiter)) for cell in cells):
+            return [] if entry_of(line)[1] and delimiter == " " else cells
+    return []
+
+
+def _stated_decimal(path: Path, head: Sequence[str]) -> str | None:
+    """The decimal sign that `# decimal:` states in a head."""
+    for number, line in enumerate(head, 1):
+        key, colon, text = entry_of(line)
+        if colon and plain_name(key) == "decimal":
+            sign = text if text in DECIMAL_SIGNS else text.rstrip(";,\t ")
+            if sign not in DECIMAL_SIGNS:
+                raise HistoryError(f"{path}:{number}: decimal is '{quoted(text)}'; allowed: point, comma")
+            return DECIMAL_SIGNS[sign]
+    return None
+
+
+def _head_entries(path: Path, lines: Sequence[str], names: Sequence[str], dialect: Dialect) -> dict[str, SourceText]:
+    """The `# key: value` lines; a comment without a colon is a remark.
+
+    A spreadsheet writes them with an empty cell for each further column; these cells are cut off.
+    """
+    padding = dialect.delimiter * (len(names) - 1)
+    is_padded = len(names) > 1 and all(line.rstrip(" ").endswith(padding) for line in lines if line.strip())
+    header: dict[str, SourceText] = {}
+    for number, line in enumerate(lines, 1):
+        key, colon, text = entry_of(line.rstrip(" ").removesuffix(padding) if is_padded else line)
+        if not colon or plain_name(key) == "decimal":
+            continue
+        if key in header:
+            first = header[key].location.rpartition(":")[2]
+            raise HistoryError(f"{path}:{number}: '{key}' was already given in line {first}; keep one of them")
+        header[key] = SourceText(text, f"{path}:{number}", dialect.decimal)
+    return header
