@@ -177,7 +177,7 @@ def of_lengths_and_instruments(
 ) -> tuple[Perturbation, ...]:
     """Lengths that are off in each test by itself, errors common to all tests, and lengths that are off in all alike.
 
-    Those for which no nuisance parameter stands.
+    Those for which no nuisance parameter stands. x : (unknowns,).
     """
     nuisances, own, common = problem.settings.nuisances, list[Perturbation](), list[Perturbation]()
     kinds, shared = {n.kind for n in nuisances}, {n.kind for n in nuisances if n.scope != "test"}
