@@ -48,7 +48,6 @@ from .inverse.sparsity.penalties import L2 as L2
 from .inverse.sparsity.penalties import GroupL2 as GroupL2
 from .inverse.sparsity.penalties import Sqrt as Sqrt
 from .inverse.sparsity.penalties import Subsets as Subsets
-from .inverse.uncertainty.model_averaging import rate_band as rate_band
 from .inverse.uncertainty.quantities import exponent_at as exponent_at
 from .inverse.uncertainty.quantities import rate_at as rate_at
 from .jobs.worker_pools import ParallelExecution as ParallelExecution

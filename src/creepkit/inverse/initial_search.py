@@ -43,7 +43,7 @@ class StartingEstimate:
 
 
 class SearchOutcome(NamedTuple):
-    """The end of a global search: starts of the estimation, evaluations, and trace.
+    """The end of a global search: starts of the estimation, evaluations and trace.
 
     starts : (parameters,) conditioned coordinates each. minima : how many ends it had, and how many of them differ.
     """
