@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34469
+TESTS = 34483
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
