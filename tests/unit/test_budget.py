@@ -35,7 +35,7 @@ BUDGET = {
     "language": 1506,
     "laws": 136,
     "modules": 781,
-    "quality": 1467,
+    "quality": 1458,
     "readers": 5490,
     "records": 1979,
     "registry": 616,
