@@ -173,13 +173,6 @@ class NoiseLikelihood:
         return float(self._value[0]), self._gradient.copy()
 
 
-def log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
-    """Gaussian log-likelihood of the residuals under a noise model."""
-    factor = CovarianceFactor.of_residuals(residuals, noise_model)
-    whitened, count = factor.whiten(residuals.values), int(residuals.present.sum())
-    return float(-0.5 * ((whitened**2).sum() + factor.log_determinant + count * np.log(2 * np.pi)))
-
-
 def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, Floats]:
     """Best linear prediction of each test's offsets, (tests, outputs) in their units, and ln rate factor, (tests,)."""
     unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
