@@ -370,7 +370,7 @@ def _result(
         search_trace=search_outcome.trace,
         linearised=best.linearised,
         problem=replace(
-            problem, covariance_factor=CovarianceFactor.of_residuals(best.residuals, noise_model), loss="linear"
+            problem, covariance_factor=CovarianceFactor.of_residuals(residuals, noise_model), loss="linear"
         ),
     )
 
