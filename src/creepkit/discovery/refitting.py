@@ -39,13 +39,13 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify, identify_values
 from creepkit.inverse.information_criteria import criterion_weights
+from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.iterative_estimation import linearised, starting_point
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 

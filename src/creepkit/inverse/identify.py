@@ -38,7 +38,7 @@ from creepkit.inverse.identification_notes import (
     one_end_note,
     provenance_of,
 )
-from creepkit.inverse.initial_search import SearchOutcome, initial_search
+from creepkit.inverse.initial_search import SearchOutcome, StartingEstimate, initial_search
 from creepkit.inverse.iterative_estimation import (
     APPROXIMATE_LIMITS,
     SIMULATION_LIMITS,
@@ -66,7 +66,6 @@ from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import MultiStart
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import LawAtTests, contradicting_values
-from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.inverse.uncertainty.laplace_approximation import (
     covariance_of_values,
