@@ -164,7 +164,7 @@ class RateScatter:
     def solved(self, sd: Floats, columns: Floats | None = None, prior_sd: Floats | None = None) -> Solution:
         """ln of the restricted likelihood, mean and covariance of (dx, c) and of further effects on rates, given sd.
 
-        sd : (levels,). columns : (tests, effects) on ln rates, prior_sd : (effects,) their prior standard deviations.
+        sd : (levels,). columns : (tests, effects) on ln rates. prior_sd : (effects,) their prior standard deviations.
         """
         own = (np.maximum(sd[-1], SMALLEST_EFFECT) ** 2 + self.variance) / self.weight
         further = np.zeros((own.size, 0)) if columns is None else columns
