@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.readers.column_names import NameTable, split_unit, split_written_name
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column
-from creepkit.readers.questions import Question
+from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.table import CellTable, some_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records.quantities import QuantityKind
@@ -53,22 +54,26 @@ def read_frames(
     kinds = terms.column_kinds
     averaged = (name for names in vocabulary.averaged_columns.values() for name in names)
     ignored = {*skipped_columns, *vocabulary.labels, *averaged}
-    values: dict[str, Floats] = {}
-    found: dict[str, str] = {}
-    for k, name in enumerate(table.columns):
+    values, found, errors = dict[str, Floats](), dict[str, str](), list[HistoryError]()
+
+    def read(k: int, name: str) -> None:
         written = table.as_written(k)
-        if ignored.isdisjoint((name, written)):
-            quantity, suffix = _parsed_column(table, k, vocabulary.synonyms.get(name, name), kinds)
-            if quantity in values:
-                raise column_question(
-                    table,
-                    f"'{found[quantity]}' and '{written}' both hold the {quantity}; which counts?",
-                    *({one: UNUSED} for one in (written, found[quantity])),
-                )
-            values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
-            if quantity == "used":
-                _check_marks(table, k, values[quantity])
-            found[quantity] = written
+        quantity, suffix = _parsed_column(table, k, vocabulary.synonyms.get(name, name), kinds)
+        if quantity in found:
+            raise column_question(
+                table,
+                f"'{found[quantity]}' and '{written}' both hold the {quantity}; which counts?",
+                *({one: UNUSED} for one in (written, found[quantity])),
+            )
+        found[quantity] = written
+        values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
+        if quantity == "used":
+            _check_marks(table, k, values[quantity])
+
+    for k, name in enumerate(table.columns):
+        if ignored.isdisjoint((name, table.as_written(k))):
+            collected(errors, partial(read, k, name))
+    raise_all(errors)
     if "time" not in values:
         place, names = table.location(table.columns_line), table.written or table.columns
         result = f"among {some_of(names)}" if names else "as every column is the same in all rows"
