@@ -60,7 +60,7 @@ def read_histories(
     read: dict[tuple[str, str], tuple[Path, History]] = {}
     errors = list[HistoryError]()
     for path in _existing_paths(paths):
-        for source in _readable_paths(path, readers):
+        for source in readable_paths(path, readers):
             found = collected(errors, partial(_histories_of, source, readers))
             for history in found or ():
                 _check_printable(history, source)
@@ -131,7 +131,7 @@ def _existing_paths(paths: PathsLike) -> list[Path]:
     return list(results)
 
 
-def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
+def readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
     """The paths to read: the path itself, or the files in a folder that no reader accepts as a whole."""
     if path.is_file() or any(accepts_path(reader, path) for reader in readers):
         return [path]
