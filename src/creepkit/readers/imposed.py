@@ -124,20 +124,26 @@ def _component_loading(conditions: StatedConditions) -> Loading | None:
     """The stresses and strains of a material point."""
     programs: dict[str, dict[str, Program]] = {"stress": {}, "strain": {}}
     for name, kind in COMPONENT_LOADING_KINDS.items():
-        result = _steps_or_program(conditions, name, kind)
-        if result is not None:
+        if (stated := _stated_form(conditions, name, kind)) is not None:
             quantity, _, component = name.partition("_")
-            programs[quantity][component] = Program.steps(result) if isinstance(result, tuple) else result
+            programs[quantity][component] = _as_program(stated)
     return PointLoading(**programs) if programs["stress"] or programs["strain"] else None
 
 
-def _steps_or_program(
-    conditions: StatedConditions, quantity: str, kind: QuantityKind
-) -> TimeValuePairs | Program | None:
-    """Steps or a program that stand in the head."""
+def _stated_form(
+    conditions: StatedConditions, quantity: str, kind: QuantityKind, number: StatedNumber | None = None
+) -> float | TimeValuePairs | Program | None:
+    """What stands in the head: a number, steps or a program."""
     steps, breakpoints = (conditions.take_pairs(f"{quantity}_{form}", kind) for form in ("steps", "program"))
-    if steps is not None and breakpoints is not None:
-        raise HistoryError(f"{conditions.location}: {quantity} has both steps and a program; keep one")
+    forms = [form for form in (number, steps, breakpoints) if form is not None]
+    if len(forms) > 1:
+        raise HistoryError(
+            f"{conditions.location}: the {quantity} is given {len(forms)} times over, as a number, {quantity}_steps "
+            f"or {quantity}_program; keep one"
+        )
+    if number is not None:
+        _check_bare_strain(conditions, quantity, kind, number)
+        return number.value
     return steps if breakpoints is None else Program(*np.array(breakpoints).T)
 
 
@@ -189,20 +195,7 @@ def _stated_loading(
     """
     kind = TEMPERATURE if quantity == "temperature" else conditions.terms.load_kinds[quantity]
     column = _imposed_column(conditions, frames, quantity)
-    number = conditions.take_number(quantity)
-    steps = conditions.take_pairs(f"{quantity}_steps", kind)
-    breakpoints = conditions.take_pairs(f"{quantity}_program", kind)
-    forms = [form for form in (number, steps, breakpoints) if form is not None]
-    if len(forms) > 1:
-        raise HistoryError(
-            f"{conditions.location}: the {quantity} is given {len(forms)} times over, as a number, {quantity}_steps "
-            f"or {quantity}_program; keep one"
-        )
-    if number is not None:
-        _check_bare_strain(conditions, quantity, kind, number)
-    stated: float | TimeValuePairs | Program | None = number.value if number is not None else steps
-    if breakpoints is not None:
-        stated = Program(*np.array(breakpoints).T)
+    stated = _stated_form(conditions, quantity, kind, conditions.take_number(quantity))
     earlier = conditions.take_pairs(f"stated_{quantity}_program", kind)
     if earlier is not None:
         conditions.stated[quantity] = Program(*np.array(earlier).T)

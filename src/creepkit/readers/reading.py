@@ -77,7 +77,7 @@ def _histories_of(source: Path, readers: Sequence[Reader]) -> list[History]:
 def answered_readers(path: Path, readers: Sequence[Reader]) -> Sequence[Reader]:
     """The readers with what the file of answers beside a path says of it."""
     answers = answers_of(path)
-    return [_with_vocabulary(one, answers.added_to) for one in readers] if answers else readers
+    return [_with_vocabulary(one, answers.added_to) for one in readers] if any(answers) else readers
 
 
 def _check_printable(history: History, path: Path) -> None:
