@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 136,
     "modules": 782,
     "quality": 1467,
-    "readers": 5477,
+    "readers": 5435,
     "records": 1979,
     "registry": 616,
     "reports": 8060,

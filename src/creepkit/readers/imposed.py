@@ -6,7 +6,7 @@ and recorded, or asked for.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Literal
 
@@ -53,22 +53,17 @@ LONGEST_RAMP, SUSTAINED, STRAIGHT = 0.1, 0.5, 0.1
 below; of its range by how much a strain that was imposed by its rate is off a straight line."""
 
 
-def read_temperature(
-    conditions: StatedConditions, frames: TableFrames, marked: Collection[int] = ()
-) -> float | Program:
-    """The temperature, K; marked : lines of frames at which a load or temperature changed."""
-    result = _stated_loading(conditions, frames, "temperature", marked)
+def read_temperature(conditions: StatedConditions, frames: TableFrames) -> float | Program:
+    """The temperature, K."""
+    result = _stated_loading(conditions, frames, "temperature")
     if result is None:
         advice = "write temperature_C or temperature_K, or a column of that name"
         raise conditions.missing_error("temperature", advice, "temperature_C")
     return Program.steps(result) if isinstance(result, tuple) else result
 
 
-def read_loading(conditions: StatedConditions, frames: TableFrames, marked: Collection[int] = ()) -> Loading:
-    """The loading: by components, by what has steps and programs alone, else by the first load that is stated.
-
-    marked : lines of frames at which a load or temperature changed.
-    """
+def read_loading(conditions: StatedConditions, frames: TableFrames) -> Loading:
+    """The loading: by components, by what has steps and programs alone, else by the first load that is stated."""
     terms, load_kinds = conditions.terms, conditions.terms.load_kinds
     quantities = (*load_kinds, *COMPONENT_LOADING_KINDS)
     with errors_located_at(
@@ -77,7 +72,7 @@ def read_loading(conditions: StatedConditions, frames: TableFrames, marked: Coll
         loading = _component_loading(conditions)
         likely = {load for one in conditions.terms.specimens_with(frames.values) for load in terms.loads.get(one, ())}
         for name in sorted(load_kinds, key=lambda name: (name in terms.number_kinds, name not in likely)):
-            loading = loading or _loading_by(name, conditions, frames, marked)
+            loading = loading or _loading_by(name, conditions, frames)
         if loading is not None and loading.quantity == "strain" and conditions.text_of("control") == "strain":
             conditions.take_text("control")
     if loading is None:
@@ -101,11 +96,9 @@ def _loading_advice(terms: Terms, loads: Sequence[str]) -> str:
     return f"write {'; or '.join(forms)}"
 
 
-def _loading_by(
-    quantity: str, conditions: StatedConditions, frames: TableFrames, marked: Collection[int]
-) -> Loading | None:
+def _loading_by(quantity: str, conditions: StatedConditions, frames: TableFrames) -> Loading | None:
     """The loading by one quantity, if it is stated or recorded."""
-    value: float | TimeValuePairs | Program | TwoLevels | None = _stated_loading(conditions, frames, quantity, marked)
+    value: float | TimeValuePairs | Program | TwoLevels | None = _stated_loading(conditions, frames, quantity)
     value = _step_change(conditions, quantity) if value is None else value
     return None if value is None else _loading_of(conditions, quantity, value, float(frames.times[-1]))
 
@@ -187,7 +180,7 @@ def _required_number(conditions: StatedConditions, name: str, companion: StatedN
 
 
 def _stated_loading(
-    conditions: StatedConditions, frames: TableFrames, quantity: str, marked: Collection[int]
+    conditions: StatedConditions, frames: TableFrames, quantity: str
 ) -> float | TimeValuePairs | Program | None:
     """The value given for a quantity: a number, steps as (time, value), or a Program.
 
@@ -206,7 +199,7 @@ def _stated_loading(
         stated = None if jump is None else _loading_of(conditions, quantity, jump, jump.time).program()
     if stated is not None:
         conditions.stated[quantity] = _as_program(stated)
-    return _recorded(conditions, frames, quantity, column, marked)
+    return _recorded(conditions, frames, quantity, column)
 
 
 def _agrees(program: Program, times: Floats, column: Floats) -> bool:
@@ -334,7 +327,7 @@ def _levels_of_steps(conditions: StatedConditions, frames: TableFrames, quantity
 
 
 def _recorded(
-    conditions: StatedConditions, frames: TableFrames, quantity: str, column: Floats, marked: Collection[int]
+    conditions: StatedConditions, frames: TableFrames, quantity: str, column: Floats
 ) -> float | TimeValuePairs | Program:
     """A column as a number, as steps where it holds nominal levels, else as the program of a record."""
     if np.ptp(column) == 0.0:
@@ -353,7 +346,7 @@ def _recorded(
     for before, frame, after in zip(bounds, bounds[1:-1], bounds[2:], strict=False):
         shorter = min(frames.times[frame - 1] - frames.times[before], frames.times[after - 1] - frames.times[frame])
         gap = frames.times[frame] - frames.times[frame - 1]
-        if gap > LARGEST_GAP * shorter and int(frames.lines[frame]) not in marked:
+        if gap > LARGEST_GAP * shorter and int(frames.lines[frame]) not in frames.marked:
             unit = "K" if is_temperature else next(iter(conditions.terms.load_kinds[quantity].units))
             first, second = (f"{column[k]:g} {unit}".rstrip() for k in (frame - 1, frame))
             early, late = (f"{frames.times[k]:g} s" for k in (frame - 1, frame))
