@@ -27,7 +27,7 @@ from creepkit.records import (
     dimension_named,
     dimensions_of,
 )
-from creepkit.sampling.specimen_conditions import MODULUS, TEMPERATURE
+from creepkit.sampling.conditions import MODULUS, TEMPERATURE
 from creepkit.surrogates.recipe import ProgressCallback
 
 if TYPE_CHECKING:

@@ -10,13 +10,11 @@ import torch
 
 from creepkit.dataset.dataset import Dataset
 from creepkit.errors import DatasetError, SurrogateError
-from creepkit.surrogates.evaluation import evaluate
+from creepkit.surrogates.evaluation import dataset_fingerprint, evaluate, training_split
 from creepkit.surrogates.parameter_gru import ParameterGru
 from creepkit.surrogates.parameter_network import ParameterModule
 from creepkit.surrogates.recipe import Training
-from creepkit.surrogates.training import train
-from creepkit.surrogates.training_loop import epochs_since_best, learning_rate
-from creepkit.surrogates.training_rows import dataset_fingerprint, training_split
+from creepkit.surrogates.training import epochs_since_best, learning_rate, train
 from helpers.mistakes import said_otherwise
 from helpers.planted_datasets import bars
 from helpers.written_files import names_in
