@@ -254,29 +254,24 @@ class ProgressRecord:
 
     def leading_run(self) -> list[int] | None:
         """The shortest leading run of done shards that is enough; None while there is none."""
-        total, run = 0, []
-        for number in self._shard_numbers():
-            if self.samples is not None and total >= self.target:
-                break
-            if number not in self.done:
-                return None
-            run.append(number)
-            total += self._contribution(number)
-        return run
+        run = self._needed()
+        return run if all(number in self.done for number in run) else None
 
     def next_shard(self, running: Collection[int]) -> int | None:
         """The next shard to simulate; None when those done and running are expected to be enough."""
-        expected = 0.0
+        return next((n for n in self._needed(running) if n not in self.done and n not in running), None)
+
+    def _needed(self, running: Collection[int] = ()) -> list[int]:
+        """The first shards that are expected to be enough, up to the first that is neither done nor running."""
+        needed, expected = list[int](), 0.0
         for number in self._shard_numbers():
             if self.samples is not None and expected >= self.target:
                 break
-            if number in self.done:
-                expected += self._contribution(number)
-            elif number in running:
-                expected += self.acceptance_rate * self.job.rows
-            else:
-                return number
-        return None
+            needed.append(number)
+            if number not in self.done and number not in running:
+                break
+            expected += self._contribution(number) if number in self.done else self.acceptance_rate * self.job.rows
+        return needed
 
     def _shard_numbers(self) -> Iterable[int]:
         """The shards that may be needed, first ones first."""

@@ -8,6 +8,7 @@ service (c-optimal), and the law.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -98,12 +99,12 @@ def design(
 
 
 def _grids(laws: Sequence[Identification], rigs: Sequence[Rig], budget: float | None) -> list[CandidateTest]:
-    by_temperature = all(fit.law.uses(temperature) for fit in laws)
+    by_temperature, most = all(fit.law.uses(temperature) for fit in laws), np.inf if budget is None else budget
     candidates: list[CandidateTest] = []
     for rig in rigs:
         tests = [h for h in laws[0].histories if h.specimen == rig.specimen]
-        base = max(tests, key=lambda h: float(h.times[-1]))
-        candidates += grid_of_rig(rig, base, budget=np.inf if budget is None else budget, by_temperature=by_temperature)
+        longest = max(tests, key=lambda h: float(h.times[-1]))
+        candidates += grid_of_rig(rig, longest, budget=most, by_temperature=by_temperature)
     return candidates
 
 
@@ -111,7 +112,8 @@ class _Search:
     """The evaluation of candidates: all to first order, the best at draws, and for the law with refits in full."""
 
     def __init__(self, task: DesignTask, rigs: Sequence[Rig], seed: int, progress: Progress | None) -> None:
-        self.task, self.rigs, self.progress = task, {rig.specimen: rig for rig in rigs}, progress
+        self.task, self.rigs = task, {rig.specimen: rig for rig in rigs}
+        self.progress: Progress = progress or (lambda *_: None)
         with single_threaded_blas():
             noise_model = task.laws[0].noise_model
             known = [KnownLaw.from_identification(fit, noise_model) for fit in task.laws]
@@ -216,18 +218,15 @@ class _Search:
                 self.tests.remove(test)
             else:
                 self._evaluate_at_draws(test)
-            if self.progress is not None:
-                self.progress("best tests at draws of the posteriors", done + 1, len(promising))
+            self.progress("best tests at draws of the posteriors", done + 1, len(promising))
         if isinstance(self.criterion, LawCriterion):
             self._refit(self.criterion)
 
     def _promising(self) -> list[PlannedTest]:
         """The first candidates, no more than two of one load and duration."""
-        chosen: list[PlannedTest] = []
-        places: dict[tuple[float, float], int] = {}
+        chosen, places = list[PlannedTest](), Counter[tuple[float, float]]()
         for test in self.tests:
-            place = test.first_level, test.candidate.duration
-            places[place] = places.get(place, 0) + 1
+            places[place := (test.first_level, test.candidate.duration)] += 1
             if places[place] <= MOST_ALIKE and len(chosen) < EVALUATED_AT_DRAWS:
                 chosen.append(test)
         return chosen
@@ -254,11 +253,9 @@ class _Search:
             refitted.add(id(first.candidate))
             for a, b in criterion.directions():
                 refits += int(refits < MOST_REFITS and criterion.refit(first.histories, a, b))
-                if self.progress is not None:
-                    self.progress("refits in full", min(refits, MOST_REFITS), MOST_REFITS)
+                self.progress("refits in full", min(refits, MOST_REFITS), MOST_REFITS)
             self._evaluate_at_draws(first)
-        if self.progress is not None:
-            self.progress("refits in full", MOST_REFITS, MOST_REFITS)
+        self.progress("refits in full", MOST_REFITS, MOST_REFITS)
 
     def _order(self, test: PlannedTest) -> tuple[float, ...]:
         """Least for the best: the cheapest that decides between laws, else the likeliest to; for values by the hour.
@@ -299,8 +296,7 @@ class _Search:
                 k = int(np.argmax(gains))
             chosen.append(fitting[k])
             left, known = left - fitting[k].hours, known + gains[k]
-            if self.progress is not None:
-                self.progress("runs for the budget", len(chosen), MOST_RUNS)
+            self.progress("runs for the budget", len(chosen), MOST_RUNS)
         return tuple(chosen)
 
     def _notes_of_plan(self, plan: Sequence[PlannedTest]) -> list[str]:

@@ -197,7 +197,10 @@ class NetworkQuery:
     def of_tests(
         cls, inputs: LoadHistoryInputs, law_rows: Floats, tests: Sequence[tuple[History, Floats]], moved: NuisanceValues
     ) -> NetworkQuery:
-        """The inputs of tests with their frames, (frames,) s; moved : their nuisances."""
+        """The inputs of tests.
+
+        law_rows : (candidates, columns). tests : with frames, (frames,) s, each. moved : their nuisances.
+        """
         count = len(law_rows)
         perturbed = [
             inputs.with_nuisances(history, {kind: v[:, k] for kind, v in moved.items()}, count)

@@ -7,7 +7,7 @@ resumed from a checkpoint gives the same result.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Tensor
+from torch.optim.lr_scheduler import ReduceLROnPlateau
 
 from creepkit.arrays import Ints
 from creepkit.checked_arguments import checked
@@ -39,33 +40,8 @@ from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors
 from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, Training, Weights
 from creepkit.surrogates.surrogate import CHECKPOINT, Surrogate, load_surrogate
 
-PLATEAU_THRESHOLD = 1e-4
-"""Relative fall of a loss that counts as one, and DROP what the rate falls to: torch's ReduceLROnPlateau, unset in the
-paper."""
-
-
-PLATEAU_FACTOR = 0.1
-
-
 LEAST_LEARNING_RATE = 1e-8
-
-
-def learning_rate(training: Training, losses: Sequence[float], epoch_fraction: float = 0.0) -> float:
-    """The rate in the epoch that follows these validation losses; epoch_fraction : of its batches that are done."""
-    if training.schedule == "constant":
-        return training.rate
-    if training.schedule == "cosine":
-        done = (len(losses) + epoch_fraction) / training.epochs
-        return training.rate * 0.5 * (1.0 + math.cos(math.pi * min(done, 1.0)))
-    rate, best, stalled_epochs = training.rate, math.inf, 0
-    for loss in losses:
-        better = loss < best * (1.0 - PLATEAU_THRESHOLD)
-        best, stalled_epochs = (loss, 0) if better else (best, stalled_epochs + 1)
-        if stalled_epochs > training.patience:
-            stalled_epochs = 0
-            if rate - max(rate * PLATEAU_FACTOR, LEAST_LEARNING_RATE) > LEAST_LEARNING_RATE:
-                rate = max(rate * PLATEAU_FACTOR, LEAST_LEARNING_RATE)
-    return rate
+"""To which a plateau lowers it."""
 
 
 def epochs_since_best(losses: Sequence[float]) -> int:
@@ -100,6 +76,7 @@ class NetworkTraining:
         self.train, self.validation = (torch.from_numpy(part).to(device) for part in rows)
         self.training, self.seed = training, seed
         self.adam = torch.optim.Adam(module.parameters(), lr=training.rate)
+        self.plateau = ReduceLROnPlateau(self.adam, patience=training.patience, min_lr=LEAST_LEARNING_RATE)
         self.curves: dict[str, list[float]] = {"loss": [], "validation": [], "rse": [], "rate": []}
         self.best = self._weights()
         self._scale = torch.from_numpy(output_deviation(samples, rows[0])).to(device)
@@ -140,25 +117,25 @@ class NetworkTraining:
             self.best = self._weights()
         for name, value in (("loss", loss), ("validation", validation), ("rse", rse), ("rate", rate)):
             self.curves[name].append(value)
+        if self.training.schedule == "plateau":
+            self.plateau.step(validation)
 
     def _train_epoch(self) -> tuple[float, float]:
         """The mean loss of the batches, and the rate at the beginning."""
-        settings, losses, initial_rate = (
-            self.training,
-            self.curves["validation"],
-            learning_rate(self.training, self.curves["validation"]),
-        )
-        devices = [self.device] if self.device.type == "cuda" else []
+        devices, rates = [self.device] if self.device.type == "cuda" else [], []
         total = torch.zeros((), dtype=torch.float64, device=self.device)
         self.module.train()
         with torch.random.fork_rng(devices=devices):
             torch.manual_seed(int(np.random.SeedSequence((self.seed, self.epochs)).generate_state(1)[0]))
             order = self.train[torch.randperm(len(self.train)).to(self.device)]
-            batches = torch.split(order, settings.batch)
+            batches = torch.split(order, self.training.batch)
             for k, rows in enumerate(batches):
-                self.adam.param_groups[0]["lr"] = learning_rate(settings, losses, k / len(batches))
+                if self.training.schedule == "cosine":
+                    done = (self.epochs + k / len(batches)) / self.training.epochs
+                    self.adam.param_groups[0]["lr"] = self.training.rate * 0.5 * (1.0 + math.cos(math.pi * done))
+                rates.append(float(self.adam.param_groups[0]["lr"]))
                 total += self._step(rows) * len(rows)
-        return float(total) / len(order), initial_rate
+        return float(total) / len(order), rates[0]
 
     def _step(self, rows: Tensor) -> Tensor:
         self.adam.zero_grad()
@@ -216,6 +193,8 @@ class NetworkTraining:
             moments.setdefault(int(number), {})[moment] = tensor
         self.adam.load_state_dict({**self.adam.state_dict(), "state": moments})
         self.curves = {name: list(values) for name, values in curves.items()}
+        for loss in self.curves["validation"] if self.training.schedule == "plateau" else ():
+            self.plateau.step(loss)
 
 
 def _batch(samples: SampleTensors, rows: Tensor) -> SampleTensors:
@@ -235,20 +214,20 @@ def training_request(data: Dataset, recipe: ParameterGru, seed: int) -> dict[str
     return request
 
 
+@dataclass(frozen=True)
 class Checkpoint:
-    """Where a training leaves what it needs to go on; without a path it leaves nothing."""
+    """Where a training leaves what it needs to go on; without a path it leaves nothing. request : what was asked."""
 
-    def __init__(self, result_path: Path | None, request: Mapping[str, Any]) -> None:
-        self.path = None if result_path is None else result_path.with_name(f"{result_path.name}.checkpoint")
-        self.request = dict(request)
+    path: Path | None
+    request: dict[str, Any]
 
-    def save(self, state_of_training: NetworkTraining) -> None:
+    def save(self, fit: NetworkTraining) -> None:
         """Leave a fit as it is, in the place of what was left before."""
         if self.path is not None:
-            header = {"call": self.request, "curves": state_of_training.curves}
-            write_safetensors(self.path, state_of_training.state(), header, CHECKPOINT, internal=True)
+            header = {"call": self.request, "curves": fit.curves}
+            write_safetensors(self.path, fit.state(), header, CHECKPOINT, internal=True)
 
-    def restore(self, state_of_training: NetworkTraining) -> None:
+    def restore(self, fit: NetworkTraining) -> None:
         """Bring a fresh fit to where the same call was interrupted, if it was."""
         if self.path is None or not self.path.exists():
             return
@@ -260,14 +239,9 @@ class Checkpoint:
                 "file, or choose another name"
             )
         try:
-            state_of_training.restore(tensors, header["curves"])
+            fit.restore(tensors, header["curves"])
         except (KeyError, RuntimeError, ValueError, TypeError, AttributeError):
             raise SurrogateError(f"{self.path}: this checkpoint is damaged; remove it to begin again") from None
-
-    def remove(self) -> None:
-        """The training is done and its file written."""
-        if self.path is not None:
-            self.path.unlink(missing_ok=True)
 
 
 @checked
@@ -305,7 +279,7 @@ def train(
         module = recipe.module(data, tensors, train_rows)
     metadata = recipe.metadata(data, tensors, train_rows, module)
     fit = NetworkTraining(module, samples, rows, recipe.training, seed, torch_device)
-    checkpoint = Checkpoint(path, request)
+    checkpoint = Checkpoint(None if path is None else path.with_name(f"{path.name}.checkpoint"), request)
     checkpoint.restore(fit)
     fit.run(checkpoint.save, progress)
     weights = weights_of(fit.best)
@@ -316,7 +290,7 @@ def train(
     result = Surrogate(recipe, weights, metadata)
     if path is not None:
         result.save(path)
-        checkpoint.remove()
+        path.with_name(f"{path.name}.checkpoint").unlink(missing_ok=True)
     return result
 
 
@@ -404,17 +378,13 @@ def size_study(
     # an error now, not after hours of training
     training_split(len(data), replace(recipe.training, samples=max(counts)), seed)
     folder.mkdir(parents=True, exist_ok=True)
-    cells, layers, hidden = (
-        sizes.cells or (recipe.cell,),
-        sizes.layers or (recipe.layers,),
-        sizes.hidden or (recipe.hidden,),
-    )
-    combinations = list(product(cells, layers, hidden, counts))
+    widths = sizes.layers or (recipe.layers,), sizes.hidden or (recipe.hidden,)
+    combinations = list(product(sizes.cells or (recipe.cell,), *widths, counts))
     results = []
-    for k, (cell, depth, size, count) in enumerate(combinations):
-        settings = replace(recipe.training, samples=count)
-        variant = replace(recipe, cell=cell, layers=depth, hidden=size, training=settings)
-        path = folder / f"{cell}-{size}x{depth}-{count}.safetensors"
+    for k, (cell, layers, hidden, count) in enumerate(combinations):
+        training = replace(recipe.training, samples=count)
+        variant = replace(recipe, cell=cell, layers=layers, hidden=hidden, training=training)
+        path = folder / f"{cell}-{hidden}x{layers}-{count}.safetensors"
         named_progress = _with_task_name(progress, f"{k + 1} of {len(combinations)}, {path.stem}")
         model = train(data, variant, to=path, seed=seed, device=device, progress=named_progress)
         results.append(_study_result(model, variant, count, path))
