@@ -1,6 +1,5 @@
 """What creepkit and its workers can import: nothing from the working folder, nor what lies beside a script."""
 
-import ast
 import os
 import subprocess
 import sys
@@ -9,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from creepkit.jobs.worker_process import setup_message
-from helpers import source_tree
 
 PLANTED = "import sys; open({ran!r}, 'a').write(__name__ + chr(10))\n"
 NAMES = ("json", "numpy", "sympy", "lazy_loader", "typer", "pickle", "creepkit_plugin", "openpyxl")
@@ -97,50 +95,6 @@ def test_a_worker_finds_nothing_in_the_working_folder_but_the_class_of_its_job(
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["nothing"]
     assert not (folder / "ran").exists()
-
-
-STARTING = {
-    "subprocess", "multiprocessing", "pty", "asyncio", "joblib", "loky", "billiard", "runpy", "webbrowser",
-}  # fmt: skip
-OF_OS = ("system", "popen", "fork", "forkpty", "posix_spawn", "posix_spawnp", "startfile")
-
-
-def _starts_processes(module: str) -> bool:
-    """Whether a module imports what starts processes, or calls what does."""
-    for node in ast.walk(source_tree.tree(module)):
-        if isinstance(node, ast.Import):
-            names = {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            names = {str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)}
-        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "os":
-            names = {"subprocess"} if node.attr in OF_OS or node.attr.startswith(("exec", "spawn")) else set()
-        else:
-            names = {node.attr} & {"ProcessPoolExecutor"} if isinstance(node, ast.Attribute) else set()
-        if {name.split(".")[0] for name in names} & STARTING or any("ProcessPool" in name for name in names):
-            return True
-    return False
-
-
-def test_processes_are_started_in_one_place() -> None:
-    """`worker_pools` waits for workers and ends them; `cli.report` asks the desktop for its browser."""
-    starting = {module for module in source_tree.modules() if _starts_processes(module)}
-    assert starting <= {"creepkit.jobs.worker_process", "creepkit.jobs.worker_pools", "creepkit.cli.report"}
-    pools = source_tree.tree("creepkit.jobs.worker_pools")
-    called = {
-        node.func.attr
-        for node in ast.walk(pools)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
-    }
-    assert called & {"Popen", "run", "call", "check_call", "check_output"} == set()
-
-
-def test_nothing_of_the_working_folder_is_imported_before_it_is_left_out(tmp_path):
-    for name in ("lazy_loader", "json"):
-        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'w')")
-    command = [sys.executable, "-m", "creepkit", "--version"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert not (tmp_path / "executed").exists()
 
 
 def test_torch_with_its_made_up_attributes_leaves_workers_what_they_need():

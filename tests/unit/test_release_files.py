@@ -43,21 +43,6 @@ def test_the_workflow_calls_the_scripts_of_this_folder() -> None:
         assert (ROOT / script).is_file(), script
 
 
-def test_every_system_is_tested_and_has_wheels_of_its_processors() -> None:
-    """PyTorch, which creepkit requires, has no packages for Macs with processors of Intel since 2.3."""
-    systems = {"ubuntu": {"x86_64", "aarch64"}, "macos": {"arm64"}, "windows": {"amd64", "arm64"}}
-    tested = JOBS["tests"]["strategy"]["matrix"]["os"]
-    built = [(one["os"], one["arch"].lower()) for one in JOBS["wheels"]["strategy"]["matrix"]["include"]]
-    for runner, processors in systems.items():
-        assert any(one.startswith(runner) for one in tested)
-        assert {arch for system, arch in built if system.startswith(runner)} == processors
-
-
-def test_lower_bounds_are_of_what_is_required() -> None:
-    """.ci/lower_bounds.py reads requirements of this form alone."""
-    assert all(re.fullmatch(r"[\w-]+>=[\d.]+", one) for one in PROJECT["dependencies"])
-
-
 @pytest.mark.parametrize("name", ["CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md"])
 def test_links_lead_somewhere(name: str) -> None:
     for link in re.findall(r"\]\(([^)\s]+)\)", text(name)):

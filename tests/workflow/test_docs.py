@@ -19,8 +19,6 @@ PAGES = [
     for path in sorted([ROOT / "README.md", *ROOT.glob("plugins/*/README.md"), *DOCS.rglob("*.md")])
     if not any(path.is_relative_to(DOCS / folder) for folder in WRITTEN_AT_BUILD)
 ]
-MEASURED_BY_OTHERS = {"index"}
-"""The page of docs/measured that no program of tests/benchmarks writes."""
 
 
 def page_name(path: Path) -> str:
@@ -102,39 +100,3 @@ def test_the_files_of_the_guide_are_read(tmp_path):
     alone = "\n".join(line.rsplit(",", 3)[0] if line[0] != "#" else line for line in blocks[1].splitlines())
     (tmp_path / "alone.csv").write_text(alone, encoding="utf-8")
     assert list(ck.read_histories(tmp_path / "alone.csv")[0].outputs) == ["amplitude"]
-
-
-def test_every_measured_page_has_its_program():
-    """A page has the name of its program, or begins with it where a program writes several."""
-    programs = tuple(path.stem for path in (ROOT / "tests" / "benchmarks").glob("*.py"))
-    pages = {path.stem for path in (DOCS / "measured").glob("*.md")}
-    assert [page for page in pages - MEASURED_BY_OTHERS if not page.startswith(programs)] == []
-
-
-def test_measured_pages_end_with_the_command_that_repeats_them():
-    """The command is that of the page's program, and has no option that the program does not know."""
-    for page in (DOCS / "measured").glob("*.md"):
-        if page.stem in MEASURED_BY_OTHERS:
-            continue
-        last = page.read_text(encoding="utf-8").splitlines()[-1]
-        command = re.search(r"`python (tests/benchmarks/(\w+)\.py)( [^`]*)?`\.$", last)
-        assert command, f"{page.name} does not end with its command"
-        assert page.stem.startswith(command[2]), f"{page.name} is not written by {command[1]}"
-        text = (ROOT / command[1]).read_text(encoding="utf-8")
-        options = set(re.findall(r"--[a-z][a-z-]*", command[3] or "")) - {"--write"}
-        assert [option for option in options if f'"{option}"' not in text] == [], page.name
-        by_hand = re.search(r"kept by hand until `([\w./]+)` writes this page", last)
-        assert not by_hand or by_hand[1] == command[1], page.name
-
-
-def test_every_page_is_reachable_from_the_index():
-    """Each folder of docs/ has an index whose table of contents names its pages, or takes all of them."""
-    for index in [DOCS / "index.md", *DOCS.glob("*/index.md")]:
-        text = index.read_text(encoding="utf-8")
-        trees = re.findall(r"```\{toctree\}\n(.*?)```", text, flags=re.S)
-        assert trees, f"{index} has no table of contents"
-        if any(":glob:" in tree for tree in trees):
-            continue
-        entries = {line.strip() for tree in trees for line in tree.splitlines()}
-        siblings = {path.stem for path in index.parent.glob("*.md")} - {"index"}
-        assert siblings <= entries, f"{index} does not name {siblings - entries}"

@@ -140,7 +140,7 @@ def test_derivatives_are_those_of_differences_in_the_same_steps() -> None:
     test = AxisymmetricTest.of(disc, plan, nuisances, True)
     simulation = test.simulate(kernel, theta, settings)
     assert simulation.sensitivities is not None
-    found = simulation.sensitivities.surface[:, 0]
+    found = simulation.sensitivities[:, 0]
 
     def deflections(theta, **changes):
         other = AxisymmetricTest.of(disc, plan, {**nuisances, **changes}, False)

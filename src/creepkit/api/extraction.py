@@ -174,21 +174,18 @@ def imposed_on(
     {test piece: why it has no result}; None: HistoryError for the first of them.
     """
     import creepkit as ck
+    from creepkit.extraction.extract import problem_kept
     from creepkit.instruments.clock_alignment import nominal_zero
     from creepkit.records import ClockAlignment
 
-    known, clock, failed_here = known or ImposedChannels(), clock or ClockOptions(), dict[str, str]()
+    known, clock, problems = known or ImposedChannels(), clock or ClockOptions(), dict[str, str]()
     times = extractions[0].times + extractions[0].first_time
     known.check(record, [one.name for one in extractions])
-    names: dict[str, tuple[str, list[str]]] = {}
+    names = dict[str, tuple[str, list[str]]]()
     for one in extractions:
-        try:
+        with problem_kept(problems, one.name, failed):
             names[one.name] = known.names_for(one.name, record)
-        except HistoryError as error:
-            failed_here[one.name] = str(error)
     pieces = [one for one in extractions if one.name in names]
-    if failed is None and failed_here:
-        raise HistoryError("; ".join(failed_here.values()))
     found: list[Imposed] = []
     if clock.lag is not None:
         alignment = ClockAlignment.stated(clock.lag, zero=nominal_zero(record, times, clock.start))
@@ -207,17 +204,12 @@ def imposed_on(
         )
     for one in pieces:
         load, warm = names[one.name]
-        try:
+        with problem_kept(problems, one.name, failed):
             with_its, channel, sd = _with_temperature(record, one, warm, known)
-            found.append(
-                replace(ck.imposed(with_its, (load, channel), times, alignment), specimen=one.name, temperature_sd=sd)
-            )
-        except HistoryError as error:
-            if failed is None:
-                raise
-            failed_here[one.name] = str(error)
+            imposed = ck.imposed(with_its, (load, channel), times, alignment)
+            found.append(replace(imposed, specimen=one.name, temperature_sd=sd))
     if failed is not None:
-        failed.update(failed_here)
+        failed.update(problems)
     return found
 
 
@@ -244,15 +236,16 @@ def _with_temperature(
 
 
 def history_of(extraction: Extraction, under: Imposed) -> History:
-    """The test as a history, under what was imposed."""
+    """The test as a history, under what was imposed; what is not known of the lag enters the noise of its outputs."""
     history = extraction.history_under(
         RecordedLoading(under.load, extraction.load_name),
         under.temperature,
         time_zero=float(under.time_zero) - extraction.first_time,
     )
-    if not under.temperature_sd:
-        return history
-    return history.replace(labels={**history.labels, "temperature_sd_K": f"{under.temperature_sd:.2g}"})
+    errors = {name: under.lag_error(history.times, values) for name, values in history.outputs.items()}
+    sd = {name: np.hypot(history.standard_deviation[name], error) for name, error in errors.items()}
+    kelvin = {"temperature_sd_K": f"{under.temperature_sd:.2g}"} if under.temperature_sd else {}
+    return history.replace(standard_deviation=sd, labels={**history.labels, **kelvin})
 
 
 def _watched(specimen: Specimen | str) -> SupportsSurfaceObservation:

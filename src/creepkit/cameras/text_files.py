@@ -74,7 +74,8 @@ class TextHead:
     @property
     def again(self) -> re.Pattern[bytes]:
         """A whole line that is the same."""
-        return re.compile(rb"(?<=[\r\n])" + re.escape(self.line) + rb"(?=[\r\n]|\Z)")
+        line = re.escape(self.line)  # which comes first, so that a search looks for its bytes
+        return re.compile(line + rb"(?<=[\r\n]" + line + rb")(?=[\r\n]|\Z)")
 
 
 def is_remark(line: bytes) -> bool:

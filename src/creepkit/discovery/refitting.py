@@ -40,6 +40,7 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify, identify_values
 from creepkit.inverse.information_criteria import criterion_weights
+from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.iterative_estimation import linearised, starting_point
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -47,7 +48,6 @@ from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection import rank
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
@@ -169,8 +169,8 @@ def refit(
 ) -> TemperatureLaw:
     """Refit the combinations that remain to the tests, and weigh them by how well they follow these.
 
-    settings : where values are to come from frames of equal weight ("noise", the default) the likelihood takes its
-        place: combinations must be compared under one covariance, with scatter between tests and autocorrelation in it.
+    settings : of every identification; combinations are compared under one covariance, with scatter between tests and
+        autocorrelation in it.
     max_refits : combinations that are refitted at most; the simplest law, Arrhenius with every other parameter
         constant, is always among them.
     joint_fit : an identification of that law from all tests, where to begin.
@@ -180,7 +180,7 @@ def refit(
         temperature_law.isothermal_estimates,
         list(histories),
         using,
-        _likelihood_settings(settings or IdentificationSettings()),
+        settings or IdentificationSettings(),
         None if progress is None else progress_with_duration("refits of forms", progress),
         max_refits,
     )
@@ -211,10 +211,6 @@ def refit(
         cache.failed,
         points,
     )
-
-
-def _likelihood_settings(settings: IdentificationSettings) -> IdentificationSettings:
-    return replace(settings, weights="likelihood") if settings.weights == "noise" else settings
 
 
 def _baseline(combinations: RankedCombinations) -> list[CandidateForm]:

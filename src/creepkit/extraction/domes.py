@@ -44,23 +44,29 @@ def find_domes(frames: Frames, plate: ReferencePlate, region: SurfaceRegion) -> 
     that moves, and a maximum counts that stands out of the plate and lies nearer than that radius to no higher one.
     Surfaces rise towards the cameras: where more falls than rises, z points away from them.
     """
-    late = _late_frames(frames, plate)
-    over = plate.turned_over()
-    found = {side.turned: _highest_domes(late, side, region) for side in (plate, over)}
-    side = max((plate, over), key=lambda one: sum(height for height, _ in found[one.turned]))
-    if not found[side.turned]:
+    late, discs = _late_frames(frames, plate), _discs(plate, region)
+    risen, fallen = (
+        max((_domes_of(plate, sign * heights, valid, region, discs) for heights, valid in late), key=_total, default=[])
+        for sign in (1.0, -1.0)
+    )
+    if not (risen or fallen):
         raise HistoryError(
             f"frames '{frames.name}': no dome of about {region.moving:g} mm radius stands out of the noise in the late "
             "frames; give its centre"
         )
-    return Found(side, _named([place for _, place in found[side.turned]], region.moving))
+    if _total(risen) >= _total(fallen):
+        return Found(plate, _named([place for _, place in risen], region.moving))
+    return Found(plate.turned_over(), _named([place * [1.0, -1.0] for _, place in fallen], region.moving))
+
+
+def _total(domes: Sequence[tuple[float, Floats]]) -> float:
+    return sum(height for height, _ in domes)
 
 
 def place_centers(frames: Frames, plate: ReferencePlate, region: SurfaceRegion, centers: Centers) -> Found:
     """Given centres, in the plate turned over where the middles about them fall in the last frame that can be read."""
     over = plate.turned_over()
-    for moved, valid in _late_frames(frames, plate):
-        heights = _heights(plate, moved, valid)
+    for heights, valid in _late_frames(frames, plate):
         noise = 1.4826 * float(np.median(np.abs(heights)))
         near = [
             np.hypot(*(plate.places[valid, :2] - center).T) < 0.3 * region.moving
@@ -74,7 +80,7 @@ def place_centers(frames: Frames, plate: ReferencePlate, region: SurfaceRegion, 
 
 
 def _late_frames(frames: Frames, plate: ReferencePlate) -> list[tuple[Floats, Bools]]:
-    """Displacements (points, 3) mm and validity (points,) of some late frames that can be read, the last first."""
+    """Heights (valid points,) mm and validity (points,) of some late frames that can be read, the last first."""
     read, count = [], len(frames)
     for index in dict.fromkeys(int(k) for k in (count - 1, 0.95 * count, 0.75 * count, 0.5 * count)):
         if index <= plate.index or index < 0:
@@ -84,16 +90,8 @@ def _late_frames(frames: Frames, plate: ReferencePlate) -> list[tuple[Floats, Bo
         except (CreepkitError, OSError):
             continue
         if valid.sum() >= 0.5 * plate.known.sum():
-            read.append((moved, valid))
+            read.append((_heights(plate, moved, valid), valid))
     return read
-
-
-def _highest_domes(
-    late: Sequence[tuple[Floats, Bools]], plate: ReferencePlate, region: SurfaceRegion
-) -> list[tuple[float, Floats]]:
-    discs = _discs(plate, region)
-    found = [_domes_of(plate, moved, valid, region, discs) for moved, valid in late]
-    return max(found, key=lambda domes: sum(height for height, _ in domes), default=[])
 
 
 def given_centers(centers: Centers, plate: ReferencePlate) -> dict[str, Floats]:
@@ -134,11 +132,10 @@ def _discs(plate: ReferencePlate, region: SurfaceRegion) -> _Discs:
 
 
 def _domes_of(
-    plate: ReferencePlate, moved: Floats, valid: Bools, region: SurfaceRegion, discs: _Discs
+    plate: ReferencePlate, heights: Floats, valid: Bools, region: SurfaceRegion, discs: _Discs
 ) -> list[tuple[float, Floats]]:
-    """Heights in mm and centres of domes."""
-    places, heights = plate.places[valid], _heights(plate, moved, valid)
-    field = np.zeros(len(valid))
+    """Heights in mm and centres of domes; heights : (valid points,) mm."""
+    places, field = plate.places[valid], np.zeros(len(valid))
     field[valid] = heights
     radius = 0.5 * region.moving
     area = discs.near @ valid.astype(float)

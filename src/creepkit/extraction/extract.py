@@ -13,20 +13,10 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, HistoryError, quoted
 from creepkit.extraction.domes import Centers, find_domes, place_centers
 from creepkit.extraction.extraction import Extraction, FieldMap, PlateMotion
-from creepkit.extraction.frame_checks import fit_flags, frames_at_rest, motion_flags, read_flags, residual_flags
-from creepkit.extraction.noise import (
-    NOISE_FRAMES,
-    ErrorFields,
-    NoiseEstimate,
-    autocorrelation,
-    clamped_covariance,
-    estimate_noise,
-    smooth_free,
-    whole,
-)
+from creepkit.extraction.frame_checks import FrameFlags, frames_at_rest, motion_reasons, residual_reasons
+from creepkit.extraction.noise import NOISE_FRAMES, ErrorFields, NoiseEstimate, estimate_noise, smooth_free, whole
 from creepkit.extraction.plate import RigidMotions, rigid_motions
 from creepkit.extraction.series import PointSeries, ReferencePlate, SeriesOfFrames, read_series, reference_plate
-from creepkit.quality.flags import QualityFlag
 from creepkit.records import Frames, SupportsSurfaceObservation, SurfaceObservation, SurfacePoints, SurfaceRegion
 
 FEWEST_CLAMPED_POINTS = 30
@@ -100,13 +90,13 @@ def extract_surfaces(
     problems: dict[str, str] = {}
     groups: dict[str, Ints] = {}
     for name, center in found.items():
-        with _kept(problems, name, failed):
+        with problem_kept(problems, name, failed):
             groups[name] = _group(plate, center, region, list(found.values()), name)
     read = read_series(frames, plate, list(groups.values()))
     request = ExtractionRequest(operator or region.operator, rest, subset, load, centers is not None)
     extracted = []
     for name, series in zip(groups, read.series, strict=True):
-        with _kept(problems, name, failed):
+        with problem_kept(problems, name, failed):
             piece = _Piece(name, found[name], plate, read, series)
             extracted.append(_extract_one(frames, specimen, request, piece))
     if not extracted:
@@ -117,8 +107,8 @@ def extract_surfaces(
 
 
 @contextmanager
-def _kept(problems: dict[str, str], name: str, failed: object) -> Iterator[None]:
-    """What is wrong with one test piece is kept beside the others, where someone asks for it."""
+def problem_kept(problems: dict[str, str], name: str, failed: object) -> Iterator[None]:
+    """What is wrong with one test piece is kept beside the others; a HistoryError where `failed` is None."""
     try:
         yield
     except HistoryError as error:
@@ -173,14 +163,15 @@ def _extract_one(
     places = plate.places[series.points] - np.r_[piece.center, 0.0]
     distance = np.hypot(places[:, 0], places[:, 1])
     clamped = distance > region.held[0]
-    flags, good = _first_flags(piece, series, clamped)
+    frame_flags = _first_flags(piece, series, clamped)
+    good = frame_flags.good
     clamped = _always_there(series, clamped, good, piece.name)
     taken = _take_off(places, series, clamped, good)
     translations, rotations = taken.motion.translations(), taken.motion.rotation_vectors()
-    more = motion_flags(piece.name, translations, rotations, good, region.moving)
-    more += residual_flags(piece.name, {"of the clamped plate": _size(taken.clamped_heights)}, good)
-    good = _without(good, more)
-    flags += more
+    moved = motion_reasons(translations, rotations, good, region.moving)
+    rough = residual_reasons("of the clamped plate", _size(taken.clamped_heights), good)
+    frame_flags.add("motion", moved)
+    frame_flags.add("residual", rough)
     signal = _mean(taken.heights[:, distance < 0.3 * region.moving])
     rest = _rest_of(request, signal, good, piece.read.zero_reference)
     surface = np.flatnonzero(distance <= region.held[0])
@@ -198,13 +189,10 @@ def _extract_one(
         center_sd = np.sqrt(np.diag(covariance))
     centred = replace(points, places=points.places - center)
     seen = specimen.observe_surface(centred, request.operator)
-    failed = good & ~seen.converged
-    flags += fit_flags(piece.name, failed)
-    good &= ~failed
+    failed = np.flatnonzero(good & ~seen.converged)
+    frame_flags.add("fit", dict.fromkeys(failed.tolist(), "the observation operator gave no outputs"))
     residual = _size(seen.residuals)
-    last = residual_flags(piece.name, {"of the observation": residual}, good)
-    flags += last
-    good = _without(good, last)
+    frame_flags.add("residual", residual_reasons("of the observation", residual, good))
     names = tuple(seen.outputs)
     signal = seen.outputs[names[0]]
     fields, shown = _error_fields(
@@ -216,7 +204,7 @@ def _extract_one(
     motion = PlateMotion(
         translations,
         rotations,
-        _motion_errors(taken, fields, noise, plate.spacing),
+        _motion_errors(taken, fields.clamped_places, noise),
         int(clamped.sum()),
         *_presence(series, clamped, good),
         _size(taken.clamped_heights),
@@ -231,7 +219,7 @@ def _extract_one(
         outputs=seen.outputs,
         standard_deviation={n: sd[:, k] for k, n in enumerate(names)},
         used=good & np.isfinite(signal),
-        flags=tuple(sorted(flags, key=lambda flag: flag.frames)),
+        flags=tuple(sorted(frame_flags.flags, key=lambda flag: flag.frames)),
         rest=rest,
         center=plate.axes.camera_places((piece.center + center)[None])[0, :2],
         center_sd=center_sd * inflation,
@@ -250,21 +238,21 @@ def _extract_one(
     )
 
 
-def _first_flags(piece: _Piece, series: PointSeries, clamped: Bools) -> tuple[list[QualityFlag], Bools]:
-    """Frames that cannot be read or lack points, and (frames,) which are left."""
+def _first_flags(piece: _Piece, series: PointSeries, clamped: Bools) -> FrameFlags:
+    """Flags of frames that cannot be read or lack points."""
+    found = FrameFlags(piece.name, len(series.valid))
     share = np.minimum(*(_share(series.valid[:, some]) for some in (clamped, ~clamped)))
-    few = share < FEWEST_SHARE
-    few |= series.valid[:, clamped].sum(axis=1) < FEWEST_CLAMPED_POINTS
-    flags = read_flags(piece.name, piece.read.unreadable, few, share)
-    good = ~few
-    good[list(piece.read.unreadable)] = False
-    if good.sum() < 3:
+    few = (share < FEWEST_SHARE) | (series.valid[:, clamped].sum(axis=1) < FEWEST_CLAMPED_POINTS)
+    found.add("unreadable", piece.read.unreadable)
+    lacking = np.flatnonzero(few & found.good).tolist()
+    found.add("few points", {k: f"{100 * share[k]:.0f} % of the points that other frames have" for k in lacking})
+    if found.good.sum() < 3:
         raise HistoryError(
-            f"{piece.name}: {good.sum()} of {good.size} frames can be used "
-            f"({flags[0].reason if flags else 'there are no more'}); "
+            f"{piece.name}: {found.good.sum()} of {found.good.size} frames can be used "
+            f"({found.flags[0].reason if found.flags else 'there are no more'}); "
             "extraction needs at least 3"
         )
-    return flags, good
+    return found
 
 
 def _share(valid: Bools) -> Floats:
@@ -329,12 +317,6 @@ def _size(values: Floats) -> Floats:
     return np.sqrt(_mean(values**2))
 
 
-def _without(good: Bools, flags: list[QualityFlag]) -> Bools:
-    left = np.array(good)
-    left[[frame for flag in flags for frame in flag.frames]] = False
-    return left
-
-
 def _error_fields(
     seen: SurfaceObservation, taken: TakenOff, points: SurfacePoints, good: Bools, rest: Ints, loaded: Ints,
     clamped_places: Floats,
@@ -363,16 +345,12 @@ def _positions(signal: Floats) -> Floats:
     return even if not growth[-1] > 0.0 else 0.5 * (even + growth / growth[-1])
 
 
-def _motion_errors(taken: TakenOff, fields: ErrorFields, noise: NoiseEstimate, spacing: float) -> Floats:
-    """(6,) standard errors of one frame's translations and rotations: along z and about x and y by patches."""
-    places = fields.clamped_places
-    rho = autocorrelation(fields.clamped, places, spacing)
-    out = np.sqrt(np.diag(clamped_covariance(fields.clamped, places, noise.patch, rho)))
-    single = np.median(taken.motion.residual_sd, axis=0)
+def _motion_errors(taken: TakenOff, places: Floats, noise: NoiseEstimate) -> Floats:
+    """(6,) standard errors of one frame's translations and rotations; those in the plane from independent patches."""
     independent = np.sqrt(len(places) / max(1.0, np.pi * (0.5 * noise.patch) ** 2 / _cell(places)))
     lever = np.sqrt((places**2).sum(axis=1).mean())
-    in_plane = single[:2] / independent
-    return np.array([*in_plane, out[0], out[1], out[2], float(np.hypot(*in_plane)) / np.sqrt(2.0) / lever])
+    in_plane = np.median(taken.motion.residual_sd, axis=0)[:2] / independent
+    return np.array([*in_plane, *noise.plate_sd, float(np.hypot(*in_plane)) / np.sqrt(2.0) / lever])
 
 
 def _cell(places: Floats) -> float:

@@ -91,60 +91,51 @@ def isolated(values: Floats, good: Bools, threshold: float, floor: float) -> Flo
     return result
 
 
-def read_flags(name: str, unreadable: Mapping[int, str], few: Bools, seen: Floats) -> list[QualityFlag]:
-    """Flags of frames that could not be read or hold too few points: few (frames,), seen (frames,) shares of points."""
-    flags = [_flag(name, "unreadable", index, reason) for index, reason in unreadable.items()]
-    flags += [
-        _flag(name, "few points", int(k), f"{100 * seen[k]:.0f} % of the points that other frames have")
-        for k in np.flatnonzero(few)
-        if int(k) not in unreadable
-    ]
-    return flags
-
-
-def motion_flags(name: str, translations: Floats, rotations: Floats, good: Bools, reach: float) -> list[QualityFlag]:
-    """Frames whose rigid motion differs from that of their neighbours.
+def motion_reasons(translations: Floats, rotations: Floats, good: Bools, reach: float) -> dict[int, str]:
+    """{frame: reason} of frames whose rigid motion differs from that of their neighbours.
 
     translations : (frames, 3) mm. rotations : (frames, 3) rad. good : (frames,) which count. reach : mm, lever of a
     rotation.
     """
-    flags: dict[int, QualityFlag] = {}
+    reasons: dict[int, str] = {}
     for k, axis in enumerate("xyz"):
-        for values, floor, what, unit, scale in (
-            (translations[:, k], LEAST_MOTION_JUMP, "shift along", "um", 1e3),
-            (rotations[:, k], LEAST_MOTION_JUMP / reach, "rotation about", "mrad", 1e3),
+        for values, floor, what, unit in (
+            (translations[:, k], LEAST_MOTION_JUMP, "shift along", "um"),
+            (rotations[:, k], LEAST_MOTION_JUMP / reach, "rotation about", "mrad"),
         ):
-            for index in np.flatnonzero(off := isolated(values, good, MOTION_JUMP, floor)):
-                reason = (
-                    f"{what} {axis} of {scale * values[index]:.3g} {unit} is {off[index]:.0f} times the scatter "
-                    "off its neighbours"
-                )
-                flags.setdefault(int(index), _flag(name, "motion", int(index), reason))
-    return list(flags.values())
+            off = isolated(values, good, MOTION_JUMP, floor)
+            for index in np.flatnonzero(off):
+                size = f"{what} {axis} of {1e3 * values[index]:.3g} {unit}"
+                reasons.setdefault(int(index), f"{size} is {off[index]:.0f} times the scatter off its neighbours")
+    return reasons
 
 
-def residual_flags(name: str, sizes: Mapping[str, Floats], good: Bools) -> list[QualityFlag]:
-    """Frames whose residuals are larger than their neighbours'.
+def residual_reasons(where: str, size: Floats, good: Bools) -> dict[int, str]:
+    """{frame: reason} of frames whose residuals are larger than their neighbours'.
 
-    sizes : {where: (frames,) mm root mean square}. good : (frames,) which count.
+    where : of what. size : (frames,) mm root mean square. good : (frames,) which count.
     """
-    flags: dict[int, QualityFlag] = {}
-    for where, size in sizes.items():
-        median = float(np.nanmedian(size[good])) if good.any() else 0.0
-        for index in np.flatnonzero(isolated(size, good, RESIDUAL_JUMP, 0.5 * median)):
-            neighbours = np.nanmedian(size[max(index - 2, 0) : index + 3])
-            if size[index] > 1.5 * neighbours:
-                reason = (
-                    f"residual {where} of {1e3 * size[index]:.3g} um beside {1e3 * neighbours:.3g} um of its neighbours"
-                )
-                flags.setdefault(int(index), _flag(name, "residual", int(index), reason))
-    return list(flags.values())
+    reasons: dict[int, str] = {}
+    median = float(np.nanmedian(size[good])) if good.any() else 0.0
+    for index in np.flatnonzero(isolated(size, good, RESIDUAL_JUMP, 0.5 * median)):
+        neighbours = np.nanmedian(size[max(index - 2, 0) : index + 3])
+        if size[index] > 1.5 * neighbours:
+            beside = f"beside {1e3 * neighbours:.3g} um of its neighbours"
+            reasons[int(index)] = f"residual {where} of {1e3 * size[index]:.3g} um {beside}"
+    return reasons
 
 
-def fit_flags(name: str, failed: Bools) -> list[QualityFlag]:
-    """Frames from which the observation operator made nothing; failed : (frames,)."""
-    return [_flag(name, "fit", int(k), "the observation operator gave no outputs") for k in np.flatnonzero(failed)]
+class FrameFlags:
+    """Which frames of a test piece are good, and flags of the others.
 
+    good : (frames,). flags : one for each reason.
+    """
 
-def _flag(name: str, kind: FlagKind, frame: int, reason: str) -> QualityFlag:
-    return QualityFlag((name,), kind, (frame,), reason, proposal="it is marked unused")
+    def __init__(self, name: str, count: int) -> None:
+        self.name, self.good, self.flags = name, np.ones(count, bool), list[QualityFlag]()
+
+    def add(self, kind: FlagKind, reasons: Mapping[int, str]) -> None:
+        """Flag frames, {frame: reason}, which are no longer good."""
+        for frame, reason in reasons.items():
+            self.flags.append(QualityFlag((self.name,), kind, (frame,), reason, proposal="it is marked unused"))
+            self.good[frame] = False

@@ -51,13 +51,12 @@ class RigidMotions(NamedTuple):
     """What takes the plate of each frame back to where it was.
 
     rotations : (frames, 3, 3). shifts : (frames, 3) mm: X = R x + t. weights : (frames, points) of the robust fit.
-    residuals : (frames, points, 3) mm. residual_sd : (frames, 3) mm, robust.
+    residual_sd : (frames, 3) mm, robust, of what it leaves.
     """
 
     rotations: Floats
     shifts: Floats
     weights: Floats
-    residuals: Floats
     residual_sd: Floats
 
     def taken_off(self, places: Floats, displacements: Floats) -> Floats:
@@ -70,14 +69,10 @@ class RigidMotions(NamedTuple):
 
     def rotation_vectors(self) -> Floats:
         """(frames, 3) rad, of the plate since the reference, exact for small and large angles."""
+        from scipy.spatial.transform import Rotation
+
         turned = self.rotations.transpose(0, 2, 1)  # of the plate, not of what takes it back
-        skew = 0.5 * np.stack(
-            [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]],
-            axis=1,
-        )
-        sine = np.linalg.norm(skew, axis=1)
-        angle = np.arctan2(sine, 0.5 * (np.trace(turned, axis1=1, axis2=2) - 1.0))
-        return np.asarray(skew * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-300), 1.0)[:, None])
+        return np.asarray(Rotation.from_matrix(turned).as_rotvec())
 
     def translations(self) -> Floats:
         """(frames, 3) mm of the plate at the origin of the places."""
@@ -91,10 +86,10 @@ def plate_axes(points: Floats) -> PlateAxes:
     middle = np.median(points, axis=0)
     X = points - middle
     terms = np.stack([np.ones(len(X)), X[:, 0], X[:, 1]], axis=1)
-    weights = np.ones(len(X))
-    values = np.zeros(3)
+    weights, values = np.ones(len(X)), np.zeros(3)
     for k in range(30):
-        values = np.linalg.lstsq(terms * np.sqrt(weights)[:, None], X[:, 2] * np.sqrt(weights), rcond=None)[0]
+        weighted = terms * weights[:, None]
+        values = np.asarray(np.linalg.lstsq(weighted.T @ terms, weighted.T @ X[:, 2], rcond=None)[0], dtype=float)
         residual = X[:, 2] - terms @ values
         weights = _robust_weights(residual / _spread(residual), first=k < 5)
     normal = np.array([-values[1], -values[2], 1.0])
@@ -126,7 +121,7 @@ def rigid_motions(places: Floats, displacements: Floats, valid: Bools) -> RigidM
             sd = _robust_sd(residuals, valid)
         elif change < 1e-2:
             break
-    return RigidMotions(rotations, shifts, weights, np.where(valid[..., None], residuals, 0.0), sd)
+    return RigidMotions(rotations, shifts, weights, sd)
 
 
 def _kabsch(places: Floats, moved: Floats, weights: Floats) -> tuple[Floats, Floats, Floats]:

@@ -11,8 +11,10 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.cameras.array_files import matlab_table
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import decode_text, detect_dialect, parse_numbers, split_line, text_lines
+from creepkit.files.delimited_text import parse_numbers
 from creepkit.files.reading import FileKind, read_bytes
+from creepkit.readers.table import CellTable, TableRow
+from creepkit.readers.text_files import read_text_table
 from creepkit.records import ZERO_CELSIUS, InstrumentRecord
 from creepkit.records.units import celsius_text
 
@@ -198,15 +200,15 @@ def image_of_numbers(path: Path) -> Floats:
             raise HistoryError(f"{path}: holds {len(matrices)} matrices; an infrared image is one")
         values = table.load(matrices)[matrices[0]].reshape(table.shapes[matrices[0]])
     else:
-        lines = [one for one in text_lines(decode_text(read_bytes(path, IMAGE_FILE), path)) if one.strip()]
-        dialect = detect_dialect(lines, str(path))
-        rows = []
-        for k, line in enumerate(lines, 1):
-            place = f"{path}:{k}"
-            rows.append(parse_numbers(split_line(line, dialect, place), dialect, lambda _: place, "pixel"))  # noqa: B023
-        if len({len(row) for row in rows}) != 1:
+        text = read_text_table(path)
+        rows = [_pixels(text, row) for row in text.rows]
+        if len({row.size for row in rows}) != 1:
             raise HistoryError(f"{path}: its rows differ in length; an infrared image is a matrix of numbers")
         values = np.array(rows)
     if values.ndim != 2 or min(values.shape) < 2 or values.dtype.kind not in "fiu":
         raise HistoryError(f"{path}: holds {quoted(str(values.shape))} numbers; an infrared image is a matrix")
     return np.asarray(values, dtype=float)
+
+
+def _pixels(table: CellTable, row: TableRow) -> Floats:
+    return parse_numbers(row.cells, table.dialect, lambda _: table.location(row.line), "pixel")

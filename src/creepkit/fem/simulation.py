@@ -72,20 +72,6 @@ class LoadHistory:
 
 
 @dataclass(frozen=True, eq=False)
-class SurfaceSensitivities:
-    """Derivatives of a simulation.
-
-    surface : (steps, observed, C) mm, of the observed displacements, to the law's internal parameters, then to the
-        directions of the load program, then to the numbers of the geometry. Where the motion controls a displacement,
-        its force in N/rad comes after the observed ones.
-    times : (steps, D) s, of the times of the steps, to the directions.
-    """
-
-    surface: Floats
-    times: Floats
-
-
-@dataclass(frozen=True, eq=False)
 class Simulation:
     """A finished simulation: its accepted steps, and how it ended.
 
@@ -99,7 +85,9 @@ class Simulation:
     beta : exponent of the time transformation (see integration.time_discretisation).
     positions : (steps, 2) where each step began in its segment, and its length, in the transformed time.
     reactions : (steps,) N/rad, force of the displacement that the motion controls; zeros where none is.
-    sensitivities : if asked for.
+    sensitivities : if asked for, (steps, observed, C) mm, of the observed displacements, to the law's parameters,
+        then to the directions of the load program, then to the numbers of the geometry. Where the motion controls a
+        displacement, its force in N/rad comes after the observed ones.
     """
 
     times: Floats
@@ -114,7 +102,7 @@ class Simulation:
     beta: float
     positions: Floats
     reactions: Floats
-    sensitivities: SurfaceSensitivities | None = None
+    sensitivities: Floats | None = None
 
     def at(self, values: Floats, times: Floats) -> Floats:
         """Values (steps, ...) of the accepted steps at other times, (times, ...); NaN after the end."""
@@ -175,9 +163,6 @@ def simulate(
         law, theta, model, LoadProgram(beta, load_history.poisson, segments, pattern, script),
         settings or SolverSettings(), keep_points=keep_points, directions=directions,
     )  # fmt: skip
-    derivatives = None
-    if record.surface is not None and record.moments is not None:
-        derivatives = SurfaceSensitivities(record.surface, record.moments)
     return Simulation(
         times=record.times,
         displacements=model.displacements(record.displacements),
@@ -191,5 +176,5 @@ def simulate(
         beta=beta,
         positions=record.positions,
         reactions=record.reactions,
-        sensitivities=derivatives,
+        sensitivities=record.surface,
     )

@@ -14,7 +14,7 @@ from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.solvable_model import SensitivityDirections, SolvableModel
 from creepkit.integration.core_structures import MAX_STATES
-from creepkit.kernels.interface import CompiledLaw, Entry
+from creepkit.kernels.interface import CompiledEntry, CompiledLaw
 
 (
     REACHED_END, DEFLECTION_LIMIT, STRAIN_LIMIT, STATE_LIMIT, LIMIT_LOAD, LOST_CONVERGENCE, TOO_MANY_STEPS, LAW_FAILED,
@@ -65,7 +65,6 @@ class StepRecord(NamedTuple):
     code, time : how it ended, and when, s.
     reactions : (steps,) N/rad, force of the displacement that the motion controls; zeros where none is.
     surface : (steps, observed, C) mm, derivatives of the observed displacements, then of that force, or None.
-    moments : (steps, D) s, derivatives of the times to the directions of the load program, or None.
     """
 
     times: Floats
@@ -79,7 +78,6 @@ class StepRecord(NamedTuple):
     time: float
     reactions: Floats
     surface: Floats | None
-    moments: Floats | None
 
 
 def solve(
@@ -114,8 +112,7 @@ def solve(
         program.beta, program.poisson, len(segments), address(segments), address(pattern), address(initial),
         address(limits), len(script), address(script),
     )  # fmt: skip
-    surface = moments = None
-    along = derivatives = None
+    surface = along = derivatives = None
     kept: tuple[Floats, ...] = ()
     if directions is not None:
         kept = tuple(map(_contiguous, (directions.segments, *model.core_directions(directions))))
@@ -137,7 +134,7 @@ def solve(
     return StepRecord(
         times[:n].copy(), numbers[:n].copy(), displacements[:n].copy(), None if values is None else values[:n].copy(),
         mises[:n].copy(), positions[:n].copy(), counts, ended.code, ended.time, reactions[:n].copy(),
-        None if surface is None else surface[:n], None if moments is None else moments[:n],
+        None if surface is None else surface[:n],
     )  # fmt: skip
 
 
@@ -199,7 +196,7 @@ class LoadProgram(NamedTuple):
 def _entry_addresses(law: CompiledLaw) -> tuple[int, int]:
     """Addresses of the entries that the core calls; SolveError for what is no entry of a compiled law."""
     for entry in (law.update, law.sensitivity):
-        if not isinstance(entry, Entry) or not entry.address:
+        if not isinstance(entry, CompiledEntry) or not entry.address:
             raise SolveError(
                 f"a compiled law has {entry!r} for an entry, which is no compiled function of this package"
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -90,14 +90,6 @@ class TimeInterpolation:
             for array in (self.times, self.starts, self.origins, self.exponents)
         )
         return times, starts, np.array(self.rows, np.int64), origins, exponents
-
-    def moved(self, times: Floats, starts: Floats) -> TimeInterpolation:
-        """The same steps at other times, the segments beginning at others too.
-
-        times : (steps,) s, and starts : (segments reached,) s, added to those here.
-        """
-        origins = np.where(self.origins == self.starts, self.origins + starts, self.origins)
-        return replace(self, times=self.times + times, starts=self.starts + starts, origins=origins)
 
 
 _INTERPOLATED, _NOT_INCREASING, _NO_MEMORY = 0, 2, 3

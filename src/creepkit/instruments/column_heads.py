@@ -93,10 +93,7 @@ def near_unit(text: str) -> str:
     if not unit or channel_unit(unit) is not None or unit in TIME_UNITS:
         return ""
     alike = [known for known in _UNITS if known.lower() == unit.lower()]
-    if alike:
-        return alike[0]
-    found = get_close_matches(unit, _UNITS, 1, 0.74) if len(unit) > 2 else []
-    return found[0] if found else ""
+    return next(iter(alike or (get_close_matches(unit, _UNITS, 1, 0.74) if len(unit) > 2 else ())), "")
 
 
 def near_unit_of_name(name: str) -> tuple[str, str]:

@@ -55,6 +55,23 @@ class Imposed(Presentable, text="reports.instrument_records:imposed_text"):
     notes: tuple[str, ...] = ()
     temperature_sd: float = 0.0
 
+    def lag_error(self, times: Floats, values: Floats) -> Floats:
+        """(frames,) standard deviation of an output by what is not known of the lag, over its posterior probability.
+
+        An output D at a time shifted by s is c (P(t + s) - P(t)) + r s away: c is its response to changes of the load P
+        between frames by least squares, r the rate of what is left. times : (frames,) s of the history. values :
+        (frames,) of the output.
+        """
+        lags, probability = self.alignment.lags, self.alignment.probability
+        if lags.size < 2 or times.size < 2:
+            return np.zeros(times.size)
+        shifts, loads = lags - probability @ lags, self.load.at(times)
+        steps = np.where(np.abs(np.diff(loads)) > REST * np.abs(loads).max(), np.diff(loads), 0.0)
+        response = float(steps @ np.diff(values)) / max(float(steps @ steps), 1e-300)
+        rate = np.gradient(values - response * loads, times)
+        errors = response * (self.load.at(times[:, None] + shifts) - loads[:, None]) + rate[:, None] * shifts
+        return np.asarray(np.sqrt(errors**2 @ probability))
+
 
 @checked
 def imposed(
@@ -78,7 +95,12 @@ def imposed(
     if times.ndim != 1 or times.size < 2 or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
         raise HistoryError(f"{record.origin}: the times of the frames must be finite and increase; give at least two")
     if alignment is None:
-        alignment = _agreeing(record, times)
+        if record.start is None or times[0] < 1e8:
+            raise HistoryError(
+                f"{record.origin}: the clocks of frames and record are not known to agree; give the alignment of "
+                "align_clocks(), or ck.ClockAlignment.stated(lag)"
+            )
+        alignment = ClockAlignment.stated(0.0, zero=record.start)
     names = channel_names(record, specimen) if isinstance(specimen, str) else specimen
     load, temperature = (record.channel(name) for name in names)
     notes = _checked_channels(record, load, temperature)
@@ -102,15 +124,6 @@ def imposed(
         alignment,
         tuple(notes),
     )
-
-
-def _agreeing(record: InstrumentRecord, times: Floats) -> ClockAlignment:
-    if record.start is None or times[0] < 1e8:
-        raise HistoryError(
-            f"{record.origin}: the clocks of frames and record are not known to agree; give the alignment of "
-            "align_clocks(), or ck.ClockAlignment.stated(lag)"
-        )
-    return ClockAlignment.stated(0.0, zero=record.start)
 
 
 def named_specimens(record: InstrumentRecord, pattern: str = "") -> list[str]:
@@ -164,14 +177,9 @@ def _checked_channels(record: InstrumentRecord, load: Channel, temperature: Chan
             f"{record.origin}: whether the channel '{load.name}' holds gauge or absolute pressures is not stated; "
             "state pressure_reference='gauge' or 'absolute' to read_record()"
         )
-    notes = []
-    for channel in (load, temperature):
-        if channel.missing:
-            notes.append(
-                f"{channel.missing} of {channel.values.size} readings of '{channel.name}' are missing; the program is "
-                "straight across"
-            )
-    return notes
+    missing = ((one.missing, one.values.size, one.name) for one in (load, temperature) if one.missing)
+    text = "{} of {} readings of '{}' are missing; the program is straight across"
+    return [text.format(*one) for one in missing]
 
 
 def _check_overlap(record: InstrumentRecord, alignment: ClockAlignment, times: Floats) -> None:

@@ -183,19 +183,17 @@ def log_likelihoods(response: Response, displacements: Floats, model: ResponseMo
 
     displacements : (frames,) mm.
     """
-    terms = np.empty(response.loads[1:].shape)
-    for k, (innovation, variance) in enumerate(_innovations(response, displacements, model)):
-        terms[k] = -0.5 * (np.log(2.0 * np.pi * variance) + innovation**2 / variance)
-    return terms
+    innovation, variance = innovations(response, displacements, model)
+    return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + innovation**2 / variance))
 
 
 def innovations(response: Response, displacements: Floats, model: ResponseModel) -> tuple[Floats, Floats]:
-    """(frames - 1, lags) mm, by which displacements differ from what was expected before, and standard deviations.
+    """(frames - 1, lags) mm, by which displacements differ from what was expected before, and variances, mm2.
 
     displacements : (frames,) mm.
     """
-    pairs = list(_innovations(response, displacements, model))
-    return np.array([one for one, _ in pairs]), np.sqrt([variance for _, variance in pairs])
+    found = np.array(list(_innovations(response, displacements, model)))
+    return found[:, 0], found[:, 1]
 
 
 def _innovations(response: Response, displacements: Floats, model: ResponseModel) -> Iterator[tuple[Floats, Floats]]:

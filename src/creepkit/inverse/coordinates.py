@@ -14,7 +14,7 @@ from creepkit.errors import LawError
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.kernels import ArrayKernel, lower
 from creepkit.language import CreepLaw, stress, temperature
-from creepkit.language.expression_cost import expression_cost
+from creepkit.language.law_record import expression_size
 from creepkit.language.symbols import POINT_VARIABLES
 
 SAMPLE_POINTS = 64
@@ -70,8 +70,8 @@ _CACHE: dict[tuple[str, tuple[str, ...], tuple[tuple[float, float], ...]], tuple
 """What was derived in this process, by fingerprint, order of parameters (that of a sum may differ), and bounds."""
 
 
-SIMPLIFICATION_LIMIT = 3000
-"""Nodes of the derivatives of a term up to which sympy simplifies its exponent in seconds; others have none found."""
+SIMPLIFICATION_LIMIT = 750
+"""Size of a term up to which sympy simplifies its exponent in seconds; others have none found."""
 
 
 def _derived(law: CreepLaw) -> tuple[LocalExponent, ...]:
@@ -88,7 +88,7 @@ def _derived(law: CreepLaw) -> tuple[LocalExponent, ...]:
 def _exponent_of_term(law: CreepLaw, term: sympy.Expr, used_positions: set[int]) -> LocalExponent | None:
     if term.free_symbols & set(law.states) or not term.has(stress):
         return None
-    if expression_cost(term).derivatives > SIMPLIFICATION_LIMIT:
+    if expression_size(term) > SIMPLIFICATION_LIMIT:
         return None
     exponent = sympy.simplify(stress * sympy.diff(term, stress) / term)
     parameters = [symbol for symbol in law.params if symbol in exponent.free_symbols]

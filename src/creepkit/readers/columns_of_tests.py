@@ -8,23 +8,28 @@ above `0.2 %` and `1 %`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import accumulate
 
 from creepkit.files.delimited_text import Dialect, is_number
-from creepkit.readers.column_names import NAMES_OF, NameTable, split_written_name, unit_suffix, words_of
+from creepkit.readers.column_names import (
+    NAMES_OF,
+    NameTable,
+    plain_name,
+    split_unit,
+    split_written_name,
+    unit_suffix,
+    words_of,
+)
 from creepkit.readers.ends_of_tests import FIRM, kind_of_column, plain_words
-from creepkit.readers.table import TableRow
-from creepkit.readers.vocabulary import CONDITION_KINDS, plain_name, split_unit
+from creepkit.readers.table import CellTable, TableRow
+from creepkit.readers.vocabulary import CONDITION_KINDS
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
 
-MEASURED = ("minimum_rate", "rupture")
-"""Of which a table of tests has one at least, or a time to a strain."""
-
-
 TIME_TO_STRAIN = "time_to_strain"
-"""Before the strain, as a fraction, in the key of a column of times to it."""
+"""Before the strain, as a fraction, in the quantity of a column of times to it."""
 
 
 QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
@@ -35,19 +40,8 @@ QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
     "rupture": (
         TIME,
         (
-            *(
-                "rupture",
-                "rupture time",
-                "creep life",
-                "t r",
-                "tr",
-                "t rupture",
-                "life",
-                "bruchzeit",
-                "standzeit",
-                "tb",
-            ),
-            *("t f", "tf", "ttr", "ttf", "t u", "tu", "zeitstand", "durée de vie"),
+            *("rupture", "rupture time", "creep life", "t r", "tr", "t rupture", "life", "bruchzeit", "standzeit"),
+            *("tb", "t f", "tf", "ttr", "ttf", "t u", "tu", "zeitstand", "durée de vie"),
         ),
     ),
     "end_time": (
@@ -84,10 +78,6 @@ TEXTS: Mapping[str, tuple[str, ...]] = {
 """{key of a history file: the names of a column of it in small letters}."""
 
 
-def _spellings(name: str) -> tuple[str, str]:
-    return name, plain_words(name).replace("|", " ")
-
-
 NAMES = NameTable(
     {quantity: kind for quantity, (kind, _) in QUANTITIES.items()},
     tuple(TEXTS),
@@ -95,10 +85,37 @@ NAMES = NameTable(
         spelling: key
         for key, names in (*TEXTS.items(), *((q, names) for q, (_, names) in QUANTITIES.items()))
         for name in names
-        for spelling in _spellings(name)
+        for spelling in (name, plain_words(name).replace("|", " "))
     },
     {},
 )
+
+
+@dataclass(frozen=True)
+class TestColumn:
+    """A column of a table of tests.
+
+    quantity : of QUANTITIES, a time to a strain, `time_to_strain 0.01`, or a key of TEXTS; "" where its name means
+    none. unit : of a number, as creepkit writes it or as it is written.
+    """
+
+    quantity: str = ""
+    unit: str = ""
+
+    @property
+    def kind(self) -> QuantityKind | None:
+        """The kind of its numbers; None of a text."""
+        return TIME if self.strain is not None else QUANTITIES.get(self.quantity, (None,))[0]
+
+    @property
+    def strain(self) -> float | None:
+        """The strain, as a fraction, to which it states times."""
+        return float(self.quantity.split()[1]) if self.quantity.startswith(TIME_TO_STRAIN) else None
+
+    @property
+    def key(self) -> str:
+        """The key of a history file that states the same."""
+        return f"{self.quantity}_{self.unit}" if self.kind else self.quantity
 
 
 _IS_TIME = re.compile(
@@ -114,30 +131,26 @@ _UNIT_IN_NAME = {"h": r"hours?|hrs?|stunden|heures?", "d": r"days|tage|jours", "
 
 
 @lru_cache(maxsize=4096)
-def key_of_column(written: str) -> tuple[str, str]:
-    """The quantity, or key, that the name of a column means, and its unit; ("", "") where it means none.
-
-    A time to a strain is `time_to_strain 0.01`, with the strain as a fraction.
-    """
+def column_called(written: str) -> TestColumn:
+    """The column that a name means."""
     if (strain := _strain_reached(written)) is not None:
-        return f"{TIME_TO_STRAIN} {strain:.6g}", _unit_of_time(written)
+        return TestColumn(f"{TIME_TO_STRAIN} {strain:.6g}", _unit_of_time(written))
     name, unit = split_written_name(written)
     if re.fullmatch(r"[\w ]+(?:/[\w ]+)+|.*=.*", unit) and not unit_suffix(unit):
-        return "", ""  # (yes/no), (1 = failed): no unit but the values of the column
+        return TestColumn()  # (yes/no), (1 = failed): no unit but the values of the column
     unit = unit_suffix(unit) or unit
     if plain_name(name) == "t":
-        return "temperature" if unit in TEMPERATURE.units or (name == "T" and not unit) else "end_time", unit
-    meant = _meaning(name, unit == "pct")
-    if meant in QUANTITIES:
-        return meant, unit or (_unit_of_time(written) if QUANTITIES[meant][0] is TIME else "")
-    whole = _meaning(written, is_per_cent=False)
-    text = whole if whole in TEXTS else meant if unit in ("", "pct") else ""
-    if not text and (quantity := _quantity_by_words(name, unit)):
-        return quantity, unit or (_unit_of_time(written) if QUANTITIES[quantity][0] is TIME else "")
-    return text, ""
+        return TestColumn(
+            "temperature" if unit in TEMPERATURE.units or (name == "T" and not unit) else "end_time", unit
+        )
+    quantity, whole = _meaning(name, unit == "pct"), _meaning(written, is_per_cent=False)
+    text = whole if whole in TEXTS else quantity if unit in ("", "pct") else ""
+    if quantity not in QUANTITIES and (text or not (quantity := _quantity_by_words(name, unit))):
+        return TestColumn(text)
+    return TestColumn(quantity, unit or (_unit_of_time(written) if QUANTITIES[quantity][0] is TIME else ""))
 
 
-def _meaning(name: str, is_per_cent: bool = True) -> str:
+def _meaning(name: str, is_per_cent: bool) -> str:
     if name.casefold() in ("a", "el") and not is_per_cent:
         return ""
     plain = plain_words(name).replace("|", " ").replace("?", " ")
@@ -150,11 +163,8 @@ def _quantity_by_words(name: str, unit: str) -> str:
     is_rate = _RATES.search(plain) and _OF_CREEP.search(plain) and not re.search(r"sd\b|std|err", plain)
     if is_rate and (unit in RATE.units or unit in ("", "pct")):
         return "minimum_rate"
-    if _OF_OTHERS.search(plain):
-        return ""
-    if _OF_RUPTURE.search(plain) and _IS_TIME.search(plain):
-        return "rupture"
-    return ""
+    is_rupture = _OF_RUPTURE.search(plain) and _IS_TIME.search(plain) and not _OF_OTHERS.search(plain)
+    return "rupture" if is_rupture else ""
 
 
 def _strain_reached(written: str) -> float | None:
@@ -180,24 +190,10 @@ def _unit_of_time(written: str) -> str:
     return next((unit for unit, names in _UNIT_IN_NAME.items() if re.search(rf"\b(?:{names})\b", words)), "")
 
 
-def kind_of(quantity: str) -> QuantityKind | None:
-    """The kind of the numbers of a column; None of a text."""
-    if quantity.startswith(TIME_TO_STRAIN):
-        return TIME
-    return QUANTITIES[quantity][0] if quantity in QUANTITIES else None
-
-
 def quantity_of(key: str) -> str:
-    """The quantity of a key, without its unit; other keys as they are."""
-    if key.startswith(TIME_TO_STRAIN):
-        return key.rpartition("_")[0] if key.count("_") > TIME_TO_STRAIN.count("_") else key
+    """The quantity that a key or a name states, without its unit; other keys as they are."""
     found = split_unit(key, {**CONDITION_KINDS, **NAMES.kinds})
-    return found[0] if found else key_of_column(key)[0] or key
-
-
-def unit_of(key: str) -> str:
-    """The unit of a key."""
-    return key.rpartition("_")[2]
+    return found[0] if found else column_called(key).quantity or key
 
 
 # ---- the rows of the head ------------------------------------------------------------------------------------------
@@ -216,8 +212,9 @@ class TestTableHead:
 _NUMBER_LIKE = re.compile(
     r"(?:[<>≥≤~≈(\[]|>=|ca\.? )*\s*[+-]?\d[\d.,'’\s]*(?:[eEdD][+-]?\d+)?\s*(?:[+*)\]†‡#→h]|->|\.\.\.|…)*"
 )
-_SEARCHED, _DEEPEST = 60, 5
-"""Rows within which the tests must begin, and rows of a head."""
+_WITH_UNIT = re.compile(r"[<>≥]?\s*[\d.,]+(?:[eE][+-]?\d+)?\s*(\S{1,6})")
+_SEARCHED, _DEEPEST, _MOST_IN_COLUMNS = 60, 5, 30
+"""Rows within which the tests must begin; rows of a head; and of a table whose tests stand in columns."""
 
 
 def is_number_like(cell: str, dialect: Dialect) -> bool:
@@ -227,7 +224,7 @@ def is_number_like(cell: str, dialect: Dialect) -> bool:
 
 def _is_measured(cell: str, dialect: Dialect) -> bool:
     """Whether a cell holds a number, perhaps with a unit behind it."""
-    with_unit = re.fullmatch(r"[<>≥]?\s*[\d.,]+(?:[eE][+-]?\d+)?\s*(\S{1,6})", cell)
+    with_unit = _WITH_UNIT.fullmatch(cell)
     has_unit = with_unit is not None and unit_suffix(with_unit[1]) not in (None, "pct")
     return has_unit or is_number_like(cell, dialect)
 
@@ -240,16 +237,14 @@ def only_text(row: TableRow, dialect: Dialect) -> str:
     return "" if is_number_like(filled[0], dialect) or unit_suffix(filled[0]) else filled[0]
 
 
-def head_of_tests(rows: Sequence[TableRow], dialect: Dialect, meant: Mapping[str, str]) -> TestTableHead | None:
+def head_of_tests(table: CellTable, meant: Mapping[str, str]) -> TestTableHead | None:
     """The head of a table with one row a test; None where the rows are no such table.
 
     meant : {name as written: what it is} of columns that were named otherwise.
     """
-    body = next(
-        (k for k, row in enumerate(rows[:_SEARCHED]) if sum(_is_measured(c, dialect) for c in row.cells if c) > 1), None
-    )
-    if not body:
-        return None
+    rows, dialect = table.rows, table.dialect
+    searched = enumerate(rows[:_SEARCHED])
+    body = next((k for k, row in searched if sum(_is_measured(c, dialect) for c in row.cells if c) > 1), 0)
     while body > 1 and only_text(rows[body - 1], dialect):  # sections above the first test
         body -= 1
     first = body
@@ -257,43 +252,41 @@ def head_of_tests(rows: Sequence[TableRow], dialect: Dialect, meant: Mapping[str
         first -= 1
     for start in range(body - 1, first - 1, -1):
         names = _joined([row.cells for row in rows[start:body]], meant)
-        if is_test_table([meant.get(name, name) for name in names]):
-            # A further row above may hold units, or what stands above several columns.
-            for higher in range(first, start):
-                if sum(bool(key_of_column(cell)[0]) for cell in rows[higher].cells if cell) > 1:
-                    return TestTableHead(tuple(names), higher, start, body)  # the same names in another language
-                wider = _joined([row.cells for row in rows[higher:body]], meant)
-                if _understood(wider, meant) > _understood(names, meant):
-                    return TestTableHead(tuple(wider), higher, start, body)
-            return TestTableHead(tuple(names), start, start, body)
+        if not is_test_table([meant.get(name, name) for name in names]):
+            continue
+        # A further row above may hold units, or what stands above several columns.
+        for higher in range(first, start):
+            if sum(bool(column_called(cell).quantity) for cell in rows[higher].cells if cell) > 1:
+                return TestTableHead(tuple(names), higher, start, body)  # the same names in another language
+            wider = _joined([row.cells for row in rows[higher:body]], meant)
+            if _understood(wider, meant) > _understood(names, meant):
+                return TestTableHead(tuple(wider), higher, start, body)
+        return TestTableHead(tuple(names), start, start, body)
     return None
 
 
 def _may_name(row: TableRow, dialect: Dialect) -> bool:
     filled = [cell for cell in row.cells if cell]
-    return (len(set(filled)) > 1 or bool(unit_suffix(filled[0]))) and not any(
-        _is_measured(cell, dialect) for cell in filled
-    )
+    is_head = len(set(filled)) > 1 or bool(unit_suffix(filled[0]))
+    return is_head and not any(_is_measured(cell, dialect) for cell in filled)
 
 
 def _understood(names: Sequence[str], meant: Mapping[str, str]) -> int:
-    keys = [key_of_column(meant.get(name, name)) for name in names]
-    return sum(bool(key) + bool(key in QUANTITIES and unit in QUANTITIES[key][0].units) for key, unit in keys)
+    columns = [column_called(meant.get(name, name)) for name in names]
+    is_in_unit = (one.quantity in QUANTITIES and one.unit in QUANTITIES[one.quantity][0].units for one in columns)
+    return sum(bool(one.quantity) for one in columns) + sum(is_in_unit)
 
 
 def _joined(rows: Sequence[Sequence[str]], meant: Mapping[str, str]) -> list[str]:
     """One name a column, with its unit, of the rows of a head."""
     width = max(len(cells) for cells in rows)
     padded = [[*cells, *[""] * (width - len(cells))] for cells in rows]
-    above = [list(_filled_right(cells)) for cells in padded[:-1]]
+    above = [list(accumulate(cells, _filled)) for cells in padded[:-1]]
     return [_name_of(k, padded, above, meant) for k in range(width)]
 
 
-def _filled_right(cells: Sequence[str]) -> Iterator[str]:
-    last = ""
-    for cell in cells:
-        last = cell or last
-        yield last
+def _filled(last: str, cell: str) -> str:
+    return cell or last
 
 
 def _name_of(k: int, rows: Sequence[Sequence[str]], above: Sequence[Sequence[str]], meant: Mapping[str, str]) -> str:
@@ -303,30 +296,38 @@ def _name_of(k: int, rows: Sequence[Sequence[str]], above: Sequence[Sequence[str
     units = [cell.strip("()[] ") for cell in cells if cell not in texts and cell != "-"]
     if len(rows) == 1 or not texts:
         return "".join(texts)
-    wide = list(dict.fromkeys(filter(None, (*(cells[k] for cells in above), rows[-1][k]))))
+    wide = dict.fromkeys(filter(None, (*(cells[k] for cells in above), rows[-1][k])))
     options = [" ".join(texts), *reversed(texts), " ".join(wide)]
     for text in options:
         own = unit_suffix(split_written_name(text)[1])
         is_reached = own == "pct" and bool(units) and unit_suffix(units[0]) in TIME.units
         name = f"{text} ({units[0]})" if units and (not own or is_reached) else text
-        if text in meant or key_of_column(name)[0]:
+        if text in meant or column_called(name).quantity:
             return name
     return f"{options[0]} ({units[0]})" if units else options[0]
 
 
 def is_test_table(names: Sequence[str]) -> bool:
     """Whether names are those of tests: a stress or a temperature, and a rate, a rupture time or a time to a strain."""
-    keys = [key_of_column(name)[0] for name in names if name]
-    measured = any(key in MEASURED or key.startswith(TIME_TO_STRAIN) for key in keys)
-    measured |= "end_time" in keys and any(kind_of_column(name) in FIRM for name in names)
-    return measured and not {"stress", "temperature"}.isdisjoint(keys) and not has_frames(names)
+    columns = [column_called(name) for name in names if name]
+    found = {one.quantity for one in columns}
+    measured = not {"minimum_rate", "rupture"}.isdisjoint(found) or any(one.strain is not None for one in columns)
+    measured |= "end_time" in found and any(kind_of_column(name) in FIRM for name in names)
+    return measured and not {"stress", "temperature"}.isdisjoint(found) and not has_frames(names)
 
 
 def has_frames(names: Sequence[str]) -> bool:
     """Whether a column is a strain over time, and no rate, no time to it and none at rupture."""
-    for name in names:
-        words = set(words_of(name).split())
-        is_strain = "strain" in words and words.isdisjoint(("rate", "rupture", "fracture", "failure", "final"))
-        if is_strain and not key_of_column(name)[0].startswith(TIME_TO_STRAIN):
-            return True
-    return False
+    others = ("rate", "rupture", "fracture", "failure", "final")
+    words = {name: set(words_of(name).split()) for name in names}
+    strains = (name for name, one in words.items() if "strain" in one and one.isdisjoint(others))
+    return any(column_called(name).strain is None for name in strains)
+
+
+def stands_in_columns(table: CellTable, meant: Mapping[str, str]) -> bool:
+    """Whether the first cells of the rows name what is known of tests, each of which stands in a column."""
+    rows = table.rows[:_MOST_IN_COLUMNS]
+    names = [row.cells[0] for row in rows if row.cells[0]]
+    known = [bool(column_called(meant.get(name, name)).quantity) for name in names]
+    filled = [sum(map(bool, row.cells)) for row in rows]
+    return 2 * sum(known) > len(known) and min(filled) > 2 and is_test_table(names)

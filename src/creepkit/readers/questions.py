@@ -20,6 +20,10 @@ ANSWERS_FILE = "tests.toml"
 _T = TypeVar("_T")
 
 
+Answer = str | float | dict[str, str]
+"""What answers a question: a text, a number, or {name: what it is}."""
+
+
 def toml_key(name: str) -> str:
     """A key of TOML, bare where it may be."""
     is_bare = bool(name) and all(sign.isascii() and (sign.isalnum() or sign in "_-") for sign in name)
@@ -35,14 +39,7 @@ class Question(HistoryError):
     """
 
     def __init__(
-        self,
-        path: Path,
-        place: str,
-        sentence: str,
-        key: str,
-        choices: Sequence[str | float | dict[str, str]],
-        *,
-        is_free: bool = False,
+        self, path: Path, place: str, sentence: str, key: str, choices: Sequence[Answer], *, is_free: bool = False
     ) -> None:
         self.path, self.place, self.sentence, self.key = path, place, sentence, key
         self.choices, self.is_free = tuple(choices), is_free
@@ -57,7 +54,7 @@ class Question(HistoryError):
         joined = f"{self.sentence} W" if self.sentence.endswith("?") else f"{self.sentence}; w"
         return f"{self.place}{more}: {joined}{under}{f' (or {others})' if others else ''}"
 
-    def entry(self, choice: str | float | dict[str, str]) -> str:
+    def entry(self, choice: Answer) -> str:
         """The line of tests.toml that gives an answer."""
         return f"{self.key} = {toml_value(choice)}"
 

@@ -1,82 +1,62 @@
-"""The rows of tables with one row a test, with what stands above, between, beside and below them."""
+"""Tables with one row a test: their columns, their rows, and what stands above, between, beside and below them.
+
+What is not understood of a column is asked for. A condition that stands once for a group of rows holds for the group:
+in merged cells, above blank ones, or in a row of its own.
+"""
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from functools import partial
 from itertools import pairwise
-from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_missing, is_number
-from creepkit.readers.column_names import KnownNames, split_written_name
+from creepkit.readers.column_names import plain_name, split_unit, split_written_name, unit_suffix, words_of
 from creepkit.readers.columns_of_tests import (
+    NAMES,
+    QUANTITIES,
+    TEXTS,
+    TestColumn,
     TestTableHead,
-    head_of_tests,
+    column_called,
     is_number_like,
-    is_test_table,
-    key_of_column,
     only_text,
+    quantity_of,
 )
 from creepkit.readers.condition_texts import conditions_in_text, sources_of_names
-from creepkit.readers.questions import Question
-from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width, without_ignored
-from creepkit.readers.text_files import read_text_table
-from creepkit.readers.vocabulary import HeaderVocabulary, plain_name
+from creepkit.readers.ends_of_tests import LABEL, NO, YES, kind_of_column
+from creepkit.readers.questions import Answer, Question, collected
+from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width, joined, without_ignored
+from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary, Terms
+from creepkit.records.quantities import TIME
 
-TEXT_SUFFIXES, SPREADSHEET_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc"), (".xlsx", ".xlsm")
+MOST_ASKED = 6
+"""Texts that a question or a note names."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class TestRow:
     """The row of one test.
 
-    cells : of the columns. stated : what a row above says of its group. filled : columns whose cell is that of a row
-    above. is_open : whether a cell is asked for.
+    stated : what a row above says of its group. assumed : what was assumed of its cells. is_open : whether one is asked
+    for.
     """
 
     line: int
-    cells: tuple[str, ...]
+    cells: list[str]
     stated: Mapping[str, SourceText] = field(default_factory=dict)
-    filled: tuple[int, ...] = ()
+    assumed: list[str] = field(default_factory=list)
     is_open: bool = False
-
-
-@dataclass(frozen=True)
-class TestTable:
-    """A table with one row a test.
-
-    names : of the columns, as written, with their units. line : in which they stand. header : what holds for all tests.
-    notes : titles and remarks around the table. assumptions : what was assumed of it. positions : of its columns in the
-    file, from 0. sources : conditions in titles and in the names of sheet and file.
-    """
-
-    grid: CellTable
-    names: tuple[str, ...]
-    line: int
-    rows: tuple[TestRow, ...]
-    header: Mapping[str, SourceText]
-    notes: tuple[str, ...] = ()
-    assumptions: tuple[str, ...] = ()
-    positions: tuple[int, ...] = ()
-    sources: tuple[SourceText, ...] = ()
-
-    def location(self, line: int) -> str:
-        """Where a row stands."""
-        return self.grid.location(line)
-
-    def entry(self, row: TestRow, column: int, is_number: bool = True) -> SourceText:
-        """A cell of a row; of a number without separators between thousands, with a decimal point."""
-        text, decimal = row.cells[column], self.grid.dialect.decimal
-        if is_number or re.fullmatch(r"[+-]?\d*,\d+", text):
-            text, decimal = plain_number(text, decimal)
-        return SourceText(text, self.location(row.line), decimal, self.names[column])
 
 
 _GROUPED = re.compile(r"\d{1,3}(?:\.\d{3})+,\d+|\d{1,3}(?:,\d{3})+\.\d+|\d{1,3}(?:[\s'’]\d{3})+(?:[.,]\d+)?(?![\d.,])")
 """A number with separators between thousands that cannot be a decimal sign."""
+
 
 _POWER = re.compile(r"(?<=[\d.,])\s*(?:[x×·*∙]\s*)10\s*\^?\s*\(?([+-]?\d+|[⁻⁺⁰¹²³⁴-⁹]+)\)?")
 """A power of ten, written as such."""
@@ -97,134 +77,6 @@ def plain_number(text: str, decimal: str) -> tuple[str, str]:
     return changed, "." if count else decimal
 
 
-def grids_of(path: Path) -> list[CellTable]:
-    """The cells of a text file, or of the sheets of a spreadsheet."""
-    if path.suffix.lower() not in SPREADSHEET_SUFFIXES:
-        return [read_text_table(path)]
-    from creepkit.readers.spreadsheets import read_sheets
-
-    return read_sheets(path)
-
-
-def head_in(grid: CellTable, vocabulary: HeaderVocabulary) -> TestTableHead | None:
-    """The head of a grid with one row a test; None of any other grid."""
-    return head_of_tests(grid.rows, grid.dialect, vocabulary.synonyms)
-
-
-def tables_in(path: Path, vocabulary: HeaderVocabulary) -> list[TestTable]:
-    """The tables of tests in a file, without columns that are left out; HistoryError where there is none."""
-    found = [(grid, head_in(grid, vocabulary)) for grid in grids_of(path)]
-    if not any(head for _, head in found):
-        turned = next((grid for grid, _ in found if stands_in_columns(grid, vocabulary)), None)
-        if turned is not None:
-            what = "each test stands in a column; transpose the table, so that each stands in a row"
-            raise HistoryError(f"{turned.place}: {what}")
-        raise HistoryError(
-            f"{path}: no row names the columns of tests; name a stress or temperature, and a rate or a time, such as "
-            "stress_MPa,temperature_C,rupture_h"
-        )
-    aside = tuple(f"sheet '{grid.sheet}' not read as it is no table of tests" for grid, head in found if head is None)
-    texts = tuple(only_text(row, grid.dialect) for grid, head in found if head is None for row in grid.rows)
-    tables = [_table(grid, head, vocabulary, aside) for grid, head in found if head is not None]
-    return [replace(table, notes=(*table.notes, *filter(None, texts))) for table in tables]
-
-
-_MOST_ROWS_OF_COLUMNS = 30
-
-
-def stands_in_columns(grid: CellTable, vocabulary: HeaderVocabulary) -> bool:
-    """Whether the first cells of the rows name what is known of tests, each of which stands in a column."""
-    names = [row.cells[0] for row in grid.rows[:_MOST_ROWS_OF_COLUMNS] if row.cells[0]]
-    known = [bool(key_of_column(vocabulary.synonyms.get(name, name))[0]) for name in names]
-    filled = [sum(map(bool, row.cells)) for row in grid.rows[:_MOST_ROWS_OF_COLUMNS]]
-    return 2 * sum(known) > len(known) and min(filled) > 2 and is_test_table(names)
-
-
-def _table(grid: CellTable, head: TestTableHead, vocabulary: HeaderVocabulary, aside: tuple[str, ...]) -> TestTable:
-    rows = list(grid.rows)
-    known, line = KnownNames.of(vocabulary), rows[head.line].line
-    heading = {tuple(row.cells) for row in rows[head.first : head.body]}
-    body = [row for row in rows[head.body :] if tuple(row.cells) not in heading]
-    below = without_ignored(replace(grid, rows=[TableRow(line, list(head.names)), *body]), 0, vocabulary.ignored)
-    header, notes = _around(replace(grid, header=below.header), rows[: head.first], known)
-    names, body = below.rows[0].cells, list(below.rows[1:])
-    while body and _is_note(body[-1], grid):
-        notes.append(" ".join(dict.fromkeys(filter(None, body.pop().cells))))
-    width = max((k for k, name in enumerate(names, 1) if name), default=0)
-    tests, stated = list[TestRow](), dict[str, SourceText]()
-    for row in body:
-        if text := only_text(row, grid.dialect):
-            stated = conditions_of_group(text, grid.location(row.line), known)
-        else:
-            cells = cells_of_width(grid, row, width, beside=True)
-            if any(cells[k] for k in range(width) if names[k]):
-                tests.append(TestRow(row.line, tuple(cells), stated))
-    beside = [k for k in range(max((len(row.cells) for row in tests), default=width)) if k >= width or not names[k]]
-    written = [name or "note" for name in names[:width]] + ["note"] * any(k >= width for k in beside)
-    tests = [_with_margin(row, width, len(written), grid) for row in tests]
-    kept = [k for k in range(len(written)) if (k < width and names[k]) or any(row.cells[k] for row in tests)]
-    rows_of_tests = tuple(replace(row, cells=tuple(row.cells[k] for k in kept)) for row in tests)
-    columns, positions = tuple(written[k] for k in kept), below.positions or range(len(written))
-    return TestTable(
-        *(grid, columns, line, rows_of_tests, header, tuple(notes), (*grid.assumptions, *aside)),
-        tuple(positions[k] if k < len(positions) else k for k in kept),
-        (*_sources(rows[: head.first], grid, known), *sources_of_names(grid, vocabulary)),
-    )
-
-
-def _sources(above: Sequence[TableRow], grid: CellTable, known: KnownNames) -> list[SourceText]:
-    """Conditions in titles above a table."""
-    titles = [(row.line, only_text(row, grid.dialect)) for row in above]
-    return [one for line, text in titles for one in conditions_in_text(text, grid.location(line), known)]
-
-
-def _with_margin(row: TestRow, width: int, columns: int, grid: CellTable) -> TestRow:
-    """The row with what stands beside the table as the note in its last column; HistoryError for a number there."""
-    beside = [cell for cell in row.cells[width:] if cell]
-    if any(is_number_like(cell, grid.dialect) for cell in beside):
-        raise HistoryError(
-            f"{grid.location(row.line)}: '{quoted(beside[0])}' stands in a column without a name; name that column"
-        )
-    return replace(row, cells=(*row.cells[:width], *[" ".join(beside)] * (columns - width)))
-
-
-def _is_note(row: TableRow, grid: CellTable) -> bool:
-    """Whether a row below the tests is one of remarks: it holds texts in one or two cells, and no number."""
-    filled = [cell for cell in row.cells if cell]
-    few = len(filled) <= 2 < len(row.cells) and not any(is_number_like(cell, grid.dialect) for cell in filled)
-    return few or bool(only_text(row, grid.dialect))
-
-
-def _around(grid: CellTable, above: Sequence[TableRow], known: KnownNames) -> tuple[dict[str, SourceText], list[str]]:
-    """What lines above a table state of all its tests, and what is a note."""
-    header, notes = dict(grid.header), list[str]()
-    for row in above:
-        filled = list(dict.fromkeys(cell for cell in row.cells if cell))
-        if len(filled) == 1 and ":" in filled[0]:
-            filled = [part.strip() for part in filled[0].split(":", 1)]
-        key = filled[0].rstrip(": =")
-        if len(filled) in (2, 3) and known.is_condition(key):
-            unit = f" ({filled[2]})" if len(filled) == 3 and not split_written_name(key)[1] else ""
-            header[f"{key}{unit}"] = SourceText(filled[1], grid.location(row.line), grid.dialect.decimal)
-        else:
-            notes.append(" ".join(filled))
-    for line, key, entry in grid.comments:
-        if known.is_condition(key):
-            raise HistoryError(
-                f"{grid.location(line)}: '{key}' stands below the names of the columns; move it above them"
-            )
-        notes.append(f"{key}: {entry.text}")
-    return header, notes
-
-
-def conditions_of_group(text: str, place: str, known: KnownNames) -> dict[str, SourceText]:
-    """What a row of its own says of the tests below it: stress and temperature, or else a label of the group."""
-    found = {one.key: SourceText(one.text, place) for one in conditions_in_text(text, place, known)}
-    return found or {"label group": SourceText(text, place)}
-
-
-# ---- conditions that stand once for a group ------------------------------------------------------------------------
-
 _GROUP_SIZE = 1.5
 """Rows of a group, on average, above which empty cells below a filled one are a way of writing, and no lost values."""
 
@@ -233,60 +85,306 @@ _DITTO = frozenset(('"', "''", "″", "〃", "”", "ditto", "idem", "do.", "dto
 """Marks that repeat the cell above, in small letters."""
 
 
-def with_groups(table: TestTable, keys: Sequence[str], errors: list[HistoryError]) -> TestTable:
-    """The table with conditions that stand once for a group in all of its rows; a lost value is an error.
+class TestTable:
+    """A table with one row a test.
 
-    keys : quantities of the columns, without units. Empty cells below a filled one are those of its group where no
-    value is written twice below itself, and groups have more than one row; in merged cells they are in any case.
+    table : with the names of its columns, as written and with their units. columns : what they mean. notes : titles and
+    remarks around the table. errors : to which what is wrong is added.
     """
-    cells = [list(row.cells) for row in table.rows]
-    filled, asked = [list[int]() for _ in cells], set[int]()
-    for k, key in enumerate(keys):
-        if key not in ("stress", "temperature", "label heat", "alloy", "label laboratory"):
-            continue
-        column = [row[k] for row in cells]
-        ditto = {r for r, cell in enumerate(column) if cell.casefold() in _DITTO}
-        gaps = [r for r, cell in enumerate(column) if is_missing(cell) or r in ditto]
-        if not gaps or len(gaps) == len(column):
-            continue
-        values = len(column) - len(gaps)
-        is_repeated = any(a == b and not is_missing(a) for a, b in pairwise(column))
-        is_grouped = not is_repeated and len(column) > _GROUP_SIZE * values and gaps[0] > 0
-        for r in gaps:
-            if r > 0 and (is_grouped or r in ditto or (table.rows[r].line, table.positions[k]) in table.grid.merged):
-                cells[r][k] = cells[r - 1][k]
-                filled[r].append(k)
-        missing = [r for r in gaps if is_missing(cells[r][k])]
-        if missing and key in ("stress", "temperature") and not _is_stated(key, table, missing):
-            errors.append(_empty_cell(table, k, key, missing))
-            asked.update(missing)
-    rows = [
-        replace(row, cells=tuple(cells[r]), filled=tuple(filled[r]), is_open=r in asked)
-        for r, row in enumerate(table.rows)
-    ]
-    return replace(table, rows=tuple(rows))
+
+    def __init__(
+        self, sheet: CellTable, head: TestTableHead, vocabulary: HeaderVocabulary, errors: list[HistoryError]
+    ) -> None:
+        self.vocabulary, self.errors = vocabulary, errors
+        self.notes: list[str] = []
+        self.rows: list[TestRow] = []
+        self._read(sheet, head)
+        count = len(errors)
+        self.columns = list(self._understood_columns())
+        self.is_understood = len(errors) == count
+        if self.is_understood:
+            self._fill_stated()
+            self._fill_groups()
+            if vocabulary.ignored:
+                self._leave_out_silent_rows()
+
+    @property
+    def place(self) -> str:
+        """Where the names of the columns stand."""
+        return self.table.location(self.table.columns_line)
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Of the columns, as they are written."""
+        return self.table.columns
+
+    def position(self, quantity: str) -> int | None:
+        """The column of a quantity or text, None where there is none."""
+        return next((k for k, one in enumerate(self.columns) if one.quantity == quantity), None)
+
+    def names_of_tests(self) -> list[str]:
+        """Of the rows; "" where no column has them."""
+        k = self.position("name")
+        return ["" if k is None else row.cells[k] for row in self.rows]
+
+    def entry(self, row: TestRow, k: int) -> SourceText:
+        """A cell of a row; of a number without separators between thousands, with a decimal point."""
+        text, decimal = row.cells[k], self.table.dialect.decimal
+        if self.columns[k].kind or re.fullmatch(r"[+-]?\d*,\d+", text):
+            text, decimal = plain_number(text, decimal)
+        return SourceText(text, self.table.location(row.line), decimal, self.names[k])
+
+    def question(
+        self, what: str, key: str, choices: Sequence[Answer], *, line: int = 0, is_free: bool = False
+    ) -> Question:
+        """The question of a row, else of the names of the columns."""
+        place = self.table.location(line) if line else self.place
+        return Question(self.table.path, place, what, key, choices, is_free=is_free)
+
+    # ---- what stands where
+
+    def _read(self, sheet: CellTable, head: TestTableHead) -> None:
+        """Take apart names, rows, groups, margin, titles and notes."""
+        known, line, dialect = self.vocabulary.terms(), sheet.rows[head.line].line, sheet.dialect
+        heading = {tuple(row.cells) for row in sheet.rows[head.first : head.body]}
+        body = [row for row in sheet.rows[head.body :] if tuple(row.cells) not in heading]
+        below = replace(sheet, rows=joined([TableRow(line, list(head.names))], body))
+        below = without_ignored(below, 0, self.vocabulary.ignored)
+        header = self._around(replace(sheet, header=below.header), sheet.rows[: head.first], known)
+        names, body = below.rows[0].cells, list(below.rows[1:])
+        while body and _is_note(body[-1], dialect):
+            self.notes.append(" ".join(dict.fromkeys(filter(None, body.pop().cells))))
+        named = [k for k, name in enumerate(names) if name]
+        width, stated, notes = named[-1] + 1, dict[str, SourceText](), list[str]()
+        for row in body:
+            if text := only_text(row, dialect):
+                place = sheet.location(row.line)
+                found = {one.key: SourceText(one.text, place) for one in conditions_in_text(text, place, known)}
+                stated = found or {"label group": SourceText(text, place)}
+                continue
+            cells = cells_of_width(sheet, row, width, beside=True)
+            if any(cells[k] for k in named):
+                for cell in filter(None, cells[width:]):
+                    if is_number_like(cell, dialect):
+                        what = f"'{quoted(cell)}' stands in a column without a name; name that column"
+                        raise HistoryError(f"{sheet.location(row.line)}: {what}")
+                notes.append(" ".join(cell for k, cell in enumerate(cells) if cell and k not in named))
+                self.rows.append(TestRow(row.line, [cells[k] for k in named], stated))
+        if any(notes):
+            for test, note in zip(self.rows, notes, strict=True):
+                test.cells.append(note)
+        columns = [*(names[k] for k in named), *(["note"] if any(notes) else [])]
+        positions = [below.positions[k] if below.positions else k for k in named] + [width] * any(notes)
+        titles = [(row.line, only_text(row, dialect)) for row in sheet.rows[: head.first]]
+        sources = [one for n, text in titles for one in conditions_in_text(text, sheet.location(n), known)]
+        sources += sources_of_names(sheet, self.vocabulary)
+        self.table = replace(
+            sheet,
+            rows=(),
+            columns=columns,
+            columns_line=line,
+            header=header,
+            positions=positions,
+            sources=tuple(sources),
+        )
+
+    def _around(self, sheet: CellTable, above: Sequence[TableRow], known: Terms) -> dict[str, SourceText]:
+        """What lines above a table state of all its tests; all else is a note."""
+        header = dict(sheet.header)
+        for row in above:
+            filled = list(dict.fromkeys(cell for cell in row.cells if cell))
+            if len(filled) == 1 and ":" in filled[0]:
+                filled = [part.strip() for part in filled[0].split(":", 1)]
+            key = filled[0].rstrip(": =")
+            if len(filled) in (2, 3) and known.is_condition(key):
+                unit = f" ({filled[2]})" if len(filled) == 3 and not split_written_name(key)[1] else ""
+                header[f"{key}{unit}"] = SourceText(filled[1], sheet.location(row.line), sheet.dialect.decimal)
+            else:
+                self.notes.append(" ".join(filled))
+        for line, key, entry in sheet.comments:
+            if known.is_condition(key):
+                what = f"'{key}' stands below the names of the columns"
+                raise HistoryError(f"{sheet.location(line)}: {what}; move it above them")
+            self.notes.append(f"{key}: {entry.text}")
+        return header
+
+    # ---- columns
+
+    def _understood_columns(self) -> Iterator[TestColumn]:
+        """What each column means; units and names that are not understood are errors."""
+        synonyms, found = self.vocabulary.synonyms, list[TestColumn]()
+        stated = [TestColumn(quantity_of(key)) for key in self.table.header]
+        for k, written in enumerate(self.names):
+            is_label = written in self.vocabulary.labels
+            meant = synonyms.get(written) or synonyms.get(split_written_name(written)[0], written)
+            column, cells = TestColumn() if is_label else column_called(meant), [row.cells[k] for row in self.rows]
+            if column == TestColumn("rupture") and {cell.casefold() for cell in cells} <= {"", "-", *YES, *NO}:
+                column = TestColumn()
+            if kind := column.kind:
+                column = replace(column, unit=column.unit or _unit_of_cells(cells))
+                if column.unit not in kind.units:
+                    self.errors.append(self._wrong_unit(column, written, cells))
+            elif not column.quantity:
+                if meant == written and not is_label:
+                    collected(self.errors, partial(self._refuse_misspelt, written))
+                    collected(self.errors, partial(self._ask_of_time, written))
+                column = TestColumn(meant if meant.startswith(("label ", "geometry ")) else f"label {meant}")
+            elif column.quantity == "specimen" and self._tells_tests_apart(cells):
+                column = TestColumn("name")
+            quantities = [one.quantity for one in found]
+            if column.quantity in quantities:
+                self.errors.append(self._twice(written, self.names[quantities.index(column.quantity)]))
+            for key, one in zip(self.table.header, stated, strict=True):
+                if one.quantity == column.quantity:
+                    what = f"'{quoted(key, 60)}' is also a column, '{quoted(written, 60)}'; keep one of them"
+                    self.errors.append(HistoryError(f"{self.table.header[key].location}: {what}"))
+            found.append(column)
+            yield column
+
+    def _tells_tests_apart(self, cells: Sequence[str]) -> bool:
+        """Whether a column of specimens holds the names of the tests, and no kinds, and no other column does.
+
+        A column of kinds of specimens, such as uniaxial, has the same word in several rows, or words that are
+        registered.
+        """
+        texts = [cell for cell in cells if not is_missing(cell)]
+        kinds = set(HeaderVocabulary().terms("").outputs)
+        is_named = any(column_called(name).quantity == "name" for name in self.names)
+        return not is_named and len(set(texts)) == len(texts) and not {text.casefold() for text in texts} & kinds
+
+    def _twice(self, written: str, other: str) -> HistoryError:
+        what = f"'{quoted(other, 60)}' and '{quoted(written, 60)}' mean the same; keep one of them"
+        if written == other:
+            return HistoryError(f"{self.place}: {what}, or put tables side by side below one another")
+        return self.question(what, "columns", ({written: LABEL}, {other: LABEL}))
+
+    def _wrong_unit(self, column: TestColumn, written: str, cells: Sequence[str]) -> HistoryError:
+        assert column.kind is not None
+        found = f"the unit '{quoted(column.unit)}', which is not understood" if column.unit else "no unit"
+        what = f"column '{quoted(written.strip(), 60)}' has {found}; allowed: {', '.join(column.kind.units)}"
+        if column.unit:
+            return HistoryError(f"{self.place}: {what}; convert it")
+        likely = [unit for unit in ("MPa", "ksi", "1/h", "pct/h", "1/s") if unit in column.kind.units]
+        if column.kind is TIME:
+            likely = ["h", "s"]
+        elif column.quantity == "temperature":
+            numbers = [float(number) for cell in cells for number in re.findall(r"^\d+", cell)]
+            likely = ["C", "K", "F"] if min(numbers, default=0) < 900 else ["K", "C", "F"]
+        name = column.quantity.replace(" ", "_")
+        return self.question(what, "columns", [{written: f"{name}_{unit}"} for unit in likely], is_free=True)
+
+    def _refuse_misspelt(self, written: str) -> None:
+        name, unit = split_written_name(written)
+        lists = (*(names for _, names in QUANTITIES.values()), *TEXTS.values())
+        known = [one for names in lists for one in names if len(one) > 3]
+        near = get_close_matches(words_of(name), known, 1, cutoff=0.8)
+        if near and kind_of_column(written) == "":
+            meant = f"{near[0]} ({unit_suffix(unit)})" if unit_suffix(unit) else near[0]
+            what = f"column '{quoted(written, 60)}' is not understood; did you mean '{near[0]}'?"
+            raise self.question(what, "columns", ({written: meant}, {written: LABEL}))
+
+    def _ask_of_time(self, written: str) -> None:
+        """Ask of a time that is not understood: `t0.2 (h)` may be one to a strain."""
+        name, unit = split_written_name(written)
+        if unit_suffix(unit) not in TIME.units or _OF_TREATMENT.search(name):
+            return
+        number = re.search(r"\d+(?:[.,]\d+)?", name)
+        meaning = f"time to {number[0].replace(',', '.')} % ({unit})" if number else f"duration ({unit})"
+        what = f"column '{quoted(written, 60)}' is a time that is not understood; is it a time to a strain?"
+        raise self.question(what, "columns", [{written: meaning}, {written: LABEL}], is_free=True)
+
+    # ---- cells that stand elsewhere
+
+    def _fill_stated(self) -> None:
+        """Take what a file of answers states: of a column of that quantity it fills the empty cells."""
+        header = dict(self.table.header)
+        for key, (text, place) in self.vocabulary.stated.items():
+            quantity, unit = split_unit(key, {**CONDITION_KINDS, **NAMES.kinds}) or (key, "")
+            k = self.position(quantity)
+            if k is None:
+                header[key] = SourceText(text, place)
+            elif self.columns[k].unit != unit:
+                what = f"'{key}' fills cells of '{quoted(self.names[k], 60)}'; state it in that unit"
+                self.errors.append(HistoryError(f"{place}: {what}"))
+            else:
+                for row in self.rows:
+                    row.cells[k] = text if is_missing(row.cells[k]) else row.cells[k]
+        self.table = replace(self.table, header=header)
+
+    def _fill_groups(self) -> None:
+        """Give all rows of a group the conditions that stand once for it; a lost value is an error.
+
+        Empty cells below a filled one are those of its group where no value is written twice below itself, and groups
+        have more than one row; in merged cells they are in any case.
+        """
+        for k, one in enumerate(self.columns):
+            if one.quantity not in ("stress", "temperature", "label heat", "alloy", "label laboratory"):
+                continue
+            cells = [row.cells[k] for row in self.rows]
+            gaps = [r for r, cell in enumerate(cells) if is_missing(cell) or cell.casefold() in _DITTO]
+            if not gaps or len(gaps) == len(cells):
+                continue
+            is_repeated = any(a == b and not is_missing(a) for a, b in pairwise(cells))
+            is_grouped = not is_repeated and len(cells) > _GROUP_SIZE * (len(cells) - len(gaps)) and gaps[0] > 0
+            for r in gaps:
+                row = self.rows[r]
+                is_merged = (row.line, self.table.positions[k]) in self.table.merged
+                if r > 0 and (is_grouped or cells[r].casefold() in _DITTO or is_merged):
+                    row.cells[k] = self.rows[r - 1].cells[k]
+                    row.assumed.append(f"{one.quantity} of the row above (empty cell)")
+            missing = [r for r in gaps if is_missing(self.rows[r].cells[k])]
+            if missing and one.quantity in ("stress", "temperature"):
+                stated = [*self.table.header, *self.rows[missing[0]].stated]
+                if not any(plain_name(name).startswith(one.quantity) for name in stated):
+                    self.errors.append(self._empty_cell(k, missing))
+
+    def _empty_cell(self, k: int, missing: Sequence[int]) -> Question:
+        """The question of conditions that lack in some rows of a column."""
+        for r in missing:
+            self.rows[r].is_open = True
+        name, quantity = self.names[k], self.columns[k].quantity
+        others = f", and {len(missing) - 1} more" if len(missing) > 1 else ""
+        unit = split_written_name(name)[1].replace("°", "").strip() or ("C" if quantity == "temperature" else "MPa")
+        above = [row.cells[k] for row in self.rows[: missing[0]] if not is_missing(row.cells[k])]
+        likely = above[-1] if above else next(row.cells[k] for row in self.rows if not is_missing(row.cells[k]))
+        plain = likely.replace(",", ".")
+        number = float(plain) if is_number(plain, Dialect()) else likely
+        what = f"the cell of '{quoted(name, 60)}' is empty{others}; which {quantity} is it?"
+        return self.question(what, f"{quantity}_{unit}", (number,), line=self.rows[missing[0]].line, is_free=True)
+
+    def _leave_out_silent_rows(self) -> None:
+        """Leave out rows that state no result once columns are left out, which its assumptions name."""
+        results = ("minimum_rate", "rupture", "end_time")
+        says = [k for k, one in enumerate(self.columns) if one.quantity in results or one.strain is not None]
+        silent = [all(is_missing(row.cells[k]) for k in says) for row in self.rows]
+        if silent and all(silent):
+            raise HistoryError(
+                f"{self.place}: no row states a minimum creep rate or an end of its test once the ignored columns are "
+                "left out; keep one of these columns"
+            )
+        names = zip(self.names_of_tests(), self.rows, silent, strict=True)
+        called = [name or f"line {row.line}" for name, row, is_silent in names if is_silent]
+        if called:
+            more = f" and {len(called) - MOST_ASKED} more" if len(called) > MOST_ASKED else ""
+            listed = f"{' '.join(called[:MOST_ASKED])}{more}"
+            self.table = self.table.assuming(f"without {listed} (nothing but ignored columns)")
+            self.rows = [row for row, is_silent in zip(self.rows, silent, strict=True) if not is_silent]
 
 
-def _is_stated(key: str, table: TestTable, rows: Sequence[int]) -> bool:
-    """Whether the condition of some rows is stated for the table, or for their groups."""
-    names = [*table.header, *(name for r in rows[:1] for name in table.rows[r].stated)]
-    return any(plain_name(name).startswith(key) for name in names)
+_OF_TREATMENT = re.compile(
+    r"anneal|ag(?:e?ing|ed)|temper|heat ?treat|soak|solution|glüh|auslager|anlass|recuit|revenu", re.I
+)
 
 
-def _empty_cell(table: TestTable, column: int, key: str, rows: Sequence[int]) -> Question:
-    name, place = table.names[column], table.location(table.rows[rows[0]].line)
-    others = f", and {len(rows) - 1} more" if len(rows) > 1 else ""
-    above = [row.cells[column] for row in table.rows[: rows[0]] if not is_missing(row.cells[column])]
-    unit = split_written_name(name)[1]
-    suffix = unit.replace("°", "").strip() or ("C" if key == "temperature" else "MPa")
-    likely = above[-1] if above else next(r.cells[column] for r in table.rows if not is_missing(r.cells[column]))
-    plain = likely.replace(",", ".")
-    number = float(plain) if is_number(plain, Dialect()) else likely
-    return Question(
-        table.grid.path,
-        place,
-        f"the cell of '{quoted(name, 60)}' is empty{others}; which {key} is it?",
-        f"{key}_{suffix}",
-        (number,),
-        is_free=True,
-    )
+def _is_note(row: TableRow, dialect: Dialect) -> bool:
+    """Whether a row below the tests is one of remarks: it holds texts in one or two cells, and no number."""
+    filled = [cell for cell in row.cells if cell]
+    few = len(filled) <= 2 < len(row.cells) and not any(is_number_like(cell, dialect) for cell in filled)
+    return few or bool(only_text(row, dialect))
+
+
+def _unit_of_cells(cells: Sequence[str]) -> str:
+    """The unit behind the numbers of a column, as in `600 °C`; "" where not all cells that hold something have it."""
+    texts = [cell for cell in cells if not is_missing(cell)]
+    found = {unit_suffix(re.sub(r"^[<>≥]?\s*[\d.,]+(?:[eE][+-]?\d+)?\s*", "", text)) or "" for text in texts}
+    return found.pop() if len(found) == 1 else ""

@@ -45,13 +45,13 @@ def _weights(settings: IdentificationSettings) -> str:
         return (
             'the intervals rest on the likelihood (weights "likelihood"): readings count by their estimated noise, so '
             "that the shape of every curve counts beside the comparison of tests; readings of equal weight "
-            '(weights "noise", the default of one law by itself) give other values and, as a rule, wider intervals'
+            '(weights "noise") give other values and, as a rule, wider intervals'
         )
     if settings.weights == "noise":
         return (
             'the intervals rest on readings of equal weight (weights "noise") and all the scatter that was estimated, '
-            'with what the law cannot follow; the likelihood (weights "likelihood", by which several laws are '
-            "compared) gives other values and, as a rule, narrower intervals"
+            'with what the law cannot follow; the likelihood (weights "likelihood", the default) gives other values '
+            "and, as a rule, narrower intervals"
         )
     weights = settings.weights if isinstance(settings.weights, str) else f"{dict(settings.weights)}"
     return (

@@ -47,7 +47,7 @@ STEPS = {"temperature step": 1.0, "temperature drift": 1.0, "load step": 1e-3, "
 """K and relative, of central differences of the load history by kind; it is linear in all but for the modulus in K."""
 
 
-class TestResponse(NamedTuple):
+class CandidateResponse(NamedTuple):
     """One candidate in one test.
 
     values : (times, outputs). law : (times, outputs, parameters) derivatives to the internal parameters, or None.
@@ -170,16 +170,18 @@ class FiniteElementTest(ABC):
 
     def respond(
         self, kernel: CompiledLaw, theta: Floats, settings: SolverSettings, model: SolvableModel | None = None
-    ) -> TestResponse:
+    ) -> CandidateResponse:
         """Simulate and observe the test, with derivatives where it has directions; theta : (parameters,)."""
         simulation = self.simulate(kernel, theta, settings, model)
         if self.directions is None:
-            return TestResponse(simulation, self.observed_at_times(simulation), None, {})
+            return CandidateResponse(simulation, self.observed_at_times(simulation), None, {})
         outputs, columns = self.differentiated(simulation)
         names = (*self.loads, *self.lengths, *self.views)
         at = simulation.at(columns, self.history.times)
         nuisances = {name: at[..., theta.size + k] for k, name in enumerate(names)}
-        return TestResponse(simulation, simulation.at(outputs, self.history.times), at[..., : theta.size], nuisances)
+        return CandidateResponse(
+            simulation, simulation.at(outputs, self.history.times), at[..., : theta.size], nuisances
+        )
 
     def columns(self, simulation: Simulation, by_observed: Floats, change: Floats) -> Floats:
         """Derivatives (steps, outputs, columns): to the law's parameters, to loads, lengths and views.
@@ -260,7 +262,7 @@ def predict_tests(
     # before threads begin: a reduced-order model may have to be trained
     tests = [prepared(0, k) for k in range(len(histories))] if tasks else []
 
-    def run(task: tuple[int, int]) -> TestResponse:
+    def run(task: tuple[int, int]) -> CandidateResponse:
         c, k = task
         test, model = tests[k] if shared or c == 0 else prepared(c, k)
         return test.respond(kernel, theta[c], settings, model)
@@ -274,7 +276,7 @@ def predict_tests(
 
 
 def _history_prediction(
-    responses: Sequence[TestResponse], outputs: Sequence[str], observed: Sequence[str]
+    responses: Sequence[CandidateResponse], outputs: Sequence[str], observed: Sequence[str]
 ) -> HistoryPrediction:
     """The responses of all candidates in one test; NaN for outputs of other tests, which are observed too."""
     columns = [observed.index(name) for name in outputs]

@@ -18,13 +18,12 @@ from pathlib import Path
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
 from creepkit.files.delimited_text import Dialect, is_number, parse_number
-from creepkit.readers.column_names import split_written_name, unit_suffix
+from creepkit.readers.column_names import plain_name, split_written_name, unit_suffix
 from creepkit.readers.spreadsheets import read_sheets
 from creepkit.readers.table import CellTable
 from creepkit.readers.text_files import read_text_table
-from creepkit.readers.vocabulary import plain_name
 from creepkit.records import Specimen, dimensions_of
-from creepkit.records.quantities import LENGTH, MODULUS, QuantityKind
+from creepkit.records.quantities import LENGTH, MODULUS
 
 COLUMNS: Mapping[str, tuple[str, ...]] = {
     "camera": ("camera", "view", "field_of_view", "kamera"),
@@ -119,9 +118,13 @@ def _same(first: str, second: str) -> bool:
     return one == other or (one.isdecimal() and other == f"d{int(one)}")
 
 
+def _grid(path: Path) -> CellTable:
+    return read_sheets(path)[0] if path.suffix.lower() == ".xlsx" else read_text_table(path)
+
+
 def read_alloy_table(path: Path, specimen: Specimen) -> AlloyTable:
     """Read a table of alloys; HistoryError, with file and row, says what is wrong with another."""
-    grid = read_sheets(path)[0] if path.suffix.lower() == ".xlsx" else read_text_table(path)
+    grid = _grid(path)
     heads = _heads(grid, specimen)
     rows: list[Dimple] = []
     for row in grid.rows[1:]:
@@ -146,6 +149,24 @@ class _Head:
     unit: str
     written: str
 
+    def value(self, cell: str, place: str, dialect: Dialect, length: float | None = None) -> float:
+        """The number of a cell, mm or MPa; length : mm, of which a tolerance may be in per cent."""
+        number, kind = parse_number(cell, dialect, place, self.written), MODULUS if self.role == "modulus" else LENGTH
+        suffix = unit_suffix(self.unit) if self.unit else "mm" if self.role == "length" else ""
+        if self.role == "tolerance" and suffix == "pct":
+            if length is None:
+                raise HistoryError(
+                    f"{place}: a tolerance in % needs the length that it is of; write that in its column"
+                )
+            number, suffix = 0.01 * number * length, "mm"
+        if not suffix:
+            units = ", ".join(kind.units)
+            raise HistoryError(f"{place}: '{quoted(self.written)}' has no unit that is known; write it as in [{units}]")
+        value = kind.convert(number, suffix, place, self.written)
+        if not value > 0.0:
+            raise HistoryError(f"{place}: '{quoted(self.written)}' is {number:g}; write a number above zero")
+        return value
+
 
 def _heads(grid: CellTable, specimen: Specimen) -> list[_Head]:
     if not grid.rows:
@@ -153,27 +174,27 @@ def _heads(grid: CellTable, specimen: Specimen) -> list[_Head]:
     place = grid.location(grid.rows[0].line)
     roles = {spelling: role for role, spellings in COLUMNS.items() for spelling in spellings}
     lengths = {plain_name(name): one.name for one in dimensions_of(specimen) for name in one.names}
-    lengths |= dict.fromkeys(THICKNESS_WORDS, next(iter(lengths.values()), ""))
-    heads = []
+    thickness = next(iter(lengths.values()), "")
+    lengths |= dict.fromkeys(THICKNESS_WORDS, thickness)
+    heads: list[_Head] = []
     for written in grid.rows[0].cells:
         name, unit = split_written_name(written)
-        plain, first, _ = plain_name(name), *plain_name(name).rpartition("_")[::2]
-        last = plain_name(name).rpartition("_")[2]
+        plain = plain_name(name)
+        first, _, last = plain.rpartition("_")
         if plain in roles:
-            heads.append(_Head(roles[plain], "", unit, written))
+            head = _Head(roles[plain], "", unit, written)
         elif plain in lengths:
-            heads.append(_Head("length", lengths[plain], unit, written))
-        elif plain in TOLERANCE_WORDS or (last in TOLERANCE_WORDS and first in lengths):
-            heads.append(_Head("tolerance", lengths.get(first) or next(iter(lengths.values())), unit, written))
+            head = _Head("length", lengths[plain], unit, written)
+        elif last in TOLERANCE_WORDS and (not first or first in lengths):
+            head = _Head("tolerance", lengths.get(first, thickness), unit, written)
         else:
-            heads.append(_Head("label", " ".join(written.split()), "", written))
-    named = [(one.role, one.name) for one in heads]
-    if ("dimple", "") not in named or ("alloy", "") not in named:
+            head = _Head("label", " ".join(written.split()), "", written)
+        if (head.role, head.name) in [(one.role, one.name) for one in heads]:
+            raise HistoryError(f"{place}: '{quoted(written)}' stands there twice; rename one of these columns")
+        heads.append(head)
+    if not {"dimple", "alloy"} <= {one.role for one in heads}:
         found = quoted(", ".join(one.written for one in heads), 200)
         raise HistoryError(f"{place}: a table of alloys has the columns dimple and alloy, found {found}")
-    for one in heads:
-        if named.count((one.role, one.name)) > 1:
-            raise HistoryError(f"{place}: '{quoted(one.written)}' stands there twice; rename one of these columns")
     return heads
 
 
@@ -181,56 +202,27 @@ def _dimple(place: str, cells: Mapping[_Head, str], dialect: Dialect) -> Dimple:
     texts = {head.role: cell for head, cell in cells.items()}
     if not texts["dimple"]:
         raise HistoryError(f"{place}: does not name its dimple; write it, such as D1")
-    lengths: dict[str, float] = {}
-    tolerances: dict[str, float] = {}
-    modulus = None
+    filled: dict[str, dict[str, tuple[_Head, str]]] = {}
     for head, cell in cells.items():
-        if not cell or head.role not in ("length", "tolerance", "modulus"):
-            continue
-        number = parse_number(cell, dialect, place, head.written)
-        if head.role == "length":
-            lengths[head.name] = _converted(number, head, LENGTH, "mm", place)
-        elif head.role == "modulus":
-            modulus = _converted(number, head, MODULUS, "", place)
-    for head, cell in cells.items():
-        if cell and head.role == "tolerance":
-            number = parse_number(cell, dialect, place, head.written)
-            tolerances[head.name] = _tolerance(number, head, lengths.get(head.name), place)
+        if cell:
+            filled.setdefault(head.role, {})[head.name] = (head, cell)
+    lengths = {name: head.value(cell, place, dialect) for name, (head, cell) in filled.get("length", {}).items()}
     word = texts.get("exclude", "")
     reason = "" if word.casefold() in NOTHING else word
-    labels = {head.name: cell for head, cell in cells.items() if head.role == "label" and head.name and cell}
     return Dimple(
         place,
         texts.get("camera", ""),
         texts["dimple"],
         texts["alloy"],
         lengths,
-        tolerances,
-        modulus,
+        {
+            name: head.value(cell, place, dialect, lengths.get(name))
+            for name, (head, cell) in filled.get("tolerance", {}).items()
+        },
+        next((head.value(cell, place, dialect) for head, cell in filled.get("modulus", {}).values()), None),
         f"excluded by {place}" if reason.casefold() in PLAIN_YES else reason,
-        labels,
+        {name: cell for name, (_, cell) in filled.get("label", {}).items() if name},
     )
-
-
-def _converted(number: float, head: _Head, kind: QuantityKind, usual: str, place: str) -> float:
-    """A number in creepkit's unit; `usual` is the unit of a column that states none, "" where there must be one."""
-    suffix = unit_suffix(head.unit) if head.unit else usual
-    if not suffix:
-        units = ", ".join(kind.units)
-        raise HistoryError(f"{place}: '{quoted(head.written)}' has no unit that is known; write it as in [{units}]")
-    value = kind.convert(number, suffix, place, head.written)
-    if not value > 0.0:
-        raise HistoryError(f"{place}: '{quoted(head.written)}' is {number:g}; write a number above zero")
-    return value
-
-
-def _tolerance(number: float, head: _Head, length: float | None, place: str) -> float:
-    """mm, of a length, mm; per cent of it where the column says so."""
-    if unit_suffix(head.unit) == "pct":
-        if length is None:
-            raise HistoryError(f"{place}: a tolerance in % needs the length that it is of; write that in its column")
-        return _converted(0.01 * number * length, _Head(head.role, head.name, "mm", head.written), LENGTH, "mm", place)
-    return _converted(number, head, LENGTH, "", place)
 
 
 def looks_like_alloys(path: Path, specimen: Specimen) -> bool:
@@ -238,7 +230,7 @@ def looks_like_alloys(path: Path, specimen: Specimen) -> bool:
     if path.suffix.lower() not in (".csv", ".xlsx", ".txt", ".tsv"):
         return False
     with suppress(CreepkitError, OSError):
-        grid = read_sheets(path)[0] if path.suffix.lower() == ".xlsx" else read_text_table(path)
+        grid = _grid(path)
         _heads(grid, specimen)
         return not any(is_number(cell, grid.dialect) for cell in grid.rows[0].cells)
     return False

@@ -6,18 +6,17 @@ import math
 import numpy as np
 import pytest
 
-from creepkit.exporters.c import STABLE_FUNCTIONS, CExporter
-from creepkit.language import Param, stress
+from creepkit.exporters.c import CExporter
+from creepkit.language import stress
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import LawWithValues, Units
 from helpers.compilers import shared_library
-from helpers.export_cases import LAWS, case, disagreements, labelled_values
+from helpers.export_cases import LAWS, disagreements, labelled_values
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
-COEFFICIENT = Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0)
 
 
 def compile_c(gcc, folder, sources):
@@ -78,12 +77,6 @@ def test_every_law_agrees_with_50_digits(tmp_path, gcc):
         return np.array([rows for rows, _ in found]), np.array([log for _, log in found])
 
     assert disagreements(evaluate) == []
-
-
-def test_these_laws_call_every_stable_function():
-    texts = [CExporter().text(LawWithValues(case(name).law, case(name).sets[0])) for name in LAWS]
-    called = {name for text in texts for name in STABLE_FUNCTIONS if f"static double {name}(" in text}
-    assert called == {*STABLE_FUNCTIONS}
 
 
 # ---- what the text holds -------------------------------------------------------------------------------------------

@@ -9,19 +9,13 @@ import pytest
 
 from creepkit.errors import ExportError
 from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine
-from creepkit.exporters.fortran_code import (
-    FORTRAN_RESERVED,
-    fortran_expression,
-    fortran_number,
-    fortran_statement,
-    law_subroutine,
-)
+from creepkit.exporters.fortran_code import FORTRAN_RESERVED, law_subroutine
 from creepkit.exporters.law_code import Identifiers, LawCode
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import LawWithValues, Units
+from creepkit.records import LawWithValues
 from helpers.compiled_fortran import PARAMETERS, compile_fortran, pointer
 from helpers.export_cases import LAWS, disagreements, labelled_values
 
@@ -220,23 +214,3 @@ def test_what_creep_is_not_told_is_refused():
     assert "-p*mpa" in AbaqusCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
     with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass"):
         CalculixCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
-
-
-def test_units_are_constants_of_the_file():
-    text = AbaqusCreepSubroutine().text(LawWithValues(NORTON, NORTON_VALUES, units=Units("Pa", "h")))
-    assert "parameter :: mpa = 1.0d-6" in text
-    assert "parameter :: seconds = 3600.0d0" in text
-    assert "! Stress in Pa, time in h, rates in 1/h." in text
-
-
-def test_statements_break_between_tokens():
-    long = "total = " + " + ".join(f"share_of_term_{k}*1.25d-{k:02d}" for k in range(20))
-    lines = fortran_statement(long)
-    assert all(len(line) <= 72 for line in lines)
-    assert all(line.startswith("     &") for line in lines[1:])
-    assert "".join(line[6:] for line in lines).replace(" ", "") == long.replace(" ", "")
-
-
-def test_numbers_are_double_precision():
-    assert [fortran_number(v) for v in (5, 1e-120, -2.5, 0.1)] == ["5.0d0", "1.0d-120", "-2.5d0", "0.1d0"]
-    assert fortran_expression(stress**n / 3) == "(0.3333333333333333d0)*power(stress, n)"

@@ -1,6 +1,5 @@
 """The exported JavaScript runs in node without a module beside it and agrees with 50 digits: rates and derivatives."""
 
-import json
 import math
 import re
 
@@ -168,12 +167,3 @@ def test_the_expression_for_a_page_keeps_what_is_switched_off(tmp_path):
     added = 1e-9 * math.sinh(100.0 / source.values["B"]) ** source.values["n_1"]
     assert found[1] - found[0] == pytest.approx(added, rel=1e-10)
     assert found[2] == len(COMBINED.params)
-
-
-def test_the_description_is_that_of_the_law():
-    text = JavaScriptExporter().text(LawWithValues(NORTON, {"A": 1e-16, "n": 5.0}))
-    described = json.loads(re.search(r"const law = Object\.freeze\((\{.*?\n\})\);", text, re.DOTALL)[1])
-    assert described["parameters"][0] == {
-        "name": "A", "value": 1e-16, "unit": "1/s", "meaning": "rate coefficient", "scale": "log",
-    }  # fmt: skip
-    assert described["variables"] == ["stress"]

@@ -14,12 +14,11 @@ from creepkit.errors import CreepkitError, ExportError, LawError
 from creepkit.exporters.exporting import export
 from creepkit.exporters.latex import LatexExporter, latex_number
 from creepkit.exporters.law_files import JsonExporter, read_valued_law
-from creepkit.files.writing import RECORD
 from creepkit.language import CreepLaw, Param, State, activated, arrhenius, linear, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
-from creepkit.records import Exporter, LawWithValues, Units
+from creepkit.records import LawWithValues, Units
 from creepkit.registry import default_registry
 
 A, n, k_max = parameters("A n k_max")
@@ -45,17 +44,6 @@ NOTES = ("intervals: n = 4.5 +- 0.1 (95 %)", "valid from 700 to 900 C\nand 20 to
 
 def text_of(law, values, exporter, notes=(), **more):
     return exporter.text(LawWithValues(law, values, notes, **more))
-
-
-def test_the_exporters_keep_the_protocol():
-    exporters = available("exporters")
-    assert {"latex": ".tex", "python": ".py", "json": ".json", "markdown": ".md", "mathml": ".xhtml"}.items() <= {
-        name: exporter.suffix for name, exporter in exporters.items()
-    }.items()
-    for exporter in exporters.values():
-        assert isinstance(exporter, Exporter)
-        assert exporter.title == exporter.title.strip() != ""
-        assert re.fullmatch(r"\.\w+", exporter.suffix)
 
 
 def test_values_are_checked():
@@ -133,26 +121,6 @@ def test_any_text_is_a_document_or_an_error(text):
 # ---- LaTeX ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
-def test_latex_is_balanced_and_holds_every_parameter(law):
-    text = text_of(law, law.center(), LatexExporter(), NOTES)
-    code = "\n".join(line for line in text.splitlines() if not line.startswith("%"))
-    plain = re.sub(r"\\[{}$%&]", "", code)
-    depth = 0
-    for c in plain:
-        depth += (c == "{") - (c == "}")
-        assert depth >= 0
-    assert depth == 0
-    assert plain.count("$") % 2 == 0
-    assert code.count(r"\left") == code.count(r"\right")
-    assert re.findall(r"\\begin\{(.*?)\}", code) == re.findall(r"\\end\{(.*?)\}", code)
-    rows = re.findall(r"^  \$(.+?)\$ & (.+?) & \$(.+?)\$ & (.*?) \\\\$", code, flags=re.M)
-    assert len(rows) == len(law.params) + len(law.states)
-    for value, (_, _, shown, _) in zip(law.center().values(), rows, strict=False):
-        mantissa, _, exponent = shown.partition(r" \times 10^{")
-        assert float(mantissa) * 10.0 ** int(exponent.rstrip("}") or 0) == pytest.approx(value, rel=1e-5)
-
-
 def test_latex_escapes_text():
     text = text_of(DAMAGE, {"A": 1e-16, "n": 5}, LatexExporter())
     assert r"& rate coefficient \& more &" in text
@@ -195,24 +163,6 @@ def test_numbers_in_latex(value, shown):
 # ---- files ---------------------------------------------------------------------------------------------------------
 
 VALUED = LawWithValues(NORTON, {"A": 1e-16, "n": 5}, NOTES)
-
-
-def test_a_file_is_written_whole(tmp_path):
-    path = tmp_path / "norton.json"
-    export(VALUED, "json", to=path)
-    assert read_valued_law(path.read_text(encoding="utf-8")).law == NORTON
-    assert {p.name for p in tmp_path.iterdir()} == {RECORD, "norton.json"}
-
-
-def test_a_file_that_exists_stays_unless_forced(tmp_path):
-    path = tmp_path / "norton.json"
-    path.write_text("old")
-    with pytest.raises(ExportError, match="norton.json: cannot be written: it is there, and creepkit did not write it"):
-        export(VALUED, "json", to=path)
-    assert path.read_text() == "old"
-    export(VALUED, "json", to=path, force=True)
-    assert read_valued_law(path.read_text(encoding="utf-8")) == VALUED
-    assert {p.name for p in tmp_path.iterdir()} == {RECORD, "norton.json"}
 
 
 def test_a_refused_export_leaves_the_old_file(tmp_path):

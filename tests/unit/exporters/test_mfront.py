@@ -159,24 +159,6 @@ def test_every_file_keeps_the_grammar():
         assert {f"{sign}{variable}" for variable in declared(text, "StateVariable") for sign in "df"} <= used
 
 
-def test_the_file_reads_as_the_gallery_does():
-    text = exported(NORTON, {"A": 1.2e-16, "n": 5.2}, elastic=ELASTIC, notes=["n = 5.2 +- 0.1 (95 %)"])
-    for line in (
-        "// Note: n = 5.2 +- 0.1 (95 %)",
-        "@DSL Implicit;",
-        "@Behaviour norton;",
-        "@Brick StandardElasticity;",
-        "@ElasticMaterialProperties {150000.0, 0.3};",
-        'p.setGlossaryName("EquivalentViscoplasticStrain");',
-        "@Parameter A = 1.2e-16; // 1/s, rate coefficient",
-        "  feel += dp * flow;",
-        "  fp -= dt * rate;",
-        "  dfeel_ddp = flow;",
-        "  dfp_ddeel = -theta * dt * (rate_by_stress * 2 * shear * flow);",
-    ):
-        assert line in text.splitlines()
-
-
 def test_moduli_are_properties_unless_they_are_known():
     assert "@MaterialProperty stress young;" in exported(NORTON)
     text = exported(NORTON, elastic=Elastic(150e3 - 60.5 * temperature, 0.3), units=Units("Pa"))

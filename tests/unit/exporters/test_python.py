@@ -9,9 +9,8 @@ import pytest
 import sympy
 
 from creepkit.exporters.python import NumpyExporter, PythonExporter
-from creepkit.language import CreepLaw, Param, State, arrhenius, linear, parameters, states, stress
+from creepkit.language import CreepLaw, Param, State, arrhenius, parameters, states, stress
 from creepkit.laws.combined import COMBINED
-from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import LawWithValues
 from helpers.export_cases import LAWS, disagreements, renamed
@@ -99,19 +98,6 @@ def test_state_rates_agree_too(tmp_path):
     assert found == {"omega": pytest.approx(1e-8 * 12 / 0.25, rel=1e-14)}
 
 
-def test_values_are_the_defaults(tmp_path):
-    loaded = module(NORTON, tmp_path, {"A": 1e-16, "n": 5.2})
-    assert loaded.rate(80) == pytest.approx(1e-16 * 80**5.2, rel=1e-13)
-    assert loaded.rate(80, n=4) == pytest.approx(1e-16 * 80**4, rel=1e-13)
-
-
-def test_a_coefficient_of_zero_switches_its_term_off(tmp_path):
-    loaded = module(COMBINED, tmp_path, {**COMBINED.center(), "A_1": 0.0, "A_2": 0.0})
-    alone = module(COMBINED.only("time hardening"), tmp_path)
-    assert loaded.rate(100, time=100.0) == pytest.approx(alone.rate(100, time=100.0), rel=1e-13)
-    assert loaded.rate(100, time=100.0, A_3=0.0) == 0.0
-
-
 def test_what_the_law_uses_must_be_given_and_the_rest_may_be(tmp_path):
     loaded = module(STRAIN_HARDENING, tmp_path)
     with pytest.raises(TypeError, match="strain"):
@@ -146,18 +132,3 @@ def test_the_module_says_what_it_is():
         "        # strain hardening",
     ):
         assert line in text.splitlines()
-
-
-def test_constraints_are_told():
-    text = PythonExporter().text(LawWithValues(NORTON.with_temperature(n=linear()), {"A": 1e-16, "n": 5, "n_T": 1e-9}))
-    assert "# Valid where n + n_T*(temperature - 1073.15) >= 0." in text
-
-
-@pytest.mark.parametrize("meaning", ["\"\"\"'''", "back\\", "\\x", '"""; raise SystemExit; """'])
-def test_nothing_in_a_meaning_becomes_code(meaning, tmp_path):
-    (omega,) = states("omega")
-    A, n = NORTON.params
-    law = CreepLaw(
-        "odd", {"term": A * stress**n}, NORTON.params, states={omega: State(0.0, A * stress, meaning=meaning)}
-    )
-    assert module(law, tmp_path).rate(100, omega=0) > 0

@@ -85,19 +85,6 @@ def test_a_ramp_taken_in_one_step_is_straight():
     np.testing.assert_allclose(line.interpolate(np.array([0.0, 1.0]), asked), asked / 5, atol=1e-15)
 
 
-def test_moving_all_steps_moves_the_curve():
-    steps = doubling(100.0, 5000.0)
-    line = TimeInterpolation.from_steps(
-        np.concatenate([[0.0, 100.0], steps[1:]]),
-        np.concatenate([[0, 0], np.ones(steps.size - 1, int)]),
-        program((0, 100, 0, 8), (100, 5000, 8, 8)),
-    )
-    values = np.sqrt(np.arange(steps.size + 1))
-    asked = np.array([120.0, 800, 4000])
-    later = line.moved(np.full(line.times.size, 7.0), np.full(2, 7.0))
-    np.testing.assert_allclose(later.interpolate(values, asked + 7), line.interpolate(values, asked), rtol=1e-13)
-
-
 @cache
 def run_of(law, pressure, few):
     kernel = kernels.lower(ck.law(law), "compiled")

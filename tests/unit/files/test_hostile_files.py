@@ -86,13 +86,6 @@ def test_an_hdf5_file_is_bounded_as_it_unpacks(tmp_path, monkeypatch):
     assert read_hdf5(path)["x"].shape == (10_000,)
 
 
-def test_groups_in_a_circle_end(tmp_path):
-    with h5py.File(tmp_path / "x.h5", "w") as file:
-        file.create_group("a")["b"] = file["/"]
-    with open_hdf5(tmp_path / "x.h5", NOTE_HDF5) as file:
-        assert list(file) == ["a"]
-
-
 def test_json_of_honest_size_is_read():
     """As of 50 MB of numbers of 15 digits, in rows of 8."""
     rows = ",".join(["[" + ",".join(["0.12345678901234"] * 8) + "]"] * 300_000)
@@ -171,20 +164,6 @@ def test_whatever_a_reader_raises_names_file_and_reader(tmp_path, error):
     assert message.startswith(f"{path}: read() of reader 'failing' ")
     assert message.isprintable()
     assert len(message) < 1000
-
-
-@pytest.mark.parametrize("name", ["brackets", "underscores", "quotes"])
-def test_long_names_take_no_time(tmp_path, name):
-    text = {"brackets": "a [(" * 16_000, "underscores": "a=" + "1_" * 300_000, "quotes": '"' + "x" * 900_000 + '"'}[
-        name
-    ]
-    path = tmp_path / "x.csv"
-    path.write_text(f"{text}\n0.5\n", encoding="utf-8")
-    for read in (ck.read_histories, ck.read_record, ck.read_frames):
-        with pytest.raises(HistoryError) as caught:
-            read(path)
-        assert str(caught.value).startswith(str(path))
-        assert len(str(caught.value)) <= 2000
 
 
 def test_a_table_of_a_million_texts_is_refused_before_it_is_read(tmp_path, monkeypatch):

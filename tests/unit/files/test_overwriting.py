@@ -94,20 +94,6 @@ def test_permissions_are_kept_and_read_only_files_stay(tmp_path):
     assert path.read_text() == "newer"
 
 
-def test_a_list_that_is_damaged_makes_no_file_ours(tmp_path):
-    path = write_text("old", tmp_path / "note", ExportError)
-    for content in (b"\xff\0 garbage\n" * 10, b'["note", 1]\n[]\n7\n"note"\n', b""):
-        (tmp_path / RECORD).write_bytes(content)
-        assert is_foreign(path)
-    write_text("new", path, ExportError, force=True)
-    assert not is_foreign(path)
-
-
-def test_names_that_are_no_text_are_listed(tmp_path):
-    for name in ("plain", "back\\slash", "line\nend", "\udcff"):
-        assert not is_foreign(write_text("text", tmp_path / name, ExportError))
-
-
 def test_what_was_made_from_another_file_stays(tmp_path, monkeypatch):
     path = tmp_path / "tests" / "D1.csv"
     path.parent.mkdir()

@@ -146,11 +146,6 @@ def test_a_record_may_be_changed_in_some_fields():
         CODEC.updated(OUTER, {"inner": {"colour": 1}})
 
 
-def test_a_codec_names_only_fields_that_are_there():
-    with pytest.raises(TypeError, match="Inner has no field colour"):
-        RecordCodec(omitted={Inner: ("colour",)})
-
-
 def test_what_cannot_be_stored_is_said():
     with pytest.raises(RecordError, match="the record.inner is a set, which cannot be stored"):
         CODEC.to_json(Outer(**{**vars(OUTER), "inner": {1}}))

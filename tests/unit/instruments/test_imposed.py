@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -43,20 +45,6 @@ def test_noise_is_not_followed_and_its_size_is_stated() -> None:
     assert found.load.times.size < 60
 
 
-def test_a_simulation_takes_what_was_imposed() -> None:
-    found = ck.imposed(record(), "D1", FRAMES, ClockAlignment.stated(0.0))
-    history = ck.History(
-        "D1",
-        (FRAMES - found.time_zero)[found.time_zero + 1.0 < FRAMES],
-        {},
-        ck.RecordedLoading(found.load, "pressure"),
-        found.temperature,
-        "bulge",
-        ck.Elastic(150e3),
-    )
-    assert history.loading.program().values.max() == pytest.approx(8.0, abs=0.02)
-
-
 def test_a_record_in_the_zone_of_the_frames_needs_no_alignment() -> None:
     known = InstrumentRecord("test", TIMES, record().channels, 1.7e9, record().channel_patterns)
     assert ck.imposed(known, "D1", FRAMES + 1.7e9).time_zero == pytest.approx(1.7e9 + 500.0, abs=1.5)
@@ -75,3 +63,21 @@ def test_records_are_cut_and_thinned_and_gaps_are_found() -> None:
     assert cut.gaps.tolist() == [[999.0, 1100.0]]
     with pytest.raises(HistoryError, match="no row from 5000 to 6000 s"):
         one.between(5000.0, 6000.0)
+
+
+def test_the_error_of_the_lag_counts_where_an_output_changes() -> None:
+    """All lags within +-9 s are as likely: 9 / 3^0.5 s times the rate of the output, in a ramp and in a hold."""
+    shifts = np.linspace(-9.0, 9.0, 2001)
+    known = ClockAlignment(0.0, 0.0, lags=shifts, probability=np.full(shifts.size, 1.0 / shifts.size))
+    load = Program(np.array([0.0, 100, 200, 1000]), np.array([1.0, 1, 6, 6]))
+    one = ck.imposed(record(), "D1", FRAMES, ClockAlignment.stated(0.0))
+    times = np.arange(5.0, 900.0, 10.0)
+    response, creep = 0.02, 3e-5
+    found = dataclasses.replace(one, load=load, alignment=known).lag_error(
+        times, response * load.at(times) + creep * times
+    )
+    spread, ramp = 9.0 / 3.0**0.5, (times > 109) & (times < 191)
+    hold = (times < 81) | (times > 219)
+    np.testing.assert_allclose(found[ramp], spread * (response * 0.05 + creep), rtol=0.03)
+    np.testing.assert_allclose(found[hold], spread * creep, rtol=0.05)
+    assert not one.lag_error(times, times).any()  # of a lag that is stated

@@ -9,7 +9,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.instruments.column_heads import split_head
 from helpers.instrument_samples import samples
 from helpers.paths import SHARED, needs_shared_data
 
@@ -205,14 +204,6 @@ def test_whether_a_pressure_is_absolute_stands_in_its_unit_or_its_name(
 def test_a_row_of_units_that_says_more_than_the_names(tmp_path: Path) -> None:
     record = ck.read_record(written(tmp_path, "time_s,p [bar],T (upper)\ns,barg,K\n0,1,800\n1,2,800\n"))
     assert [(c.reference, c.quantity) for c in record.channels.values()] == [("gauge", "pressure"), ("", "temperature")]
-
-
-def test_units_in_heads() -> None:
-    assert split_head("A1: Press.(PSIG)") == ("A1: Press.", "PSIG")
-    assert split_head("P1 [bar(g)]") == ("P1", "bar(g)")
-    assert split_head("p / kPa") == ("p", "kPa")
-    assert split_head("furnace_temperature_C") == ("furnace_temperature", "C")
-    assert split_head("set_point") == ("set_point", "")
 
 
 @needs_shared_data

@@ -273,14 +273,6 @@ def test_an_observation_without_data_is_left_as_it_is(correlated):
     assert CovarianceFactor.of_residuals(nothing, noise).log_determinant == 0.0
 
 
-def test_counted_twice_is_the_square_twice():
-    residuals, noise = example()
-    factor = CovarianceFactor.of_residuals(residuals, noise)
-    counts = np.full(residuals.values.shape, 2.0)
-    once, twice = ((f.whiten(residuals.values) ** 2).sum() for f in (factor, factor.with_counts(counts)))
-    assert twice == pytest.approx(2.0 * once, rel=1e-12)
-
-
 def test_components_go_into_a_noise_model_and_out():
     _, noise = example()
     assert noise.with_components(noise.components) == noise

@@ -16,7 +16,6 @@ from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.testing import draw_samples
 from helpers.literature_laws import EQUATIONS
 
 SHIPPED = [NORTON, STRAIN_HARDENING, TIME_HARDENING, HYPERBOLIC_SINE, DRIFTING_EXPONENT, COMBINED]
@@ -80,20 +79,6 @@ def test_log_rate_reaches_where_the_rate_does_not(target: Any, array: Callable[[
 # ---- off, and zero -------------------------------------------------------------------------------------------------
 
 
-@each_target
-@each_law
-def test_a_law_that_is_off_creeps_at_rate_zero(law: CreepLaw, target: Any, array: Callable[[Any], Any]) -> None:
-    kernel = lower(law, target)
-    off = {name: p.off for name, p in law.table.items() if p.off == 0 and p.scale == "log"}
-    point = {"stress": array([50.0]), "temperature": 1000.0, "time": 0.0, "strain": 0.0}
-
-    found = kernel.derivatives({**law.center(), **off}, **point)
-
-    assert float(found.rate[0]) == 0.0
-    assert all(np.isfinite(float(d[0])) for d in (*found.point.values(), *found.params.values()))
-    assert -np.inf < float(kernel.log_rate({**law.center(), **off}, **point)[0]) < -1e20
-
-
 def test_the_gradient_to_a_coefficient_that_is_off_is_not_nan() -> None:
     A = torch.tensor(0.0, dtype=torch.float64, requires_grad=True)
 
@@ -103,48 +88,7 @@ def test_the_gradient_to_a_coefficient_that_is_off_is_not_nan() -> None:
     assert torch.isfinite(A.grad)
 
 
-@pytest.mark.parametrize("zeros", [(0, 4, 5), (1,), (2,), (0, 1, 2, 4, 5)], ids=["stress", "strain", "time", "all"])
-@pytest.mark.parametrize(
-    ("law", "dtype"),
-    [*((law, torch.float64) for law in LAWS), *((law, torch.float32) for law in SHIPPED)],
-    ids=lambda x: x.name if isinstance(x, CreepLaw) else str(x),
-)
-def test_nothing_is_nan_or_infinite_at_zero(law: CreepLaw, dtype: torch.dtype, zeros: tuple[int, ...]) -> None:
-    arguments = moderate(law, 4, dtype)
-    for column in zeros:
-        arguments[column] = torch.zeros_like(arguments[column])
-    kernel = lower(law, "torch")
-    inputs = [a.requires_grad_() for a in arguments]
-
-    log_rate = kernel.internal_log_rate(*inputs)
-    gradients = torch.autograd.grad(log_rate.sum(), inputs, allow_unused=True)
-
-    assert log_rate.dtype == dtype
-    assert torch.isfinite(log_rate).all()
-    assert all(torch.isfinite(g).all() for g in gradients if g is not None)
-    plain = [a.detach().numpy() for a in arguments]
-    with np.errstate(all="raise", under="ignore", over="ignore", divide="ignore"):
-        assert np.isfinite(lower(law, "numpy").internal_log_rate(*plain)).all()
-        found = lower(law, "numpy").internal_derivatives(*plain)
-    if dtype == torch.float64:
-        assert np.isfinite([found.rate, *found.point.values(), *found.params.values()]).all()
-
-
 # ---- gradients -----------------------------------------------------------------------------------------------------
-
-
-@each_law
-def test_autograd_gives_the_derivatives_by_symbols(law: CreepLaw) -> None:
-    drawn = draw_samples(law, 64, seed=5)
-    found = lower(law, "numpy").internal_derivatives(*drawn.arguments())
-    kept = np.isfinite(found.rate) & (found.rate > 1e-250) & (found.rate < 1e250)
-    inputs = [torch.tensor(column[kept], requires_grad=True) for column in drawn.arguments()]
-
-    grown = torch.autograd.grad(lower(law, "torch").internal_rates(*inputs)[0].sum(), inputs, allow_unused=True)
-
-    assert kept.sum() > 10
-    for g, expected in zip(grown, [*found.point.values(), *found.params.values()], strict=True):
-        np.testing.assert_allclose(0.0 if g is None else g.numpy(), expected[kept], rtol=1e-10)
 
 
 @torch_warns
@@ -191,17 +135,6 @@ def test_second_derivatives_are_those_of_norton() -> None:
     (ss, sn), (ns, nn) = torch.func.hessian(log_rate, argnums=(0, 1))(*at)
 
     torch.testing.assert_close(torch.stack([ss, sn, ns, nn]), torch.tensor([-0.01, 0.05, 0.05, 0.0], dtype=at[0].dtype))
-
-
-def test_gradients_flow_to_inputs_of_any_shape() -> None:
-    kernel = lower(STRAIN_HARDENING, "torch")
-    stress = torch.rand(3, 1, dtype=torch.float64, requires_grad=True)
-    n = torch.full((4,), 3.0, dtype=torch.float64, requires_grad=True)
-
-    kernel.log_rate({"A": 1e-10, "n": n, "m": -0.5}, stress=stress, strain=0.01).sum().backward()
-
-    torch.testing.assert_close(stress.grad, 12.0 / stress.detach())
-    torch.testing.assert_close(n.grad, torch.log(stress.detach()).sum().expand(4))
 
 
 def test_single_precision_stays_single() -> None:

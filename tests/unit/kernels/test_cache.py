@@ -1,6 +1,5 @@
 """Kernels on disk: found again, safe from each other, from damage and from folders that cannot be written."""
 
-import errno
 import os
 import subprocess
 import sys
@@ -159,43 +158,6 @@ def test_without_a_folder_to_write_to_each_process_compiles_for_itself(tmp_path:
     assert list(temporary.iterdir()) == []
 
 
-def test_a_folder_that_is_read_only_still_serves_what_it_holds(
-    cache: Path, made: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    lower(some_law(29), "compiled")
-    before = folder_of(cache)
-
-    def refuse(**options: object) -> str:
-        raise PermissionError
-
-    monkeypatch.setattr(compilation.tempfile, "mkdtemp", refuse)
-    compilation._loaded_modules.clear()
-
-    lower(some_law(29), "compiled")
-    assert len(made) == 1
-    lower(some_law(31), "compiled")
-
-    assert len(made) == 2
-    assert folder_of(cache) == before
-
-
-@pytest.mark.parametrize("failing", ["write", "rename"])
-def test_what_cannot_be_kept_runs_from_memory(cache: Path, monkeypatch: pytest.MonkeyPatch, failing: str) -> None:
-    """A full disk, or a folder that cannot be put into its place: nothing half written is left."""
-
-    def refuse(*arguments: object) -> None:
-        raise OSError(errno.ENOSPC if failing == "write" else errno.EACCES, "refused")
-
-    lower(some_law(67), "compiled")
-    damaged = folder_of(cache) / CODE_FILE
-    damaged.write_bytes(b"")
-    compilation._loaded_modules.clear()
-    monkeypatch.setattr(*((Path, "write_bytes") if failing == "write" else (os, "rename")), refuse)
-
-    assert lower(some_law(67), "compiled").source
-    assert kept(cache) == ([damaged.parent.name] if failing == "write" else [])
-
-
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes of files say nothing of others here")
 @pytest.mark.parametrize("shared", ["folder", CODE_FILE, SOURCE_FILE, CHECKSUM_FILE])
 def test_what_others_can_write_is_not_run(cache: Path, made: list[str], shared: str) -> None:
@@ -208,22 +170,6 @@ def test_what_others_can_write_is_not_run(cache: Path, made: list[str], shared: 
     lower(some_law(71), "compiled")
     assert len(made) == 2
     assert is_intact(folder)
-
-
-def test_the_folder_above_may_be_shared(cache: Path) -> None:
-    cache.mkdir()
-    cache.chmod(0o1777)
-
-    lower(some_law(79), "compiled")
-
-    assert is_intact(folder_of(cache))
-
-
-def test_a_failure_leaves_nothing_half_made(cache: Path) -> None:
-    with pytest.raises(SyntaxError):
-        compilation.load_module("broken", lambda: "def rate(:")
-
-    assert kept(cache) == []
 
 
 def test_the_folder_is_for_its_owner_alone(cache: Path) -> None:

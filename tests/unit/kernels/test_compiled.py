@@ -169,25 +169,6 @@ def test_a_nan_is_flagged(law_: CreepLaw) -> None:
     assert flags(compiled, "update", x, theta) & RATE_NOT_FINITE
 
 
-@each_law
-@pytest.mark.parametrize("zeros", [(), (0, 1, 2, 4, 5)], ids=["somewhere", "at zero"])
-def test_with_every_term_off_the_rate_is_zero_and_the_update_finite(law_: CreepLaw, zeros: tuple[int, ...]) -> None:
-    compiled, drawn = lower(law_, "compiled"), draw_samples(law_, 8)
-    x, theta = drawn.points.copy(), drawn.theta[0].copy()
-    x[:, zeros] = 0.0
-    theta[[k for k, p in enumerate(law_.params.values()) if p.off == 0 and p.scale == "log"]] = -np.inf
-
-    rate, rate_flags = call_entry(compiled, "rate", x, theta)
-    update, update_flags = call_entry(compiled, "update", x, theta)
-    sensitivity, sensitivity_flags = call_entry(compiled, "sensitivity", x, theta)
-
-    assert (rate[:, 0] == 0).all()
-    assert (update[:, 0] < -1e20).all()
-    assert np.isfinite(update).all()
-    assert np.isfinite(sensitivity).all()
-    assert (rate_flags, update_flags, sensitivity_flags) == (0, 0, 0)
-
-
 def test_a_term_that_is_off_leaves_the_others() -> None:
     compiled = lower(COMBINED, "compiled")
     values = {**COMBINED.center(), "A_1": 0.0, "A_3": 0.0, "A_2": 1e-16, "n_2": 4.0, "m_1": -0.5}

@@ -7,7 +7,7 @@ import pytest
 from creepkit.errors import HistoryError
 from creepkit.quality import check_data_quality
 from creepkit.readers.history_csv import HISTORY_CSV, write_history
-from creepkit.readers.rate_and_rupture_tables import TEST_TABLE
+from creepkit.readers.tests_in_rows import TEST_TABLE
 from creepkit.records import History
 
 HEAD = "# stress_MPa: 100\n# temperature_C: 800\n"

@@ -7,7 +7,7 @@ import pytest
 
 from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import HISTORY_CSV
-from creepkit.readers.rate_and_rupture_tables import TEST_TABLE
+from creepkit.readers.tests_in_rows import TEST_TABLE
 
 FRAMES = "# temperature_C: 800\n# control: load\n{}\ntime_h;strain_pct\n0;0\n100;0,5\n900;0,9\n"
 

@@ -5,7 +5,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.readers.columns_of_tests import key_of_column
+from creepkit.readers.columns_of_tests import column_called
 from creepkit.readers.history_csv import write_history
 from creepkit.records import UNKNOWN_DURATION, History, constant_stress
 from helpers.workbooks import workbook
@@ -75,7 +75,7 @@ NAMES = [
 
 
 def test_names_of_columns():
-    assert [(written, key_of_column(written)) for written, _ in NAMES] == NAMES
+    assert [(name, (one.quantity, one.unit)) for name, one in ((n, column_called(n)) for n, _ in NAMES)] == NAMES
 
 
 REFUSED = [

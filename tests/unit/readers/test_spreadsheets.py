@@ -9,8 +9,8 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.readers.rate_and_rupture_tables import TEST_TABLE
 from creepkit.readers.spreadsheets import SPREADSHEET, number_text
+from creepkit.readers.tests_in_rows import TEST_TABLE
 from creepkit.records import History
 from helpers.workbooks import workbook
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 import creepkit as ck
-from creepkit.errors import DatasetError
 from creepkit.sampling.domains import acceptance, sampling_design
 
 DIMPLE = ck.specimen("bulge")
@@ -37,13 +35,3 @@ def test_few_laws_of_the_papers_box_are_useful_and_nearly_all_of_the_conditioned
     law = ck.law("combined")
     assert acceptance(sampling_design(law, DIMPLE, "paper"), 1024).useful.mean() < 0.15
     assert acceptance(sampling_design(law, DIMPLE), 1024).useful.mean() > 0.99
-
-
-def test_the_figure_is_written(tmp_path):
-    found = acceptance(sampling_design(ck.law("combined"), DIMPLE, "paper"), draws=256)
-    figure = found.plot(tmp_path / "rates.png")
-    assert (tmp_path / "rates.png").stat().st_size > 10_000
-    legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert legend[0] == f"in the useful window: {100 * found.useful.mean():.1f} %"
-    with pytest.raises(DatasetError, match="is no format of pictures"):
-        found.plot(tmp_path / "rates.nonsense")

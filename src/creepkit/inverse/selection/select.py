@@ -19,12 +19,12 @@ from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify, identify_values
+from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, challenged, rank, ranking_from_scores
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Predictor
 from creepkit.registry import default_registry
@@ -84,14 +84,14 @@ def select(
     by: Criterion = "bic",
     progress: IterationCallback | None = None,
 ) -> Ranking:
-    """Identify every candidate from the same histories by likelihood, and rank them.
+    """Identify every candidate from the same histories, and rank them.
 
     sums : also sums of two candidates: True, False, or None for sums of the best law where it does not explain the
         tests to their noise, and then richer registered laws, at most settings.further_laws of both together.
     by : "bic", "aicc", or "hold-out" (the last 30 % of each history predicted from a refit to the first 70 %).
     A law that cannot be identified is named in `failed`; FitError if none can.
     """
-    settings = replace(settings or IdentificationSettings(), weights="likelihood")
+    settings = settings or IdentificationSettings()
     if by not in CRITERIA:
         raise FitError(f"select(by={by!r}) is not known; allowed are {', '.join(CRITERIA)}")
     if not candidates:

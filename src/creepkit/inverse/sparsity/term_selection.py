@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
+from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.inverse.search.multistart import distinct
@@ -25,7 +25,6 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, PenalisedTerms, Subsets, check_penalty
 from creepkit.inverse.sparsity.reduced_laws import ReducedLaw, ReducedLaws, TermProblem, terms_above
 from creepkit.inverse.sparsity.result import FitStatistics, PenaltyPath, Sparsity, TermNames
-from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
@@ -72,7 +71,7 @@ def trace_path(
     corners = penalised_starts(reductions)[-len(labels) :]
     optima = [full.x]
     for k, strength in enumerate(sorted(strengths)):
-        optima.append(_next_fit(reductions, penalised.with_strength(strength), optima[-1], corners).x)
+        optima.append(_next_fit(reductions, replace(penalised, strength=strength), optima[-1], corners).x)
         if progress is not None:
             progress("strength", k + 1, len(strengths))
         if len(terms_above(problem.contributions_at(optima[-1]))) == 1:
@@ -208,22 +207,6 @@ def identify_reduced(
     fit = identify(reduced.law, full.histories, full.predictor, settings=full.settings, start=start, progress=progress)
     record = _sparsity_record(full, fit, reductions, reduced, choice, penalty)
     return replace(fit, search_trace=choice.trace or full.search_trace, sparsity=record)
-
-
-@checked
-def penalty_path(
-    law: CreepLaw,
-    histories: Sequence[History],
-    using: PredictorOrMapping,
-    penalty: ContributionPenalty,
-    *,
-    strengths: Sequence[float] = PATH_STRENGTHS,
-    settings: IdentificationSettings | None = None,
-    progress: IterationCallback | None = None,
-) -> PenaltyPath:
-    """The path of a penalty over its strength, from none to all, with the automatic choice."""
-    _, reductions = identify_full(law, histories, using, None, settings, progress)
-    return trace_path(reductions, penalty, strengths, progress)
 
 
 def identify_full(

@@ -39,7 +39,7 @@ class Items:
 
 
 @dataclass(frozen=True)
-class CellTable:
+class Table:
     """A table with a caption; the first cell of each row is its head. numeric : columns that stand right."""
 
     kind: ClassVar[str] = "table"
@@ -107,7 +107,7 @@ class Answer:
     files: Sequence[tuple[str, str, str]] = ()
 
 
-Block: TypeAlias = Answer | Paragraph | Items | CellTable | Picture | Formula | Verbatim | Downloads
+Block: TypeAlias = Answer | Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads
 
 
 @dataclass(frozen=True)

@@ -28,15 +28,12 @@ def ranking_sentences(found: GroupFindings, references: References, *, numbers: 
     ranking = found.ranking
     if ranking is None:
         return []
-    by_likelihood = found.fit.settings.weights == "likelihood"
     if ranking.criterion in CRITERIA:
         name, penalty = CRITERIA[ranking.criterion]
         n = f" (n = {number(ranking.independent_frames, 4)})" if numbers and _known(ranking.independent_frames) else ""
         deviance = (
             "chi-square, under the covariance of the law that fits the tests best, plus the logarithm of the "
             "determinant that integrates nuisance parameters out"
-            if by_likelihood
-            else "-2 ln L, multiplied by the number of independent readings over that of all"
         )
         criterion = (
             f"{name}{references.cite(ranking.criterion)}: {deviance}, plus {penalty} for K parameters that the tests "

@@ -111,7 +111,7 @@ class AxisymmetricTest(FiniteElementTest):
     def differentiated(self, simulation: Simulation) -> tuple[Floats, Floats]:
         """As `observed`, and derivatives (steps, outputs, columns): central differences of the author's function."""
         assert simulation.sensitivities is not None
-        quantities, change = self.quantities(simulation), np.array(simulation.sensitivities.surface)
+        quantities, change = self.quantities(simulation), np.array(simulation.sensitivities)
         if self.body.section.controlled is not None:
             change[:, -1] *= 2.0 * np.pi
         slopes = [np.zeros((len(quantities), len(self.outputs), 0))]

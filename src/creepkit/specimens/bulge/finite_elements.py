@@ -65,7 +65,7 @@ class BulgeTest(FiniteElementTest):
         assert simulation.sensitivities is not None
         profiles = self.profiles(simulation)
         outputs, derivatives = self.observation.observe_with_derivatives(self.radii, profiles)
-        columns = self.columns(simulation, derivatives, simulation.sensitivities.surface)
+        columns = self.columns(simulation, derivatives, simulation.sensitivities)
         if self.observation.form != "rings":  # width and shape at rest are those of the first step
             columns[0, 1:] = columns[1, 1:] if len(columns) > 1 else 0.0
         return outputs, columns

@@ -104,7 +104,7 @@ def test_thickness() -> None:
         return run.displacements[:, setup.model.top, 1]
 
     difference = (top(1e-5) - top(-1e-5)) / 2e-5
-    np.testing.assert_allclose(base.sensitivities.surface[:, :, -1], difference, atol=1e-6 * np.abs(difference).max())
+    np.testing.assert_allclose(base.sensitivities[:, :, -1], difference, atol=1e-6 * np.abs(difference).max())
 
 
 @pytest.mark.long_when_sanitized

@@ -22,7 +22,7 @@ from creepkit.laws.combined import COMBINED
 from creepkit.records import History, PressureJump, Status
 from creepkit.specimens.bulge.finite_elements import BulgeTest
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.finite_element_tests import TestResponse, solver_settings
+from creepkit.specimens.finite_element_tests import CandidateResponse, solver_settings
 from helpers.literature_laws import RATE, damage, law, number, omega
 
 SPECIMEN = Bulge(refinement=0.5, threads=1)
@@ -59,7 +59,7 @@ class Base(NamedTuple):
     theta: Floats
     history: History
     made: BulgeTest
-    response: TestResponse
+    response: CandidateResponse
 
     @property
     def found(self) -> Simulation:

@@ -1,0 +1,450 @@
+"""Tables of creep tests, one row a test: stress, temperature, minimum creep rate, rupture time, times to strains.
+
+    test,stress_MPa,temperature_C,min creep rate (1/h),t_r (h),heat
+    A1,120,750,2.1e-6,8200,X7
+    A2,100,750,,>10000,X7
+
+How a test ended is read of marks of its time (`>10000`, `10000+`), of columns of words, codes or yes and no, and of
+remarks; what stays open is asked for (`ends_of_tests`). Times to a strain become frames of strain. Other columns are
+labels. All errors of a file come at once.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+
+from creepkit.errors import HistoryError, quoted
+from creepkit.files.delimited_text import is_missing
+from creepkit.readers.assembly import assemble_history, assemble_without_frames
+from creepkit.readers.column_names import split_written_name, words_of
+from creepkit.readers.columns_of_tests import (
+    TestColumn,
+    column_called,
+    has_frames,
+    head_of_tests,
+    only_text,
+    quantity_of,
+    stands_in_columns,
+)
+from creepkit.readers.condition_texts import with_weak_sources
+from creepkit.readers.ends_of_tests import (
+    FIRM,
+    LABEL,
+    RUPTURED,
+    STOPPED,
+    TIME_IN_CELL,
+    UNCLEAR,
+    EndsOfColumn,
+    MarkedTime,
+    end_said_by,
+    ends_in_column,
+    kind_of_column,
+    legend_in,
+    marked_time,
+)
+from creepkit.readers.frames import unknown_text
+from creepkit.readers.questions import Question, collected, raise_all
+from creepkit.readers.spreadsheets import SPREADSHEET_SUFFIXES, read_sheets
+from creepkit.readers.standard_names import in_standard_keys, specimen_named
+from creepkit.readers.table import CellTable, SourceText, TableRow
+from creepkit.readers.tables_of_tests import MOST_ASKED, TestRow, TestTable
+from creepkit.readers.text_files import peek_table, read_text_table
+from creepkit.readers.vocabulary import HeaderVocabulary
+from creepkit.records import History
+from creepkit.records.quantities import TIME
+
+TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc")
+
+
+_TITLES = 10
+"""Rows of a sheet in which a column of strain makes it one of frames."""
+
+
+_ROUNDING = 0.01
+"""Part of a time by which two that are the same may differ."""
+
+
+def tables_of(path: Path) -> list[CellTable]:
+    """The cells of a text file, or of the sheets of a spreadsheet."""
+    return read_sheets(path) if path.suffix.lower() in SPREADSHEET_SUFFIXES else [read_text_table(path)]
+
+
+@dataclass(frozen=True)
+class RowPerTestReader:
+    """Reader of tables of minimum creep rates, rupture times and times to strains, one row a test."""
+
+    name: str
+    title: str
+    vocabulary: HeaderVocabulary = field(default_factory=HeaderVocabulary)
+
+    def accepts(self, path: Path) -> bool:
+        """Say whether `path` is such a table: a rate or a time beside a stress or a temperature, and no strain."""
+        suffix = path.suffix.lower()
+        if suffix not in (*TEXT_SUFFIXES, *SPREADSHEET_SUFFIXES) or not path.is_file():
+            return False
+        if suffix in TEXT_SUFFIXES:
+            table = peek_table(path)
+            return table is not None and self._is_table(table)
+        try:
+            sheets = read_sheets(path)
+        except HistoryError:
+            return False
+        framed = any(has_frames(row.cells) for sheet in sheets for row in sheet.rows[:_TITLES])
+        return not framed and any(map(self._is_table, sheets))
+
+    def _is_table(self, table: CellTable) -> bool:
+        names = self.vocabulary.synonyms
+        return head_of_tests(table, names) is not None or stands_in_columns(table, names)
+
+    def read(self, path: Path) -> list[History]:
+        """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""
+        errors, places, histories = list[HistoryError](), dict[str, str](), list[History]()
+        for table in self.tables(path, errors):
+            if not table.is_understood:
+                continue
+            for row, end in zip(table.rows, ends_of_rows(table), strict=True):
+                if (end.is_open or row.is_open) and errors:
+                    continue
+                history = collected(errors, partial(self._history, table, row, end))
+                if history is None:
+                    continue
+                place = table.table.location(row.line)
+                if history.name in places:
+                    what = f"test '{history.name}' already stands in {places[history.name]}"
+                    errors.append(HistoryError(f"{place}: {what}; give each row its own name"))
+                else:
+                    places[history.name] = place
+                    histories.append(history)
+        raise_all(errors)
+        return histories
+
+    def tables(self, path: Path, errors: list[HistoryError]) -> list[TestTable]:
+        """The tables of tests in a file; HistoryError where there is none. errors : to which others are added."""
+        found = [(table, head_of_tests(table, self.vocabulary.synonyms)) for table in tables_of(path)]
+        if not any(head for _, head in found):
+            for table, _ in found:
+                if stands_in_columns(table, self.vocabulary.synonyms):
+                    what = "each test stands in a column; transpose the table, so that each stands in a row"
+                    raise HistoryError(f"{table.place}: {what}")
+            raise HistoryError(
+                f"{path}: no row names the columns of tests; name a stress or temperature, and a rate or a time, such "
+                "as stress_MPa,temperature_C,rupture_h"
+            )
+        others = [table for table, head in found if head is None]
+        aside = [f"sheet '{other.sheet}' not read as it is no table of tests" for other in others]
+        heads = [(table.assuming(*aside), head) for table, head in found if head is not None]
+        tables = [TestTable(table, head, self.vocabulary, errors) for table, head in heads]
+        for one in tables:
+            one.notes += filter(None, (only_text(row, other.dialect) for other in others for row in other.rows))
+        return tables
+
+    def _history(self, table: TestTable, row: TestRow, end: RowEnd) -> History:
+        """The test of a row."""
+        sheet, location = table.table, table.table.location(row.line)
+        cells = {
+            column.quantity: Cell(column, table.entry(row, k))
+            for k, column in enumerate(table.columns)
+            if not is_missing(row.cells[k])
+        }
+        empty = [column.quantity for column in table.columns if column.quantity not in cells]
+        frames, assumptions = _strains_reached(cells, location)
+        cells = _with_end({name: one for name, one in cells.items() if one.column.strain is None}, end, location)
+        entries = {**sheet.header, **row.stated, **{one.column.key: one.entry for one in cells.values()}}
+        known = self.vocabulary.terms(specimen_named(entries, self.vocabulary))
+        quantities = {column_called(name).quantity for name in table.names}
+        sources = tuple(one for one in sheet.sources if one.key not in quantities)
+        entries, of_names = with_weak_sources(
+            in_standard_keys(entries, known), CellTable(sheet.path, (), sources=sources), known
+        )
+        stated = {*map(quantity_of, entries)}
+        assumptions = [
+            *sheet.assumptions,
+            *(_unknown(quantity, stated, cells) for quantity in empty),
+            *(*end.assumptions, *of_names, *row.assumed, *assumptions),
+        ]
+        if sheet.cut is not None and sheet.cut.line == row.line:
+            assumptions.append(
+                f"{sheet.cut.text} in line {row.line} is whole (the file ends there without a line end and with fewer "
+                "digits than the numbers above have)"
+            )
+        if assumed := ", ".join(filter(None, assumptions)):
+            entries.setdefault("label assumed", SourceText(assumed, location))
+        name, where = f"{sheet.sheet or sheet.path.stem} {row.line}", f"sheet {sheet.sheet}, " if sheet.sheet else ""
+        source = f"{sheet.path} ({where}{cells['name'].entry.text if 'name' in cells else f'line {row.line}'})"
+        if not frames:
+            return assemble_without_frames(name, entries, self.vocabulary, location=location, source=source)
+        if measure := _includes_elastic(table):
+            entries.setdefault("includes_elastic", SourceText(measure, location))
+        rows = [TableRow(row.line, (repr(time), repr(strain), "1")) for time, strain in frames]
+        if "end_time" in cells and cells["ended"].entry.text == STOPPED:  # after the last frame, with its strain
+            last = cells["end_time"].seconds()
+            rows += [TableRow(row.line, (repr(last), repr(frames[-1][1]), "0"))] * (last > frames[-1][0])
+        columns = ("time_s", "strain_1", "used")
+        text = CellTable(sheet.path, rows, sheet.sheet, columns=columns, columns_line=row.line)
+        return assemble_history(name, entries, text, self.vocabulary, location=location, source=source)
+
+
+TEST_TABLE = RowPerTestReader(
+    "test-table", "one row a test: stress, temperature, and minimum creep rate, rupture time or times to strains"
+)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a cell of a row states."""
+
+    column: TestColumn
+    entry: SourceText
+
+    def seconds(self, number: str = "") -> float:
+        """Its time, s; number : where a mark stands beside it."""
+        entry = replace(self.entry, text=number or self.entry.text)
+        return TIME.convert(entry.number(entry.key), self.column.unit, entry.location, entry.key)
+
+    def as_quantity(self, quantity: str, text: str) -> Cell:
+        """The same as another quantity, of this text."""
+        return Cell(replace(self.column, quantity=quantity), replace(self.entry, text=text))
+
+
+def _unknown(quantity: str, stated: set[str], cells: Mapping[str, Cell]) -> str:
+    """What an empty cell leaves unknown; "" where the rest of the row says it, or where it would be a label."""
+    is_stopped = "ended" in cells and cells["ended"].entry.text == STOPPED
+    said = {"rupture": is_stopped, "end_time": "rupture" in stated}.get(quantity, quantity in (*stated, "name"))
+    is_result = TestColumn(quantity).strain is None and not quantity.startswith("label ")
+    return unknown_text(quantity) if is_result and not said and quantity not in stated else ""
+
+
+# ---- times to strains ----------------------------------------------------------------------------------------------
+
+
+def _strains_reached(cells: Mapping[str, Cell], location: str) -> tuple[list[tuple[float, float]], list[str]]:
+    """(s, strain) in the order of time, and what is said of strains that were not reached.
+
+    A creep strain that is the only one follows one of zero when the load is put on.
+    """
+    reached, others, lasted = list[tuple[float, float, SourceText]](), list[str](), None
+    if broke := cells.get("rupture"):
+        mark = marked_time(broke.entry.text, {})
+        lasted = broke.seconds(mark.number) if mark.number and not mark.said else None
+    for cell in cells.values():
+        if (strain := cell.column.strain) is None:
+            continue
+        entry, mark = cell.entry, marked_time(cell.entry.text, {})
+        if mark.said != STOPPED:
+            reached.append((cell.seconds(mark.number), strain, entry))
+            continue
+        if broke and lasted is not None and cell.seconds(mark.number) > (1 + _ROUNDING) * lasted:
+            what = f"'{entry.key}' is {quoted(entry.text)}, and '{broke.entry.key}' {quoted(broke.entry.text)}"
+            raise HistoryError(f"{location}: {what}; a strain is reached before rupture or not: correct one of them")
+        others.append(f"{strain:.3g} of strain not reached by {mark.number} {cell.column.unit}")
+    reached.sort(key=lambda one: one[:2])
+    for (_, before, one), (_, strain, other) in pairwise(reached):
+        if strain <= before:
+            raise HistoryError(
+                f"{other.location}: '{one.key}' is {one.text}, and '{other.key}' {other.text}: the larger strain is "
+                "reached first; correct one of them"
+            )
+    frames = [(time, strain) for time, strain, _ in reached]
+    return ([(0.0, 0.0), *frames] if len(frames) == 1 else frames), others
+
+
+def _includes_elastic(table: TestTable) -> str:
+    """Whether times are those to a total strain, by the names of their columns; "" where these do not say it."""
+    named = zip(table.names, table.columns, strict=True)
+    words = " ".join(words_of(name) for name, column in named if column.strain is not None)
+    is_total = re.search(r"\btot(?:al\w*)?\b|gesamt", words) is not None
+    is_creep = re.search(r"creep|kriech|plasti|bleibend|fluage", words) is not None
+    return "" if is_total == is_creep else "yes" if is_total else "no"
+
+
+# ---- how the tests ended -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class RowEnd:
+    """How the test of a row ended, by its columns, "" where none says it, and by the mark of its time.
+
+    is_open : whether that is asked for.
+    """
+
+    stated: str
+    mark: MarkedTime
+    assumptions: tuple[str, ...] = ()
+    is_open: bool = False
+
+
+_SAYS_NO_END = (
+    *("name", "alloy", "control", "specimen", "label heat", "label laboratory", "label group", "label assumed"),
+)
+
+
+def ends_of_rows(table: TestTable) -> list[RowEnd]:
+    """How the test of each row ended; what its columns leave open is an error that asks for it."""
+    legend = {sign: end for note in (*table.notes, *table.names) for sign, end in legend_in(note).items()}
+    answers = legend | {text.casefold(): end for text, end in table.vocabulary.end_of_test_terms.items()}
+    time, duration = table.position("rupture"), table.position("end_time")
+    marks = [
+        MarkedTime("", "")
+        if time is None or is_missing(row.cells[time])
+        else marked_time(table.entry(row, time).text, answers)
+        for row in table.rows
+    ]
+    named = [answers.get(name.casefold(), "") for name in table.names_of_tests()]
+    kinds = [kind_of_column(name) for name in table.names]
+    columns = [
+        k
+        for k, column in enumerate(table.columns)
+        if column.kind is None
+        and column.quantity not in _SAYS_NO_END
+        and table.names[k] not in table.vocabulary.labels
+        and (kinds[k] or not split_written_name(table.names[k])[1])  # one with a unit is a quantity
+    ]
+    decided = any(mark.said == STOPPED for mark in marks)
+    found = dict[int, EndsOfColumn]()
+    for k in sorted(columns, key=lambda k: kinds[k] not in FIRM):
+        found[k] = ends_in_column(table.names[k], [row.cells[k] for row in table.rows], answers, decided)
+        decided |= kinds[k] in FIRM and any(found[k].ends)
+    if time is None and duration is None:
+        found = {k: one for k, one in found.items() if kinds[k] in FIRM}
+    ends = list[RowEnd]()
+    for r, (row, mark) in enumerate(zip(table.rows, marks, strict=True)):
+        stated = {k: one.ends[r] for k, one in found.items() if one.ends[r] in (RUPTURED, STOPPED)}
+        firm = {k: end for k, end in stated.items() if not found[k].is_remark}
+        said = {named[r]} if named[r] in (RUPTURED, STOPPED) else set(firm.values())
+        if not said and mark.said not in (RUPTURED, STOPPED):
+            group = row.stated.get("label group")
+            said = set(stated.values()) | ({end_said_by(group.text) if group else ""} & {STOPPED, RUPTURED})
+        if len(said) > 1:
+            each = " and ".join(f"'{quoted(table.names[k])}' says {end}" for k, end in (firm or stated).items())
+            table.errors.append(HistoryError(f"{table.table.location(row.line)}: {each}; correct one of them"))
+        is_unsaid = any(kinds[k] == "status" and one.ends[r] == "" for k, one in found.items())
+        notes = list[str]()
+        if is_unsaid and not said and mark.said != STOPPED:
+            known = "ruptured" if time is not None and mark.said in ("", RUPTURED) and mark.number else "unknown"
+            notes.append(f"ended {known} (empty cell)")
+        if STOPPED in said and mark.said != STOPPED and not firm and named[r] == "":
+            notes.append("stopped before rupture by its remark")
+        is_asked = len(said) != 1 and UNCLEAR in (mark.said, *(one.ends[r] for one in found.values()))
+        ends.append(RowEnd("".join(said) if len(said) == 1 else "", mark, tuple(notes), is_asked))
+    if time is not None and not any(STOPPED in (end.stated, end.mark.said) for end in ends):
+        table.errors += _asked_of_notes(table, answers)
+    if time is not None or duration is not None:
+        table.errors += [_asked_of_column(table, k, one, time) for k, one in found.items() if one.asked]
+    if time is not None:
+        open_rows = [r for r, end in enumerate(ends) if end.mark.said == UNCLEAR and end.stated == ""]
+        table.errors += _asked_of_marks(table, time, {marks[r].mark: table.rows[r] for r in reversed(open_rows)})
+    return ends
+
+
+def _asked_of_notes(table: TestTable, answers: Mapping[str, str]) -> list[HistoryError]:
+    """Questions of notes that speak of tests which did not break, while the table has none."""
+    names = table.names_of_tests()
+    if any(name.casefold() in answers for name in names if name):
+        return []
+    return [
+        table.question(
+            f"the note '{quoted(note, 80)}' may speak of tests that did not break; which are they?",
+            "ended",
+            ({names[-1] or "NAME OF A TEST": STOPPED}, {note: LABEL}),
+        )
+        for note in table.notes
+        if end_said_by(note) not in ("", RUPTURED) and not legend_in(note) and note.casefold() not in answers
+    ]
+
+
+def _asked_of_column(table: TestTable, k: int, column: EndsOfColumn, time: int | None) -> Question:
+    """The question of what the texts of a column say of the end."""
+    first = column.ends.index(UNCLEAR)
+    texts = list(column.asked[:MOST_ASKED])
+    more = f" and {len(column.asked) - len(texts)} more" if len(column.asked) > len(texts) else ""
+    listed = " and ".join(f"'{quoted(text, 60)}'" if text else "an empty cell" for text in texts)
+    flags = [text for text in texts if text]
+    choices = [dict.fromkeys(texts, end) for end in (STOPPED, RUPTURED)]
+    if len(flags) == 2 and len(column.values) == 2 and not column.is_remark:
+        likely = _likely_unbroken(table, k, flags, time)
+        other = next(text for text in flags if text != likely)
+        choices = [{likely: STOPPED, other: RUPTURED}, {likely: RUPTURED, other: STOPPED}]
+    return table.question(
+        f"'{quoted(table.names[k], 60)}' says {listed}{more}: did these tests break, were they stopped before, or does "
+        "it say nothing of their end?",
+        "ended",
+        [*choices, dict.fromkeys(texts, LABEL)],
+        line=table.rows[first].line,
+    )
+
+
+def _likely_unbroken(table: TestTable, column: int, texts: Sequence[str], time: int | None) -> str:
+    """Which of two values tests have that did not break: those that share one time, else those that lasted longer."""
+
+    def rank(text: str) -> tuple[bool, float]:
+        rows = [row for row in table.rows if row.cells[column].casefold() == text.casefold()]
+        cells = [TIME_IN_CELL.fullmatch(row.cells[time]) for row in rows] if time is not None else []
+        times = [float(one["number"].replace(",", ".")) for one in cells if one and one["number"].count(".") < 2]
+        return len(times) > 1 and len(set(times)) == 1, sum(times) / max(len(times), 1)
+
+    return max(texts, key=rank)
+
+
+def _asked_of_marks(table: TestTable, time: int, marked: Mapping[str, TestRow]) -> list[HistoryError]:
+    """Questions of what marks of times mean, one for each; `<` says nothing that could be used."""
+    errors = list[HistoryError]()
+    for mark, row in sorted(marked.items(), key=lambda one: one[1].line):
+        what = f"'{quoted(table.names[time], 60)}' is '{quoted(row.cells[time])}'"
+        if mark[:1] in "<≤~≈" or not re.sub(r"[^\w()*+†‡#^/\[\]§¹²³-]", "", mark):
+            place = table.table.location(row.line)
+            errors.append(HistoryError(f"{place}: {what}; write a number of {table.names[time]}, >1000 for a run-out"))
+            continue
+        choices = [{mark.casefold(): STOPPED}, {mark.casefold(): RUPTURED}]
+        errors.append(table.question(f"{what}: did this test break then?", "ended", choices, line=row.line))
+    return errors
+
+
+def _with_end(cells: Mapping[str, Cell], end: RowEnd, location: str) -> dict[str, Cell]:
+    """The cells of a row, its run-out as the time at which it was stopped, and with `ended` where that is known."""
+    cells, stated, mark = dict(cells), end.stated, end.mark
+    taken, time = cells.get("end_time"), cells.pop("rupture", None)
+    if taken is not None and (lasted := marked_time(taken.entry.text, {})).number:
+        taken = cells["end_time"] = taken.as_quantity("end_time", lasted.number)
+        stated = stated or (STOPPED if lasted.said == STOPPED and time is None else "")
+    if time is not None:
+        if mark.said == STOPPED and stated == RUPTURED and mark.number:
+            what = f"'{time.entry.text}' is a time without rupture, and the test ruptured"
+            raise HistoryError(f"{location}: {what}; keep one")
+        if mark.number and STOPPED in (mark.said, stated):
+            stated = STOPPED
+            if taken is not None and taken.entry.text != mark.number:
+                what = f"it was stopped at '{time.entry.text}' and at '{taken.entry.text}'"
+                raise HistoryError(f"{location}: {what}; keep one")
+            cells.setdefault("end_time", time.as_quantity("end_time", mark.number))
+        elif mark.number:
+            cells["rupture"] = time.as_quantity("rupture", mark.number)
+        else:  # a word stands in the place of the time
+            stated = stated or mark.said
+    if stated == RUPTURED and "rupture" not in cells:
+        if "end_time" in cells:  # a column of durations says when it broke
+            broke = cells.pop("end_time")
+            cells["rupture"] = broke.as_quantity("rupture", broke.entry.text)
+        elif "minimum_rate" in cells:
+            cells.setdefault("label ended", Cell(TestColumn("label ended"), SourceText(RUPTURED, location)))
+            return cells
+    elif "rupture" in cells:
+        _check_duration(cells["rupture"], cells.pop("end_time", None))
+    if stated or "rupture" in cells:  # said here, whatever a remark says
+        said = STOPPED if stated == STOPPED else RUPTURED
+        cells["ended"] = Cell(TestColumn("ended"), SourceText(said, location))
+    return cells
+
+
+def _check_duration(rupture: Cell, duration: Cell | None) -> None:
+    """Refuse a duration of a test that is not its rupture time."""
+    if duration is not None and abs(duration.seconds() - rupture.seconds()) > _ROUNDING * rupture.seconds():
+        one, other = rupture.entry, duration.entry
+        raise HistoryError(
+            f"{one.location}: '{one.key}' is {quoted(one.text)}, and '{other.key}' is {quoted(other.text)}; a test "
+            "that ruptured lasted until then; correct one of them"
+        )
