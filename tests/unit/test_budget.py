@@ -24,18 +24,18 @@ BUDGET = {
     "experiments": 1598,
     "exporters": 2680,
     "extraction": 1314,
-    "fem": 1841,
+    "fem": 1827,
     "files": 1420,
     "forecasts": 1416,
     "instruments": 1286,
-    "integration": 782,
+    "integration": 774,
     "inverse": 11740,
     "jobs": 254,
     "kernels": 1703,
     "language": 1506,
     "laws": 136,
     "modules": 781,
-    "quality": 1467,
+    "quality": 1458,
     "readers": 5490,
     "records": 1979,
     "registry": 616,
@@ -43,14 +43,14 @@ BUDGET = {
     "rupture_assessment": 1878,
     "sampling": 1056,
     "screening": 687,
-    "specimens": 3598,
+    "specimens": 3592,
     "studies": 3092,
     "surrogates": 1697,
     "testing": 1892,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34449
+TESTS = 34464
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
