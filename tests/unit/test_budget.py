@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 136,
     "modules": 781,
     "quality": 1458,
-    "readers": 5435,
+    "readers": 5434,
     "records": 1979,
     "registry": 616,
     "reports": 8011,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34464
+TESTS = 34478
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
