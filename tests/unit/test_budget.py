@@ -38,7 +38,7 @@ BUDGET = {
     "quality": 1458,
     "readers": 5434,
     "records": 1979,
-    "registry": 616,
+    "registry": 615,
     "reports": 8011,
     "rupture_assessment": 1878,
     "sampling": 1056,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34478
+TESTS = 34463
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
