@@ -55,12 +55,12 @@ def extract(
 
     >>> extractions = ck.extract(frames, subset=1.2)  # doctest: +SKIP
     """
-    from creepkit.extraction import extract_surfaces
+    from creepkit.extraction import ExtractionRequest, extract_surfaces
 
     watched = _watched(specimen)
     program = loading.program() if isinstance(loading, Loading) else None
     load = None if program is None else program.at(frames.times - frames.times[0])
-    found = extract_surfaces(frames, watched, operator=operator, centers=centers, rest=rest, subset=subset, load=load)
+    found = extract_surfaces(frames, watched, ExtractionRequest(operator, centers, (), rest, subset, load))
     if loading is None or temperature is None:
         return found
     # A program counts from the first frame, a constant load from the last frame at rest.
@@ -82,7 +82,7 @@ def extract_as_described(
     nothing is extracted of it}, so that the others are; None: HistoryError for the first. HistoryError for another
     number of names than of test pieces, and where none of these is left.
     """
-    from creepkit.extraction import extract_surfaces
+    from creepkit.extraction import ExtractionRequest, extract_surfaces
 
     if described.interval is not None:
         frames = replace(frames, times=described.interval * np.arange(len(frames), dtype=float))
@@ -99,16 +99,9 @@ def extract_as_described(
         progress("frames", len(done), len(frames))
         return frames.read_frame(index)
 
-    return extract_surfaces(
-        replace(frames, read_frame=read),
-        _watched(specimen),
-        operator=operator,
-        centers={name: (x, y) for name, (x, y) in zip(names, described.centers, strict=False)} or None,
-        names=names,
-        rest=described.frames_at_rest,
-        subset=described.subset,
-        failed=failed,
-    )
+    centers = {name: (x, y) for name, (x, y) in zip(names, described.centers, strict=False)} or None
+    asked = ExtractionRequest(operator, centers, names, described.frames_at_rest, described.subset)
+    return extract_surfaces(replace(frames, read_frame=read), _watched(specimen), asked, failed)
 
 
 def operator_of(specimen: Specimen | str, described: ExtractionOptions) -> str:

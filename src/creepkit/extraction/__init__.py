@@ -4,8 +4,8 @@
 docs/concepts/extraction.md describes the method.
 """
 
-from creepkit.extraction.extract import extract_surfaces
+from creepkit.extraction.extract import ExtractionRequest, extract_surfaces
 from creepkit.extraction.extraction import Extraction, FieldMap, PlateMotion
 from creepkit.extraction.noise import NoiseEstimate
 
-__all__ = ["Extraction", "FieldMap", "NoiseEstimate", "PlateMotion", "extract_surfaces"]
+__all__ = ["Extraction", "ExtractionRequest", "FieldMap", "NoiseEstimate", "PlateMotion", "extract_surfaces"]

@@ -39,15 +39,19 @@ SHOWN_FRAMES = 6
 class ExtractionRequest:
     """What is asked of an extraction.
 
-    operator : text of the observation operator. rest : frames at rest; None to find them. subset : mm. load : (frames,)
-    imposed; None where it is not known. center_given : whether the centres stay as they are.
+    operator : text of the observation operator; None for the specimen's own. centers : {name: (x, y)} or [(x, y), ...],
+    mm in the axes of the frames; None to find domes and fit their centres. names : of those that are found, row by row;
+    by default D1, D2 .... rest : slice of the frames that are at rest; None to find them. subset : mm, side of the
+    square that the camera system averages over, whose smoothing is taken out; 0 leaves it in. load : (frames,) imposed,
+    any unit; None where it is not known.
     """
 
-    operator: str
+    operator: str | None = None
+    centers: Centers | None = None
+    names: Sequence[str] = ()
     rest: slice | None = None
     subset: float = 0.0
     load: Floats | None = None
-    center_given: bool = False
 
 
 class TakenOff(NamedTuple):
@@ -65,29 +69,20 @@ class TakenOff(NamedTuple):
 def extract_surfaces(
     frames: Frames,
     specimen: SupportsSurfaceObservation,
-    *,
-    operator: str | None = None,
-    centers: Centers | None = None,
-    names: Sequence[str] = (),
-    rest: slice | None = None,
-    subset: float = 0.0,
-    load: Floats | None = None,
+    request: ExtractionRequest,
     failed: dict[str, str] | None = None,
 ) -> list[Extraction]:
     """Extract every test piece in the field of view, in one pass through the frames.
 
-    specimen : says how cameras see it. operator : text of the observation operator; None for the specimen's own.
-    centers : {name: (x, y)} or [(x, y), ...], mm in the axes of the frames; None to find domes and fit their centres.
-    names : of those that are found, row by row; by default D1, D2 ....
-    rest : slice of the frames that are at rest; None to find them. subset : mm, side of the square that the camera
-    system averages over, whose smoothing is taken out; 0 leaves it in. load : (frames,) imposed, any unit.
-    failed : takes {test piece: why nothing is extracted of it}; None: the first such is a HistoryError.
+    specimen : says how cameras see it. failed : takes {test piece: why nothing is extracted of it}; None: the first
+    such is a HistoryError.
     """
-    _check(frames, subset)
+    _check(frames, request.subset)
     region = specimen.surface_region
     plate = reference_plate(frames)
-    if centers is not None:
-        plate, found = place_centers(frames, plate, region, centers)
+    names = request.names
+    if request.centers is not None:
+        plate, found = place_centers(frames, plate, region, request.centers)
     else:
         plate, found = find_domes(frames, plate, region)
         if names and len(names) != len(found):
@@ -102,7 +97,6 @@ def extract_surfaces(
         with problem_kept(problems, name, failed):
             groups[name] = _group(plate, center, region, list(found.values()), name)
     read = read_series(frames, plate, list(groups.values()))
-    request = ExtractionRequest(operator or region.operator, rest, subset, load, centers is not None)
     extracted = []
     for name, series in zip(groups, read.series, strict=True):
         with problem_kept(problems, name, failed):
@@ -188,14 +182,14 @@ def _extract_one(
     if loaded.size < 2:
         raise HistoryError(f"{piece.name}: {loaded.size} good frames under load; extraction needs at least 2")
     center, center_sd = np.zeros(2), np.zeros(2)
-    if not request.center_given:
+    if request.centers is None:
         try:
             center, covariance = specimen.surface_center(replace(points, heights=heights[loaded]))
         except FitError as error:
             raise HistoryError(f"{piece.name}: {error}") from None
         center_sd = np.sqrt(np.diag(covariance))
     centred = replace(points, places=points.places - center)
-    seen = specimen.observe_surface(centred, request.operator)
+    seen = specimen.observe_surface(centred, request.operator or region.operator)
     failed = np.flatnonzero(good & ~seen.converged)
     frame_flags.add("fit", dict.fromkeys(failed.tolist(), "the observation operator gave no outputs"))
     residual = _size(seen.residuals)
@@ -226,7 +220,7 @@ def _extract_one(
         rest=rest,
         center=plate.axes.camera_places((piece.center + center)[None])[0, :2],
         center_sd=center_sd * inflation,
-        center_given=request.center_given,
+        center_given=request.centers is not None,
         region=region,
         subset=request.subset,
         motion=motion,
