@@ -13,7 +13,7 @@ from creepkit.dataset.dataset import column_units, summary, summary_columns
 from creepkit.errors import DatasetError
 from creepkit.reports.figures import empty_figure, make_folder, save_figure, set_range
 from creepkit.reports.terminal import print_json, tell, tell_written
-from creepkit.sampling.specimen_conditions import specimen_conditions
+from creepkit.sampling.conditions import specimen_conditions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from creepkit.discovery.combinations import FormWeight
     from creepkit.discovery.discover import TemperatureStudy
     from creepkit.discovery.elastic_moduli import ModulusEstimates
-    from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw
+    from creepkit.discovery.regression import FormCombination
+    from creepkit.discovery.temperature_law import TemperatureLaw
 
 
 MAX_PANELS_PER_ROW = 3
@@ -142,15 +143,15 @@ def _standard_deviations(function: Callable[[Floats], Floats], theta: Floats, co
     return np.array(deviations, float)
 
 
-def _curve_standard_deviations(function: Callable[[Floats], Floats], candidate: CandidateLaw, T: Floats) -> Floats:
+def _curve_standard_deviations(function: Callable[[Floats], Floats], candidate: FormCombination, T: Floats) -> Floats:
     """(temperatures,) standard deviations of a function of theta along a candidate's curve."""
-    names = list(candidate.internal_values)
+    names = list(candidate.values)
 
     def along(values: Floats) -> Floats:
-        displaced = replace(candidate, internal_values=dict(zip(names, map(float, values), strict=True)))
+        displaced = replace(candidate, values=dict(zip(names, map(float, values), strict=True)))
         return function(displaced.theta(T))
 
-    return delta_method(along, np.array(list(candidate.internal_values.values())), candidate.covariance)[1]
+    return delta_method(along, np.array(list(candidate.values.values())), candidate.covariance)[1]
 
 
 MAX_COMBINATIONS_LISTED = 6
@@ -223,8 +224,7 @@ def _combination_lines(temperature_law: TemperatureLaw) -> list[str]:
     for candidate in temperature_law.candidates[:MAX_COMBINATIONS_LISTED]:
         forms = ", ".join(f"{name}:{form}" for name, form in candidate.forms.items())
         lines.append(
-            f"    {forms} | {len(candidate.internal_values)} | {candidate.criterion_difference:.1f} "
-            f"| {candidate.weight:.3f}"
+            f"    {forms} | {len(candidate.values)} | {candidate.criterion_difference:.1f} | {candidate.weight:.3f}"
         )
     remaining = len(temperature_law.candidates) - MAX_COMBINATIONS_LISTED
     return [*lines, f"    and {remaining} more"] if remaining > 0 else lines
