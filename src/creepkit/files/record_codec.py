@@ -11,7 +11,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from functools import partial
 from types import GenericAlias, NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -234,16 +234,6 @@ class RecordCodec:
     def _range(self, record: type, name: str) -> NumberRange:
         tables = (table for kind, table in self.ranges.items() if issubclass(record, kind))
         return next((table[key] for table in tables for key in (name, "*") if key in table), self.default_range)
-
-
-def with_shapes(record: Record, shapes: Mapping[str, tuple[int, ...]]) -> Record:
-    """The record with arrays of these shapes, empty ones too: JSON holds no shape of those; RecordError for others."""
-    arrays = {name: getattr(record, name) for name in shapes if getattr(record, name) is not None}
-    for name, array in arrays.items():
-        if array.shape != shapes[name] and not array.size == 0 == math.prod(shapes[name]):
-            raise RecordError(f"{name} has the shape {array.shape}, not {shapes[name]}")
-    shaped: Any = {name: array.reshape(shapes[name]) for name, array in arrays.items()}
-    return replace(record, **shaped)  # type: ignore[type-var]
 
 
 _MAX_DIMENSIONS = 8

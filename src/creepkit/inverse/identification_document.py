@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
-from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError, ValueCodec, with_shapes
+from creepkit.files.record_codec import NumberRange, Record, RecordCodec, RecordError, ValueCodec
 from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.explanation import Explanation, LeftOut
@@ -139,6 +141,16 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
         return replace(fit, predictor=predictor_from_documents(fit.predictor_documents))
     except FitError as error:
         raise FitError(f"{source}: {error}") from None
+
+
+def with_shapes(record: Record, shapes: Mapping[str, tuple[int, ...]]) -> Record:
+    """The record with arrays of these shapes, empty ones too: JSON holds no shape of those; RecordError for others."""
+    arrays = {name: getattr(record, name) for name in shapes if getattr(record, name) is not None}
+    for name, array in arrays.items():
+        if array.shape != shapes[name] and not array.size == 0 == math.prod(shapes[name]):
+            raise RecordError(f"{name} has the shape {array.shape}, not {shapes[name]}")
+    shaped: Any = {name: array.reshape(shapes[name]) for name, array in arrays.items()}
+    return replace(record, **shaped)  # type: ignore[type-var]
 
 
 def _with_arrays(fit: Identification) -> Identification:

@@ -135,7 +135,10 @@ class TermProblem:
         return self.problem.bounds.clip(shifted)
 
     def fraction_permutations(self) -> list[Floats]:
-        """The start with unequal fractions of its rate, each term leading once: equal ones are a stationary point."""
+        """(unknowns,) each: the start with unequal fractions of its rate, each term leading once.
+
+        Equal ones are a stationary point.
+        """
         rates, permutations = list(self.problem.coordinates.term_rates), []
         for k in range(len(rates) if len(rates) > 1 else 0):
             x = np.array(self.start)
