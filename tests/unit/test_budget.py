@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 6180,
     "records": 1985,
     "registry": 620,
-    "reports": 8060,
+    "reports": 7445,
     "rupture_assessment": 1880,
     "sampling": 1070,
     "screening": 740,
