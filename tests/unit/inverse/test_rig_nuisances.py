@@ -1,5 +1,6 @@
 """Steps and drifts of temperature, rate and load: against closed forms and differences, planted ones found, groups."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
