@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 5785,
     "records": 1979,
     "registry": 616,
-    "reports": 8060,
+    "reports": 7445,
     "rupture_assessment": 1878,
     "sampling": 1069,
     "screening": 740,

@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 
+from creepkit.exporters.mathml import expression_mathml, law_equations
 from creepkit.inverse.adequacy import SHAPE_MISFIT
 from creepkit.inverse.identified_values import depends_on_history
 from creepkit.inverse.perturbation import combined_change_text
@@ -22,8 +23,9 @@ from creepkit.language import temperature
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.minimum_rate_panel import PERCENT_PER_HOUR, compared_minimum_rates, exponents
-from creepkit.reports.stress_exponents import NumberText, interval_digits, plain_number, rate_and_exponent
+from creepkit.reports.blocks import Answer, Rich, as_text, number, plural, printable
+from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
+from creepkit.reports.stress_exponents import interval_digits, rate_and_exponent
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -31,10 +33,15 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.laplace_approximation import Estimate
+    from creepkit.language import CreepLaw
     from creepkit.quality.flags import DataQuality
 
 MOST_CAUTIONS = 3
 """On the first screen and in a terminal; the others stand in the details."""
+
+
+MOST_ASKED = 2
+"""Forecasts on the first screen."""
 
 
 MOST_NAMED = 4
@@ -61,17 +68,18 @@ class KeyFigure:
     unit: str = ""
     remark: str = ""
 
-    def text(self, number: NumberText) -> str:
+    @property
+    def text(self) -> str:
         """Value, interval and unit."""
         unit = f" {self.unit}" if self.unit else ""
         if math.isnan(self.low):
             return f"{self.value:#.2g}".rstrip(".") + unit
         digits = interval_digits(self.value, self.low, self.high)
-        value, low, high = (_written_out(v, digits, number) for v in (self.value, self.low, self.high))
+        value, low, high = (_written_out(v, digits) for v in (self.value, self.low, self.high))
         return f"{value}{unit} [{low}, {high}]"
 
 
-def _written_out(value: float, digits: int, number: NumberText) -> str:
+def _written_out(value: float, digits: int) -> str:
     """A number without a power of ten where it has a usual size, such as 2930 h."""
     if not 1e3 <= abs(value) < 1e5:
         return number(value, digits)
@@ -148,8 +156,7 @@ def _range(fit: Identification) -> str:
 
 def tests_text(fit: Identification) -> str:
     """How many tests, and under which conditions."""
-    count = len(fit.tests)
-    return f"{count} test{'' if count == 1 else 's'}, {_range(fit)}"
+    return f"{plural(len(fit.tests), 'test')}, {_range(fit)}"
 
 
 # ---- cautions --------------------------------------------------------------------------------------------------------
@@ -256,35 +263,48 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
     return "forecast (creepkit predict), or export the law to your code (creepkit export)"
 
 
-# ---- as text ---------------------------------------------------------------------------------------------------------
+# ---- the answer ------------------------------------------------------------------------------------------------------
 
-WIDTH = 100
-"""Characters of a line in a terminal."""
+
+def answer(
+    fit: Identification,
+    ranking: Ranking | None = None,
+    *,
+    asked: Sequence[KeyFigure] = (),
+    quality: DataQuality | None = None,
+    **page: Any,
+) -> Answer:
+    """Headline, equations, values, key figures, cautions and what to do next, of the best law of a ranking if given.
+
+    asked : what forecasts say. quality : of the data. page : picture and files.
+    """
+    symbols = symbols_of(fit.law)
+    remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
+    if ranking is not None and len(ranking.laws) > 1:
+        remarks.append(chosen_text(ranking))
+    if fit.sparsity is not None:
+        remarks.append(fit.sparsity.verdict)
+    return Answer(
+        fit.headline,
+        titled_law(fit.law),
+        equations(fit.law),
+        [(symbols[e.name], f"{e.value:.4g}", interval_ends(fit.law, e), unit_text(e.unit)) for e in fit.estimates],
+        [(one.name, one.where, one.text, one.remark) for one in [*asked[:MOST_ASKED], *key_figures(fit)]],
+        cautions(fit, ranking, quality)[:MOST_CAUTIONS],
+        next_step(fit, ranking),
+        remarks,
+        **page,
+    )
 
 
 def answer_text(fit: Identification) -> str:
-    """The answer of one law: headline, equations, values, key figures, cautions and what to do next."""
-    return _text(fit, None)
+    """The answer of one law."""
+    return as_text([answer(fit)])
 
 
 def ranking_answer_text(ranking: Ranking) -> str:
-    """The same of the best law of a ranking, behind the weights of all."""
-    return _text(ranking.best, ranking)
-
-
-def _text(fit: Identification, ranking: Ranking | None) -> str:
-    lines = wrap(fit.headline, WIDTH)
-    failed = {} if ranking is None else ranking.failed
-    lines += [line for law, why in failed.items() for line in _indented(f"left out: {law}: {why}", "    ")]
-    if ranking is not None and len(ranking.laws) > 1:
-        lines += _indented(chosen_text(ranking))
-    summands = " + ".join(expression_text(term) for term in fit.law.terms.values())
-    lines += [f"  rate = {summands}", *(f"  {equation}" for equation in state_equations(fit.law))]
-    lines += _indented("   ".join(_value(fit, e) for e in fit.estimates), "    ")
-    lines += _indented(fit.sparsity.verdict, "    ") if fit.sparsity is not None else []
-    lines += [line for one in key_figures(fit) for line in _indented(_figure_text(one), "    ")]
-    lines += [line for text in cautions(fit, ranking)[:MOST_CAUTIONS] for line in _indented(f"- {text}", "    ")]
-    return "\n".join([*lines, *_indented(f"next: {next_step(fit, ranking)}; more: .details()")])
+    """The same of the best law of a ranking, with the weights of all."""
+    return as_text([answer(ranking.best, ranking)])
 
 
 def chosen_text(ranking: Ranking) -> str:
@@ -295,22 +315,32 @@ def chosen_text(ranking: Ranking) -> str:
     return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}"
 
 
-def _value(fit: Identification, estimate: Estimate) -> str:
-    """One value with its interval on a line of its own piece: its blanks do not break."""
-    low, high = interval_ends(fit.law, estimate)
-    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    text = f"{estimate.name} = {estimate.value:.4g} [{low}, {high}]{unit}"
-    return text.replace(" ", "\u00a0")
+# ---- laws ------------------------------------------------------------------------------------------------------------
 
 
-def _figure_text(figure: KeyFigure) -> str:
-    remark = f", {figure.remark}" if figure.remark else ""
-    return f"{figure.name} at {figure.where}: {figure.text(plain_number)}{remark}"
+def titled_law(law: CreepLaw) -> Rich:
+    """The name of a law, by which commands and files know it; on pages behind its title."""
+    name = Markup("<code>{}</code>").format(printable(law.name, 120))
+    return Rich(law.name, Markup("{} ({})").format(printable(law.title, 160), name) if law.title else name)
 
 
-def _indented(text: str, hanging: str = "  ") -> list[str]:
-    """Lines of a text, the first indented by two."""
-    return [
-        line.replace("\u00a0", " ")
-        for line in wrap(text, WIDTH, initial_indent="  ", subsequent_indent=hanging, break_long_words=False)
-    ]
+def equations(law: CreepLaw) -> list[Rich]:
+    """The creep rate, and the rates of internal variables."""
+    rate = " + ".join(expression_text(term) for term in law.terms.values())
+    texts = [f"rate = {rate}", *state_equations(law)]
+    return [Rich(text, Markup(html)) for text, html in zip(texts, law_equations(law), strict=True)]
+
+
+def symbols_of(law: CreepLaw) -> dict[str, Rich]:
+    """{parameter: its symbol}."""
+    return {str(symbol): Rich(str(symbol), expression_mathml(symbol)) for symbol in law.params}
+
+
+def value_cells(law: CreepLaw, estimate: Estimate) -> tuple[str, str]:
+    """A value and the ends of its 95 % interval, as every table shows them."""
+    return f"{estimate.value:.5g}", " to ".join(interval_ends(law, estimate))
+
+
+def unit_text(unit: str) -> str:
+    """A unit as it stands behind a number: "" of pure numbers."""
+    return "" if unit == "1" else unit

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.dataset.dataset import column_units, summary, summary_columns
 from creepkit.errors import DatasetError
+from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, make_folder, save_figure, set_range
 from creepkit.reports.terminal import print_json, tell, tell_written
 from creepkit.sampling.specimen_conditions import specimen_conditions
@@ -153,56 +153,27 @@ def _unit_label(unit: str) -> str:
 
 def dataset_text(data: Dataset) -> str:
     """A page of text: counts, reasons of rejection, ranges and origin."""
-    summary_data = summary(data)
-    return "\n".join(
-        [
-            *_dataset_heading(summary_data),
-            *_rejection_lines(summary_data),
-            "",
-            *_range_table(summary_data),
-            "",
-            *_origin_lines(summary_data),
-        ]
-    )
-
-
-def _dataset_heading(summary_data: dict[str, Any]) -> Iterator[str]:
-    percent = 100 * summary_data["accepted"] / max(summary_data["samples"], 1)
-    description = f"{summary_data['samples']} samples of {summary_data['law']} on {summary_data['specimen']}"
-    yield f"{description}: {summary_data['accepted']} accepted ({percent:.1f} %)"
-    times = summary_data["times"]
+    known = summary(data)
+    percent, times, source = 100 * known["accepted"] / max(known["samples"], 1), known["times"], known["provenance"]
     until = "over the length of each test" if times["relative"] else f"to {times['to'] / 3600:g} h"
-    burst = f"{summary_data['burst_accepted']} of the accepted burst before their end"
-    yield f"{summary_data['frames']} frames {until}; {burst}"
-
-
-def _rejection_lines(summary_data: dict[str, Any]) -> Iterator[str]:
-    for entry in summary_data["reasons"]:
-        not_simulated = entry["not_simulated"]
-        part_text = "" if not_simulated == entry["rejected"] else f"{not_simulated} of them "
-        suffix = f"; {part_text}not simulated" if not_simulated else ""
-        yield f"{entry['rejected']:>9} rejected: criterion {entry['criterion']}, {entry['text']}{suffix}"
-    if summary_data["failed"]:
-        yield f"{summary_data['failed']:>9} failed"
-    for error_message, occurrences in summary_data["failures"].items():
-        yield f"{occurrences:>18} x {error_message}"
-
-
-def _range_table(summary_data: dict[str, Any]) -> Iterator[str]:
-    """Ranges, one row each."""
-    if not summary_data["ranges"]:
-        return
-    width = max(map(len, summary_data["ranges"]))
-    yield f"{'accepted samples':<{width}}  {'unit':<5}{'least':>12}{'median':>12}{'most':>12}"
-    for name, statistics in summary_data["ranges"].items():
-        numbers = "".join(f"{statistics[key]:>12.4g}" for key in ("least", "median", "most"))
-        yield f"{name:<{width}}  {summary_data['units'][name]:<5}{numbers}"
-
-
-def _origin_lines(summary_data: dict[str, Any]) -> Iterator[str]:
-    source = summary_data["provenance"]
-    items = {key: source[key] for key in ("design", "seed", "creepkit", "when", "fingerprint") if key in source}
-    yield f"from {', '.join(f'{key} {value}' for key, value in items.items())}"
+    lines = [
+        f"{known['samples']} samples of {known['law']} on {known['specimen']}: {known['accepted']} accepted "
+        f"({percent:.1f} %)",
+        f"{known['frames']} frames {until}; {known['burst_accepted']} of the accepted burst before their end",
+    ]
+    for entry in known["reasons"]:
+        left_out, rejected = entry["not_simulated"], entry["rejected"]
+        suffix = f"; {'' if left_out == rejected else f'{left_out} of them '}not simulated" if left_out else ""
+        lines.append(f"{rejected:>9} rejected: criterion {entry['criterion']}, {entry['text']}{suffix}")
+    lines += [f"{known['failed']:>9} failed"] if known["failed"] else []
+    lines += [f"{occurrences:>18} x {message}" for message, occurrences in known["failures"].items()]
+    rows = [
+        (name, known["units"][name], *(f"{numbers[key]:.4g}" for key in ("least", "median", "most")))
+        for name, numbers in known["ranges"].items()
+    ]
+    ranges = aligned(("accepted samples", "unit", "least", "median", "most"), rows, numeric=(2, 3, 4)) if rows else []
+    origin = ", ".join(f"{k} {source[k]}" for k in ("design", "seed", "creepkit", "when", "fingerprint") if k in source)
+    return "\n".join([*lines, "", *ranges, "", f"from {origin}"])
 
 
 def print_dataset(data: Dataset, to: Path, part: str | None, as_json: bool) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from creepkit.instruments.clock_alignment import UNIX_TIME
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.figures import empty_figure, save_figure
+from creepkit.reports.json_values import fields_to_json
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,26 +46,20 @@ def record_to_json(record: InstrumentRecord) -> dict[str, Any]:
     """What record_text says, as data; values in MPa, K, mm, N or as written."""
     channels = [
         {
-            "name": channel.name,
-            "quantity": channel.quantity,
-            "reference": channel.reference,
-            "written_unit": channel.written_unit,
-            "missing": channel.missing,
+            **fields_to_json(channel, "name quantity reference written_unit missing"),
             "least": None if channel.missing == channel.values.size else float(np.nanmin(channel.values)),
             "largest": None if channel.missing == channel.values.size else float(np.nanmax(channel.values)),
         }
         for channel in record.channels.values()
     ]
     return {
-        "name": record.name,
-        "source": record.source,
+        **fields_to_json(record, "name source notes"),
         "rows": int(record.times.size),
         "interval_s": record.interval,
         "duration_s": float(np.ptp(record.times)),
         "start_unix_s": record.start,
         "gaps_s": record.gaps.tolist(),
         "channels": channels,
-        "notes": list(record.notes),
     }
 
 

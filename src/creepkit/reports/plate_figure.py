@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.reports.condition_colours import distinct_colours
 from creepkit.reports.figures import empty_figure, place_legend_right, set_range, shortened
-from creepkit.reports.minimum_rate_panel import DRAWN_FACTOR, PERCENT_PER_HOUR
+from creepkit.reports.rate_panels import DRAWN_FACTOR, PERCENT_PER_HOUR
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""Text of rankings of laws, as a whole and as rows of a table."""
+"""What a ranking of laws says: the laws with misfits and weights, what separates them, and the values of each."""
 
 from __future__ import annotations
 
@@ -7,15 +7,27 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from creepkit.errors import CreepkitError
+from creepkit.inverse.compared_tests import UNTESTABLE, rests_on_durations
+from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, chi_square_by_test
+from creepkit.records import is_logarithmic
+from creepkit.reports.answer import titled_law, unit_text, value_cells
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
+from creepkit.reports.identification import rejected, scatter_of_rates, verdict_given_law
+from creepkit.reports.json_values import fields_to_json
+from creepkit.reports.ranking_plot import misfit_name, ranking_figure
 from creepkit.reports.terminal import print_table, tell, tell_written
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.reports.svg import PageFigures
 
-
-_CRITERION_NAMES = {"bic": "BIC", "aicc": "AICc", "hold-out": "hold-out"}
+CRITERIA = {"bic": "BIC", "aicc": "AICc"}
+"""Abbreviations of the criteria by which laws are ranked."""
 
 
 CHI_SQUARE_NOTE = (
@@ -24,26 +36,119 @@ CHI_SQUARE_NOTE = (
 )
 
 
+LAW_REJECTED = "the law does not fit"
+"""What stands for what tests say of a parameter, where they reject the law."""
+
+
 def ranking_text(ranking: Ranking) -> str:
-    """How well the best law describes the tests, the verdict, then a line for each law."""
-    width = max(len(r.fit.law.name) for r in ranking.laws)
-    header = (
-        f"{'law':{width}}   weight  {_CRITERION_NAMES[ranking.criterion]} - best  chi-square  by the noise of the tests"
-    )
+    """How well the best law describes the tests, the verdict, then all laws."""
+    equivalent = [] if ranking.decisive else [str(pair) for pair in equivalents_among_remaining(ranking)]
+    head: list[Block] = [Paragraph(ranking.best.headline), Paragraph(ranking.verdict), Items(equivalent)]
+    return as_text([*head, *ranking_blocks(ranking), *credible_values(ranking)])
+
+
+def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str = "") -> list[Block]:
+    """The laws tried with misfits and weights, what separates them, and with `figures` the misfit of each law.
+
+    of : the material, " of CMSX-4".
+    """
+    blocks: list[Block] = [_table(ranking)]
+    blocks += [Paragraph(CHI_SQUARE_NOTE, "note")] if any(math.isfinite(one.chi_square) for one in ranking.laws) else []
+    separation = separating_test(ranking)
+    blocks += [Paragraph(text) for text in separation]
+    if ranking.challenges:
+        blocks += [Paragraph("what the tests allow beside the best law:"), Items([*map(str, ranking.challenges)])]
+    if ranking.failed:
+        blocks.append(Items([f"{name}: {reason}" for name, reason in ranking.failed.items()]))
+    if figures is not None and ranking.best.tests:
+        weights = ", ".join(f"{r.fit.law.name} {r.weight:.3f}" for r in ranking.laws)
+        description = (
+            f"{misfit_name(ranking)}: {plural(len(ranking.laws), 'law')} in {plural(len(ranking.best.tests), 'test')}, "
+            f"the weights of the laws, and the curves of the credible ones. {' '.join(separation)} Weights: {weights}."
+        )
+        caption = f"Where the laws differ: {misfit_name(ranking)}, and weights."
+        title = f"Misfit of each law in each test{of}"
+        blocks.append(figures.picture(lambda: ranking_figure(ranking), title, description, caption))
+    return blocks
+
+
+def _table(ranking: Ranking) -> Table:
     rows = [
-        f"{r.fit.law.name:{width}}   {r.weight:6.3f}  {r.excess:10.1f}  {r.chi_square:10.1f}  {explanation(r.fit)}"
-        for r in ranking.laws
+        (
+            titled_law(one.fit.law),
+            str(len(one.fit.law.params)),
+            *_misfit(one.fit),
+            number(one.excess, 3),
+            f"{one.weight:.3f}",
+            number(one.chi_square, 4),
+            explanation(one.fit),
+        )
+        for one in ranking.laws
     ]
-    failed = [f"{name}: {reason}" for name, reason in ranking.failed.items()]
-    equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
-    return "\n".join(
-        [ranking.best.headline, ranking.verdict, *equivalent, "", header, *rows, *failed, "", CHI_SQUARE_NOTE]
+    columns = (
+        *("law", "parameters", _misfit_name(ranking.best), "test to test", f"{criterion_name(ranking)} - best"),
+        *("weight", "chi-square", "by the noise of the tests"),
     )
+    return Table("laws tried, the best first", columns, rows, numeric=(1, 2, 3, 4, 5, 6))
 
 
 def explanation(fit: Identification) -> str:
     """Whether the tests contradict a law at their noise, with the p-value, and what it leaves, in noises."""
     return "?" if fit.adequacy is None else fit.adequacy.verdict_text
+
+
+def criterion_name(ranking: Ranking) -> str:
+    """The abbreviation of the criterion by which laws are ranked."""
+    return CRITERIA.get(ranking.criterion, ranking.criterion)
+
+
+def _misfit_name(fit: Identification) -> str:
+    """What _misfit says first: of the first output, else of minimum rates, else of rupture times."""
+    if fit.errors:
+        output = next(iter(fit.errors))
+        return f"rms ln {output}" if is_logarithmic(output) else f"error of {output}"
+    return f"rms ln {'minimum rate' if any(m.minimum_rate for m in fit.tests) else 'rupture time'}"
+
+
+def _misfit(fit: Identification) -> tuple[str, str]:
+    """The misfit of the first output, or of tests without frames, and the scatter of rates between tests."""
+    if fit.errors:
+        output = next(iter(fit.errors))
+        return f"{fit.rms:.3f}" if is_logarithmic(output) else (
+            f"{fit.errors[output].relative_squared_error:.3g}"
+        ), scatter_of_rates(fit)
+    rates = [m.minimum_rate.ratio for m in fit.tests if m.minimum_rate is not None]
+    ratios = rates or [m.rupture.ratio for m in fit.tests if m.rupture is not None and not m.rupture.censored]
+    logarithms = [math.log(ratio) for ratio in ratios if 0.0 < ratio < math.inf]
+    rms = math.sqrt(sum(x * x for x in logarithms) / len(logarithms)) if logarithms else math.nan
+    return f"{rms:.3f}", scatter_of_rates(fit)
+
+
+def separating_test(ranking: Ranking) -> list[str]:
+    """The test that speaks most for the best law against the second, and by how much the second is worse in all."""
+    if len(ranking.laws) < 2 or ranking.criterion == "hold-out" or len(ranking.best.tests) < 2:
+        return []
+    fits, second = [one.fit for one in ranking.laws], ranking.laws[1]
+    if any(fit.linearised is None for fit in fits):
+        fits = fits[:2]  # others cost a prediction each
+    if any(fit.linearised is None and (not fit.histories or fit.predictor is None) for fit in fits):
+        return []
+    try:
+        chi_square = chi_square_by_test(fits)
+    except CreepkitError:
+        return []
+    differences = chi_square[1] - chi_square[0]
+    if not np.isfinite(differences).all():
+        return []
+    if min(float(differences.sum()), second.excess) < DISTINGUISHABLE_CHI_SQUARE:
+        return []
+    k, name = int(np.argmax(differences)), second.fit.law.name
+    share = 100 * float(differences[k]) / float(np.maximum(differences, 0.0).sum())
+    return [
+        f"what separates {name} from {fits[0].law.name} most is test {fits[0].tests[k].name} "
+        f"({fits[0].tests[k].condition}): {share:.0f} % of the chi-square that speaks against {name} is its own; "
+        f"{criterion_name(ranking)} of {name} is {number(second.excess, 3)} larger in all"
+    ]
 
 
 def equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
@@ -54,74 +159,50 @@ def equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
     return [pair for pair in ranking.equivalents() if {pair.first, pair.second} <= names]
 
 
-def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) -> None:
-    """Print the table of laws, the verdict, the best law and what was written."""
+def credible_values(ranking: Ranking | None) -> list[Block]:
+    """Values and intervals of every credible law, where the tests do not decide for one; each given its own law."""
+    if ranking is None or ranking.decisive or len(ranking.credible) < 2:
+        return []
     rows = [
         (
-            entry.fit.law.name,
-            str(len(entry.fit.law.params)),
-            *misfit_cells(entry.fit),
-            f"{entry.excess:.1f}",
-            f"{entry.weight:.3f}",
-            explanation(entry.fit),
+            titled_law(one.fit.law),
+            f"{one.weight:.3f}",
+            e.name,
+            *value_cells(one.fit.law, e),
+            unit_text(e.unit),
+            LAW_REJECTED if rejected(one.fit) else verdict_given_law(one.fit, e),
         )
-        for entry in ranking.laws
+        for one in ranking.credible
+        for e in one.fit.estimates
     ]
-    columns = ("law", "parameters", *misfit_columns(ranking.best), "BIC - best", "weight", "by the noise of the tests")
-    print_table(f"{test_count} tests", columns, rows)
+    columns = ("law", "weight", "parameter", "value", "95 % interval", "unit", "given this law")
+    caption = "values of every credible law, of weight above 0.05: each interval holds only if its law is right"
+    untested = [one.fit for one in ranking.credible if rests_on_durations(one.fit.law, one.fit.histories)]
+    said = [Paragraph(f"{', '.join(fit.law.name for fit in untested)}: {UNTESTABLE}", "note")] if untested else []
+    return [Table(caption, columns, rows, numeric=(1, 3, 4)), *said]
+
+
+# ---- commands --------------------------------------------------------------------------------------------------------
+
+
+def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) -> None:
+    """Print the table of laws, the answer, and what was written."""
+    table = _table(ranking)
+    print_table(f"{test_count} tests", table.columns, [[*map(str, row)] for row in table.rows])
     tell(f"{ranking}\n")
     for path in written:
         tell_written(path)
-
-
-def _is_logarithmic(output: str) -> bool:
-    from creepkit.records import is_logarithmic  # heavy, and the help of the command line needs none of it
-
-    return is_logarithmic(output)
-
-
-def misfit_columns(fit: Identification) -> tuple[str, ...]:
-    """Heads of the columns of misfit_cells."""
-    if not fit.errors:
-        return _single_value_misfit(fit)[0], "test to test"
-    output = next(iter(fit.errors))
-    return (f"rms ln {output}" if _is_logarithmic(output) else f"error of {output}", "test to test")
-
-
-def misfit_cells(fit: Identification) -> tuple[str, ...]:
-    """The misfit of the first output, and the scatter of rates between tests."""
-    from creepkit.reports.identification_text import scatter_of_rates  # heavy, as below
-
-    if not fit.errors:
-        return _single_value_misfit(fit)[1], scatter_of_rates(fit)
-    output = next(iter(fit.errors))
-    misfit = f"{fit.rms:.3f}" if _is_logarithmic(output) else f"{fit.errors[output].relative_squared_error:.3g}"
-    return misfit, scatter_of_rates(fit)
-
-
-def _single_value_misfit(fit: Identification) -> tuple[str, str]:
-    """Name and size of the misfit of tests without frames: of their minimum rates, else of their rupture times."""
-    rates = [m.minimum_rate.ratio for m in fit.tests if m.minimum_rate is not None]
-    ratios = rates or [m.rupture.ratio for m in fit.tests if m.rupture is not None and not m.rupture.censored]
-    logarithms = [math.log(ratio) for ratio in ratios if 0.0 < ratio < math.inf]
-    rms = math.sqrt(sum(x * x for x in logarithms) / len(logarithms)) if logarithms else math.nan
-    return f"rms ln {'minimum rate' if rates else 'rupture time'}", f"{rms:.3f}"
 
 
 def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]:
     """The same as JSON-able data."""
     return {
         "headline": ranking.best.headline,
-        "verdict": ranking.verdict,
-        "decisive": ranking.decisive,
-        "adequacy": ranking.adequacy,
-        "further": list(ranking.further),
-        "failed": dict(ranking.failed),
-        "challenges": None if ranking.challenges is None else list(ranking.challenges),
-        "laws": [
-            {**_fit_to_json(ranked.fit), "bic_excess": ranked.excess, "weight": ranked.weight}
-            for ranked in ranking.laws
-        ],
+        **{
+            name: getattr(ranking, name)
+            for name in ("verdict", "decisive", "adequacy", "further", "failed", "challenges")
+        },
+        "laws": [{**_fit_to_json(one.fit), "bic_excess": one.excess, "weight": one.weight} for one in ranking.laws],
         "files": [str(path) for path in written],
     }
 
@@ -129,15 +210,8 @@ def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]
 def _fit_to_json(fit: Identification) -> dict[str, Any]:
     return {
         "law": fit.law.name,
-        **{f"rms_ln_{name}": fit.rms for name in fit.errors if _is_logarithmic(name)},
-        "errors": dict(fit.errors),
-        "parameters": {
-            e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
-            for e in fit.estimates
-        },
-        "adequacy": fit.adequacy,
-        "numerical_error": fit.numerical_error,
-        "nuisances": list(fit.nuisances),
-        "noise_model": fit.noise_model,
+        **{f"rms_ln_{name}": fit.rms for name in fit.errors if is_logarithmic(name)},
+        "parameters": {e.name: fields_to_json(e, "value low high unit verdict") for e in fit.estimates},
+        **{name: getattr(fit, name) for name in ("errors", "adequacy", "numerical_error", "nuisances", "noise_model")},
         "notes": list(fit.notes),
     }

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.goodness_of_fit import TestFit
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
 from creepkit.reports.curve_of_test import axis_label, curve_of_test
 from creepkit.reports.figures import empty_figure, logarithmic_labels, power_of_ten, save_figure, shortened, wrapped
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
-from creepkit.reports.judged_readings import judged_readings
+from creepkit.reports.judged_readings import judged_readings, misfit_of
 from creepkit.reports.load_programs import program_text
 from creepkit.reports.prediction_bands import FittedCurves, fitted_curves
 
@@ -93,13 +92,6 @@ def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
 
 
 # ---- misfits and weights ---------------------------------------------------------------------------------------------
-
-
-def misfit_of(test: TestFit) -> float:
-    """Reduced chi-square of a test over the frames of all its outputs, against the noise of a frame."""
-    rows = [(one.errors.frames, one.errors.chi_square) for one in test.outputs if np.isfinite(one.errors.chi_square)]
-    frames = sum(count for count, _ in rows)
-    return sum(count * chi_square for count, chi_square in rows) / frames if frames else float("nan")
 
 
 def misfit_name(ranking: Ranking) -> str:

@@ -39,8 +39,8 @@ from creepkit.reports.contents import (
     ReportProvenance,
     ReportSource,
 )
+from creepkit.reports.findings import findings_of
 from creepkit.reports.html import report_html
-from creepkit.reports.html.findings import findings_of
 from creepkit.reports.identified_files import identified_files
 from creepkit.rupture_assessment.assessment import RuptureAssessment
 from creepkit.screening.results import AlloyResult, ScreeningResult

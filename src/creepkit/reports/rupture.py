@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.records.units import celsius_text
+from creepkit.records.units import ZERO_CELSIUS, celsius_text
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
+from creepkit.reports.json_values import fields_to_json
+from creepkit.reports.rupture_plot import rupture_figure
 from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 
 if TYPE_CHECKING:
+    from creepkit.reports.svg import PageFigures
     from creepkit.rupture_assessment.assessment import RuptureAssessment
     from creepkit.rupture_assessment.checks import AssessmentCheck
     from creepkit.rupture_assessment.rupture_fit import RuptureFit
-    from creepkit.rupture_assessment.strength import StrengthEstimate
 
 SHOWN_WEIGHT = 1e-3
 """Fits of less weight do not count in what is said of the scatter."""
@@ -31,43 +33,60 @@ CRITERIA = {"bic": "BIC", "aicc": "AICc"}
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
 
-def rupture_text(assessment: RuptureAssessment, *, strengths: bool = True) -> str:
-    """The verdict, then tables of methods, strengths (where wanted) and checks, and the notes."""
+def rupture_text(assessment: RuptureAssessment) -> str:
+    """The verdict, then methods, strengths and checks, and the notes."""
+    return as_text([*strength_blocks(assessment), *rupture_blocks(assessment)])
+
+
+def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
+    """The tests, the verdict, and the strengths of the average method in a table."""
     tests = assessment.tests
-    span = f"{_range(tests.stress)} MPa, {_range(tests.temperature - 273.15)} °C"
+    span = f"{_range(tests.stress)} MPa, {_range(tests.temperature - ZERO_CELSIUS)} °C"
     heats = "".join(f", {len(set(v))} {_plural(group)}" for group, v in tests.groups.items())
     head = (
         f"{len(tests)} rupture tests, {int(tests.censored.sum())} of them run-outs, {span}, up to "
         f"{10 ** float(tests.log_time.max()):.4g} h{heats}"
     )
-    best = assessment.best
-    lines = [
-        head,
-        assessment.verdict,
-        "",
-        *_aligned(
-            (
-                "method",
-                "weight",
-                f"{CRITERIA[assessment.settings.criterion]} - best",
-                "scatter of a test",
-                *(f"between {_plural(group)}" for group in tests.groups),
-            ),
-            _method_rows(assessment),
-        ),
-        *(f"{name}: not ranked, for {why}" for name, why in assessment.rejected.items()),
-        "",
-        *_constants(best),
-        *_effect_lines(best),
+    table, note = _strengths(assessment)
+    said = [Paragraph(note, "note")] if note else []
+    return [Paragraph(assessment.verdict, "lead"), Paragraph(head), table, *said]
+
+
+def rupture_blocks(assessment: RuptureAssessment, figures: PageFigures | None = None, of: str = "") -> list[Block]:
+    """Methods with their weights and constants, checks and notes, and with `figures` the isotherms."""
+    best, relation, groups = assessment.best, assessment.relation, assessment.tests.groups
+    columns = (
+        *("method", "weight", f"{CRITERIA[assessment.settings.criterion]} - best", "scatter of a test"),
+        *(f"between {_plural(group)}" for group in groups),
+    )
+    rows = [
+        (
+            one.fit.name,
+            f"{one.weight:.3f}",
+            f"{one.excess:.1f}",
+            f"factor {power_of_ten(one.fit.scale_corrected):.3g}",
+            *(f"factor {power_of_ten(scatter):.3g}" for scatter in one.fit.scatter_corrected.values()),
+        )
+        for one in assessment.ranked
     ]
-    if assessment.relation is not None:
-        lines += ["not ranked, for they use minimum rates:", *_constants(assessment.relation.times)]
-        lines += _constants(assessment.relation.rates)
-    lines += ["", *_strength_lines(assessment)] if strengths else []
-    lines += ["", f"checks of {best.name}:"]
-    lines += [f"- {check_text(check)}" for check in assessment.checks]
-    lines += [f"note: {note}" for note in assessment.notes]
-    return "\n".join(lines)
+    blocks: list[Block] = [Table("methods by their weights", columns, rows, numeric=(1, 2))]
+    if figures is not None:
+        picture = figures.picture(
+            lambda: rupture_figure(assessment),
+            f"Rupture assessment{of}",
+            "Isotherms of stress over rupture time with tests and bounds, the master curve, and predicted over "
+            f"measured times of {plural(len(assessment.tests), 'test')}.",
+            "Isotherms with tests and bounds; master curve; predicted against measured times. Broken lines lie beyond "
+            "the stresses tested.",
+        )
+        blocks.append(picture)
+    blocks += [Items([f"{name}: not ranked, for {why}" for name, why in assessment.rejected.items()])]
+    blocks += [_constants(best), *(Paragraph(line) for line in _effect_lines(best))]
+    if relation is not None:
+        blocks += [Paragraph("not ranked, for they use minimum rates:")]
+        blocks += [_constants(relation.times), _constants(relation.rates)]
+    blocks += [Paragraph(f"checks of {best.name}:"), Items(list(map(check_text, assessment.checks)))]
+    return [*blocks, Paragraph("notes:"), Items(assessment.notes)] if assessment.notes else blocks
 
 
 def check_text(check: AssessmentCheck) -> str:
@@ -85,33 +104,13 @@ def _range(values: Any) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(len(row[k]) for row in [heads, *rows]) for k in range(len(heads))]
-    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in [heads, *rows]]
-
-
-def _method_rows(assessment: RuptureAssessment) -> list[tuple[str, ...]]:
-    return [
-        (
-            one.fit.name,
-            f"{one.weight:.3f}",
-            f"{one.excess:.1f}",
-            f"factor {power_of_ten(one.fit.scale_corrected):.3g}",
-            *(f"factor {power_of_ten(scatter):.3g}" for scatter in one.fit.scatter_corrected.values()),
-        )
-        for one in assessment.ranked
-    ]
-
-
-def _constants(fit: RuptureFit) -> list[str]:
+def _constants(fit: RuptureFit) -> Table:
     from creepkit.rupture_assessment.methods import METHODS
 
     given = "".join(f", {name} = {value:.6g} given" for name, value in fit.fixed.items())
-    head = f"{fit.name}: {METHODS[fit.method].equation}{given}"
-    return [
-        head,
-        *(f"  {p.name} = {p.value:.5g} [{p.low:.5g}, {p.high:.5g}] {p.unit}".rstrip() for p in fit.parameters),
-    ]
+    rows = [(p.name, f"{p.value:.5g}", f"{p.low:.5g} to {p.high:.5g}", p.unit) for p in fit.parameters]
+    caption = f"{fit.name}: {METHODS[fit.method].equation}{given}"
+    return Table(caption, ("constant", "value", "95 % interval", "unit"), rows, numeric=(1, 2))
 
 
 def _effect_lines(fit: RuptureFit) -> list[str]:
@@ -123,18 +122,18 @@ def _effect_lines(fit: RuptureFit) -> list[str]:
         ordered = [f"{name} {10 ** effects[name]:.2f}" for name in sorted(effects, key=lambda name: effects[name])]
         if len(ordered) > 2 * SHOWN_EFFECTS:
             ordered = [*ordered[:SHOWN_EFFECTS], "...", *ordered[-SHOWN_EFFECTS:]]
-        lines.append(f"  times of {_plural(group)} over those of the average one: {', '.join(ordered)}")
+        lines.append(f"times of {_plural(group)} over those of the average one: {', '.join(ordered)}")
     return lines
 
 
-def strength_rows(assessment: RuptureAssessment) -> tuple[list[str], list[tuple[str, ...]], str]:
-    """Heads of columns, rows of the strengths of the average method, and what is said of a new heat, "" for nothing."""
+def _strengths(assessment: RuptureAssessment) -> tuple[Table, str]:
+    """The strengths of the average method, and what is said of a new heat, "" for nothing."""
     level = f"{100 * assessment.settings.level:g} %"
     shown = [one for one in assessment.strengths if one.method == "average"]
     if assessment.relation is not None:
         shown += [one for one in assessment.strengths if one.method == assessment.relation.times.method]
     scattering = [g for g in assessment.tests.groups if _largest_scatter(assessment, g) >= LEAST_SCATTER_SHOWN]
-    heads = ["strength, MPa", "temperature", "time, h", "value", f"{level} of the mean"]
+    heads = ["method", "temperature", "time, h", "value", f"{level} of the mean"]
     heads += [f"of a new {' and '.join(scattering)}"] if scattering else []
     rows = []
     for one in shown:
@@ -156,12 +155,9 @@ def strength_rows(assessment: RuptureAssessment) -> tuple[list[str], list[tuple[
     elif not scattering:
         groups = " and ".join(map(_plural, assessment.tests.groups))
         note = f"a new heat has the bounds of the mean: no scatter between {groups} is found"
-    return [*heads, "of one test", ""], rows, note
-
-
-def _strength_lines(assessment: RuptureAssessment) -> list[str]:
-    heads, rows, note = strength_rows(assessment)
-    return [*_aligned(heads, rows), *([note] if note else [])]
+    columns = [*heads, "of one test", "remarks"]
+    caption = "creep rupture strengths in MPa, with bounds in brackets"
+    return Table(caption, columns, rows, numeric=(2, 3)), note
 
 
 def _largest_scatter(assessment: RuptureAssessment, group: str) -> float:
@@ -192,8 +188,15 @@ def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
         "relation": None
         if assessment.relation is None
         else [_fit_to_json(assessment.relation.times), _fit_to_json(assessment.relation.rates)],
-        "strengths": [_strength_to_json(one) for one in assessment.strengths],
-        "checks": [{"name": c.name, "passed": c.passed, "found": c.found, "fault": c.fault} for c in assessment.checks],
+        "strengths": [
+            {
+                "strength": one.value,
+                **fields_to_json(one, "method hours temperature bounds_of_mean bounds_of_heat bounds_of_test"),
+                **fields_to_json(one, "extrapolation reason"),
+            }
+            for one in assessment.strengths
+        ],
+        "checks": [fields_to_json(one, "name passed found fault") for one in assessment.checks],
         "level": assessment.settings.level,
         "notes": list(assessment.notes),
         "provenance": dict(assessment.provenance),
@@ -202,27 +205,9 @@ def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
 
 def _fit_to_json(fit: RuptureFit) -> dict[str, Any]:
     return {
-        "method": fit.method,
-        "degree": fit.degree,
-        "parameters": {
-            p.name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit} for p in fit.parameters
-        },
-        "fixed": dict(fit.fixed),
+        **fields_to_json(fit, "method degree fixed log_likelihood"),
+        "parameters": {p.name: fields_to_json(p, "value low high unit") for p in fit.parameters},
         "scale_log10": fit.scale,
         "scatter_log10": dict(fit.scatter),
         "effects_log10": {group: dict(effects) for group, effects in fit.effects.items()},
-        "log_likelihood": fit.log_likelihood,
-    }
-
-
-def _strength_to_json(one: StrengthEstimate) -> dict[str, Any]:
-    bounds = {of: list(getattr(one, of)) for of in ("bounds_of_mean", "bounds_of_heat", "bounds_of_test")}
-    return {
-        "method": one.method,
-        "hours": one.hours,
-        "temperature": one.temperature,
-        "strength": one.value,
-        **bounds,
-        "extrapolation": one.extrapolation,
-        "reason": one.reason,
     }

@@ -12,6 +12,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, growing_output, output_named, specimen_of
+from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
 from creepkit.reports.terminal import print_json, print_table, tell
 from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
@@ -35,10 +36,7 @@ def table_rows(plate: ScreeningResult) -> list[tuple[str, ...]]:
 
 def screening_text(plate: ScreeningResult) -> str:
     """The table, the share of each law in each class, and what failed."""
-    rows = [TABLE_COLUMNS, *table_rows(plate)]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(TABLE_COLUMNS))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join([*lines, "", *summary_lines(plate)])
+    return "\n".join([*aligned(TABLE_COLUMNS, table_rows(plate)), "", *summary_lines(plate)])
 
 
 def summary_lines(plate: ScreeningResult) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.sparsity.result import LEAST_CONTRIBUTION
+from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, place_legend_below, save_figure, set_range
 
 if TYPE_CHECKING:
@@ -73,12 +74,12 @@ def _draw_evaluations(axes: Axes, trace: SearchTrace) -> None:
 def sparsity_text(sparsity: Sparsity) -> str:
     """The verdict, and the contribution of every term without penalty, with it, and after the refit."""
     strength = "" if sparsity.strength is None else f" of strength {sparsity.strength:g}"
-    width = max(map(len, sparsity.contributions_without_penalty))
-    lines = [f"{sparsity.penalty}{strength}: {sparsity.verdict}", f"{'':{width}}  without  with  after"]
+    rows = []
     for term, contribution in sparsity.contributions_without_penalty.items():
-        refitted = sparsity.contributions_after_refit.get(term)
-        after = "dropped" if refitted is None else f"{refitted:.3f}"
-        lines.append(f"{term:{width}}  {contribution:.3f}  {sparsity.contributions_with_penalty[term]:.3f}  {after}")
+        after = sparsity.contributions_after_refit.get(term)
+        numbers = (contribution, sparsity.contributions_with_penalty[term])
+        rows.append((term, *(f"{one:.3f}" for one in numbers), "dropped" if after is None else f"{after:.3f}"))
+    lines = [f"{sparsity.penalty}{strength}: {sparsity.verdict}", *aligned(("", "without", "with", "after"), rows)]
     return "\n".join([*lines, f"(contributions; below {LEAST_CONTRIBUTION:g} a term is dropped)"])
 
 
@@ -95,13 +96,12 @@ def selection_frequencies_text(frequencies: SelectionFrequencies) -> str:
 
 def penalty_path_text(path: PenaltyPath) -> str:
     """One row a strength: chi-square, BIC less the least, contributions and the terms that are kept."""
-    rows = [["strength", "chi-square", "BIC - least", *path.terms, "kept"]]
+    rows = []
     for k, strength in enumerate(path.strengths):
         numbers = [f"{strength:g}", f"{path.chi_square[k]:.1f}", f"{path.bic_excess[k]:.1f}"]
         rows.append([*numbers, *(f"{c:.3f}" for c in path.contributions[k]), ", ".join(path.kept_terms[k])])
-    rows[1 + path.chosen][-1] += "   <- chosen"
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+    rows[path.chosen][-1] += "   <- chosen"
+    return "\n".join(aligned(("strength", "chi-square", "BIC - least", *path.terms, "kept"), rows))
 
 
 SMALLEST_DRAWN_RISE = 0.1

@@ -7,26 +7,17 @@ formula, and that of bars which are compared at one strain, as measured rates ar
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.language import strain, time
 from creepkit.records.units import celsius_text
+from creepkit.reports.blocks import number
 from creepkit.reports.load_programs import SECONDS_PER_HOUR
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
-
-
-NumberText = Callable[[float, int], str]
-"""A number with so many digits, as the place where it stands writes it."""
-
-
-def plain_number(value: float, digits: int) -> str:
-    """A number as terminals and comments show it."""
-    return f"{value:.{digits}g}"
 
 
 def rate_and_exponent(fit: Identification) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -53,20 +44,20 @@ def held_quantities(fit: Identification) -> str:
     return f"{', '.join(held[:-1])} and {held[-1]}" if len(held) > 1 else "".join(held)
 
 
-def reference_sentences(fit: Identification, text: NumberText = plain_number) -> list[str]:
+def reference_sentences(fit: Identification) -> list[str]:
     """Rate and exponent amid the tests, one sentence each, without full stops."""
     r, state = fit.reference, _state(fit)
-    at = f"{text(r.stress, 4)} MPa and {celsius_text(r.temperature, digits=0)}"
-    formula = _interval(tuple(map(float, fit.local_exponent(r.stress, warn=False))), text)
+    at = f"{number(r.stress)} MPa and {celsius_text(r.temperature, digits=0)}"
+    formula = _interval(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
     held = held_quantities(fit)
     if state is not None:
         hours = tuple(v / SECONDS_PER_HOUR for v in state.time)
         lines = [
             f"amid the tests, under a constant true stress of {at}, a bar reaches a logarithmic creep strain of "
-            f"{text(r.strain, 2)} after {_interval(hours, text)} h, and creeps there at a rate of "
-            f"{_interval(state.rate, text)} 1/s (95 % intervals in brackets)",
+            f"{number(r.strain, 2)} after {_interval(hours)} h, and creeps there at a rate of "
+            f"{_interval(state.rate)} 1/s (95 % intervals in brackets)",
             "the stress exponent at constant strain, d ln rate / d ln stress of bars compared when each has this "
-            f"strain, is {_interval(state.exponent, text)}: the one to compare with exponents of measured creep rates",
+            f"strain, is {_interval(state.exponent)}: the one to compare with exponents of measured creep rates",
         ]
         if held != "strain":
             lines.append(
@@ -74,13 +65,13 @@ def reference_sentences(fit: Identification, text: NumberText = plain_number) ->
                 "shows"
             )
         return lines
-    rate = _interval(tuple(map(float, fit.rate(r.stress, warn=False))), text)
+    rate = _interval(tuple(map(float, fit.rate(r.stress, warn=False))))
     if not held:
         return [
             f"amid the tests, at {at}, the creep rate is {rate} 1/s and the stress exponent, d ln rate / d ln stress, "
             f"is {formula} (95 % intervals in brackets)"
         ]
-    state_text = f"a strain of {text(r.strain, 2)} and {text(r.time / SECONDS_PER_HOUR, 3)} h"
+    state_text = f"a strain of {number(r.strain, 2)} and {number(r.time / SECONDS_PER_HOUR, 3)} h"
     # Of a law of stress, temperature and strain the derivative at constant strain is what bars at one strain show.
     other = "" if held == "strain" else "; bars compared at one strain show another exponent where their times differ"
     if fit.law.states:
@@ -92,10 +83,10 @@ def reference_sentences(fit: Identification, text: NumberText = plain_number) ->
     ]
 
 
-def _interval(values: tuple[float, ...], text: NumberText) -> str:
+def _interval(values: tuple[float, ...]) -> str:
     value, low, high = values
     digits = interval_digits(value, low, high)
-    return f"{text(value, digits)} [{text(low, digits)}, {text(high, digits)}]"
+    return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"
 
 
 FEWEST_DIGITS, MOST_DIGITS = 3, 7

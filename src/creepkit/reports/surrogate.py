@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from creepkit.errors import SurrogateError
 from creepkit.records import output_named
+from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
 from creepkit.surrogates.evaluation import PredictionComparison, evaluate, worst_histories
 from creepkit.surrogates.recipe import SurrogateMetadata
@@ -129,37 +130,20 @@ ERROR_HEADS = ("RSE (Eq. 4)", "MSE", "MAE", "R2", "largest error, median", "95 %
 
 def surrogate_text(surrogate: Surrogate) -> str:
     """Title, laws, errors on the validation rows for each output, and where it came from."""
-    metadata, metrics = surrogate.metadata, surrogate.metadata.metrics
+    metadata, metrics, source = surrogate.metadata, surrogate.metadata.metrics, surrogate.metadata.provenance
     lines = [surrogate.title, f"predicts law '{metadata.law.name}', and that less some of its terms"]
     if metrics:
-        rows = {
-            name: [_number_text(errors_of_output[c]) for c in ERROR_COLUMNS]
-            for name, errors_of_output in metrics["outputs"].items()
-        }
-        lines += _aligned_rows(("output", *ERROR_HEADS), rows)
+        rows = [(name, *(_number_text(one[c]) for c in ERROR_COLUMNS)) for name, one in metrics["outputs"].items()]
+        lines += aligned(("output", *ERROR_HEADS), rows, numeric=range(1, 1 + len(ERROR_HEADS)))
         lines.append(f"validation loss (Eq. 4, outputs together): {_number_text(metrics['loss'])}")
-    lines += _training_lines(metadata.provenance)
+    if "training_rows" in source:
+        counts = f"{source['training_rows']} samples for training, {source['validation_rows']} for validation"
+        lines.append(f"{counts}; best epoch {source['best_epoch']} of {source['epochs']}, seed {source['seed']}")
     return "\n".join([*lines, *(f"note: {note}" for note in metadata.notes)])
-
-
-def _training_lines(provenance: Mapping[str, Any]) -> list[str]:
-    if "training_rows" not in provenance:
-        return []
-    counts = f"{provenance['training_rows']} samples for training, {provenance['validation_rows']} for validation"
-    return [f"{counts}; best epoch {provenance['best_epoch']} of {provenance['epochs']}, seed {provenance['seed']}"]
 
 
 def _number_text(value: float | None) -> str:
     return "-" if value is None else f"{value:.4g}"
-
-
-def _aligned_rows(heads: tuple[str, ...], rows: Mapping[str, list[str]]) -> list[str]:
-    table_rows = [list(heads), *([name, *cells] for name, cells in rows.items())]
-    widths = [max(len(row[k]) for row in table_rows) for k in range(len(heads))]
-    return [
-        "  ".join(c.rjust(w) if k else c.ljust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True)))
-        for row in table_rows
-    ]
 
 
 def write_surrogate_figures(surrogate: Surrogate, data: Dataset, folder: Path, name: str) -> list[Path]:

@@ -12,6 +12,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.records import ZERO_CELSIUS
 from creepkit.records.units import celsius_text
+from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, place_legend_right, save_figure, set_range, wrapped
 
 if TYPE_CHECKING:
@@ -154,14 +155,8 @@ def _draw_pair(
 
 def correlation_text(correlation: Correlation) -> str:
     """The matrix with its names, four digits."""
-    widths = [max(len(name), 8) + 1 for name in correlation.names]
-    first_width = max(len(name) for name in correlation.names) + 1
-    heads = (f"{name:>{width}}" for name, width in zip(correlation.names, widths, strict=True))
-    lines = [" " * first_width + "".join(heads)]
-    for name, row in zip(correlation.names, correlation.matrix, strict=True):
-        cells = (f"{value:>{width}.4f}" for value, width in zip(row, widths, strict=True))
-        lines.append(f"{name:{first_width}}" + "".join(cells))
-    return "\n".join(lines)
+    rows = [(name, *(f"{v:.4f}" for v in row)) for name, row in zip(correlation.names, correlation.matrix, strict=True)]
+    return "\n".join(aligned(("", *correlation.names), rows, numeric=range(1, 1 + len(rows))))
 
 
 def correlation_figure(correlation: Correlation, path: str | Path | None = None) -> Figure:

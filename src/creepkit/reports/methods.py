@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from creepkit.reports.blocks import plural, printable, sentence, typeset
+from creepkit.reports.citations import CITATIONS, References, listed
 from creepkit.reports.design import order_text
-from creepkit.reports.html.citations import CITATIONS, References, listed
-from creepkit.reports.html.elements import plural, printable, sentence
-from creepkit.reports.html.methods_identification import identification_methods
+from creepkit.reports.methods_identification import identification_methods
 
 if TYPE_CHECKING:
     from creepkit.reports.contents import ReportContents
-    from creepkit.reports.html.findings import GroupFindings
+    from creepkit.reports.findings import GroupFindings
 
 
 def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
@@ -24,7 +24,7 @@ def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> st
         *_stages(contents, references),
         _software(contents, found, references),
     ]
-    text, cited = references.numbered("\n\n".join(" ".join(p) for p in paragraphs if p))
+    text, cited = references.numbered(typeset("\n\n".join(" ".join(p) for p in paragraphs if p)))
     numbered = "\n".join(f"[{k}] {citation}" for k, citation in enumerate(cited, start=1))
     return f"{text}\n\n{numbered}".strip() + "\n"
 

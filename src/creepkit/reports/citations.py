@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 
 from creepkit.laws.paper import PAPER
-from creepkit.reports.html.elements import printable
+from creepkit.reports.blocks import printable
 
 CITATIONS = {
     "sobol": "I. M. Sobol' (1967), USSR Comput. Math. Math. Phys. 7(4), 86-112",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.files.file_names import file_stem
 from creepkit.reports.attachments import problem_of_name
-from creepkit.reports.html.elements import (
+from creepkit.reports.blocks import (
     Block,
     Downloads,
     Items,
@@ -22,15 +22,18 @@ from creepkit.reports.html.elements import (
     printable_lines,
     sentence,
 )
-from creepkit.reports.html.findings import MOST_FILES
-from creepkit.reports.html.law_definitions import definition_blocks
-from creepkit.reports.html.law_tables import covariance_file
-from creepkit.reports.html.methods import methods_text
-from creepkit.reports.html.methods_tests import laws_of
+from creepkit.reports.identified_files import covariance_file
+from creepkit.reports.law_names import definition_blocks
+from creepkit.reports.methods import methods_text
+from creepkit.reports.methods_tests import laws_of
 
 if TYPE_CHECKING:
     from creepkit.reports.contents import ExportedFile, ReportContents
-    from creepkit.reports.html.findings import GroupFindings
+    from creepkit.reports.findings import GroupFindings
+
+
+MOST_FILES = 4
+"""On the first screen."""
 
 
 def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -> list[PageSection]:
@@ -82,7 +85,7 @@ def files_to_download(contents: ReportContents, found: Sequence[GroupFindings]) 
     """
     files = [*contents.exports, *_covariances(found)]
     return [
-        (file_name(one.name), _address(one.text), f"{printable(one.target, 80)}, {_size(one.text)}")
+        (file_name(one.name), _address(one.text), f"{one.target}, {_size(one.text)}")
         for one in sorted(files, key=lambda one: one.name.endswith(".json"))
     ]
 
@@ -128,23 +131,19 @@ def _provenance_blocks(contents: ReportContents) -> list[Block]:
     if provenance.commands:
         blocks.append(Verbatim("Commands that repeat the work", printable_lines("\n".join(provenance.commands))))
     settings = {"seed": provenance.seed} if provenance.seed is not None else {}
-    rows = [
-        (printable(k, 120), printable(v, 400))
-        for k, v in _flat({**settings, **provenance.settings})
-        if v not in ("", None)
-    ]
+    rows = [(k, printable(v, 400)) for k, v in _flat({**settings, **provenance.settings}) if v not in ("", None)]
     if rows:
         blocks.append(Table("Settings", ("setting", "value"), rows))
     if provenance.versions:
-        rows = [(printable(k, 120), printable(v, 120)) for k, v in provenance.versions.items()]
+        rows = [(k, v) for k, v in provenance.versions.items()]
         blocks.append(Table("Versions", ("package", "version"), rows))
     if provenance.inputs:
-        rows = [(printable(name, 200), printable(digest, 80)) for name, digest in provenance.inputs.items()]
+        rows = [(name, digest) for name, digest in provenance.inputs.items()]
         blocks.append(Table("Input files", ("file", "sha256 of its content"), rows))
     carried = [one.name for one in contents.attachments if not problem_of_name(one.name)]
     if carried:
         blocks.append(Paragraph("Files that the page carries:"))
-        blocks.append(Items([printable(name, 200) for name in carried]))
+        blocks.append(Items(carried))
     return blocks
 
 
@@ -175,10 +174,10 @@ def _in_words(value: Any) -> Any:
 def _missing_blocks(contents: ReportContents) -> list[Block]:
     groups = [group for group in contents.groups if group.failure]
     rows = [
-        *((printable(one.stage, 80), sentence(one.sentence)) for one in contents.failures),
-        *((f"identification of {printable(group.name, 80)}", sentence(group.failure)) for group in groups),
+        *((one.stage, sentence(one.sentence)) for one in contents.failures),
+        *((f"identification of {group.name}", sentence(group.failure)) for group in groups),
     ]
     blocks: list[Block] = []
     if rows:
         blocks.append(Table("Stages that failed, and why", ("stage", "reason"), rows))
-    return [*blocks, Items([sentence(note) for note in contents.notes])] if contents.notes else blocks
+    return [*blocks, Items(contents.notes)] if contents.notes else blocks

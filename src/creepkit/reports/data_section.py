@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING
 from creepkit.inverse.compared_tests import duration_known
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import SECONDS_PER_HOUR
-from creepkit.reports.html.compared_values import frame_counts, selection_sentence
-from creepkit.reports.html.elements import Block, PageSection, Paragraph, Table, number, plural, printable, sentence
-from creepkit.reports.html.findings import findings_of
-from creepkit.reports.html.test_details import NOT_STATED, details_of_tests
+from creepkit.reports.blocks import Block, PageSection, Paragraph, Table, number, plural
+from creepkit.reports.compared_values import frame_counts, selection_sentence
+from creepkit.reports.findings import findings_of
+from creepkit.reports.load_programs import temperature_text
 
 if TYPE_CHECKING:
     from creepkit.quality.flags import DataQuality
     from creepkit.records import History
     from creepkit.reports.contents import ReportContents
-    from creepkit.reports.html.findings import GroupFindings
+    from creepkit.reports.findings import GroupFindings
+
 
 MOST_LISTED = 400
 """Rows of a table of tests."""
@@ -31,12 +32,12 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
     if histories:
         more = f"; {len(histories) - MOST_LISTED} more are not listed" if len(histories) > MOST_LISTED else ""
         blocks += [_table_of_histories(histories, more), *details_of_tests(histories[:MOST_LISTED], more)]
-    blocks += [Paragraph(sentence(f"Source of the data: {text}")) for text in contents.data_citations]
+    blocks += [Paragraph(f"Source of the data: {text}") for text in contents.data_citations]
     if contents.quality is not None:
         blocks += _quality_blocks(contents.quality)
     in_tests = [(one.name, one.fit.adequacy) for one in found if one.fit.adequacy is not None]
     texts = [(name, adequacy.explanation_text) for name, adequacy in in_tests if adequacy.lies_in_tests]
-    blocks += [Paragraph(sentence(f"{name}: {text}" if name else text), "warning") for name, text in texts]
+    blocks += [Paragraph(f"{name}: {text}" if name else text, "warning") for name, text in texts]
     left_out = _exclusion_blocks(contents) if histories or contents.exclusions else []
     flags = 0 if contents.quality is None else len(contents.quality.flags)
     result = f"{plural(len(histories), 'test')} as measured; {plural(flags, 'flag') if flags else 'nothing suspect'}"
@@ -47,13 +48,13 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
 def _table_of_histories(histories: Sequence[History], more: str) -> Table:
     rows = [
         (
-            printable(h.name, 120),
-            printable(h.alloy or NOT_STATED, 80),
-            printable(h.condition, 200),
+            h.name,
+            h.alloy or NOT_STATED,
+            h.condition,
             str(h.times.size) if h.outputs else "–",
             number(float(h.times[-1]) / SECONDS_PER_HOUR) if duration_known(h) else "–",
             _ending(h),
-            printable(re.split(r"[/\\]", h.source)[-1] or NOT_STATED, 160),
+            re.split(r"[/\\]", h.source)[-1] or NOT_STATED,
         )
         for h in histories[:MOST_LISTED]
     ]
@@ -78,12 +79,12 @@ def _quality_blocks(quality: DataQuality) -> list[Block]:
         return [Paragraph(f"The check of data quality found nothing suspect in {plural(quality.tests, 'test')}.")]
     rows = [
         (
-            printable(flag.history, 160),
+            flag.history,
             flag.kind,
             readings_text(flag.frames) if flag.frames else "–",
             "–" if flag.time is None else number(flag.time / SECONDS_PER_HOUR),
-            printable(flag.reason),
-            printable(flag.proposal or "–"),
+            flag.reason,
+            flag.proposal or "–",
         )
         for flag in quality.flags[:MOST_LISTED]
     ]
@@ -102,7 +103,7 @@ def _exclusion_blocks(contents: ReportContents) -> list[Block]:
     if not contents.exclusions:
         return [Paragraph("No reading was excluded by hand or by the check of data quality."), *selected]
     rows = [
-        (printable(one.test, 120), readings_text(one.frames) if one.frames else "the whole test", printable(one.reason))
+        (one.test, readings_text(one.frames) if one.frames else "the whole test", one.reason)
         for one in contents.exclusions[:MOST_LISTED]
     ]
     return [Table("Left out of the identification", ("test", "what", "reason"), rows), *selected]
@@ -116,4 +117,58 @@ def _selections(contents: ReportContents) -> Iterator[str]:
             continue
         most = found.fit.settings.frames
         text = selection_sentence(frame_counts(found.fit.histories, most), most)
-        yield f"{printable(group.name, 80)}: {text}" if len(contents.groups) > 1 else text
+        yield f"{group.name}: {text}" if len(contents.groups) > 1 else text
+
+
+# ---- how tests were made ---------------------------------------------------------------------------------------------
+
+
+NOT_STATED = "not stated"
+
+
+HEAT_LABELS = ("heat", "batch", "cast")
+
+
+CONTROLS = {"load": "load held", "stress": "true stress held"}
+
+
+def details_of_tests(histories: Sequence[History], more: str) -> list[Block]:
+    """What tests have in common in a sentence, and a row for each of what differs.
+
+    more : what the caption says of tests that are not listed.
+    """
+    columns = ("specimen", "control", "temperature", "strain", "elastic strain", "heat", "dimensions, mm")
+    rows = [
+        (
+            h.specimen,
+            CONTROLS.get(str(getattr(h.loading, "control", "")), f"{h.loading.quantity} imposed"),
+            temperature_text(h),
+            *_strain(h),
+            _heat(h),
+            _dimensions(h),
+        )
+        for h in histories
+    ]
+    differing = [k for k in range(len(columns)) if len({row[k] for row in rows}) > 1]
+    shared = [f"{name} {rows[0][k]}" for k, name in enumerate(columns) if k not in differing]
+    blocks: list[Block] = [Paragraph(f"all tests: {', '.join(shared)}")] if shared else []
+    if differing:
+        named = [(h.name, *(row[k] for k in differing)) for h, row in zip(histories, rows, strict=True)]
+        blocks.append(Table(f"How the tests were made{more}", ("test", *(columns[k] for k in differing)), named))
+    return blocks
+
+
+def _strain(history: History) -> tuple[str, str]:
+    if "strain" not in history.outputs:
+        return "none measured", "–"
+    return history.strain_measure, "included" if history.includes_elastic else "not included"
+
+
+def _heat(history: History) -> str:
+    known = [history.labels[label] for label in HEAT_LABELS if history.labels.get(label)]
+    return known[0] if known else NOT_STATED
+
+
+def _dimensions(history: History) -> str:
+    stated = [f"{name.replace('_', ' ')} {number(float(value))}" for name, value in history.geometry.items()]
+    return ", ".join(stated) or NOT_STATED

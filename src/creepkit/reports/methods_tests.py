@@ -10,16 +10,16 @@ import sympy
 from creepkit.inverse.composite_predictor import predictor_for, reduced_order_model_of, underlying_specimen
 from creepkit.inverse.reference_conditions import reference_temperature
 from creepkit.language.printing import arrhenius_exponent
-from creepkit.reports.html.citations import References, listed
-from creepkit.reports.html.compared_values import compared_values, frame_counts
-from creepkit.reports.html.elements import number, plural, printable, sentence
-from creepkit.reports.html.law_names import title_in_sentence
+from creepkit.reports.blocks import number, plural, printable, sentence
+from creepkit.reports.citations import References, listed
+from creepkit.reports.compared_values import compared_values, frame_counts
+from creepkit.reports.law_names import title_in_sentence
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.language import CreepLaw
     from creepkit.records import History
-    from creepkit.reports.html.findings import GroupFindings
+    from creepkit.reports.findings import GroupFindings
 
 MOST_NAMED = 6
 """Materials that a sentence names; of more it says how many."""
