@@ -58,8 +58,7 @@ def generate(
     """
     import creepkit as ck
     from creepkit.dataset.generation import resolve_design
-    from creepkit.reports.dataset import print_dataset
-    from creepkit.reports.sampling import print_acceptance
+    from creepkit.reports.dataset import print_acceptance, print_dataset
 
     chosen = ParallelExecution(**execution)
     changes: dict[str, Any] = {"domain": domain, **(conditions or {})}

@@ -12,7 +12,7 @@ from creepkit.experiments.planned_design import ALIKE, kind_of_reason, precision
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.records import load_unit
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
-from creepkit.reports.figures import empty_figure, save_figure, wrapped
+from creepkit.reports.figures import panels_of, save_figure, wrapped
 from creepkit.reports.json_values import fields_to_json
 
 if TYPE_CHECKING:
@@ -212,8 +212,7 @@ def design_figure(design: Design, path: str | Path | None = None) -> Figure:
     the probability of a decisive and right verdict that tables give. The runs of the plan are marked. Of several
     specimens that of the best test is drawn.
     """
-    figure = empty_figure(10.5, 5.0)
-    axes = figure.subplots(1, 2, sharex=True, sharey=True)
+    figure, axes = panels_of(10.5, 5.0, 1, 2, sharex=True, sharey=True)
     drawn_tests = [test for test in design.tests if test.histories[0].specimen == design.best.histories[0].specimen]
     rates = [test.first_order_per_hour for test in drawn_tests] or [1.0]
     largest = max(*rates, 1e-9)

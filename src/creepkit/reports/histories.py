@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.readers.table_summary import TableSummary
-from creepkit.records import History, output_unit
+from creepkit.records import SECONDS_PER_HOUR, History, output_unit
 from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, save_figure
 from creepkit.reports.json_values import fields_to_json
-from creepkit.reports.load_programs import SECONDS_PER_HOUR, program_text
+from creepkit.reports.load_programs import program_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

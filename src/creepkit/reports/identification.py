@@ -20,14 +20,22 @@ from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
 from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, kind_and_start, output_unit
 from creepkit.records.units import celsius_text
-from creepkit.reports.answer import MOST_CAUTIONS, cautions, chosen_text, equations, symbols_of, unit_text, value_cells
+from creepkit.reports.answer import (
+    MOST_CAUTIONS,
+    cautions,
+    chosen_text,
+    constant_load_sentence,
+    equations,
+    reference_sentences,
+    symbols_of,
+    unit_text,
+    value_cells,
+)
 from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, as_text, number, plural
 from creepkit.reports.compared_values import compared_values
-from creepkit.reports.identification_plot import small_multiples
+from creepkit.reports.identification_plot import residual_caption, small_multiples
 from creepkit.reports.judged_readings import LAW_RATE_MEANING, OWN_RATE_CHI_SQUARE, judged_readings, misfit_of
 from creepkit.reports.rate_panels import rupture_rows
-from creepkit.reports.residual_panels import residual_caption
-from creepkit.reports.stress_exponents import constant_load_sentence, reference_sentences
 
 if TYPE_CHECKING:
     from creepkit.inverse.goodness_of_fit import TestFit

@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.instruments.clock_alignment import UNIX_TIME
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
-from creepkit.reports.figures import empty_figure, save_figure
+from creepkit.reports.figures import panels_of, save_figure
 from creepkit.reports.json_values import fields_to_json
 
 if TYPE_CHECKING:
@@ -78,8 +78,10 @@ def _channel_text(channel: Channel) -> str:
 def record_figure(record: InstrumentRecord, path: str | Path | None = None) -> Figure:
     """Every channel over time, one panel for each quantity."""
     quantities = list(dict.fromkeys(channel.quantity for channel in record.channels.values()))
-    figure = empty_figure(7.0, 1.0 + 2.2 * max(len(quantities), 1))
-    panels = figure.subplots(max(len(quantities), 1), 1, sharex=True, squeeze=False)[:, 0]
+    figure, panels = panels_of(
+        7.0, 1.0 + 2.2 * max(len(quantities), 1), max(len(quantities), 1), 1, sharex=True, squeeze=False
+    )
+    panels = panels[:, 0]
     for axes, quantity in zip(panels, quantities, strict=False):
         shift = ZERO_CELSIUS if quantity == "temperature" else 0.0
         for name, channel in record.channels.items():

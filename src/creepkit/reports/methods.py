@@ -1,18 +1,347 @@
-"""Methods as text for a paper: what was done, from the records alone, with numbered citations, versions and seeds."""
+"""Methods as text for a paper: what was done, from the records alone, with numbered citations."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-from creepkit.reports.blocks import plural, printable, sentence, typeset
-from creepkit.reports.citations import CITATIONS, References, listed
+from creepkit.inverse.adequacy import LARGEST_SCATTER
+from creepkit.inverse.chi_square_test import SIGNIFICANCE
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
+from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
+from creepkit.inverse.nuisance_parameters import nuisance_unit
+from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
+from creepkit.inverse.variance_components import NOISE_PRIOR_SD
+from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
+from creepkit.records import is_logarithmic, kind_and_start, output_unit
+from creepkit.reports.blocks import number, plural, printable, sentence, typeset
 from creepkit.reports.design import order_text
-from creepkit.reports.methods_identification import identification_methods
+from creepkit.reports.identification import rate_estimated, rate_scatter_sentence, scatter_text
+from creepkit.reports.methods_tests import (
+    CITATIONS,
+    MOST_NAMED,
+    References,
+    by_material,
+    compared_tests,
+    laws,
+    listed,
+    loading,
+    models,
+)
 
 if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
     from creepkit.reports.contents import ReportContents
     from creepkit.reports.findings import GroupFindings
+
+
+def identification_methods(
+    contents: ReportContents, found: Sequence[GroupFindings], references: References
+) -> list[list[str]]:
+    """Paragraphs on tests and laws, models, estimation, and ranking and adequacy; none where nothing was identified."""
+    if not found:
+        return []
+    alone = len(found) == 1
+    ranked = [one for one in found if one.ranking is not None]
+    return [
+        [*compared_tests(found), *by_material(found, loading), *laws(found, references)],
+        by_material(found, lambda one: models(one.fit)),
+        [
+            *by_material(found, lambda one: _estimation(one, contents, references, numbers=alone)),
+            *([] if alone else _scatter_over_materials([one.fit for one in found])),
+        ],
+        [
+            *by_material(ranked, lambda one: ranking_sentences(one, references, numbers=alone)),
+            *adequacy_sentences(found, references),
+        ],
+    ]
+
+
+# ---- search ----------------------------------------------------------------------------------------------------------
+
+
+def _estimation(found: GroupFindings, contents: ReportContents, references: References, *, numbers: bool) -> list[str]:
+    """How values and intervals were found; numbers : whether sizes of noise stand in it, as of one material alone."""
+    fit = found.fit
+    settings = fit.settings
+    sentences = [
+        _search(fit, contents, references),
+        _agreement(fit) if numbers else "",
+        "The bounds of the search are those of the table of symbols.",
+        *_weights(fit, references),
+        *_offsets(fit, numbers=numbers),
+        rate_scatter_sentence(fit) if numbers else "",
+        *_autocorrelation(fit, numbers=numbers),
+        _explicit_nuisances(fit),
+        _noise_priors(fit, numbers=numbers),
+        _penalty(found),
+    ]
+    if settings.loss != "linear":
+        sentences.append(f"Readings far off have less weight by the loss '{settings.loss}'.")
+    if settings.test_loss == "student":
+        sentences.append(
+            f"Tests far from the others have less weight by Student's distribution{references.cite('student')}."
+        )
+    if fit.numerical_error is not None:
+        sentences.append(
+            "The numerical error of the predictions was corrected at the optimum (defect correction), and a tenth of "
+            "it stays in the covariance."
+        )
+    return sentences
+
+
+def _search(fit: Identification, contents: ReportContents, references: References) -> str:
+    """How the optimum was sought, where that is known."""
+    settings, how = fit.settings, _search_name(fit, contents)
+    end = f", and refined by least squares with the Levenberg-Marquardt method{references.cite('levenberg')}."
+    seed = f" (seed {settings.seed})"
+    if how.startswith("multi-start"):
+        return (
+            f"Parameters were sought within their bounds from {plural(settings.starts, 'start')}, picked out of at "
+            f"most {settings.sobol_points} points of a Sobol' sequence{references.cite('sobol')}{seed}{end}"
+        )
+    if "swarm" in how:
+        return f"Parameters were sought within their bounds by a particle swarm{references.cite('swarm')}{seed}{end}"
+    if how.startswith("cma-es"):
+        return f"Parameters were sought within their bounds by CMA-ES{references.cite('cma-es')}{seed}{end}"
+    return f"Parameters were sought within their bounds{end}"
+
+
+def _agreement(fit: Identification) -> str:
+    """How many ends of the search agree, where the identification says so."""
+    counts = [fit.provenance.get(name) for name in ("search_ends", "ends_at_best", "distinct_minima")]
+    if not all(isinstance(one, int) for one in counts):
+        return ""
+    ends, best, distinct = counts
+    if ends == 1:
+        return "The search ended once, so that it does not show whether another minimum is lower."
+    return (
+        f"For the best law {best} of {ends} ends of the search are the best minimum, and {distinct} of them are "
+        f"{'distinct local minima' if distinct != 1 else 'distinct'}."
+    )
+
+
+def _search_name(fit: Identification, contents: ReportContents) -> str:
+    """Of the search, as the identification or the study states it; "" where that is not known."""
+    stated: Any = fit.search_trace.search if fit.search_trace is not None else fit.provenance.get("search", "")
+    part = contents.provenance.settings.get("identification")
+    if not stated and isinstance(part, Mapping):
+        stated = part.get("search", "")
+    return str(stated).lower()
+
+
+# ---- weights and noise -----------------------------------------------------------------------------------------------
+
+
+def _weights(fit: Identification, references: References) -> list[str]:
+    settings = fit.settings
+    offsets = any(n.kind == "offset" for n in settings.nuisances)
+    estimated = [*(["offsets of tests"] if offsets else []), *(["the scatter of rates"] if rate_estimated(fit) else [])]
+    if settings.weights == "likelihood":
+        parts = listed(["white noise", "autocorrelated noise", *estimated])
+        return [
+            f"The {parts} were estimated by restricted maximum likelihood{references.cite('reml')}; 95 % intervals "
+            "follow from the whole covariance with Satterthwaite's degrees of freedom"
+            f"{references.cite('satterthwaite')}. Parameters have weak Gaussian priors, with the variance of a uniform "
+            "distribution between their bounds."
+        ]
+    if settings.weights == "noise":
+        parts = listed(["noise", *estimated, "what the law cannot follow"])
+        return [
+            f"Readings have equal weights; {parts} were estimated as variance components. 95 % intervals are those of "
+            "the covariance of this weighted least-squares estimate under the estimated noise model"
+            f"{references.cite('weighted least squares')}, H⁻¹ (Jᵀ W C W J + P) H⁻¹ with H = Jᵀ W J + P, where J are "
+            "the derivatives of the residuals, W the weights, C the covariance of the noise and P the precision of the "
+            "priors, with Student's quantiles."
+        ]
+    if settings.weights == "equal":
+        return ["The sum of the relative squared errors of the outputs was minimised, each output with equal weight."]
+    if settings.weights == "paper":
+        chen = references.cite("chen")
+        return [f"The sum of the relative squared errors was minimised with 0.99 of the weight on the amplitude{chen}."]
+    weights = ", ".join(f"{name.replace('_', ' ')} {number(value, 3)}" for name, value in settings.weights.items())
+    return [f"The sum of the relative squared errors of the outputs was minimised, with the weights {weights}."]
+
+
+def _offsets(fit: Identification, *, numbers: bool) -> list[str]:
+    """The prior of offsets of tests; numbers : whether an estimated standard deviation is stated."""
+    offsets = [n for n in fit.settings.nuisances if n.kind == "offset"]
+    if not offsets:
+        return ["No offsets of tests were allowed."]
+    given = [n for n in offsets if n.sd is not None]
+    sizes = [
+        f"{name.replace('_', ' ')} {number(one.offset, 2)} {output_unit(name)}".rstrip()
+        for name, one in fit.noise_model.outputs.items()
+        if one.offset > 0
+    ]
+    was = "as was given" if len(given) == len(offsets) else "estimated from the tests"
+    stated = f" ({listed(sizes)})" if sizes and (numbers or given) else ""
+    return [
+        f"The offset of each output of a test has a Gaussian prior about zero, its standard deviation {was}{stated}."
+    ]
+
+
+def _autocorrelation(fit: Identification, *, numbers: bool) -> list[str]:
+    """What is autocorrelated, and how; numbers : whether sizes and lengths are stated."""
+    noise = fit.noise_model
+    if fit.settings.weights != "likelihood":
+        return []
+    sentences = [
+        "Autocorrelated parts have the covariance s² exp(-d / l) at a distance d, in ln t of outputs that are compared "
+        f"by their logarithm and else in time over the duration of a test; those were kept by which the likelihood "
+        f"gains more than by chance in {100 * AUTOCORRELATION_CONFIDENCE:g} % of cases."
+    ]
+    if numbers and noise.discrepancy > 0:
+        logarithmic = any(is_logarithmic(name) for name in noise.outputs)
+        length = noise.discrepancy_length / (1.0 if logarithmic else LINEAR_COORDINATE_LENGTH)
+        sentences.append(
+            f"What the law cannot follow has s = {number(noise.discrepancy, 3)} times the noise of a reading and l = "
+            f"{number(length, 3)}."
+        )
+    return sentences
+
+
+def _noise_priors(fit: Identification, *, numbers: bool) -> str:
+    """The prior about noise that the tests state, where there is some."""
+    stated = [
+        f"{name.replace('_', ' ')} {number(one.stated, 3)}{f' {unit}' if (unit := output_unit(name)) else ''}"
+        for name, one in fit.noise_model.outputs.items()
+        if one.stated > 0
+    ]
+    if not stated:
+        return ""
+    return (
+        f"The noise of a reading has a log-normal prior about the noise that the tests state"
+        f"{f' ({listed(stated)})' if numbers else ''}, with a standard deviation of {number(NOISE_PRIOR_SD, 2)} of its "
+        "logarithm."
+    )
+
+
+def _scatter_over_materials(fits: Sequence[Identification]) -> list[str]:
+    """The same of several materials, one sentence with the range for all of whom it is alike."""
+    groups: dict[str, list[Identification]] = {}
+    for fit in fits:
+        if any(n.kind == "rate" and not n.is_simulated for n in fit.settings.nuisances):
+            groups.setdefault(scatter_text(fit, "", ""), []).append(fit)
+        else:
+            groups.setdefault(rate_scatter_sentence(fit), [])
+    sentences = []
+    for text, alike in groups.items():
+        if not alike:
+            sentences.append(text)
+            continue
+        low, high = (number(100 * f(fit.noise_model.rate for fit in alike), 3) for f in (min, max))
+        counts = sorted({len(fit.tests) for fit in alike})
+        tests = plural(counts[0], "test") if len(counts) == 1 else f"{counts[0]} to {counts[-1]} tests"
+        of = "" if len(groups) == 1 else f"Of {plural(len(alike), 'material')}: "
+        sentences.append(of + scatter_text(alike[0], f"{low} %" if low == high else f"{low} to {high} %", tests))
+    return sentences
+
+
+def _explicit_nuisances(fit: Identification) -> str:
+    explicit = [n for n in fit.settings.nuisances if n.is_simulated]
+    if not explicit:
+        return ""
+    priors = {(n.key, n.prior_mean, n.prior_sd) for n in fit.nuisances}
+    named = [
+        f"{key} {number(mean)} ± {number(sd, 2)} {nuisance_unit(kind_and_start(key)[0])}".rstrip()
+        for key, mean, sd in sorted(priors)
+    ]
+    if not named or len(named) > MOST_NAMED:
+        named = list(dict.fromkeys(n.kind for n in explicit))
+    return f"Nuisance parameters with Gaussian priors (mean ± standard deviation) were {listed(named)}."
+
+
+def _penalty(found: GroupFindings) -> str:
+    """The penalty on terms of a sum, where one was used."""
+    sparse = next((one.sparsity for one in found.fits if one.sparsity is not None), None)
+    if sparse is None:
+        return ""
+    strength = "" if sparse.strength is None else f" of strength {number(sparse.strength, 3)}"
+    dropped = f"; left out were {listed([*sparse.dropped_terms])}" if sparse.dropped_terms else "; all terms stayed"
+    return (
+        f"The terms of the sum {printable(sparse.law, 120)} were selected by the penalty {sparse.penalty}{strength} "
+        f"and confirmed by BIC{dropped}."
+    )
+
+
+# ---- comparison and adequacy -----------------------------------------------------------------------------------------
+
+
+CRITERIA = {
+    "bic": ("Bayesian information criterion", "K ln n"),
+    "aicc": ("corrected information criterion of Akaike", "2 K + 2 K (K + 1) / (n - K - 1)"),
+}
+"""{criterion: its name, and its penalty for K parameters and n readings}."""
+
+
+def ranking_sentences(found: GroupFindings, references: References, *, numbers: bool) -> list[str]:
+    """How the laws of a material were compared; numbers : whether n is stated, as of one material alone."""
+    ranking = found.ranking
+    if ranking is None:
+        return []
+    by_likelihood = found.fit.settings.weights == "likelihood"
+    if ranking.criterion in CRITERIA:
+        name, penalty = CRITERIA[ranking.criterion]
+        n = f" (n = {number(ranking.independent_frames, 4)})" if numbers and _known(ranking.independent_frames) else ""
+        deviance = (
+            "chi-square, under the covariance of the law that fits the tests best, plus the logarithm of the "
+            "determinant that integrates nuisance parameters out"
+            if by_likelihood
+            else "-2 ln L, multiplied by the number of independent readings over that of all"
+        )
+        criterion = (
+            f"{name}{references.cite(ranking.criterion)}: {deviance}, plus {penalty} for K parameters that the tests "
+            f"determine and n independent readings, as many as their autocorrelation leaves{n}"
+        )
+    else:
+        criterion = "error of tests that were held out"
+    return [
+        f"The laws were compared by the {criterion}.",
+        "The weight of a law is exp(-difference / 2) over the sum of all laws tried, and a law is credible with a "
+        f"weight above {CREDIBLE_WEIGHT:g}. A law is called decisive where its weight is above {DECISIVE_WEIGHT:g}, it "
+        "was among the laws asked for, it is not contradicted by the tests, and neither a share of another law nor an "
+        "effect that was not modelled changes that.",
+    ]
+
+
+def _known(value: float) -> bool:
+    return math.isfinite(value) and value > 0
+
+
+def adequacy_sentences(found: Sequence[GroupFindings], references: References) -> list[str]:
+    """How it was judged whether the tests contradict a law; none where it was not."""
+    judged = [one.fit.adequacy for one in found if one.fit.adequacy is not None]
+    if not judged:
+        return []
+    sources = {output.noise_source for one in judged for output in one.outputs}
+    estimated = (
+        " Noise that no test states is estimated from the third differences of neighbouring readings, with "
+        f"{FREEDOM_PER_FRAME:g} degrees of freedom for each of them; chi-square over its degrees of freedom then has "
+        "the F distribution for one test, and for several that of a scaled chi-square with the same mean and variance"
+        f"{references.cite('satterthwaite')}."
+        if "estimated" in sources
+        else ""
+    )
+    freedom = (
+        f" Here it has {number(judged[0].freedom, 4)} degrees of freedom."
+        if len(judged) == 1 and _known(judged[0].freedom)
+        else ""
+    )
+    several = " (the least of those of all outputs and of each one, times their number)"
+    scatter = number(math.exp(LARGEST_SCATTER), 2)
+    return [
+        "A law is not contradicted by the tests where its chi-square, against noise that was stated or estimated "
+        f"without the law, has a probability of at least {100 * SIGNIFICANCE:g} %"
+        f"{several if any(len(one.outputs) > 1 for one in judged) else ''}, the rates of tests scatter by less than a "
+        f"factor of {scatter}, and nothing else explains that scatter six times better: a stress exponent that "
+        "changes with stress, an activation energy that changes with temperature, one test, or two groups of tests. "
+        f"Degrees of freedom are the readings less the unknowns that they determine.{freedom}{estimated}"
+    ]
+
+
+# ---- other stages ----------------------------------------------------------------------------------------------------
 
 
 def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> str:

@@ -3,28 +3,40 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
 from creepkit.inverse.compared_tests import UNTESTABLE, rests_on_durations
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
 from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, chi_square_by_test
 from creepkit.records import is_logarithmic
 from creepkit.reports.answer import titled_law, unit_text, value_cells
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
+from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
+from creepkit.reports.figures import empty_figure, logarithmic_labels, power_of_ten, save_figure, shortened, wrapped
 from creepkit.reports.identification import rejected, scatter_of_rates, verdict_given_law
+from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
 from creepkit.reports.json_values import fields_to_json
-from creepkit.reports.ranking_plot import misfit_name, ranking_figure
+from creepkit.reports.judged_readings import judged_readings, misfit_of
+from creepkit.reports.load_programs import program_text
+from creepkit.reports.prediction_bands import FittedCurves, axis_label, curve_of_test, fitted_curves
 from creepkit.reports.terminal import print_table, tell, tell_written
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.discrimination import EquivalentLaws
-    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.selection.ranking import RankedLaw, Ranking
     from creepkit.reports.svg import PageFigures
+
 
 CRITERIA = {"bic": "BIC", "aicc": "AICc"}
 """Abbreviations of the criteria by which laws are ranked."""
@@ -215,3 +227,229 @@ def _fit_to_json(fit: Identification) -> dict[str, Any]:
         **{name: getattr(fit, name) for name in ("errors", "adequacy", "numerical_error", "nuisances", "noise_model")},
         "notes": list(fit.notes),
     }
+
+
+# ---- figure ----------------------------------------------------------------------------------------------------------
+
+
+MOST_TESTS_DRAWN = 6
+"""Tests whose curves are drawn: those in which the credible laws differ most."""
+
+
+MOST_LAWS_DRAWN = 5
+"""Credible laws whose curves are drawn, the best first."""
+
+
+MOST_TEST_NAMES = 24
+"""Above this many tests the columns of the misfits are numbered by condition instead of named."""
+
+
+SHOWN_QUANTILE = 0.97
+"""Of the misfits: where the colours end. A test of hardly any noise has a misfit of any size."""
+
+
+MOST_NUMBERS = 14
+"""Up to this many tests each misfit is written in its cell."""
+
+
+PANEL_WIDTH = 3.0
+"""Inches of the title of one test's panel, as wide as its axes."""
+
+
+NOT_JUDGED = "this noise is not known well enough to judge the laws by it: compare them, not with 1"
+
+
+OWN_RATE_MISFIT = "reduced chi-square of each law in each test, its own rate and offset taken out (1: noise alone)"
+"""Of laws whose tests are at hand, judged as where it is said whether they explain them."""
+
+
+COMMON_RATE_MISFIT = "mean square misfit of each law in each test over noise², the law's rate for every test"
+"""Of identifications without their tests."""
+
+
+def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
+    """Draw the misfit of each law in each test, the weights, and the curves of the laws that tests do not tell apart.
+
+    The misfit is that of `misfits`; the title is the verdict.
+    """
+    credible = [r for r in ranking.laws if r.weight > CREDIBLE_WEIGHT][:MOST_LAWS_DRAWN]
+    with_tests = all(r.fit.histories and r.fit.predictor is not None for r in credible)
+    curves = [fitted_curves(r.fit) for r in credible] if with_tests and len(credible) > 1 else []
+    shown = _tests_to_draw([r.fit for r in credible], curves) if curves else []
+    columns = min(3, len(shown))
+    rows = -(-len(shown) // 3)
+    misfits_height = 2.0 + 0.42 * len(ranking.laws)
+    width = 12.5
+    figure = empty_figure(width, misfits_height + 3.0 * rows + 0.7)
+    heights = [misfits_height, 3.0 * rows] if shown else [misfits_height]
+    parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    _draw_misfits(parts[0], ranking)
+    if shown:
+        panels = list(parts[1].subplots(rows, columns, squeeze=False).flat)
+        for axes, test in zip(panels, shown, strict=False):
+            _draw_test(axes, credible, curves, test)
+        for axes in panels[len(shown) :]:
+            axes.set_visible(False)
+        _name_laws(parts[1], credible, every_test=len(shown) == len(ranking.best.tests))
+    title = ranking.verdict
+    figure.suptitle(wrapped(title, width), fontsize=10)
+    return save_figure(figure, path)
+
+
+# ---- misfits and weights ---------------------------------------------------------------------------------------------
+
+
+def misfit_name(ranking: Ranking) -> str:
+    """What `misfits` are of a ranking."""
+    return OWN_RATE_MISFIT if _all_judged(ranking) else COMMON_RATE_MISFIT
+
+
+def _all_judged(ranking: Ranking) -> bool:
+    return all(judged_readings(ranked.fit) is not None for ranked in ranking.laws)
+
+
+def misfits(ranking: Ranking) -> Floats:
+    """(laws, tests) misfit of each law in each test, in the order of the ranking and of its tests.
+
+    The reduced chi-square by which laws are judged, tests with their own rates, lives and offsets; where tests or
+    their noise are not known, that against the noise of a frame with the laws' own rates.
+    """
+    if _all_judged(ranking):
+        readings = [judged_readings(ranked.fit) for ranked in ranking.laws]
+        return np.array([[one.chi_square(k) for k in range(len(ranking.best.tests))] for one in readings if one])
+    return np.array([[misfit_of(test) for test in ranked.fit.tests] for ranked in ranking.laws])
+
+
+def _draw_misfits(part: Any, ranking: Ranking) -> None:
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import NullLocator
+
+    heat, bars = part.subplots(1, 2, width_ratios=(4.0, 1.0), sharey=True)
+    order = _columns(ranking.best)
+    values = misfits(ranking)[:, order]
+    finite = values[np.isfinite(values) & (values > 0)]
+    low, high = np.quantile(finite, (0.0, SHOWN_QUANTILE)) if finite.size else (1.0, 1.0)
+    labels = logarithmic_labels(min(float(low), 0.8), max(float(high), 2.0), 6)
+    image = heat.imshow(
+        np.where(values > 0, values, np.nan), norm=LogNorm(labels[0], labels[-1]), cmap="YlOrRd", aspect="auto"
+    )
+    heat.set_yticks(range(len(ranking.laws)), [_law_name(r) for r in ranking.laws], fontsize=8)
+    _label_tests(heat, ranking.best, order)
+    if len(order) <= MOST_NUMBERS:
+        middle = float(np.sqrt(labels[0] * labels[-1]))
+        for (row, column), value in np.ndenumerate(values):
+            colour = "white" if value > middle * (labels[-1] / middle) ** 0.4 else "black"
+            heat.text(column, row, _number(value), ha="center", va="center", fontsize=7.5, color=colour)
+    extend = "max" if (finite > labels[-1]).any() else "neither"
+    bar = part.colorbar(image, ax=heat, label="misfit / noise²", pad=0.01, aspect=12, extend=extend)
+    bar.set_ticks(list(labels), labels=[_number(v) for v in labels])
+    bar.ax.yaxis.set_minor_locator(NullLocator())
+    adequacy = ranking.best.adequacy
+    judged = adequacy is None or adequacy.outputs
+    title = wrapped(misfit_name(ranking), 6.5, 9.0)
+    heat.set_title(title if judged else f"{title}\n{NOT_JUDGED}", fontsize=9)
+    weights = [r.weight for r in ranking.laws]
+    bars.barh(range(len(weights)), weights, color=_law_colours(ranking), height=0.6)
+    for row, weight in enumerate(weights):
+        inside = weight > 0.7
+        place = (weight - 0.03, "right", "white") if inside else (weight + 0.03, "left", "black")
+        bars.text(place[0], row, f"{weight:.3f}", va="center", ha=place[1], color=place[2], fontsize=8)
+    bars.set(xlim=(0.0, 1.0), xticks=(0.0, 0.5, 1.0), xlabel="weight among the laws tried")
+    bars.xaxis.label.set_fontsize(9)
+    bars.tick_params(axis="y", labelleft=False)
+    bars.grid(axis="x", alpha=0.25)
+
+
+def _number(value: float) -> str:
+    """Two digits; large numbers as powers of ten."""
+    if not np.isfinite(value):
+        return "-"
+    return f"{value:.2g}" if value < 100 else f"{value:.0f}" if value < 9999.5 else power_of_ten(float(f"{value:.0e}"))
+
+
+def _law_name(ranked: RankedLaw) -> str:
+    return ranked.fit.law.name
+
+
+def _law_colours(ranking: Ranking) -> list[Any]:
+    """Those of the curves; grey for laws whose curves are not drawn."""
+    colours = distinct_colours(MOST_LAWS_DRAWN)
+    return [
+        colours[k] if r.weight > CREDIBLE_WEIGHT and k < MOST_LAWS_DRAWN else "0.6" for k, r in enumerate(ranking.laws)
+    ]
+
+
+def _columns(fit: Identification) -> list[int]:
+    """The tests from the coldest to the hottest, of one temperature (or without histories) P2 before P10."""
+    names = [_natural_order(test.name) for test in fit.tests]
+    celsius = np.round(temperatures_celsius(fit.histories)) if fit.histories else np.zeros(len(names))
+    return sorted(range(len(names)), key=lambda k: (float(celsius[k]), names[k]))
+
+
+def _natural_order(name: str) -> list[tuple[int, int, str]]:
+    """A key by which numbers within names count as numbers; other text goes before them where both begin alike."""
+    return [(1, int(part), "") if part.isdecimal() else (0, 0, part) for part in re.split(r"(\d+)", name) if part]
+
+
+def _label_tests(axes: Axes, fit: Identification, order: Sequence[int]) -> None:
+    """Names of the tests; of many, the temperature of each run of equal ones."""
+    if len(order) <= MOST_TEST_NAMES or not fit.histories:
+        step = -(-len(order) // MOST_TEST_NAMES)
+        names = [shortened(fit.tests[k].name) for k in order[::step]]
+        axes.set_xticks(range(0, len(order), step), names, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
+        return
+    celsius = np.round(temperatures_celsius(fit.histories))[list(order)]
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(celsius) > 0) + 1, [celsius.size]])
+    for edge in edges[1:-1]:
+        axes.axvline(edge - 0.5, color="black", lw=0.8)
+    centres = 0.5 * (edges[:-1] + edges[1:]) - 0.5
+    step = -(-centres.size // MOST_TEST_NAMES)
+    names = [f"{celsius[edge]:.0f}" for edge in edges[:-1:step]]
+    axes.set_xticks(list(centres[::step]), names, fontsize=8)
+    axes.set_xlabel(f"{len(order)} tests, by temperature, °C", fontsize=9)
+
+
+# ---- curves ----------------------------------------------------------------------------------------------------------
+
+
+def _tests_to_draw(fits: Sequence[Identification], curves: Sequence[FittedCurves]) -> list[int]:
+    """Positions of the tests in which the laws differ most, in noises; of one law, of its largest misfits."""
+    with_frames = [k for k, test in enumerate(fits[0].tests) if test.outputs]
+    if len(with_frames) <= MOST_TESTS_DRAWN:
+        return with_frames
+    scores = np.array([_separation(fits, curves, test) for test in with_frames])
+    chosen = np.argsort(-np.nan_to_num(scores), kind="stable")[:MOST_TESTS_DRAWN]
+    return [with_frames[k] for k in np.sort(chosen)]
+
+
+def _separation(fits: Sequence[Identification], curves: Sequence[FittedCurves], test: int) -> float:
+    """Root mean square distance of the laws' curves in a test, over the noise; of one law its own misfit."""
+    if len(fits) == 1:
+        return misfit_of(fits[0].tests[test])
+    output = fits[0].tests[test].outputs[0]
+    values = np.stack([c.of(test, output.output)[0] for c in curves])
+    distance = float(np.sqrt(np.nanmean((values - values[0])[1:] ** 2)))
+    return distance / output.noise if output.noise > 0 else distance
+
+
+def _draw_test(axes: Axes, laws: Sequence[RankedLaw], curves: Sequence[FittedCurves], test: int) -> None:
+    history, output = laws[0].fit.histories[test], laws[0].fit.tests[test].outputs[0].output
+    drawn = [curve_of_test(r.fit, c, test, output) for r, c in zip(laws, curves, strict=True)]
+    for k, (curve, colour) in enumerate(zip(drawn, distinct_colours(len(laws)), strict=True)):
+        draw_curve(axes, curve, colour, "-" if k == 0 else "--", dots="0.35" if k == 0 else None)
+    set_curve_ranges([axes], drawn, output)
+    axes.set(xlabel="time, h", ylabel=axis_label(output))
+    title = f"{shortened(history.name, 48)}: {shortened(program_text(history), 96)}"
+    axes.set_title(wrapped(title, PANEL_WIDTH), fontsize=8.5)
+
+
+def _name_laws(part: Any, laws: Sequence[RankedLaw], every_test: bool) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], color="0.35", marker=".", ls="none")]
+    labels = ["measured"]
+    for k, (ranked, colour) in enumerate(zip(laws, distinct_colours(len(laws)), strict=True)):
+        handles.append(Line2D([], [], color=colour, ls="-" if k == 0 else "--"))
+        labels.append(f"{_law_name(ranked)}, weight {ranked.weight:.3f}")
+    title = "credible laws with their 95 % bands" + ("" if every_test else "; the tests in which they differ most")
+    part.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, title=title, title_fontsize=8)

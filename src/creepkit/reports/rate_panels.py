@@ -16,12 +16,13 @@ from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_st
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, Prediction
 from creepkit.records.units import celsius_text
-from creepkit.reports.condition_colours import ColourScale, temperature_scale, tested_temperatures
-from creepkit.reports.figures import place_legend_right, set_range
+from creepkit.reports.condition_colours import ColourScale, distinct_colours, temperature_scale, tested_temperatures
+from creepkit.reports.figures import panels_of, place_legend_right, set_range, shortened
 from creepkit.reports.prediction_bands import HoldRate, rates_of_tests
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.single_values import SingleValue
@@ -83,7 +84,6 @@ def _draw_reference_rates(axes: Axes, fit: Identification, rates: Sequence[HoldR
     finite = [b for b in bounds if np.isfinite(b) and b > 0]
     set_range(axes, "y", max(min(finite), 1e-12 * max(finite)), max(finite), logarithmic=True)
     axes.set(xlabel="von Mises stress, MPa", ylabel="creep rate, %/h")
-    axes.grid(alpha=0.25)
     place_legend_right(axes, "95 % band:\nlaw")
     reference = fit.reference
     initial = "\ninternal variables as at the start, not those of a test" if fit.law.states else ""
@@ -131,7 +131,6 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
     if any(r.censored for r, _ in ruptures):
         axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped: broke\nlater, if at all")
     axes.set(xlabel="measured time to rupture, h", ylabel="identified time to rupture, h", ylim=tuple(limits))
-    axes.grid(alpha=0.25)
     place_legend_right(axes)
     axes.set_title(
         "time to rupture; bars: 95 % of a single test\n(if the law is right; with scatter between tests)", fontsize=9
@@ -203,7 +202,6 @@ def draw_minimum_rates(axes: Axes, fit: Identification, rates: Sequence[MinimumR
     set_range(axes, "y", 0.8 * float(values.min()), 1.25 * float(values.max()), logarithmic=True)
     axes.plot([], [], "o", ms=4, color="grey", mec="black", mew=0.4, label="measured")
     axes.set(xlabel="stress, MPa", ylabel="minimum creep rate, %/h")
-    axes.grid(alpha=0.25)
     place_legend_right(axes, "line: by the law;\nband: 95 % of\na single test")
     sentence = exponent_sentence(rates)
     heading = "minimum creep rate of the tests"
@@ -250,3 +248,48 @@ def _column(rates: Sequence[MinimumRate], name: str) -> Floats:
 def _positive(values: Sequence[float]) -> Floats:
     array = np.array(values, float)
     return np.asarray(array[np.isfinite(array) & (array > 0)])
+
+
+# ---- the map of a plate ----------------------------------------------------------------------------------------------
+
+
+MOST_LAWS = 10
+"""Laws with a colour of their own."""
+
+
+WIDTH, ROW, LARGEST = 8.6, 0.17, 11.0
+"""Inches of the figure, of a material in it, and of its height at most."""
+
+
+def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
+    """Rates in %/h with 95 % intervals at the median stress of all; fits : (material, best law), in the order drawn."""
+    stress = float(np.median([fit.reference.stress for _, fit in fits]))
+    figure, axes = panels_of(WIDTH, min(1.4 + ROW * max(len(fits), 12), LARGEST))
+    laws = list(dict.fromkeys(fit.law.name for _, fit in fits))
+    colours = dict(zip(laws, distinct_colours(len(laws)), strict=True))
+    rates = np.array([[float(v) for v in fit.rate(stress, warn=False)] for _, fit in fits])
+    rates = PERCENT_PER_HOUR * rates
+    centre = rates[:, 0][np.isfinite(rates[:, 0]) & (rates[:, 0] > 0)]
+    named: set[str] = set()
+    for k, ((_, fit), (rate, low, high)) in enumerate(zip(fits, rates, strict=True)):
+        if not rate > 0:
+            continue
+        agrees = fit.adequacy is not None and fit.adequacy.explains
+        label = fit.law.name if fit.law.name not in named and len(named) < MOST_LAWS else None
+        named.add(fit.law.name)
+        colour = colours[fit.law.name]
+        ends = [[max(rate - max(low, rate / 1e3), 0.0)], [max(min(high, 1e3 * rate) - rate, 0.0)]]
+        axes.errorbar(
+            rate, k, xerr=ends, fmt="o", ms=4.5, lw=0.9, color=colour, mfc=colour if agrees else "white", label=label
+        )
+    if centre.size:
+        drawn = rates[:, 1:][
+            (rates[:, 1:] > centre.min() / DRAWN_FACTOR) & (rates[:, 1:] < centre.max() * DRAWN_FACTOR)
+        ]
+        every = np.concatenate([centre, drawn])
+        set_range(axes, "x", float(every.min()), float(every.max()), logarithmic=True)
+    axes.set_yticks(range(len(fits)), [shortened(name, 24) for name, _ in fits], fontsize=7 if len(fits) > 20 else 8)
+    axes.set_ylim(len(fits) - 0.5, -0.5)
+    axes.set(xlabel=f"creep rate at {stress:.3g} MPa, %/h")
+    place_legend_right(axes, "law; open:\ncontradicted\nby its tests")
+    return figure

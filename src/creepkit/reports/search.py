@@ -10,7 +10,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.sparsity.result import LEAST_CONTRIBUTION
 from creepkit.reports.blocks import aligned
-from creepkit.reports.figures import empty_figure, place_legend_below, save_figure, set_range
+from creepkit.reports.figures import panels_of, place_legend_below, save_figure, set_range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,8 +31,7 @@ MARKER_LIMIT = 60
 
 def search_figure(trace: SearchTrace, path: str | Path | None = None) -> Figure:
     """The lowest cost over iterations, and how the candidates spread."""
-    figure = empty_figure(7.0, 4.4)
-    axes = figure.subplots()
+    figure, axes = panels_of(7.0, 4.4)
     _draw_costs(axes, trace)
     _draw_evaluations(axes, trace)
     place_legend_below(figure, axes)
@@ -59,7 +58,6 @@ def _draw_costs(axes: Axes, trace: SearchTrace) -> None:
     set_range(axes, "y", 0.9 * float(drawn.min()), 1.1 * float(drawn.max()), logarithmic=True)
     axes.set_ylabel("cost (half of chi-square,\nbound penalties and penalty included)")
     axes.set_title(trace.search, fontsize=10)
-    axes.grid(alpha=0.25)
 
 
 def _draw_evaluations(axes: Axes, trace: SearchTrace) -> None:
@@ -110,8 +108,7 @@ SMALLEST_DRAWN_RISE = 0.1
 
 def penalty_path_figure(path: PenaltyPath, file: str | Path | None = None) -> Figure:
     """Contributions on the left axis, the rise of chi-square on the right one."""
-    figure = empty_figure(7.2, 4.4)
-    axes = figure.subplots()
+    figure, axes = panels_of(7.2, 4.4)
     positions = _strength_positions(path.strengths)
     for label, contribution in zip(path.terms, path.contributions.T, strict=True):
         axes.plot(positions, contribution, "o-", ms=4, lw=1.6, label=label)
@@ -119,7 +116,6 @@ def penalty_path_figure(path: PenaltyPath, file: str | Path | None = None) -> Fi
     axes.axhspan(0.0, 0.05, color="black", alpha=0.06, lw=0)
     axes.set(xscale="log", ylim=(0, 1.05), xlabel="strength of the penalty", ylabel="contribution of each term")
     _draw_ticks(axes, path, positions)
-    axes.grid(alpha=0.25)
     _draw_chi_square(axes, path, positions)
     place_legend_below(figure, axes, columns=4)
     axes.set_title(f"{path.penalty}: terms below 5 % (grey) are dropped", fontsize=10)

@@ -11,7 +11,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline, shape_functions
 from creepkit.records import Output, Status, output_named
-from creepkit.reports.figures import empty_figure, save_figure, set_range
+from creepkit.reports.figures import panels_of, save_figure, set_range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,8 +50,7 @@ def section_figure(run: BulgeRun, time: float | None, name: str, path: str | Pat
     field = run.field(name, time)
     body = run.test.model
     moved = body.nodes + run._at(run.simulation.displacements, time)
-    figure = empty_figure(9.0, 3.1)
-    axes = figure.subplots()
+    figure, axes = panels_of(9.0, 3.1)
     places, facets = _facets(moved[body.elements])
     values = _at_facets(field.values.reshape(-1, 4), body.elements)
     for side in (1.0, -1.0):
@@ -74,8 +73,14 @@ def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
     for name in run.outputs:
         output = output_named(name, run.specimen)
         groups.setdefault((output.quantity, output.grows), []).append(output)
-    figure = empty_figure(6.4, 3.0 + 1.2 * len(groups))
-    panels = figure.subplots(len(groups) + 1, 1, sharex=True, height_ratios=(2.0, *[1.0] * (len(groups) - 1), 0.8))
+    figure, panels = panels_of(
+        6.4,
+        3.0 + 1.2 * len(groups),
+        len(groups) + 1,
+        1,
+        sharex=True,
+        height_ratios=(2.0, *[1.0] * (len(groups) - 1), 0.8),
+    )
     hours = run.times / 3600.0
     for axes, group in zip(panels, groups.values(), strict=False):
         for k, output in enumerate(group):
@@ -99,7 +104,6 @@ def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
             (1.1 if axes is panels[-1] else 1.0) * float(values.max(initial=1e-9)),
             most=5,
         )
-        axes.grid(alpha=0.25)
     set_range(panels[-1], "x", 0.0, float(knots[-1]) / 3600.0)
     ended = f", ended at {_duration(run.end_time)}: {run.reason}" if run.reason else ""
     figure.suptitle(f"{run.name}{ended}", fontsize=10)
@@ -158,8 +162,7 @@ def _duration(time: float) -> str:
 def cubature_figure(model: ReducedOrderModel, path: str | Path | None = None) -> Figure:
     """The section at rest with the points where a reduced-order model evaluates the law; areas are weights."""
     body, basis = model.model, model.basis
-    figure = empty_figure(9.0, 2.6)
-    axes = figure.subplots()
+    figure, axes = panels_of(9.0, 2.6)
     _draw_outline(axes, body.nodes, body.elements, 1.0, color=_GREY, linewidth=0.8)
     places = np.einsum("pa,eai->epi", shape_functions(GAUSS_POINTS), body.nodes[body.elements]).reshape(-1, 2)
     weights = basis.factors * body.weights.ravel()[basis.points]

@@ -11,7 +11,7 @@ import numpy as np
 from creepkit.errors import SurrogateError
 from creepkit.records import output_named
 from creepkit.reports.blocks import aligned
-from creepkit.reports.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
+from creepkit.reports.figures import empty_figure, make_folder, panels_of, place_legend_below, save_figure, set_range
 from creepkit.surrogates.evaluation import PredictionComparison, evaluate, worst_histories
 from creepkit.surrogates.recipe import SurrogateMetadata
 
@@ -57,7 +57,6 @@ def training_curves(metadata: SurrogateMetadata, path: str | Path | None = None)
     for k in rate_drops:
         axes.axvline(k + 1, color="grey", lw=0.8, ls=":", label="rate falls" if k == rate_drops[0] else None)
     axes.set(xlabel="epoch", ylabel="loss", yscale="log", title=f"{metadata.law.name}, {metadata.specimen.name}")
-    axes.grid(alpha=0.25)
     losses = np.concatenate([curves_by_name[name] for name in ("loss", "validation", "rse")])
     losses = losses[np.isfinite(losses) & (losses > 0)]
     set_range(axes, "y", float(losses.min()), float(losses.max()), logarithmic=True)
@@ -67,8 +66,9 @@ def training_curves(metadata: SurrogateMetadata, path: str | Path | None = None)
 
 def parity_figure(comparison: PredictionComparison, times: Sequence[float], path: str | Path | None = None) -> Figure:
     """Predicted against true outputs at some times: a row each time, a column each output."""
-    figure = empty_figure(3.4 * len(comparison.outputs) + 0.4, 3.1 * len(times))
-    panels = figure.subplots(len(times), len(comparison.outputs), squeeze=False)
+    figure, panels = panels_of(
+        3.4 * len(comparison.outputs) + 0.4, 3.1 * len(times), len(times), len(comparison.outputs), squeeze=False
+    )
     for row, time in zip(panels, times, strict=True):
         true, predicted = comparison.at_time(time)
         for k, (axes, name) in enumerate(zip(row, comparison.outputs, strict=True)):
@@ -97,14 +97,13 @@ def _draw_parity(axes: Axes, true: Any, predicted: Any) -> None:
         slope = ((true - true.mean()) * predicted).sum() / spread
         r_squared = 1.0 - ((predicted - true) ** 2).sum() / spread
         axes.text(0.04, 0.96, f"slope {slope:.4f}\nR2 {r_squared:.4f}", va="top", fontsize=8, transform=axes.transAxes)
-    axes.grid(alpha=0.25)
 
 
 def worst_samples_figure(comparison: PredictionComparison, path: str | Path | None = None) -> Figure:
     """The samples with the largest errors of the first output, simulated and predicted over time."""
     rows = worst_histories(comparison, comparison.largest_errors())[:WORST_SHOWN]
-    figure = empty_figure(9.6, 5.6)
-    panels = figure.subplots(2, 3).ravel()
+    figure, grid = panels_of(9.6, 5.6, 2, 3)
+    panels = grid.ravel()
     for axes in panels[len(rows) :]:
         axes.axis("off")
     for axes, sample in zip(panels, rows, strict=False):
@@ -184,13 +183,11 @@ def size_study_figure(results: Sequence[SizeStudyResult], path: str | Path | Non
     from matplotlib import colormaps
 
     ordered = sorted(results, key=lambda e: e.loss)
-    canvas = empty_figure(11.0, max(3.8, 0.28 * len(ordered) + 1.6))
-    left, right = canvas.subplots(1, 2, width_ratios=(1.15, 1.0))
+    canvas, (left, right) = panels_of(11.0, max(3.8, 0.28 * len(ordered) + 1.6), 1, 2, width_ratios=(1.15, 1.0))
     shades: list[Any] = [colormaps["viridis"](0.92 * k / max(len(ordered) - 1, 1)) for k in range(len(ordered))]
     for result, shade in reversed(list(zip(ordered, shades, strict=True))):
         left.plot(np.arange(1, len(result.losses) + 1), result.losses, lw=1.2, color=shade)
     left.set(xlabel="epoch", ylabel="loss of validation rows, Eq. (4)", yscale="log")
-    left.grid(alpha=0.25)
     positions = np.arange(len(ordered))
     for position, result, shade in zip(positions, ordered, shades, strict=True):
         right.plot([result.training, result.loss], [position, position], "-", lw=1.0, color="grey")
@@ -205,6 +202,5 @@ def size_study_figure(results: Sequence[SizeStudyResult], path: str | Path | Non
     set_range(right, "x", min(ends), max(ends), logarithmic=True, most=6)
     right.set_yticklabels([result_entry.label for result_entry in ordered], fontsize=8)
     right.invert_yaxis()
-    right.grid(alpha=0.25)
     place_legend_below(canvas, right)
     return save_figure(canvas, path, SurrogateError)

@@ -17,7 +17,7 @@ from creepkit.language import Param
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import equations, unit_text, value_cells
 from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, Verbatim, as_text
-from creepkit.reports.figures import empty_figure, place_legend_right, save_figure, set_range
+from creepkit.reports.figures import panels_of, place_legend_right, save_figure, set_range
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,8 +45,7 @@ def plot_temperature_law(temperature_law: TemperatureLaw, path: str | Path | Non
     names = temperature_law.isothermal_law.names
     columns = min(MAX_PANELS_PER_ROW, len(names))
     rows = -(-len(names) // columns)
-    figure = empty_figure(5.2 * columns, 3.7 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False)
+    figure, panels = panels_of(5.2 * columns, 3.7 * rows, rows, columns, squeeze=False)
     for k, name in enumerate(names):
         _plot_parameter(panels.flat[k], temperature_law, coordinates, k)
         panels.flat[k].set_title(_panel_title(temperature_law, coordinates, k, name), fontsize=9)
@@ -109,7 +108,6 @@ def _plot_parameter(axes: Any, temperature_law: TemperatureLaw, coordinates: Coo
     set_range(axes, "y", lowest - margin, highest + margin)
     axes.set(xlabel="temperature, K")
     place_legend_right(axes, "form, weight", size=7)
-    axes.grid(alpha=0.25)
 
 
 def _with_margin(ends: tuple[float, float]) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from creepkit.errors import FitError
 from creepkit.records import ZERO_CELSIUS
 from creepkit.records.units import celsius_text
 from creepkit.reports.blocks import aligned
-from creepkit.reports.figures import empty_figure, place_legend_right, save_figure, set_range, wrapped
+from creepkit.reports.figures import empty_figure, panels_of, place_legend_right, save_figure, set_range, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +47,7 @@ def _unit_text(unit: str) -> str:
 
 def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -> Figure:
     """The rise of chi-square over the quantity, its limit, and the parabola of Laplace's approximation."""
-    figure, axes = _figure_and_axes(6.0, 4.2)
+    figure, axes = panels_of(6.0, 4.2)
     low, high = profile.laplace
     positive = bool((profile.values > 0).all()) and low > 0
     logarithmic = positive and float(profile.values.max() / profile.values.min()) > LOGARITHMIC_RATIO
@@ -68,7 +68,6 @@ def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -
     if logarithmic:
         set_range(axes, "x", *axes.get_xlim(), logarithmic=True, most=6)
     place_legend_right(axes)
-    axes.grid(alpha=0.25)
     return save_figure(figure, path)
 
 
@@ -162,7 +161,7 @@ def correlation_text(correlation: Correlation) -> str:
 def correlation_figure(correlation: Correlation, path: str | Path | None = None) -> Figure:
     """The matrix in colours from -1 to 1, with its numbers."""
     count = len(correlation.names)
-    figure, axes = _figure_and_axes(2.0 + 0.8 * count, 1.6 + 0.8 * count)
+    figure, axes = panels_of(2.0 + 0.8 * count, 1.6 + 0.8 * count)
     image = axes.imshow(correlation.matrix, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
     for row in range(count):
         for column in range(count):
@@ -206,7 +205,7 @@ def rate_bands_figure(bands: Sequence[RateBand], path: str | Path | None = None)
     """Rates over stress with their bands: lighter with the temperature's uncertainty, darker without."""
     if not bands:
         raise FitError("there are no bands to draw")
-    figure, axes = _figure_and_axes(6.6, 4.6)
+    figure, axes = panels_of(6.6, 4.6)
     for k, band in enumerate(bands):
         colour = f"C{k % 10}"
         label = f"{band.temperature - ZERO_CELSIUS:.0f} ± {band.temperature_uncertainty:g} °C"
@@ -219,12 +218,6 @@ def rate_bands_figure(bands: Sequence[RateBand], path: str | Path | None = None)
     set_range(axes, "x", float(stresses.min()), float(stresses.max()), logarithmic=True)
     set_range(axes, "y", float(rates.min()), float(rates.max()), logarithmic=True)
     axes.set(xlabel="stress, MPa", ylabel="creep rate, 1/s")
-    axes.grid(alpha=0.25)
     place_legend_right(axes, "95 %: law and\ntemperature\n(dark: law alone)")
     axes.set_title("\n".join(dict.fromkeys(band.name for band in bands)), fontsize=9)
     return save_figure(figure, path)
-
-
-def _figure_and_axes(width: float, height: float) -> tuple[Figure, Any]:
-    figure = empty_figure(width, height)
-    return figure, figure.subplots()

@@ -20,10 +20,10 @@ from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
+from creepkit.reports.answer import interval_digits
 from creepkit.reports.blocks import number
 from creepkit.reports.judged_readings import judged_readings
 from creepkit.reports.ranking import separating_test
-from creepkit.reports.stress_exponents import interval_digits
 from helpers.steady_rate_predictor import Steady, planted
 
 SETTINGS = IdentificationSettings(starts=2, sobol_points=16, nuisances=())

@@ -12,7 +12,15 @@ from markupsafe import Markup
 
 from creepkit.discovery.temperature_law import TemperatureLaw
 from creepkit.inverse.perturbation import combined_change_text
-from creepkit.reports.answer import KeyFigure, answer, asked_figures, tests_text, titled_law
+from creepkit.reports.answer import (
+    KeyFigure,
+    answer,
+    asked_figures,
+    interval_digits,
+    rate_and_exponent,
+    tests_text,
+    titled_law,
+)
 from creepkit.reports.attachments import embed
 from creepkit.reports.blocks import (
     Answer,
@@ -31,12 +39,11 @@ from creepkit.reports.blocks import (
     sentence,
     typeset,
 )
-from creepkit.reports.closing import MOST_FILES, closing_sections, files_to_download
-from creepkit.reports.data_section import data_section
 from creepkit.reports.design import design_blocks
 from creepkit.reports.extraction import extraction_figure, extraction_text
 from creepkit.reports.findings import GroupFindings, findings_of, with_histories
 from creepkit.reports.forecast import forecast_blocks
+from creepkit.reports.html.closing import MOST_FILES, closing_sections, data_section, files_to_download
 from creepkit.reports.html.templates import resource, template
 from creepkit.reports.identification import (
     blocks_of_tests,
@@ -49,11 +56,9 @@ from creepkit.reports.identification import (
 from creepkit.reports.identification_plot import summary_figure
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.law_names import LawNames
-from creepkit.reports.plate_figure import plate_figure
 from creepkit.reports.ranking import credible_values, explanation, ranking_blocks
-from creepkit.reports.rate_panels import rupture_rows
+from creepkit.reports.rate_panels import plate_figure, rupture_rows
 from creepkit.reports.rupture import rupture_blocks, strength_blocks
-from creepkit.reports.stress_exponents import interval_digits, rate_and_exponent
 from creepkit.reports.svg import PageFigures
 from creepkit.reports.temperature_law import law_blocks, study_blocks
 
