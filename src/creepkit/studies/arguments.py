@@ -13,7 +13,7 @@ from creepkit.experiments.rig import Rig, changed_rigs
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.language import temperature
 from creepkit.options import values_of_table
-from creepkit.readers.vocabulary import split_unit
+from creepkit.readers.column_names import split_unit
 from creepkit.records import (
     SECONDS_PER_HOUR,
     ZERO_CELSIUS,

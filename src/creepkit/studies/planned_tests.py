@@ -13,7 +13,7 @@ from creepkit.forecasts.planned_tests import (
     stepped_load,
 )
 from creepkit.options import values_of_table
-from creepkit.readers.vocabulary import split_unit
+from creepkit.readers.column_names import split_unit
 from creepkit.records import (
     SECONDS_PER_HOUR,
     TENSOR_COMPONENTS,
