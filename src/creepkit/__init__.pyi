@@ -44,13 +44,10 @@ from .inverse.search.multistart import MultiStart as MultiStart
 from .inverse.selection.ranking import rank as rank
 from .inverse.settings import IdentificationSettings as IdentificationSettings
 from .inverse.settings import default_nuisances as default_nuisances
-from .inverse.sparsity.bootstrap import bootstrap_terms as bootstrap_terms
 from .inverse.sparsity.penalties import L2 as L2
 from .inverse.sparsity.penalties import GroupL2 as GroupL2
 from .inverse.sparsity.penalties import Sqrt as Sqrt
 from .inverse.sparsity.penalties import Subsets as Subsets
-from .inverse.sparsity.term_selection import penalty_path as penalty_path
-from .inverse.uncertainty.model_averaging import rate_band as rate_band
 from .inverse.uncertainty.quantities import exponent_at as exponent_at
 from .inverse.uncertainty.quantities import rate_at as rate_at
 from .jobs.worker_pools import ParallelExecution as ParallelExecution

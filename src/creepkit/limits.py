@@ -78,8 +78,7 @@ BAND_DRAWS = Limits(50, 100_000)
 """Of a forecast."""
 
 
-RESAMPLES = Limits(1, 10_000)
-WALKERS, WALKER_STEPS = Limits(4, 10_000), Limits(1, 1_000_000)
+DRAWS_OF_POSTERIOR = Limits(10, 2_000)
 WORKERS, THREADS = Limits(1, 1024), Limits(1, 1024)
 EPOCHS, BATCH = Limits(1, 1_000_000), Limits(1, 1_000_000)
 HIDDEN, LAYERS = Limits(1, 4096), Limits(1, 32)

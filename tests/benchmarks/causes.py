@@ -14,10 +14,9 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
-from measured import Page, arguments, progress
+from measured import Page, arguments, binomial_interval, progress
 
 import creepkit as ck
-from creepkit.inverse.sparsity.bootstrap import binomial_interval
 from creepkit.language.symbols import GAS_CONSTANT
 
 SEED = 39

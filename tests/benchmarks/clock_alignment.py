@@ -21,13 +21,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from measured import Page, arguments, progress
+from measured import Page, arguments, binomial_interval, progress
 from planted_bulge_tests import drawn_values
 
 import creepkit as ck
 from creepkit.errors import CreepkitError, HistoryError
 from creepkit.instruments.clock_alignment import align_clocks
-from creepkit.inverse.sparsity.bootstrap import binomial_interval
 from creepkit.records import Channel, InstrumentRecord, Program, RecordedLoading
 
 SEED = 20261123

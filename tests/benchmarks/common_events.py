@@ -14,12 +14,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from measured import Page, arguments, progress
+from measured import Page, arguments, binomial_interval, progress
 from planted_bulge_tests import SIGMA, drawn_sum, drawn_values
 
 import creepkit as ck
 from creepkit.errors import CreepkitError
-from creepkit.inverse.sparsity.bootstrap import binomial_interval
 from creepkit.quality import check_data_quality
 from creepkit.quality.rig import temperature_step
 from creepkit.records import History, Program

@@ -17,6 +17,8 @@ from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 
+from scipy.stats import binomtest
+
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "measured"
 PACKAGES = ("creepkit", "numpy", "llvmlite", "torch")
 
@@ -120,3 +122,9 @@ def processor() -> str:
 
 def _markdown_row(cells: Iterable[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def binomial_interval(count: int, trials: int) -> tuple[float, float]:
+    """Exact 95 % interval of a frequency (Clopper & Pearson (1934), Biometrika 26, 404)."""
+    found = binomtest(count, trials).proportion_ci(0.95, method="exact")
+    return float(found.low), float(found.high)

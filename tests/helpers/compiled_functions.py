@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.kernels.compilation import LoadedCode, object_code
 from creepkit.kernels.llvm_code import Module, add_entry
-from creepkit.kernels.machine_code import LoadedCode, object_code
 
 
 def compiled_function(formula: Callable[..., Any], arguments: int = 1) -> Callable[..., Floats]:

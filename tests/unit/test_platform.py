@@ -150,19 +150,13 @@ def extras() -> dict[str, list[str]]:
     return {name: [one.partition(">")[0] for one in wanted[name]] for name in wanted if name != "dev"}
 
 
-def posterior(tmp_path):
-    from creepkit.inverse.uncertainty.posterior import sample_posterior
-
-    return lambda: sample_posterior(None)  # type: ignore[arg-type]
-
-
 def cluster(tmp_path):
     from creepkit.jobs.worker_pools import cluster_workers
 
     return lambda: cluster_workers(None, "tcp://127.0.0.1:1").__enter__()  # type: ignore[arg-type]
 
 
-USES = {"mcmc": posterior, "cluster": cluster}
+USES = {"cluster": cluster}
 
 
 @pytest.mark.parametrize("extra", sorted(USES))

@@ -11,7 +11,7 @@ from creepkit.fem.finite_element_model import FiniteElementModel, finite_element
 from creepkit.fem.simulation import LoadHistory, Simulation, sensitivity_directions, simulate
 from creepkit.fem.solver import SolverSettings
 from creepkit.integration import PointTest, integrate
-from creepkit.kernels.interface import CompiledLaw, Entry
+from creepkit.kernels.interface import CompiledEntry, CompiledLaw
 from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
 from creepkit.specimens.bulge.geometry import DimpleGeometry
@@ -32,7 +32,7 @@ def norton() -> CompiledLaw:
     return kernels.lower(NORTON, "compiled")
 
 
-def entry(columns: int, value: float) -> Entry:
+def entry(columns: int, value: float) -> CompiledEntry:
     """A law's entry that gives one number everywhere."""
 
     def fill(rows, x, theta, out) -> int:
@@ -43,7 +43,7 @@ def entry(columns: int, value: float) -> Entry:
     function = C_ENTRY(fill)
     pointer = ctypes.cast(function, ctypes.c_void_p).value
     assert pointer is not None
-    return Entry(pointer, function)
+    return CompiledEntry(pointer, function)
 
 
 def run(body: FiniteElementModel, law: CompiledLaw, theta=THETA, **more) -> Simulation:

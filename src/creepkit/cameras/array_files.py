@@ -18,12 +18,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.cameras.text_files import FRAME_FILE
 from creepkit.errors import CreepkitError, HistoryError
-from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import read_bytes
-
-LARGEST_FRAME = 20_000_000
-"""Numbers of a frame in all its columns."""
-
 
 MATLAB_5, MATLAB_7, HDF5 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", b"\x89HDF\r\n\x1a\n"
 
@@ -55,12 +50,6 @@ class ArrayTable:
         if len(shapes) > 1:
             listed = ", ".join(f"{name} has {' x '.join(map(str, self.shapes[name]))}" for name in chosen)
             raise HistoryError(f"{self.path}: its arrays differ in their number of points ({listed}); is it damaged?")
-        count = sum(math.prod(self.shapes[name]) for name in chosen)
-        if count > (most := raised(LARGEST_FRAME)):
-            raise HistoryError(
-                f"{self.path}: a frame of {count} numbers, of at most {most}; is it damaged? "
-                f"{how_to_raise(count, most)}"
-            )
         arrays = self.load(chosen)
         return np.stack([np.asarray(arrays[name], dtype=float).ravel() for name in chosen], axis=1)
 

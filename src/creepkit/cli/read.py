@@ -54,7 +54,7 @@ def command(
     """
     import creepkit as ck
     from creepkit.readers.questions import single_errors
-    from creepkit.readers.table_summary import summarise_tables
+    from creepkit.readers.reading import summarise_tables
     from creepkit.reports import histories as report
     from creepkit.reports.data_quality import data_quality_to_json
 

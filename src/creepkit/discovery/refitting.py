@@ -168,8 +168,8 @@ def refit(
 ) -> TemperatureLaw:
     """Refit the combinations that remain to the tests, and weigh them by how well they follow these.
 
-    settings : where values are to come from frames of equal weight ("noise", the default) the likelihood takes its
-        place: combinations must be compared under one covariance, with scatter between tests and autocorrelation in it.
+    settings : of every identification; combinations are compared under one covariance, with scatter between tests and
+        autocorrelation in it.
     max_refits : combinations that are refitted at most; the simplest law, Arrhenius with every other parameter
         constant, is always among them.
     joint_fit : an identification of that law from all tests, where to begin.
@@ -179,7 +179,7 @@ def refit(
         temperature_law.isothermal_estimates,
         list(histories),
         using,
-        _likelihood_settings(settings or IdentificationSettings()),
+        settings or IdentificationSettings(),
         None if progress is None else progress_with_duration("refits of forms", progress),
         max_refits,
     )
@@ -210,10 +210,6 @@ def refit(
         cache.failed,
         points,
     )
-
-
-def _likelihood_settings(settings: IdentificationSettings) -> IdentificationSettings:
-    return replace(settings, weights="likelihood") if settings.weights == "noise" else settings
 
 
 def _baseline(combinations: RankedCombinations) -> list[CandidateForm]:

@@ -77,11 +77,6 @@ def notes_of(laws: Sequence[Identification], rigs: Sequence[Rig]) -> tuple[str, 
             f"fewer than {MINIMUM_TESTS} tests do not show by how much the rate scatters from test to test; it is "
             'taken as none: give Nuisance("rate", sd=...) where it is known'
         )
-    elif scatters and len(laws[0].histories) < MINIMUM_TESTS:
-        notes.append(
-            f"fewer than {MINIMUM_TESTS} tests do not show by how much the rate scatters from test to test: it is "
-            f"assumed to be {100 * laws[0].noise_model.rate:.0f} %; what tests tell of rates is more if it is less"
-        )
     if laws[0].noise_model.rate > 0 and any(rig.tests_per_run > 1 for rig in rigs):
         notes.append(
             "the rates of test pieces in one run are taken to scatter like those of tests one by one: where the oven "

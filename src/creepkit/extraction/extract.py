@@ -14,16 +14,7 @@ from creepkit.errors import FitError, HistoryError, quoted
 from creepkit.extraction.domes import Centers, find_domes, place_centers
 from creepkit.extraction.extraction import Extraction, FieldMap, PlateMotion
 from creepkit.extraction.frame_checks import FrameFlags, frames_at_rest, motion_reasons, residual_reasons
-from creepkit.extraction.noise import (
-    NOISE_FRAMES,
-    ErrorFields,
-    NoiseEstimate,
-    autocorrelation,
-    clamped_covariance,
-    estimate_noise,
-    smooth_free,
-    whole,
-)
+from creepkit.extraction.noise import NOISE_FRAMES, ErrorFields, NoiseEstimate, estimate_noise, smooth_free, whole
 from creepkit.extraction.plate import RigidMotions, rigid_motions
 from creepkit.extraction.series import PointSeries, ReferencePlate, SeriesOfFrames, read_series, reference_plate
 from creepkit.records import Frames, SupportsSurfaceObservation, SurfaceObservation, SurfacePoints, SurfaceRegion
@@ -213,7 +204,7 @@ def _extract_one(
     motion = PlateMotion(
         translations,
         rotations,
-        _motion_errors(taken, fields, noise, plate.spacing),
+        _motion_errors(taken, fields.clamped_places, noise),
         int(clamped.sum()),
         *_presence(series, clamped, good),
         _size(taken.clamped_heights),
@@ -354,16 +345,12 @@ def _positions(signal: Floats) -> Floats:
     return even if not growth[-1] > 0.0 else 0.5 * (even + growth / growth[-1])
 
 
-def _motion_errors(taken: TakenOff, fields: ErrorFields, noise: NoiseEstimate, spacing: float) -> Floats:
-    """(6,) standard errors of one frame's translations and rotations: along z and about x and y by patches."""
-    places = fields.clamped_places
-    rho = autocorrelation(fields.clamped, places, spacing)
-    out = np.sqrt(np.diag(clamped_covariance(fields.clamped, places, noise.patch, rho)))
-    single = np.median(taken.motion.residual_sd, axis=0)
+def _motion_errors(taken: TakenOff, places: Floats, noise: NoiseEstimate) -> Floats:
+    """(6,) standard errors of one frame's translations and rotations; those in the plane from independent patches."""
     independent = np.sqrt(len(places) / max(1.0, np.pi * (0.5 * noise.patch) ** 2 / _cell(places)))
     lever = np.sqrt((places**2).sum(axis=1).mean())
-    in_plane = single[:2] / independent
-    return np.array([*in_plane, out[0], out[1], out[2], float(np.hypot(*in_plane)) / np.sqrt(2.0) / lever])
+    in_plane = np.median(taken.motion.residual_sd, axis=0)[:2] / independent
+    return np.array([*in_plane, *noise.plate_sd, float(np.hypot(*in_plane)) / np.sqrt(2.0) / lever])
 
 
 def _cell(places: Floats) -> float:

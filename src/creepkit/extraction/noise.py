@@ -54,19 +54,17 @@ class NoiseEstimate:
     """Noise of the outputs of one test.
 
     covariance : (frames, outputs, outputs) of each frame's outputs, the share of the zero level in it.
-    correlation : {(output, output): median of the frames}. rest_share : weight of the frames at rest in it; the rest
-        of it is from patches.
+    correlation : {(output, output): median of the frames}.
     rest_sd, block_sd : {output: median over the frames}, both of a single frame, without the zero level; NaN where
         there is none.
     point_sd : mm, of the height of one point in one frame, its part that changes with time.
     correlation_length : mm, at which the autocorrelation in space has fallen to 0.1. patch : mm, side of the patches.
     lag_one : correlation of an output's error in successive frames. integral_frames : frames that share one error.
-    rest_frames : how many frames at rest set the zero level. growth : (frames,) scatter over that at rest.
+    plate_sd : (3,) of the clamped plate in one frame: shift along z, mm, and rotations about x and y, rad.
     """
 
     covariance: Floats
     correlation: Mapping[tuple[str, str], float]
-    rest_share: float
     rest_sd: Mapping[str, float]
     block_sd: Mapping[str, float]
     point_sd: float
@@ -74,12 +72,11 @@ class NoiseEstimate:
     patch: float
     lag_one: float
     integral_frames: float
-    rest_frames: int
-    growth: Floats
+    plate_sd: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "covariance", frozen(self.covariance))
-        object.__setattr__(self, "growth", frozen(self.growth))
+        for name in ("covariance", "plate_sd"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
         for name in ("correlation", "rest_sd", "block_sd"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
@@ -115,7 +112,8 @@ def estimate_noise(
     rho = autocorrelation(fields.clamped, fields.clamped_places, spacing)
     patch = max(2.0 * rho.length, 3.0 * spacing)
     reference = int(np.nanargmax(np.where(np.isfinite(signal), np.abs(signal), -1.0)))
-    by_blocks = _block_covariance(seen, fields, patch, rho, reference)
+    of_plate = clamped_covariance(fields.clamped, fields.clamped_places, patch, rho)
+    by_blocks = _block_covariance(seen, fields, patch, rho, reference, of_plate)
     at_rest = _rest_covariance(gains, fields.rest) if enough else np.full_like(by_blocks, np.nan)
     growth = _growth(fields, len(gains), enough)
     if enough:
@@ -132,7 +130,6 @@ def estimate_noise(
     return NoiseEstimate(
         covariance=np.where(shown[:, :, None] & shown[:, None, :], covariance, np.nan),
         correlation=_correlations(names, covariance[some]),
-        rest_share=share,
         rest_sd=_medians(names, at_rest[some]),
         block_sd=_medians(names, by_blocks[some]),
         point_sd=_point_sd(source),
@@ -140,8 +137,7 @@ def estimate_noise(
         patch=patch,
         lag_one=lag_one,
         integral_frames=integral,
-        rest_frames=len(fields.rest),
-        growth=growth,
+        plate_sd=np.sqrt(np.diag(of_plate)),
     )
 
 
@@ -237,7 +233,12 @@ def rigid_gains(places: Floats) -> Floats:
 
 
 def _block_covariance(
-    seen: SurfaceObservation, fields: ErrorFields, patch: float, rho: SpatialCorrelation, reference: int
+    seen: SurfaceObservation,
+    fields: ErrorFields,
+    patch: float,
+    rho: SpatialCorrelation,
+    reference: int,
+    of_plate: Floats,
 ) -> Floats:
     """(frames, outputs, outputs): squares of what each patch contributes, of points and of the clamped plate."""
     gains = seen.gains
@@ -255,8 +256,7 @@ def _block_covariance(
     total = by_patches * shares[0][:, None] * shares[0] + by_correlation * scale[:, None] * scale
     plane = np.stack([np.ones(len(fields.places)), fields.places[:, 1], -fields.places[:, 0]])
     tilts = np.matmul(gains, plane.T)
-    covariance = clamped_covariance(fields.clamped, fields.clamped_places, patch, rho)
-    return np.asarray(total + np.matmul(np.matmul(tilts, covariance), tilts.transpose(0, 2, 1)))
+    return np.asarray(total + np.matmul(np.matmul(tilts, of_plate), tilts.transpose(0, 2, 1)))
 
 
 def clamped_covariance(errors: Floats, places: Floats, patch: float, rho: SpatialCorrelation) -> Floats:

@@ -14,7 +14,7 @@ from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.solvable_model import SensitivityDirections, SolvableModel
 from creepkit.integration.core_structures import MAX_STATES
-from creepkit.kernels.interface import CompiledLaw, Entry
+from creepkit.kernels.interface import CompiledEntry, CompiledLaw
 
 (
     REACHED_END, DEFLECTION_LIMIT, STRAIN_LIMIT, STATE_LIMIT, LIMIT_LOAD, LOST_CONVERGENCE, TOO_MANY_STEPS, LAW_FAILED,
@@ -196,7 +196,7 @@ class LoadProgram(NamedTuple):
 def _entry_addresses(law: CompiledLaw) -> tuple[int, int]:
     """Addresses of the entries that the core calls; SolveError for what is no entry of a compiled law."""
     for entry in (law.update, law.sensitivity):
-        if not isinstance(entry, Entry) or not entry.address:
+        if not isinstance(entry, CompiledEntry) or not entry.address:
             raise SolveError(
                 f"a compiled law has {entry!r} for an entry, which is no compiled function of this package"
             )

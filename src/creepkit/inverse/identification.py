@@ -36,6 +36,15 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     parameter_estimates,
     positive_semidefinite,
 )
+from creepkit.inverse.uncertainty.quantities import (
+    CoordinateFunction,
+    DerivedQuantity,
+    Interval,
+    PointQuantity,
+    RateStatements,
+    activation_energy,
+    log_rate,
+)
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
@@ -49,7 +58,6 @@ if TYPE_CHECKING:
     from creepkit.inverse.search.global_search import SearchTrace
     from creepkit.inverse.sparsity.result import Sparsity
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit, LawMisfits
-    from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity
     from creepkit.inverse.variance_components import LinearisedProblem
 
 
@@ -58,7 +66,7 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 @dataclass(frozen=True, eq=False)
 class Identification(
-    Presentable, text="reports.answer:answer_text", details="reports.identification:identification_text"
+    RateStatements, Presentable, text="reports.answer:answer_text", details="reports.identification:identification_text"
 ):
     """The result of identify().
 
@@ -192,36 +200,15 @@ class Identification(
         """Residuals of a problem of these tests at the optimum, with the weights of tests."""
         return problem.residuals(self.x).with_test_weights(np.array([m.weight for m in self.tests]))
 
-    @checked
-    def rate(
-        self,
-        stress: ArrayLike,
-        temperature: ArrayLike | None = None,
-        *,
-        strain: ArrayLike | None = None,
-        time: ArrayLike | None = None,
-        warn: bool = True,
-    ) -> tuple[Floats, Floats, Floats]:
-        """Creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape.
-
-        stress, temperature, strain, time : numbers or arrays that broadcast, in MPa, K, - and s; by default those of
-        the reference point: without a temperature the rate is that at `reference.temperature`, the median of the tests.
-        warn : whether a point outside `ranges` gives a FitWarning, and a temperature that seems to be in Celsius a
-            FitError.
-
-        Outside the tests, and by a law that they contradict, the interval is widened by what the law misses there as
-        far as the tests tell (see uncertainty.law_misfit).
-        """
-        from creepkit.inverse.uncertainty.quantities import log_rate
-
-        function = log_rate(self.coordinates, stress, temperature, strain, time)
-        if warn:
-            point = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
-            warn_of_extrapolation(self.ranges, point)
+    def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
+        """Value and 95 % interval of a quantity, of ln rate with what the law misses there; point : {name: (...,)}."""
+        function = quantity(self.coordinates, **point)
         value, low, high = self.interval_of(function)
-        T = self.reference.temperature if temperature is None else temperature
-        more = self.misfit_half_widths(function, np.asarray(stress, float), np.asarray(T, float))
-        return np.exp(value), np.exp(value - np.hypot(value - low, more)), np.exp(value + np.hypot(high - value, more))
+        if quantity is not log_rate:
+            return value, low, high
+        T = self.reference.temperature if point["temperature"] is None else point["temperature"]
+        more = self.misfit_half_widths(function, np.asarray(point["stress"], float), np.asarray(T, float))
+        return value, value - np.hypot(value - low, more), value + np.hypot(high - value, more)
 
     @cached_property
     def misfits(self) -> LawMisfits:
@@ -257,33 +244,8 @@ class Identification(
         normal = interval_quantile(1e9)
         return np.sqrt(np.clip((normal * total) ** 2 - (high - value) ** 2, 0.0, (normal * own) ** 2))
 
-    @checked
-    def local_exponent(
-        self,
-        stress: ArrayLike,
-        temperature: ArrayLike | None = None,
-        *,
-        strain: ArrayLike | None = None,
-        time: ArrayLike | None = None,
-        warn: bool = True,
-    ) -> tuple[Floats, Floats, Floats]:
-        """Local stress exponent d ln rate / d ln stress with its 95 % interval: (exponent, low, high).
-
-        stress, temperature, strain, time : as in `rate`, numbers or arrays that broadcast; results have that shape.
-        warn : as in `rate`.
-        """
-        from creepkit.inverse.uncertainty.quantities import local_exponent
-
-        function = local_exponent(self.coordinates, stress, temperature, strain, time)
-        if warn:
-            point = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
-            warn_of_extrapolation(self.ranges, point)
-        return self.interval_of(function)
-
     def activation_energy(self) -> tuple[float, float, float]:
         """Activation energy -R d ln rate / d(1/T), J/mol, at the reference point with its 95 % interval."""
-        from creepkit.inverse.uncertainty.quantities import activation_energy
-
         r = self.reference
         value, low, high = self.interval_of(activation_energy(self.coordinates, r.stress, r.temperature))
         return float(value), float(low), float(high)
@@ -462,10 +424,10 @@ class Identification(
         """The ProfileLikelihood of a parameter, by name, or of another quantity (see uncertainty.quantities)."""
         return present("inverse.uncertainty.profile_likelihood:profile", self, quantity, level=level)
 
-    def sample(self, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None) -> Any:
-        """PosteriorSamples by Markov chains (emcee, an optional dependency); `using` may be a surrogate."""
+    def sample(self, *, draws: int = 1000, seed: int = 0, using: Predictor | None = None) -> Any:
+        """PosteriorSamples by population Monte Carlo; `using` may be a surrogate."""
         return present(
-            "inverse.uncertainty.posterior:sample_posterior", self, walkers=walkers, steps=steps, seed=seed, using=using
+            "inverse.uncertainty.importance_sampling:sample_posterior", self, draws=draws, seed=seed, using=using
         )
 
     def correlation(self, coordinates: Literal["author", "conditioned"] = "author") -> Any:

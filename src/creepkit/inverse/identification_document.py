@@ -71,7 +71,7 @@ CODEC = RecordCodec(
     omitted={
         Identification: ("histories", "predictor", "search_trace", "linearised", "problem"),
         Sparsity: ("path",),
-        Perturbation: ("residual_change", "value_change"),
+        Perturbation: ("residual_change",),
     },
     ranges={
         Identification: {"rms": NOT_NEGATIVE_OR_NAN, "effective_frames": POSITIVE, "freedom": POSITIVE},

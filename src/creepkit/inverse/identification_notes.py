@@ -22,7 +22,7 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.goodness_of_fit import TestFit
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.iterative_estimation import EstimationResult
-from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS
+from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.nuisance_plausibility import nuisance_correlation_notes
 from creepkit.inverse.prediction_failures import tests_without_prediction
@@ -125,9 +125,7 @@ def identification_notes(
     if len(stress_levels) == 1 and all(h.loading.quantity == "stress" for h in histories):
         sentences.append("all tests have one stress: the stress dependence is not determined by them")
     if len(histories) < MINIMUM_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
-        assumption_note = f"their rates are assumed to scatter by {100 * ASSUMED_RATE_SD:.0f} %"
-        likelihood_note = "how their rates scatter cannot be seen, and intervals are those of these tests alone"
-        note = likelihood_note if settings.weights == "likelihood" else assumption_note
+        note = "how their rates scatter cannot be seen, and intervals are those of these tests alone"
         sentences.append(f"fewer than {MINIMUM_TESTS} tests: {note}")
     sentences += [UNTESTABLE] if rests_on_durations(law, histories) else []
     sentences += _large_strain_notes(histories)

@@ -27,6 +27,7 @@ from creepkit.inverse.defect_correction import (
     shift_of_values,
     with_correction_at_frames,
 )
+from creepkit.inverse.errors_of_tests import error_covariances, errors_of_tests
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
@@ -44,17 +45,19 @@ from creepkit.inverse.iterative_estimation import (
     SIMULATION_LIMITS,
     EstimationResult,
     IterationLimits,
+    at_own_rates,
+    at_rates,
     estimate_iteratively,
     linearised,
     starting_point,
+    under_errors_of_tests,
 )
-from creepkit.inverse.judged_residuals import at_own_rates, at_rates
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbation import unmodelled_note
-from creepkit.inverse.perturbations import perturbations, usual_scatter
+from creepkit.inverse.perturbations import perturbations
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
@@ -66,14 +69,15 @@ from creepkit.inverse.single_values import LawAtTests, contradicting_values
 from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.inverse.uncertainty.laplace_approximation import (
+    covariance_of_values,
     cut_interval_notes,
     interval_quantile,
     parameter_estimates,
     positive_semidefinite,
+    restricted_covariance,
 )
-from creepkit.inverse.uncertainty.of_estimation import uncertainty_of
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.working_noise import WorkingNoiseEstimator
+from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor, Status, is_length_nuisance, is_logarithmic
 
@@ -145,7 +149,7 @@ def _beside_the_others(fit: Identification, without: Identification, test: int, 
     problem, x, log_factors = fit.least_squares_problem, fit.x.copy(), np.zeros(len(fit.histories))
     x[: len(without.u)] = without.u
     log_factors[test] = found.size
-    linear = at_rates(problem, x, linearised(problem, x, problem.residuals(x)), log_factors)
+    linear = at_rates(problem, linearised(problem, x, problem.residuals(x)), log_factors)
     others = RateExplanations(problem, x, linear, without.noise_model)
     logarithmic = all(map(is_logarithmic, problem.observations.outputs))
     sizes = others.rates.median_log_factors if logarithmic else others.rates.own_log_factors
@@ -182,8 +186,6 @@ def identify_values(
             search_outcome = SearchOutcome([np.clip(start.u, lower, upper)], 0, None)
         else:
             search_outcome = initial_search(problem, through, search or MultiStart(), progress)
-        if search_outcome.dropped_terms:
-            return _without_terms(problem, histories, search_outcome, progress)
         best, numerical_error = _best_estimate(
             problem, search_outcome, through, start or StartingEstimate(None), progress
         )
@@ -191,6 +193,7 @@ def identify_values(
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
+        best = under_errors_of_tests(best)
         fit = _result(histories, best, search_outcome, numerical_error)
     return replace(fit, notes=(*left_out, *fit.notes))
 
@@ -201,22 +204,6 @@ def _gradient(best: EstimationResult) -> Floats:
     assert residuals.jacobian is not None
     factor = CovarianceFactor.of_residuals(residuals, best.working_noise)
     return np.asarray(np.einsum("te,tep->p", factor.inverse_times(residuals.values), residuals.jacobian))
-
-
-def _without_terms(
-    problem: LeastSquaresProblem,
-    histories: Sequence[History],
-    search_outcome: SearchOutcome,
-    progress: IterationCallback | None,
-) -> Identification:
-    """The identification of what the search left of a sum: a term that is off must not come back as a small one."""
-    law, dropped_terms = problem.law, search_outcome.dropped_terms
-    reduced_law = law.without(*dropped_terms)
-    kept_positions = [law.names.index(name) for name in reduced_law.names]
-    start = StartingEstimate(search_outcome.starts[0][kept_positions], reference=problem.coordinates.reference)
-    fit = identify(reduced_law, histories, problem.predictor, settings=problem.settings, start=start, progress=progress)
-    note = f"the search left out {' and '.join(dropped_terms)} of law '{law.name}'"
-    return replace(fit, search_trace=search_outcome.trace, notes=(*fit.notes, note))
 
 
 def _best_estimate(
@@ -289,23 +276,28 @@ def _result(
     numerical_error: NumericalError | None,
 ) -> Identification:
     """Noise model, intervals and goodness of fit at the optimum."""
-    problem, residuals, x = best.problem, best.residuals, best.minimum.x
+    problem, x = best.problem, best.x
+    residuals = problem.residuals(x).with_test_weights(best.residuals.test_weights)
     law, coordinates, count = problem.law, problem.coordinates, problem.parameter_count
     u = x[:count]
     working_estimator = _working_estimator(problem, numerical_error)
-    noise_model, covariance, freedom = uncertainty_of(best, working_estimator, len(histories))
-    linear = best.linearised or linearised(problem, x, residuals)
-    working_noise = None if best.linearised is not None else best.working_noise
-    unmodelled = perturbations(problem, x, linear, noise_model, histories, working_noise)
+    linear, by_likelihood = best.linearised, working_estimator.by_likelihood
+    noise_model = working_estimator.final(linear, best.working_noise)
+    unestimated = working_estimator.unestimated_drift_components(noise_model)
+    covariance, freedom = restricted_covariance(linear, noise_model, problem.settings.nuisances, unestimated, count)
+    working_noise = None
+    if not by_likelihood:
+        working_noise = with_single_value_weight(best.working_noise, problem.observations)
+        covariance = covariance_of_values(linear, noise_model, working_noise)
+    judged = at_own_rates(problem, linear, noise_model)
+    errors = best.errors if by_likelihood else errors_of_tests(problem, linear.x, judged, noise_model)
+    unmodelled = perturbations(
+        problem, linear, noise_model, histories, None if errors is None else errors.perturbations, working_noise
+    )
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
-    judged = at_own_rates(problem, x, linear, noise_model)
-    rates = RateExplanations(problem, x, judged, noise_model)
-    by_scatter = usual_scatter(problem, x, linear, noise_model, rates.rates.contrasts, working_noise)
-    included = [e for e in unmodelled if e.included]
-    common = np.concatenate([np.zeros((0, x.size)), *(e.value_change for e in included if e.common)])[:, :count]
-    own = np.concatenate([by_scatter, *(e.value_change for e in included if not e.common)])[:, :count]
-    of_unknowns = np.pad(common.T @ common, (0, x.size - count)) if included else None
-    scatter = rate_scatter(problem, x, residuals, noise_model, lengths, of_unknowns)
+    rates = RateExplanations(problem, linear.x, judged, noise_model)
+    of_errors, of_common = error_covariances(judged, noise_model, errors, working_noise)
+    scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
     prediction = predict(
         problem.predictor,
         law,
@@ -318,7 +310,7 @@ def _result(
     prediction = with_correction_at_frames(problem, histories, prediction)
     # Their size is known, so that their interval is a normal one whatever the degrees of freedom of the tests are.
     quantile = interval_quantile(freedom)
-    error_covariance = (interval_quantile(1e9) / quantile) ** 2 * (common.T @ common + own.T @ own)
+    error_covariance = (interval_quantile(1e9) / quantile) ** 2 * of_errors[:count, :count]
     law_covariance = positive_semidefinite(covariance[:count, :count]) + error_covariance
     values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)
@@ -326,7 +318,7 @@ def _result(
     random_effects = predicted_random_effects(residuals, noise_model)
     tests = test_fits(problem, residuals, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
-        problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
+        problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance + of_errors))[count:]
     )
     implausible = implausible_nuisances(problem, random_effects, nuisance_estimates)
     failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]
@@ -346,7 +338,7 @@ def _result(
         noise_model=noise_model,
         rms=pooled_log_strain_rms(tests),
         log_likelihood=best.log_likelihood,
-        effective_frames=effective_sample_size(residuals, noise_model),
+        effective_frames=effective_sample_size(best.residuals, noise_model),
         freedom=freedom,
         tests=tests,
         ranges=fitted_ranges(problem),
@@ -379,7 +371,7 @@ def _result(
         search_trace=search_outcome.trace,
         linearised=best.linearised,
         problem=replace(
-            problem, covariance_factor=CovarianceFactor.of_residuals(residuals, noise_model), loss="linear"
+            problem, covariance_factor=CovarianceFactor.of_residuals(best.residuals, noise_model), loss="linear"
         ),
     )
 

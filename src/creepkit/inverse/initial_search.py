@@ -22,7 +22,7 @@ from creepkit.records import Predictor
 
 
 class SearchOutcome(NamedTuple):
-    """The end of a global search: starts of the estimation, evaluations, trace, and terms that its minimum is without.
+    """The end of a global search: starts of the estimation, evaluations and trace.
 
     starts : (parameters,) conditioned coordinates each. minima : how many ends it had, and how many of them differ.
     """
@@ -30,7 +30,6 @@ class SearchOutcome(NamedTuple):
     starts: list[Floats]
     evaluations: int
     trace: SearchTrace | None
-    dropped_terms: tuple[str, ...] = ()
     minima: Mapping[str, int] = MappingProxyType({})
 
 
@@ -46,7 +45,7 @@ def initial_search(
     distinct_minima = distinct(search_result.minima, searched.bounds, equal_predictions=equal)
     counts = minima_counts(search_result.minima, searched.bounds, equal_predictions=equal)
     starts = [minimum.x for minimum in distinct_minima]
-    return SearchOutcome(starts, searched.evaluations.count, search_result.trace, distinct_minima[0].terms_off, counts)
+    return SearchOutcome(starts, searched.evaluations.count, search_result.trace, counts)
 
 
 def search_problem(problem: LeastSquaresProblem, predictor: Predictor) -> LeastSquaresProblem:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.noise_covariance import CovarianceFactor, log_likelihood
+from creepkit.inverse.errors_of_tests import TestErrors, errors_of_tests
+from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
-from creepkit.inverse.uncertainty.laplace_approximation import marginal_log_likelihood, normal_matrix
 from creepkit.inverse.variance_components import (
     BOUND_TOLERANCE,
     LinearisedProblem,
@@ -29,6 +29,10 @@ PRIOR_STEPS = 30
 LIKELIHOOD_TOLERANCE = 1e-5
 """Relative change of a chi-square that ends a refinement by likelihood: some thousandth of one, well inside an interval
 and above what the steps of a solver leave."""
+
+
+MOST_ERROR_STEPS, ERROR_STEP = 4, 0.02
+"""Steps of values under the errors of tests, and the largest one left out, in standard deviations."""
 
 
 CONVERGED_GAIN = 0.02
@@ -57,7 +61,8 @@ class EstimationResult:
     """The end of an iterative estimation: values and working noise that agree, and their log-likelihood.
 
     problem : with the priors of nuisance parameters as they were estimated; minimum : its optimum; residuals : there,
-    with the weights of tests; linearised : the problem made linear there, of estimates by likelihood.
+    with the weights of tests; linearised : the problem made linear there. x : (unknowns,) the values: the optimum, from
+    where errors of tests move those by likelihood; errors : that were in the covariance, None for none.
     """
 
     problem: LeastSquaresProblem
@@ -65,7 +70,9 @@ class EstimationResult:
     residuals: Residuals
     working_noise: NoiseModel
     log_likelihood: float
-    linearised: LinearisedProblem | None = None
+    linearised: LinearisedProblem
+    x: Floats
+    errors: TestErrors | None = None
 
 
 def estimate_iteratively(
@@ -100,7 +107,7 @@ def estimate_iteratively(
         minimum = problem.minimise(x, tolerances=Tolerances(limits.steps, tolerance))
         x = minimum.x
         residuals = problem.residuals(x).with_test_weights(test_weights)
-        current = _round_result(problem, minimum, residuals, working_noise, working_estimator.by_likelihood)
+        current = _round_result(problem, minimum, residuals, working_noise)
         problem = current.problem
         if progress is not None:
             progress("round", round_index + 1, limits.rounds)
@@ -110,6 +117,60 @@ def estimate_iteratively(
             break
     assert best is not None
     return best
+
+
+def under_errors_of_tests(result: EstimationResult) -> EstimationResult:
+    """An estimate by likelihood with its values under the covariance that holds the errors of tests.
+
+    By Gauss-Newton steps from the optimum without them, with errors and residuals made linear at each, and every test
+    about a rate of its own: where readings are far more exact than rates are alike, residuals are not linear in these.
+    """
+    problem, linear, noise = result.problem, result.linearised, result.working_noise
+    if problem.settings.weights != "likelihood" or not problem.settings.included_errors:
+        return result
+    for step in range(MOST_ERROR_STEPS):
+        about = at_own_rates(problem, linear, noise)
+        errors = errors_of_tests(problem, linear.x, about, noise)
+        assert errors is not None
+        result = replace(result, errors=errors) if step == 0 else result
+        solution = about.solve(CovarianceFactor.of_residuals(errors.within(about.residuals), noise))
+        x = linear.x.copy()
+        x[linear.free] += solution.step
+        x = problem.bounds.clip(x)
+        if (np.abs(x - linear.x)[linear.free] <= ERROR_STEP * np.sqrt(np.diag(solution.covariance))).all():
+            break
+        residuals = problem.residuals(x).with_test_weights(result.residuals.test_weights)
+        assert residuals.jacobian is not None
+        if not (np.isfinite(residuals.values).all() and np.isfinite(residuals.jacobian).all()):
+            break
+        linear = replace(linearised(problem, x, residuals), free=linear.free)
+    return replace(result, x=linear.x)
+
+
+NOTEWORTHY_FACTOR = 0.03
+"""Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
+
+
+def at_own_rates(problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel) -> LinearisedProblem:
+    """The linear problem with every test about a rate of its own, by which a law is judged."""
+    log_factors = predicted_random_effects(linear.residuals, noise_model)[1]
+    return linear if np.abs(log_factors).max() < NOTEWORTHY_FACTOR else at_rates(problem, linear, log_factors)
+
+
+def at_rates(problem: LeastSquaresProblem, linear: LinearisedProblem, log_factors: Floats) -> LinearisedProblem:
+    """The linear problem about rates of tests with factors; log_factors : (tests,) their ln.
+
+    As `linear`, which is about the law's rates, where some rate has no coefficient or nothing is predicted there.
+    """
+    if not problem.coordinates.every_rate_has_coefficient:
+        return linear
+    there = problem.residuals_at_rates(linear.x, log_factors)
+    values = there.values - log_factors[:, None] * there.log_rate_sensitivity
+    finite = np.isfinite(values).all() and there.jacobian is not None and np.isfinite(there.jacobian).all()
+    residuals = replace(
+        there, values=values, present=linear.residuals.present, test_weights=linear.residuals.test_weights
+    )
+    return replace(linear, residuals=residuals) if finite else linear
 
 
 def _covariance_factor(
@@ -143,37 +204,24 @@ def linearised(problem: LeastSquaresProblem, x: Floats, residuals: Residuals) ->
     prior_residual = np.concatenate([np.zeros(count), x[count:] - nuisances.mean[: x.size - count]])
     tolerance = BOUND_TOLERANCE * bounds.width
     free = (x > bounds.lower + tolerance) & (x < bounds.upper - tolerance)
-    return LinearisedProblem(residuals, precision, prior_residual, free, np.stack([bounds.lower - x, bounds.upper - x]))
+    return LinearisedProblem(
+        residuals, precision, prior_residual, free, np.stack([bounds.lower - x, bounds.upper - x]), x
+    )
 
 
 def _round_result(
-    problem: LeastSquaresProblem, minimum: Minimum, residuals: Residuals, working_noise: NoiseModel, restricted: bool
+    problem: LeastSquaresProblem, minimum: Minimum, residuals: Residuals, working_noise: NoiseModel
 ) -> EstimationResult:
     """The end of a round, with the prior standard deviations that its residuals show."""
     nuisances = problem.nuisance_parameters
-    if restricted:
-        nuisances = _with_estimated_priors(nuisances, residuals, working_noise, minimum.x)
+    if any(n.sd is None for n in nuisances.nuisances):
+        assert residuals.jacobian is not None
+        whitened = CovarianceFactor.of_residuals(residuals, working_noise).whiten(residuals.jacobian)
+        nuisances = _with_prior_sd(nuisances, np.einsum("tfp,tfq->pq", whitened, whitened), minimum.x)
         problem = problem.with_nuisances(nuisances)
-        linear = linearised(problem, minimum.x, residuals)
-        likelihood = restricted_log_likelihood(linear, working_noise)
-        return EstimationResult(problem, minimum, residuals, working_noise, likelihood, linear)
-    likelihood = log_likelihood(residuals, working_noise)
-    if not nuisances.size:
-        return EstimationResult(problem, minimum, residuals, working_noise, likelihood)
-    information = normal_matrix(residuals, working_noise)
-    nuisances = _with_estimated_priors(nuisances, residuals, working_noise, minimum.x)
-    e = minimum.x[-nuisances.size :]
-    likelihood = marginal_log_likelihood(likelihood, information, e, nuisances)
-    return EstimationResult(problem.with_nuisances(nuisances), minimum, residuals, working_noise, likelihood)
-
-
-def _with_estimated_priors(
-    nuisance_parameters: NuisanceParameters, residuals: Residuals, working_noise: NoiseModel, x: Floats
-) -> NuisanceParameters:
-    """The nuisance parameters, with those prior standard deviations estimated that were not given."""
-    if all(n.sd is not None for n in nuisance_parameters.nuisances):
-        return nuisance_parameters
-    return _with_prior_sd(nuisance_parameters, normal_matrix(residuals, working_noise), x)
+    linear = linearised(problem, minimum.x, residuals)
+    likelihood = restricted_log_likelihood(linear, working_noise)
+    return EstimationResult(problem, minimum, residuals, working_noise, likelihood, linear, minimum.x)
 
 
 def _with_prior_sd(nuisance_parameters: NuisanceParameters, normal_matrix: Floats, x: Floats) -> NuisanceParameters:

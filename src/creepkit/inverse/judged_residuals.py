@@ -16,12 +16,13 @@ from scipy.optimize import lsq_linear
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.composite_predictor import prediction_errors_of
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.iterative_estimation import linearised
+from creepkit.inverse.iterative_estimation import at_own_rates, linearised
 from creepkit.inverse.known_noise import KnownNoise
-from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
+from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.residuals import life_sensitivity
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
 
 
@@ -83,24 +84,6 @@ def judged_residuals(
     )
 
 
-def life_sensitivity(residuals: Residuals, observations: ObservationVector) -> Floats:
-    """(tests, observations) -, derivative of the residuals of frames to ln of the rupture life; 0 of other tests.
-
-    Specimens of one alloy that creep alike still break at different times, and the last part of their curves moves with
-    the life. Along a curve whose creep ends in a damage that grows at a rate of its own, such as
-
-        e = A t_r lambda [1 - (1 - t / t_r)^(1 / lambda)]
-
-    a life longer by a factor exp(b) moves the time at which a strain is reached by (1 - 1/s) b in ln t, with
-    s = d ln e / d ln t: not at all in steady creep, where s = 1, and by all of b at rupture, where s is infinite. A
-    rate that scatters moves the whole curve by one amount in ln t, and the orthogonal residual of the frame by
-    L = sqrt(2) s / sqrt(1 + s^2); with that, a life moves it by L - sqrt(2 - L^2).
-    """
-    shift = np.clip(residuals.log_rate_sensitivity, 0.0, np.sqrt(2.0))
-    effect = np.maximum(shift - np.sqrt(np.maximum(2.0 - shift**2, 0.0)), 0.0)
-    return np.where(observations.followed_frames & residuals.present, effect, 0.0)
-
-
 def _with_scatter_of_lives(
     linear: LinearisedProblem, observations: ObservationVector, noise_model: NoiseModel
 ) -> LinearisedProblem:
@@ -109,47 +92,14 @@ def _with_scatter_of_lives(
     effect = scatter * life_sensitivity(linear.residuals, observations)
     if not effect.any():
         return linear
-    known = linear.residuals.random_effect_sensitivities
-    columns = [*([] if known is None else [known]), effect[..., None]]
-    residuals = replace(linear.residuals, random_effect_sensitivities=np.concatenate(columns, axis=-1))
-    return replace(linear, residuals=residuals)
-
-
-NOTEWORTHY_FACTOR = 0.03
-"""Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
-
-
-def at_own_rates(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
-) -> LinearisedProblem:
-    """The problem made linear at x (unknowns,) and where the rate of each test is its own, by which a law is judged."""
-    log_factors = predicted_random_effects(linear.residuals, noise_model)[1]
-    return linear if np.abs(log_factors).max() < NOTEWORTHY_FACTOR else at_rates(problem, x, linear, log_factors)
-
-
-def at_rates(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, log_factors: Floats
-) -> LinearisedProblem:
-    """The problem made linear at x (unknowns,) and where rates of tests have factors; log_factors : (tests,) their ln.
-
-    As `linear`, which is about the law's rates, where some rate has no coefficient or nothing is predicted there.
-    """
-    if not problem.coordinates.every_rate_has_coefficient:
-        return linear
-    there = problem.residuals_at_rates(x, log_factors)
-    values = there.values - log_factors[:, None] * there.log_rate_sensitivity
-    finite = np.isfinite(values).all() and there.jacobian is not None and np.isfinite(there.jacobian).all()
-    residuals = replace(
-        there, values=values, present=linear.residuals.present, test_weights=linear.residuals.test_weights
-    )
-    return replace(linear, residuals=residuals) if finite else linear
+    return replace(linear, residuals=linear.residuals.with_effects(effect[..., None]))
 
 
 def judged_residuals_of(fit: Identification) -> JudgedResiduals | None:
     """The same of an identification with its histories, as its adequacy was judged; None where no noise is known."""
     problem = fit.least_squares_problem
     linear = fit.linearised or linearised(problem, fit.x, problem.residuals(fit.x))
-    linear = at_own_rates(problem, fit.x, linear, fit.noise_model)
+    linear = at_own_rates(problem, linear, fit.noise_model)
     error = fit.numerical_error
     errors = prediction_errors_of(problem.predictor) if error is None else error.remaining
     known = KnownNoise.of_histories(problem.observations, fit.histories)

@@ -37,20 +37,27 @@ def _check(code: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class CovarianceFactor:
-    """The covariance C = L L' of every test; L^-1 r is white.
+    """The covariance C = L L' of all tests; L^-1 r is white.
 
     series : of the observations. components : (5 outputs + 3,) as NoiseModel.components has them. counts : (tests,
-    observations) how often the square of each whitened value counts, or None for once.
+    observations) how often the square of each whitened value counts, or None for once. common : (tests, observations,
+    effects) S of errors that tests have alike, or None for none.
+
+    With B = L_0 L_0' the blocks of single tests and U D V' the singular value decomposition of L_0^-1 S,
+    C = B + S S' is L_0 (1 + U D^2 U') L_0', and its inverse root [1 - U (1 - (1 + D^2)^-1/2) U'] L_0^-1.
     """
 
     series: ObservationSeries
     components: Floats
     counts: Floats | None = None
+    common: Floats | None = None
 
     @classmethod
     def of_residuals(cls, residuals: Residuals, noise_model: NoiseModel) -> CovarianceFactor:
         """The covariance of residuals under a noise model."""
-        return cls(residuals.series, noise_model.components)
+        common = residuals.common_effects
+        weighted = None if common is None else common / np.sqrt(residuals.test_weights)[:, None, None]
+        return cls(residuals.series, noise_model.components, common=weighted)
 
     def with_counts(self, counts: Floats) -> CovarianceFactor:
         """The same with squares of whitened values counted (tests, observations) times."""
@@ -58,20 +65,45 @@ class CovarianceFactor:
 
     def whiten(self, values: Floats) -> Floats:
         """L^-1 v of values (tests, observations[, columns]), of the same shape; observations without data stay."""
+        whitened = self._whitened_by_tests(values)
+        if self.common is None:
+            return whitened
+        left, squares = self._common_modes
+        rows = whitened.reshape(len(left), -1)
+        shrunk = rows - left @ ((1.0 - 1.0 / np.sqrt(1.0 + squares))[:, None] * (left.T @ rows))
+        return np.asarray(shrunk.reshape(whitened.shape))
+
+    def inverse_times(self, values: Floats) -> Floats:
+        """C^-1 v of values (tests, observations[, columns]), of the same shape; observations without data stay."""
+        weighted = self._transformed(values, inverse=True)[0]
+        if self.common is None:
+            return weighted
+        common = self._transformed(self.common, inverse=True)[0].reshape(-1, self.common.shape[-1])
+        inner = np.eye(common.shape[1]) + self.common.reshape(common.shape).T @ common
+        rows = common.T @ values.reshape(len(common), -1)
+        return np.asarray(weighted - (common @ np.linalg.solve(inner, rows)).reshape(weighted.shape))
+
+    @cached_property
+    def log_determinant(self) -> float:
+        """ln|C| over all tests."""
+        own = self._transformed(np.zeros((*self.series.shape, 0)), inverse=False)[1]
+        return own if self.common is None else own + float(np.log1p(self._common_modes[1]).sum())
+
+    def _whitened_by_tests(self, values: Floats) -> Floats:
+        """L_0^-1 v, each test by itself."""
         whitened = self._transformed(values, inverse=False)[0]
         if self.counts is None:
             return whitened
         roots = np.sqrt(self.counts)
         return np.asarray(whitened * (roots if values.ndim == 2 else roots[..., None]))
 
-    def inverse_times(self, values: Floats) -> Floats:
-        """C^-1 v of values (tests, observations[, columns]), of the same shape; observations without data stay."""
-        return self._transformed(values, inverse=True)[0]
-
     @cached_property
-    def log_determinant(self) -> float:
-        """ln|C| over all tests."""
-        return self._transformed(np.zeros((*self.series.shape, 0)), inverse=False)[1]
+    def _common_modes(self) -> tuple[Floats, Floats]:
+        """U, (tests x observations, effects), and the squares of D, (effects,)."""
+        assert self.common is not None
+        rows = self._whitened_by_tests(self.common).reshape(-1, self.common.shape[-1])
+        left, values, _ = np.linalg.svd(rows, full_matrices=False)
+        return left, values**2
 
     @cached_property
     def variances(self) -> Floats:
@@ -85,7 +117,7 @@ class CovarianceFactor:
         out = np.ones(series.shape)
         variance = correlated * (1.0 + RELATIVE_JITTER) + (noise * white) ** 2 + misfit**2 + ABSOLUTE_JITTER
         out.flat[series.places] = variance / series.root_weights[:, 0] ** 2
-        return out
+        return out if self.common is None else out + (self.common**2).sum(axis=-1)
 
     def _transformed(self, values: Floats, *, inverse: bool) -> tuple[Floats, float]:
         series, rows = self.series, self.series.rows(values)

@@ -35,7 +35,8 @@ class Residuals:
         the typical noise of that output.
     test_weights : (tests,) -; the covariance of a test is divided by it.
     random_effect_sensitivities : (tests, observations, effects) -, effect of one standard deviation of further random
-        effects, or None.
+        effects, independent in each test, or None. common_effects : (tests, observations, effects) -, of effects that
+        all tests have alike, or None.
     discrepancy_unit : (tests, observations) -, what a model discrepancy of one is in the transformed output: the stated
         or estimated noise of the frame; 1 % where the transform is logarithmic; 0 where there can be none.
     shared_noise : how the noise of the outputs of a frame is correlated; None where it is not.
@@ -51,12 +52,30 @@ class Residuals:
     relative_noise: Floats
     test_weights: Floats
     random_effect_sensitivities: Floats | None = None
+    common_effects: Floats | None = None
     discrepancy_unit: Floats | None = None
     shared_noise: SharedNoise | None = None
 
     def with_test_weights(self, test_weights: Floats) -> Residuals:
         """The same with other weights of tests."""
         return replace(self, test_weights=test_weights)
+
+    def with_effects(self, own: Floats, common: Floats | None = None) -> Residuals:
+        """The same with further random effects.
+
+        own, common : (tests, observations, effects) -, one standard deviation of those of each test, and of those that
+        all tests have alike.
+        """
+
+        def joined(present: Floats | None, more: Floats | None) -> Floats | None:
+            added = [one for one in (present, more) if one is not None and one.shape[-1]]
+            return np.concatenate(added, axis=-1) if added else present
+
+        return replace(
+            self,
+            random_effect_sensitivities=joined(self.random_effect_sensitivities, own),
+            common_effects=joined(self.common_effects, common),
+        )
 
     def where(self, mask: Bools) -> Residuals:
         """The same of some observations alone; mask : (tests, observations)."""
@@ -72,6 +91,7 @@ class Residuals:
             jacobian=kept(self.jacobian),
             log_rate_sensitivity=kept(self.log_rate_sensitivity),
             discrepancy_unit=kept(self.discrepancy_unit),
+            common_effects=kept(self.common_effects),
         )
 
     @cached_property
@@ -198,17 +218,6 @@ def initial_working_noise(observations: ObservationVector, nuisances: Sequence[N
         offset = initial_sd(nuisances, "offset", transform.floor, name)
         by_output[name] = OutputNoise(noise=max(float(noise), 1e-3 * transform.floor), misfit=0.3, offset=offset)
     return NoiseModel(by_output)
-
-
-def initial_noise_model(working: NoiseModel, nuisances: Sequence[Nuisance]) -> NoiseModel:
-    """The noise model from which its estimate begins; the one rate or rupture time of a test cannot drift."""
-    outputs = {
-        name: s
-        if name in SINGLE_VALUES
-        else replace(s, misfit=0.3 * s.misfit, drift=0.5 * s.misfit, correlation_length=1.0)
-        for name, s in working.outputs.items()
-    }
-    return without_confounded_misfit(NoiseModel(outputs, initial_sd(nuisances, "rate", ASSUMED_RATE_SD)))
 
 
 def without_confounded_misfit(noise_model: NoiseModel) -> NoiseModel:

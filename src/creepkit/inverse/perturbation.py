@@ -43,8 +43,6 @@ class Perturbation:
     like_hardening : the size, in the same unit, that looks most like the hardening of the law itself, NaN where it has
         none, and hardening_correlation : how much like it, in the residuals, 1 for the same.
     residual_change : (tests, observations) -, of the residuals, by one standard deviation; saved in kept fits alone.
-    value_change : (errors, unknowns) of x, by each independent error of one standard deviation, or by the common one;
-        never saved.
     common : whether it is one error of all tests, as of an instrument that measures them all. tests : how many have it.
     included : whether the intervals include it.
     per_kelvin : change of ln rate a kelvin at the reference point, NaN where it is no error of temperature; assumed :
@@ -58,7 +56,6 @@ class Perturbation:
     like_hardening: float = float("nan")
     hardening_correlation: float = float("nan")
     residual_change: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
-    value_change: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     common: bool = False
     tests: int = 1
     included: bool = False

@@ -1,16 +1,10 @@
 """Perturbations of the tests of an identification: what nobody models, and what it changes.
 
 A dimple may be thicker than its drawing, a camera may have moved, a furnace may drift; a thermocouple, a load cell or a
-micrometer may be off in every test. Where no nuisance parameter stands for it, the values take it as exactly known.
-Its effect on the residuals, s (one standard deviation of the usual size), moves them by
-
-    du = -(J'C^-1 J + P)^-1 J'C^-1 s
-
-to first order, and with it the rate. C is the covariance under which values are found. Independent errors of tests add
-in quadrature; where the scatter of rates is estimated from the tests, they are found as such scatter: C then holds the
-scatter that they make, and each test weighs as much as any other, however small the scatter is without them. An error
-common to all tests makes no scatter, and tests repeated on one rig do not average it out: what it does to each adds up.
-So du du' of the errors that the settings name is in the covariance of the values, beside what the tests say themselves.
+micrometer may be off in every test. Where no nuisance parameter stands for it, it is a perturbation.
+What an error does to values that do not know of it is, to first order, du = -(J'C^-1 J + P)^-1 J'C^-1 s, with s its
+effect on the residuals and C the covariance as it would be found: with the scatter of rates, the offsets or the misfit
+that the error makes. Those that the settings name are in the covariance instead (see inverse.errors_of_tests).
 
 A temperature or load that is off changes the creep rate of each test by its own factor. Of tests under an imposed
 strain or displacement the stress is E (strain - creep strain): a modulus or a strain that is off moves it from the
@@ -41,7 +35,6 @@ from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
-from creepkit.inverse.working_noise import with_single_value_weight
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import (
@@ -63,10 +56,6 @@ USUAL_DRIFT = 5.0
 """K over a test: what furnaces drift where nobody looks."""
 
 
-SCATTER_NODES = 60
-"""Standard deviations over which the scatter by errors of single tests is averaged."""
-
-
 LOADS, IMPOSED = ("stress", "pressure", "force"), ("strain", "displacement")
 """Quantities of a loading that an instrument sets, and those under which the stress follows from the stiffness."""
 
@@ -85,34 +74,34 @@ LOWEST_USUAL_TEMPERATURE = 1000.0
 
 def perturbations(
     problem: LeastSquaresProblem,
-    x: Floats,
     linear: LinearisedProblem,
     noise_model: NoiseModel,
     full_histories: Sequence[History],
+    known: Sequence[Perturbation] | None = None,
     working_noise: NoiseModel | None = None,
 ) -> tuple[Perturbation, ...]:
-    """Those that no nuisance parameter of the problem stands for; x : (unknowns,) its optimum.
+    """Those that no nuisance parameter of the problem stands for, with what they do to the rate, about the optimum.
 
-    working_noise : under which the values were found where that is not `noise_model`, as of frames of equal weight.
+    known : those of lengths and instruments, where they have been simulated already.
+    working_noise : under which values were found that are not by likelihood.
     """
-    fitting_noise = None if working_noise is None else with_single_value_weight(working_noise, problem.observations)
+    x = linear.x
     factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
     reference = problem.coordinates.reference
     slope = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature)
     found, without_energy = [], not problem.law.uses(temperature)
-    for one in _all(problem, x, linear, full_histories):
-        change, noise = one.residual_change, fitting_noise or noise_model
-        if not one.common and fitting_noise is None:
+    for one in _all(problem, x, linear, full_histories, known):
+        change, noise = one.residual_change, working_noise or noise_model
+        if not one.common and working_noise is None:
             noise = _with_scatter_of(change, problem, linear, noise_model)
-        if one.kind == "modulus" or one.kind.startswith("imposed "):
+        if (one.kind == "modulus" or one.kind.startswith("imposed ")) and working_noise is None:
             noise = _with_offset_of(change, problem, linear, noise)
         if one.kind == DRIFT:
             noise = _with_misfit_of(change, problem, noise)
         moved = value_changes(linear, noise, change)
         moved = moved.sum(axis=0, keepdims=True) if one.common else moved
         by_error = moved[:, : problem.parameter_count] @ _log_rate_gradient(problem, x)
-        size = float(by_error[0] if one.common else np.sqrt((by_error**2).sum()))
-        one = replace(one, rate_change=size, value_change=moved)
+        one = replace(one, rate_change=float(by_error[0] if one.common else np.sqrt((by_error**2).sum())))
         if one.kind == DRIFT:
             ratio, correlation = _likeness_of_hardening(problem, x, linear, factor, change)
             one = replace(one, like_hardening=one.size * ratio, hardening_correlation=correlation)
@@ -122,57 +111,10 @@ def perturbations(
     return tuple(found)
 
 
-def usual_scatter(
-    problem: LeastSquaresProblem,
-    x: Floats,
-    linear: LinearisedProblem,
-    noise_model: NoiseModel,
-    redundant: int,
-    working_noise: NoiseModel | None = None,
-) -> Floats:
-    """(tests, unknowns) changes of x by temperatures and loads that are off in each test by itself.
-
-    x : (unknowns,) the optimum. redundant : combinations of rates of tests that the law does not move, by which their
-    scatter was estimated. The standard deviation that the usual errors make is that of a prior of the scatter, half of
-    a normal distribution: what is added is its mean square, given the estimate, beyond that; all of it where no test is
-    redundant. Nothing is added where the settings state the scatter, and in one test, whose error is the common one.
-    working_noise : as of perturbations().
-    """
-    included, settings, tests = problem.settings.included_errors, problem.settings, range(len(problem.histories))
-    own = any(n.kind == "temperature" for n in settings.nuisances)
-    if len(tests) == 1 or ("", "rate") in components_fixed_by_priors(settings.nuisances, list(noise_model.outputs)):
-        return np.zeros((0, x.size))
-    kelvin = 0.0 if own else included.get("temperature", 0.0)
-    load, variances = included.get("load", 0.0), []
-    for test in tests:
-        per_kelvin = log_rate_per_kelvin(problem, x, *_conditions(problem, test))
-        loaded = problem.histories[test].loading.quantity in LOADS
-        exponent = _stress_exponent(problem, x, test) if loaded else 0.0
-        variances.append((per_kelvin * kelvin) ** 2 + (exponent * load) ** 2)
-    redundant = redundant if noise_model.rate > 0 else 0
-    added = np.sqrt([_mean_square(variance, noise_model.rate, redundant) for variance in variances])
-    change = added[:, None] * linear.residuals.log_rate_sensitivity
-    if working_noise is not None:
-        return value_changes(linear, with_single_value_weight(working_noise, problem.observations), change)
-    return value_changes(linear, _with_scatter_of(change, problem, linear, noise_model), change)
-
-
-def _mean_square(usual: float, estimate: float, redundant: int) -> float:
-    """Mean square of ln rate by scatter of which `usual` is the prior variance, beyond the square of its estimate."""
-    if not usual > 0:
-        return 0.0
-    s = np.geomspace(1e-3, 5.0, SCATTER_NODES) * np.sqrt(usual)
-    log_weight = (1 - redundant) * np.log(s) - 0.5 * redundant * (estimate / s) ** 2 - 0.5 * s**2 / usual
-    weight = np.exp(log_weight - log_weight.max())
-    return max(float(weight @ s**2 / weight.sum()) - estimate**2, 0.0)
-
-
 def with_random_effects(linear: LinearisedProblem, effects: Sequence[Perturbation]) -> LinearisedProblem:
     """The linear problem with these perturbations as random effects of each test in its covariance."""
-    columns = [effect.residual_change[..., None] for effect in effects]
-    present = linear.residuals.random_effect_sensitivities
-    stacked = np.concatenate([*([present] if present is not None else []), *columns], axis=-1)
-    return replace(linear, residuals=replace(linear.residuals, random_effect_sensitivities=stacked))
+    stacked = np.stack([effect.residual_change for effect in effects], axis=-1)
+    return replace(linear, residuals=linear.residuals.with_effects(stacked))
 
 
 def with_unknown_effects(linear: LinearisedProblem, changes: Floats) -> LinearisedProblem:
@@ -211,25 +153,40 @@ def sizes_of_effect(
 
 
 def _all(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, full_histories: Sequence[History]
+    problem: LeastSquaresProblem,
+    x: Floats,
+    linear: LinearisedProblem,
+    full_histories: Sequence[History],
+    known: Sequence[Perturbation] | None,
 ) -> Iterator[Perturbation]:
     """Errors that the tests have independently of one another: lengths, offsets, drifts; then those common to all."""
-    nuisances = problem.settings.nuisances
-    kinds, shared = {n.kind for n in nuisances}, {n.kind for n in nuisances if n.scope != "test"}
-    lengths = []
-    for dimension in tolerated_dimensions(problem):
-        if shared.isdisjoint(dimension.names):
-            found = _length(problem, x, linear, dimension.names[-1])
-            yield from found if kinds.isdisjoint(dimension.names) else ()
-            lengths += found
+    kinds = {n.kind for n in problem.settings.nuisances}
+    known = of_lengths_and_instruments(problem, x, linear) if known is None else known
+    yield from (one for one in known if not one.common)
     if "offset" not in kinds:
         yield from _offsets(problem, linear)
     recorded = any(isinstance(h.temperature, Program) for h in full_histories)
     # A drift changes curves, and no single value.
     if any(h.outputs for h in full_histories) and not recorded and kinds.isdisjoint({DRIFT, "rate drift"}):
         yield _drift(problem, x, linear)
-    yield from common_errors(problem, x, linear)
-    yield from (replace(one, common=True) for one in lengths if one.tests > 1)
+    yield from (one for one in known if one.common)
+
+
+def of_lengths_and_instruments(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem
+) -> tuple[Perturbation, ...]:
+    """Lengths that are off in each test by itself, errors common to all tests, and lengths that are off in all alike.
+
+    Those for which no nuisance parameter stands. x : (unknowns,).
+    """
+    nuisances, own, common = problem.settings.nuisances, list[Perturbation](), list[Perturbation]()
+    kinds, shared = {n.kind for n in nuisances}, {n.kind for n in nuisances if n.scope != "test"}
+    for dimension in tolerated_dimensions(problem):
+        if shared.isdisjoint(dimension.names):
+            found = _length(problem, x, linear, dimension.names[-1])
+            own += found if kinds.isdisjoint(dimension.names) else []
+            common += [replace(one, common=True) for one in found if one.tests > 1]
+    return (*own, *common_errors(problem, x, linear), *common)
 
 
 def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> list[Perturbation]:
@@ -255,10 +212,10 @@ def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedPro
         return np.asarray(linear.residuals.offset_sensitivity * slope * size)
 
     if "temperature" not in shared:
-        slopes = [log_rate_per_kelvin(problem, x, *_conditions(problem, test)) for test in tests]
+        slopes = [log_rate_per_kelvin(problem, x, *test_conditions(problem, test)) for test in tests]
         add("temperature", sizes["temperature"], "K", of_rates(slopes, sizes["temperature"]))
     if any(loaded):
-        exponents = [_stress_exponent(problem, x, test) if known else 0.0 for test, known in enumerate(loaded)]
+        exponents = [stress_exponent(problem, x, test) if known else 0.0 for test, known in enumerate(loaded)]
         add("load", 100 * sizes["load"], "%", of_rates(exponents, sizes["load"]))
     if any(moved):
         imposed = [h for h, counts in zip(histories, moved, strict=True) if counts]
@@ -402,11 +359,12 @@ def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, stress: float, 
     return 0.5 * (up - down)
 
 
-def _stress_exponent(problem: LeastSquaresProblem, x: Floats, test: int) -> float:
-    return float(local_exponent(problem.coordinates, *_conditions(problem, test))(x[: problem.parameter_count]))
+def stress_exponent(problem: LeastSquaresProblem, x: Floats, test: int) -> float:
+    """Of the law at the condition of a test by its position; x : (unknowns,)."""
+    return float(local_exponent(problem.coordinates, *test_conditions(problem, test))(x[: problem.parameter_count]))
 
 
-def _conditions(problem: LeastSquaresProblem, test: int) -> tuple[float, float]:
+def test_conditions(problem: LeastSquaresProblem, test: int) -> tuple[float, float]:
     """MPa and K, of a test by its position."""
     history = problem.histories[test]
     stresses = reference_stresses(history, problem.predictor)

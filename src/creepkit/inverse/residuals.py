@@ -145,6 +145,24 @@ def residuals_of_prediction(
     return _masked_residuals(observations, distance.values[0], offsets, jacobian, log_rate_sensitivity, informative)
 
 
+def life_sensitivity(residuals: Residuals, observations: ObservationVector) -> Floats:
+    """(tests, observations) -, derivative of the residuals of frames to ln of the rupture life; 0 of other tests.
+
+    Specimens of one alloy that creep alike still break at different times, and the last part of their curves moves with
+    the life. Along a curve whose creep ends in a damage that grows at a rate of its own, such as
+
+        e = A t_r lambda [1 - (1 - t / t_r)^(1 / lambda)]
+
+    a life longer by a factor exp(b) moves the time at which a strain is reached by (1 - 1/s) b in ln t, with
+    s = d ln e / d ln t: not at all in steady creep, where s = 1, and by all of b at rupture, where s is infinite. A
+    rate that scatters moves the whole curve by one amount in ln t, and the orthogonal residual of the frame by
+    L = sqrt(2) s / sqrt(1 + s^2); with that, a life moves it by L - sqrt(2 - L^2).
+    """
+    shift = np.clip(residuals.log_rate_sensitivity, 0.0, np.sqrt(2.0))
+    effect = np.maximum(shift - np.sqrt(np.maximum(2.0 - shift**2, 0.0)), 0.0)
+    return np.where(observations.followed_frames & residuals.present, effect, 0.0)
+
+
 def median_log_rate_excess(observations: ObservationVector, residuals: Floats) -> Floats:
     """(candidates,) -, ln of predicted over measured creep rates: the median over the leading outputs.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
@@ -23,7 +23,7 @@ class LinearisedProblem:
 
     residuals : with their derivatives to all unknowns. precision, prior_residual : (unknowns,) of the priors, and the
     distance from their means. free : (unknowns,) which are not at their bounds. step_bounds : (2, unknowns) least and
-    largest step within the bounds.
+    largest step within the bounds. x : (unknowns,) where it was made linear.
     """
 
     residuals: Residuals
@@ -31,6 +31,7 @@ class LinearisedProblem:
     prior_residual: Floats
     free: Bools
     step_bounds: Floats
+    x: Floats = field(default_factory=lambda: np.zeros(0))
 
     @property
     def jacobian(self) -> Floats:

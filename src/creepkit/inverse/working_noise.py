@@ -124,8 +124,15 @@ class WorkingNoiseEstimator:
 
     def starting_noise(self, tests: int) -> NoiseModel:
         """Where the iteration begins: the guess, or for a likelihood all sources of scatter at a tenth."""
-        if not self.by_likelihood:
-            return self.initial()
+        return self._likely_start(tests) if self.by_likelihood else self.initial()
+
+    def final(self, linearised: LinearisedProblem, working_noise: NoiseModel) -> NoiseModel:
+        """The noise model of largest restricted likelihood at the end: the working noise itself where values are."""
+        if self.by_likelihood:
+            return working_noise
+        return self._by_restricted_likelihood(linearised, self._likely_start(len(linearised.residuals.values)))
+
+    def _likely_start(self, tests: int) -> NoiseModel:
         nuisances, by_output = self.settings.nuisances, {}
         for name, scale, noise in zip(
             self.observations.outputs, self.observations.transforms, self.observations.noise, strict=True
@@ -229,15 +236,6 @@ class WorkingNoiseEstimator:
         for name, relative in self.relative_sd.items():
             noise_model = noise_model.with_output(name, noise=0.0, misfit=max(scale, 1e-6) * relative)
         return noise_model
-
-    def with_measured_noise(self, working: NoiseModel) -> NoiseModel:
-        """The noise model from which the whole covariance is estimated: with the noise that was measured."""
-        initial = initial_working_noise(self.observations, self.settings.nuisances)
-        for name, sizes in initial.outputs.items():
-            working = working.with_output(name, noise=sizes.noise)
-            if self.relative_sd is not None:
-                working = working.with_output(name, misfit=sizes.misfit)
-        return working
 
 
 def _drifts_at_longest(noise_model: NoiseModel, residuals: Residuals) -> bool:

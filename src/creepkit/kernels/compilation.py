@@ -21,15 +21,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+import llvmlite
+import llvmlite.binding as llvm
 import numpy as np
 
 from creepkit.arrays import Floats, frozen
 from creepkit.files.cache_folders import cache_folder, is_ours_alone
-from creepkit.kernels.interface import CompiledLaw, Entry
+from creepkit.kernels.interface import CompiledEntry, CompiledLaw
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, expression_source, law_comments
 from creepkit.kernels.llvm_code import Module, add_entry
 from creepkit.kernels.log_form import leading_exponents
-from creepkit.kernels.machine_code import LoadedCode, object_code, processor
 from creepkit.kernels.symbolic_kernel import SymbolicKernel
 from creepkit.language import symbols
 from creepkit.language.law_record import structure_of
@@ -108,7 +109,9 @@ def _execute_module(key: str, folder: Path, files: dict[str, bytes]) -> ModuleTy
     source, code = files[SOURCE_FILE].decode(), LoadedCode(files[CODE_FILE])
     module = ModuleType(f"creepkit_kernel_{key}")
     exec(compile(source, str(folder / SOURCE_FILE), "exec"), module.__dict__)
-    module.__dict__.update(SOURCE=source, COMPILED={entry: Entry(code.address(entry), code) for entry in ENTRIES})
+    module.__dict__.update(
+        SOURCE=source, COMPILED={entry: CompiledEntry(code.address(entry), code) for entry in ENTRIES}
+    )
     return module
 
 
@@ -230,3 +233,52 @@ def _leading_exponent(
         active = np.isfinite(theta[..., list(coefficients)]).all(axis=-1)
         smallest = np.where(active, np.minimum(smallest, beta), smallest)
     return np.where(np.isfinite(smallest), smallest, 1.0)
+
+
+def object_code(assembly: str) -> bytes:
+    """Compile a module."""
+    machine = _target_machine()
+    module = llvm.parse_assembly(assembly)
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    options = llvm.create_pipeline_tuning_options(speed_level=2)
+    options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False  # vectors are written out
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    code: bytes = machine.emit_object(module)
+    return code
+
+
+class LoadedCode:
+    """Object code in memory, for as long as this object lives."""
+
+    def __init__(self, code: bytes) -> None:
+        machine = _target_machine()
+        self._engine: Any = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        self._engine.finalize_object()
+
+    def address(self, name: str) -> int:
+        """Where a function is; KeyError when there is none."""
+        address = int(self._engine.get_function_address(name))
+        if not address:
+            raise KeyError(name)
+        return address
+
+
+@cache
+def processor() -> tuple[str, ...]:
+    """The compiler and the machine that code is made for."""
+    features: str = llvm.get_host_cpu_features().flatten()
+    return llvmlite.__version__, llvm.get_process_triple(), llvm.get_host_cpu_name(), features
+
+
+def _target_machine() -> Any:
+    """A description of this machine, anew each time, for an engine takes its own away with it."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    _, triple, name, features = processor()
+    target = llvm.Target.from_triple(triple)
+    static = target.name.startswith("x86")  # what LLVM's loader wants there, and any distance between code and data
+    return target.create_target_machine(
+        cpu=name, features=features, opt=2, reloc="static" if static else "default", codemodel="jitdefault", jit=True
+    )

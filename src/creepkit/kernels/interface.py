@@ -43,7 +43,7 @@ DERIVATIVE_NOT_FINITE = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
+class CompiledEntry:
     """A C function; code : what keeps its machine code in memory."""
 
     address: int
@@ -62,9 +62,9 @@ class CompiledLaw:
         (..., 6 + S) says which; else it is taken at 100 MPa and 1000 K.
     """
 
-    rate: Entry
-    update: Entry
-    sensitivity: Entry
+    rate: CompiledEntry
+    update: CompiledEntry
+    sensitivity: CompiledEntry
     names: tuple[str, ...]
     initial: Floats
     limits: Floats

@@ -9,7 +9,6 @@ from typing import Any
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.language import algebra
 from creepkit.language.law_record import LawRecord
-from creepkit.language.primary_creep import with_primary
 from creepkit.language.printing import law_latex, law_text
 from creepkit.language.temperature_factors import times
 from creepkit.presentation import present
@@ -67,7 +66,7 @@ class CreepLaw(LawRecord):
         For laws of stress and temperature alone; b is the initial over the steady rate, less one, and e_p the strain
         over which it fades.
         """
-        return with_primary(self)
+        return algebra.with_primary(self)
 
     def with_temperature(self, /, **forms: Any) -> CreepLaw:
         """The law with parameters made functions of temperature, such as n=linear(T_ref=1073)."""

@@ -13,9 +13,16 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError, quoted
-from creepkit.readers.column_names import KnownNames
+from creepkit.readers.column_names import split_unit
 from creepkit.readers.condition_texts import with_weak_sources
-from creepkit.readers.conditions import END_OF_TEST_TERMS, StatedConditions, StatedNumber, errors_located_at
+from creepkit.readers.conditions import (
+    END_OF_TEST_TERMS,
+    StatedConditions,
+    StatedNumber,
+    errors_located_at,
+    read_noise_correlation,
+)
+from creepkit.readers.derived_records import as_plain_bar, modulus_of_ramp, without_loading, without_steps
 from creepkit.readers.ends_of_tests import (
     FIRM,
     LABEL,
@@ -29,14 +36,10 @@ from creepkit.readers.ends_of_tests import (
 )
 from creepkit.readers.frames import UNUSED, TableFrames, column_means, column_question, read_frames
 from creepkit.readers.imposed import read_loading, read_temperature
-from creepkit.readers.loading_strain import without_loading
-from creepkit.readers.noise_correlation import read_noise_correlation
-from creepkit.readers.plain_bar import as_plain_bar, modulus_of_ramp
 from creepkit.readers.questions import Question
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
-from creepkit.readers.steps_taken_off import without_steps
 from creepkit.readers.table import CellTable, NumberRows, SourceText, cells_of
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records import (
     UNKNOWN_DURATION,
     History,
@@ -70,7 +73,7 @@ def assemble_history(
     resemble no key are labels, as columns of an index are.
     """
     entries, table = in_standard_names(entries, table, vocabulary)
-    known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
+    known = vocabulary.terms(specimen_named(entries, vocabulary))
     entries, assumed = with_weak_sources(entries, table, known)
     table = replace(table, assumptions=(*table.assumptions, *assumed))
     conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
@@ -156,7 +159,7 @@ def assemble_without_frames(
 
     Its one time is that of its end, where that is stated, as rupture or as `end_time`, else UNKNOWN_DURATION.
     """
-    known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
+    known = vocabulary.terms(specimen_named(entries, vocabulary))
     conditions = StatedConditions(in_standard_keys(entries, known), vocabulary, location)
     rate_known = conditions.states("minimum_rate")
     time, ended, is_end = _time_and_end(conditions, Path(source.partition(" (")[0]), name)

@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
-from creepkit.readers.vocabulary import LABEL_KEYS, HeaderVocabulary, Terms, plain_name, split_unit
 from creepkit.records.quantities import (
     ANGLE,
     AREA,
@@ -22,6 +21,19 @@ from creepkit.records.quantities import (
     QuantityKind,
 )
 from creepkit.records.units import CAPITALS_THAT_MATTER, UNITS, spellings
+
+
+@lru_cache(maxsize=4096)
+def plain_name(name: str) -> str:
+    """A name in small letters, with underscores for blanks, hyphens, points and what sets a unit apart."""
+    return re.sub(r"[\s_\-.()\[\],]+", "_", name.strip().casefold()).strip("_")
+
+
+def split_unit(name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str] | None:
+    """Split `stress_MPa` into the longest known quantity and the unit behind it; None when it begins with none."""
+    found = max((one for one in kinds if name == one or name.startswith(f"{one}_")), key=len, default=None)
+    return None if found is None else (found, name[len(found) + 1 :])
+
 
 _READ = dict.fromkeys(
     suffix
@@ -49,18 +61,8 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
-        *(
-            "remaining stress",
-            "residual stress",
-            "relaxed stress",
-            "restspannung",
-            "spannung",
-            "prüfspannung",
-            "nennspannung",
-            "anfangsspannung",
-            "contrainte",
-            "contrainte initiale",
-        ),
+        *("remaining stress", "residual stress", "relaxed stress", "restspannung", "spannung", "prüfspannung"),
+        *("nennspannung", "anfangsspannung", "contrainte", "contrainte initiale"),
     ),
     "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
     "strain": (
@@ -75,12 +77,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("längenänderung", "allongement"),
     ),
     "modulus": (
-        "young's modulus",
-        "youngs modulus",
-        "elastic modulus",
-        "e modul",
-        "elastizitätsmodul",
-        "module d'young",
+        *("young's modulus", "youngs modulus", "elastic modulus", "e modul", "elastizitätsmodul", "module d'young"),
     ),
     "poisson": ("poisson's ratio", "poissons ratio", "poisson ratio"),
     "rupture": ("rupture time", "time to rupture", "rupture life", "bruchzeit", "standzeit", "temps à rupture"),
@@ -232,69 +229,7 @@ class NameTable:
 
 
 TEST_NAME_COLUMNS = (
-    "test",
-    "test id",
-    "test name",
-    "test no",
-    "test number",
-    "sample",
-    "sample id",
-    "specimen id",
-    "versuch",
-    "probe",
-    "probennummer",
+    *("test", "test id", "test name", "test no", "test number", "sample", "sample id", "specimen id", "versuch"),
+    *("probe", "probennummer"),
 )
 """Names, in small letters, of columns and rows that tell which test it is where a table holds several."""
-
-
-@dataclass(frozen=True)
-class KnownNames:
-    """What names of columns and conditions in one file may mean."""
-
-    vocabulary: HeaderVocabulary
-    terms: Terms
-    columns: NameTable
-    conditions: NameTable
-
-    @classmethod
-    def of(cls, vocabulary: HeaderVocabulary, specimen: str = "") -> KnownNames:
-        """The names of a file; specimen : that it states."""
-        terms = vocabulary.terms(specimen or vocabulary.default_texts.get("specimen", ""))
-        lengths = dict.fromkeys(terms.dimensions, LENGTH)
-        conditions = NameTable({**lengths, **terms.condition_kinds}, terms.text_keys)
-        return cls(vocabulary, terms, NameTable(terms.column_kinds), conditions)
-
-    def column(self, name: str) -> str:
-        """A name of a column in creepkit's form, where it is understood."""
-        return name if name in self.declared else self.columns.standard(name)
-
-    def quantity(self, name: str) -> str | None:
-        """The quantity of a column, None where its name means none."""
-        found = split_unit(self.column(self.vocabulary.synonyms.get(name, name)), self.columns.kinds)
-        return found[0] if found else None
-
-    def condition(self, name: str) -> str:
-        """A name of a condition in creepkit's form, where it is understood."""
-        words = words_of(name)
-        if name in self.vocabulary.synonyms or name in self.vocabulary.labels:
-            return name
-        if name.startswith(("label ", "geometry ")):
-            return name
-        if words in (*TEST_NAME_COLUMNS, "specimen name"):
-            return "name"
-        return f"label {LABEL_KEYS[words]}" if words in LABEL_KEYS else self.conditions.standard(name)
-
-    def is_condition(self, name: str) -> bool:
-        """Whether a name is that of a condition."""
-        standard = self.condition(name)
-        return (
-            standard in (*self.conditions.texts, *self.vocabulary.synonyms)
-            or split_unit(standard, self.conditions.kinds) is not None
-            or standard.startswith(("label ", "geometry "))
-        )
-
-    @property
-    def declared(self) -> set[str]:
-        """Names of columns that the vocabulary declares, which mean what it says."""
-        averaged = (name for names in self.vocabulary.averaged_columns.values() for name in names)
-        return {*self.vocabulary.synonyms, *averaged}

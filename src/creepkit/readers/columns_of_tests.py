@@ -14,10 +14,18 @@ from functools import lru_cache
 from itertools import accumulate
 
 from creepkit.files.delimited_text import Dialect, is_number
-from creepkit.readers.column_names import NAMES_OF, NameTable, split_written_name, unit_suffix, words_of
+from creepkit.readers.column_names import (
+    NAMES_OF,
+    NameTable,
+    plain_name,
+    split_unit,
+    split_written_name,
+    unit_suffix,
+    words_of,
+)
 from creepkit.readers.ends_of_tests import FIRM, kind_of_column, plain_words
 from creepkit.readers.table import CellTable, TableRow
-from creepkit.readers.vocabulary import CONDITION_KINDS, plain_name, split_unit
+from creepkit.readers.vocabulary import CONDITION_KINDS
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
 
 TIME_TO_STRAIN = "time_to_strain"

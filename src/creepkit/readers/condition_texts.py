@@ -12,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.readers.column_names import KnownNames, unit_suffix
+from creepkit.readers.column_names import split_unit, unit_suffix
 from creepkit.readers.table import CellTable, SourceText
-from creepkit.readers.vocabulary import HeaderVocabulary, split_unit
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records.quantities import LENGTH
 
 _NUMBER = r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?"
@@ -44,7 +44,7 @@ TEMPERATURE_AGREEMENT, LOAD_AGREEMENT = 3.0, 0.03
 """K, and a fraction of the load, by which a nominal value may differ from a measured one."""
 
 
-def conditions_of_head(cell: str, known: KnownNames) -> list[tuple[str, str]]:
+def conditions_of_head(cell: str, known: Terms) -> list[tuple[str, str]]:
     """Load and temperature of a head such as `120 MPa`, or `120 MPa / 650 °C`; [] where a part of it is neither.
 
     A load is a stress, where the file names no specimen that takes another one.
@@ -56,14 +56,14 @@ def conditions_of_head(cell: str, known: KnownNames) -> list[tuple[str, str]]:
     return found if is_all and all(quantities) and len(set(quantities)) == len(quantities) else []
 
 
-def _quantity_of(unit: str, known: KnownNames) -> str:
-    suffix, kinds = unit_suffix(unit), known.terms.condition_kinds
-    loads = known.terms.own_loads or ("stress",)
+def _quantity_of(unit: str, known: Terms) -> str:
+    suffix, kinds = unit_suffix(unit), known.condition_kinds
+    loads = known.own_loads or ("stress",)
     names = (name for name in ("temperature", *loads) if name in kinds and suffix and suffix in kinds[name].units)
     return next(names, "")
 
 
-def conditions_in_text(text: str, place: str, known: KnownNames) -> list[SourceText]:
+def conditions_in_text(text: str, place: str, known: Terms) -> list[SourceText]:
     """Temperature and load that a text states, once each, and lengths such as `L0 = 40 mm`, each with its key.
 
     [] for what is said of a heat treatment or of a strength, and for ranges such as `110 to 180 MPa`.
@@ -90,13 +90,13 @@ def conditions_in_text(text: str, place: str, known: KnownNames) -> list[SourceT
 
 def sources_of_names(grid: CellTable, vocabulary: HeaderVocabulary) -> list[SourceText]:
     """What the names of sheet and file state of a test."""
-    known, path = KnownNames.of(vocabulary), grid.path
+    known, path = vocabulary.terms(), grid.path
     sheet = conditions_in_text(grid.sheet, f"{path}, name of sheet '{grid.sheet}'", known) if grid.sheet else []
     return [*sheet, *conditions_in_text(path.stem, f"{path}, name of the file", known)]
 
 
 def with_weak_sources(
-    entries: Mapping[str, SourceText], table: CellTable, known: KnownNames
+    entries: Mapping[str, SourceText], table: CellTable, known: Terms
 ) -> tuple[dict[str, SourceText], list[str]]:
     """Entries with what titles and names state beside them, and what is assumed so; HistoryError where two disagree.
 
@@ -123,7 +123,7 @@ def with_weak_sources(
 
 
 def _stated(
-    quantity: str, entries: Mapping[str, SourceText], table: CellTable, known: KnownNames
+    quantity: str, entries: Mapping[str, SourceText], table: CellTable, known: Terms
 ) -> tuple[float, str] | None:
     """What is stated or was recorded of a quantity, with where; None for what changes or is not there."""
     kind = known.conditions.kinds[quantity]
@@ -144,9 +144,9 @@ def _stated(
     return None
 
 
-def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table: CellTable, known: KnownNames) -> bool:
+def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table: CellTable, known: Terms) -> bool:
     """Whether steps, programs, columns or another load leave nothing to state."""
-    names, terms = [*entries, *table.columns], known.terms
+    names, terms = [*entries, *table.columns], known
     if any(name == quantity or name.startswith(f"{quantity}_") for name in names):
         return True
     if quantity not in terms.load_kinds:

@@ -6,7 +6,7 @@ Nothing that a file states goes unread, and no key is guessed: an unknown one is
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
-from creepkit.readers.column_names import unit_suffix
+from creepkit.readers.column_names import plain_name, split_unit, unit_suffix
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
@@ -27,16 +27,9 @@ from creepkit.readers.ends_of_tests import (
 )
 from creepkit.readers.questions import Question
 from creepkit.readers.table import SourceText
-from creepkit.readers.vocabulary import (
-    CLOSE_SPELLING,
-    SPECIMEN_NAME_PATTERN,
-    HeaderVocabulary,
-    Terms,
-    is_misspelling,
-    plain_name,
-    split_unit,
-)
+from creepkit.readers.vocabulary import CLOSE_SPELLING, SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms, is_misspelling
 from creepkit.records import Program
+from creepkit.records.noise_correlations import can_hold_together
 from creepkit.records.quantities import LENGTH, TIME, QuantityKind
 
 _ALLOWED_COMBINATIONS = (
@@ -98,7 +91,7 @@ class StatedConditions:
         self.stated: dict[str, Program] = {}
         self._vocabulary = vocabulary
         stated = entries["specimen"].text.casefold() if "specimen" in entries else ""
-        self.terms = vocabulary.terms(stated or vocabulary.default_texts.get("specimen", ""))
+        self.terms = vocabulary.terms(stated)
         self.default_specimen = vocabulary.default_texts.get("specimen", "")
         self._kinds = self.terms.condition_kinds
         self._text_keys = self.terms.text_keys
@@ -377,3 +370,47 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, entry: SourceText)
         part if part in one.units else unit_suffix(part) or part for part, one in ((parts[1], TIME), (parts[3], kind))
     )
     return TIME.convert(time, time_unit, location, key), kind.convert(value, unit, location, key)
+
+
+# ---- correlations of noise -------------------------------------------------------------------------------------------
+
+
+KEY = "noise_correlation"
+
+
+def read_noise_correlation(conditions: StatedConditions, outputs: Collection[str]) -> dict[tuple[str, str], float]:
+    """{(output, output): correlation} as the head states them; HistoryError for what cannot be one."""
+    entry = conditions.take_entry(KEY)
+    known, correlations = list(outputs), dict[tuple[str, str], float]()
+    if entry is None or not entry.text:
+        return correlations
+    location, text = entry.location, entry.text
+    for item in text.split(";"):
+        words = item.split()
+        if len(words) != 3:
+            raise HistoryError(
+                f"{location}: {KEY} holds '{item.strip()}'; write two outputs and a number between -1 and 1, as in "
+                "'amplitude width -0.31; amplitude shape 0.2'"
+            )
+        first, second, number = words
+        for name in (first, second):
+            if name not in known:
+                raise HistoryError(f"{location}: {KEY} names '{name}', which is no column; {nearest(name, known)}")
+        pair = first, second
+        if first == second or pair in correlations or pair[::-1] in correlations:
+            problem = "correlates with itself" if first == second else f"and {second} are given twice"
+            raise HistoryError(f"{location}: {KEY}: {first} {problem}; give each pair of two outputs once")
+        value = replace(entry, text=number).number(f"{KEY} of {first} {second}")
+        if not -1.0 < value < 1.0:
+            raise HistoryError(f"{location}: {KEY} of {first} {second} is {value:g}; allowed is between -1 and 1")
+        correlations[pair] = value
+    if not can_hold_together(correlations):
+        raise HistoryError(
+            f"{location}: the correlations '{text}' cannot all hold: their matrix is not positive definite; correct one"
+        )
+    return correlations
+
+
+def noise_correlation_text(correlations: Mapping[tuple[str, str], float]) -> str:
+    """The text of the key, from which the same numbers are read."""
+    return "; ".join(f"{first} {second} {float(value)!r}" for (first, second), value in correlations.items())

@@ -22,9 +22,9 @@ from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.json_documents import read_json
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
-from creepkit.readers.column_names import unit_suffix
+from creepkit.readers.column_names import plain_name, unit_suffix
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width
-from creepkit.readers.vocabulary import HeaderVocabulary, plain_name
+from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 from creepkit.records.quantities import STRAIN, STRESS, TEMPERATURE, TIME, QuantityKind
 
@@ -89,7 +89,7 @@ _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 _FILE_NAME = re.compile(r"[\w.\- ]{0,200}\w\.lis\b", re.IGNORECASE)
 
 
-class Entry(NamedTuple):
+class SchemaEntry(NamedTuple):
     """What is stated; unit : that stands apart from it."""
 
     text: str
@@ -145,7 +145,7 @@ def _member(found: Mapping[str, Any], name: str) -> Any:
     return next((value for key, value in found.items() if key.casefold() == name.casefold()), None)
 
 
-def _nested(data: Mapping[str, Any], where: str, path: Path) -> Entry:
+def _nested(data: Mapping[str, Any], where: str, path: Path) -> SchemaEntry:
     """The entry that stands somewhere in a document."""
     found: Any = data
     for name in where.split("/"):
@@ -159,12 +159,12 @@ def _nested(data: Mapping[str, Any], where: str, path: Path) -> Entry:
     return _entry(value if isinstance(value, str) else repr(value), unit, place)
 
 
-def _entry(text: str, unit: str, place: str) -> Entry:
+def _entry(text: str, unit: str, place: str) -> SchemaEntry:
     text = " ".join(text.replace("*", "").split())
-    return Entry("" if text.casefold() in NOT_STATED else text, unit.strip(), place)
+    return SchemaEntry("" if text.casefold() in NOT_STATED else text, unit.strip(), place)
 
 
-def _number(what: str, entry: Entry, kind: QuantityKind) -> tuple[str, SourceText]:
+def _number(what: str, entry: SchemaEntry, kind: QuantityKind) -> tuple[str, SourceText]:
     """Key with its unit, and number with a decimal point."""
     match = _NUMBER_AND_UNIT.fullmatch(entry.text)
     if match is None:
@@ -178,7 +178,7 @@ def _number(what: str, entry: Entry, kind: QuantityKind) -> tuple[str, SourceTex
     return f"{what}_{suffix}", SourceText(match[1].replace(",", "."), entry.place)
 
 
-def _stated(entries: Mapping[str, Entry]) -> Iterator[tuple[str, SourceText]]:
+def _stated(entries: Mapping[str, SchemaEntry]) -> Iterator[tuple[str, SourceText]]:
     """Keys and texts of a history file; HistoryError for a test that is none in tension, or ends that contradict."""
     for what, (_, _, kind) in ENTRIES.items():
         entry = entries[what]
@@ -199,7 +199,7 @@ def _stated(entries: Mapping[str, Entry]) -> Iterator[tuple[str, SourceText]]:
 
 
 def _history(
-    entries: Mapping[str, Entry], path: Path, table: CellTable | None = None, extension: str = CREEP_EXTENSION
+    entries: Mapping[str, SchemaEntry], path: Path, table: CellTable | None = None, extension: str = CREEP_EXTENSION
 ) -> History:
     """The history; table : its series, None for a rupture time alone; extension : one of EXTENSIONS, of the series."""
     stated, name, vocabulary = dict(_stated(entries)), entries["name"].text or path.stem, HeaderVocabulary()
@@ -238,7 +238,7 @@ def _text(path: Path, first: int | None = None) -> str:
         return content.decode("cp1252", errors="replace")
 
 
-def _read_series(path: Path) -> tuple[dict[str, Entry], CellTable, str]:
+def _read_series(path: Path) -> tuple[dict[str, SchemaEntry], CellTable, str]:
     """Entries of the head of a LIS file, its table, and its extension."""
     lines = _text(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     cells = [[cell.strip().strip('"') for cell in line.rstrip().split("\t")] for line in lines]
@@ -246,7 +246,7 @@ def _read_series(path: Path) -> tuple[dict[str, Entry], CellTable, str]:
     if start is None or len(lines) < start + 4:
         raise HistoryError(f"{path}: no line '[data]' with rows of names, symbols and units below it; {SERIES.advice}")
     meant = {name: what for what, (_, name, _) in ENTRIES.items()}
-    found: dict[str, Entry] = {}
+    found: dict[str, SchemaEntry] = {}
     for number, row in enumerate(cells[:start], 1):
         if len(row) < 4 or not row[0]:
             continue
@@ -276,7 +276,7 @@ def _read_series(path: Path) -> tuple[dict[str, Entry], CellTable, str]:
     if not rows:
         raise HistoryError(f"{path}:{start + 4}: no rows below the units; a test needs at least two")
     extension = next((name.casefold() for name in names if name.casefold() in EXTENSIONS), CREEP_EXTENSION)
-    entries = {what: Entry("", "", f"{path}: {name}") for what, (_, name, _) in ENTRIES.items()}
+    entries = {what: SchemaEntry("", "", f"{path}: {name}") for what, (_, name, _) in ENTRIES.items()}
     return {**entries, **found}, replace(table, rows=rows), extension
 
 

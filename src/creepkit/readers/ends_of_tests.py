@@ -62,23 +62,9 @@ _FILLERS = (
 )
 _AHEAD = r"before|prior to|short of|vor|vor dem|avant|avant la|bevor"
 _EXPECTED = _words(
-    *("before", "prior", "avant", "vor", "bevor", "could", "would", "might", "may", "should", "konnte"),
-    *(
-        "pourrait",
-        "near",
-        "close to",
-        "nearly",
-        "almost",
-        "imminent",
-        "expected",
-        "likely",
-        "will",
-        "soon",
-        "kurz vor",
-        "fast",
-    ),
-    *("still", "noch", "yet", "encore", "toujours", "pending", "outstanding", "aus"),
-    *("beinahe", "erwartet", "bald", "wird", "soll", "presque", "proche", "prevue?", "attendue?", "bientot", "if"),
+    r"before|prior|avant|vor|bevor|could|would|might|may|should|konnte|pourrait|near|close to|nearly|almost",
+    r"imminent|expected|likely|will|soon|kurz vor|fast|still|noch|yet|encore|toujours|pending|outstanding|aus",
+    r"beinahe|erwartet|bald|wird|soll|presque|proche|prevue?|attendue?|bientot|if",
 )
 _REACHED = (
     r"(?: (?:reached|attained|obtained|obtenue?|observed|occurred|seen|yet|noch|erreicht|eingetreten|aufgetreten"
@@ -94,35 +80,10 @@ _NOT_INTERRUPTED = re.compile(
 )
 _ENDED = _words(r"ended|finished|complete[d]?|terminat\w*|beendet\w*|abgeschlossen|fertig|termine\w*|fini\w*|stop date")
 _DOUBTFUL = _words(
-    *(
-        "unloading",
-        "removal",
-        r"dismount\w*",
-        "cooling",
-        r"reload\w*",
-        r"restart\w*",
-        "ausbau",
-        "entlasten",
-        "abkuhlen",
-    ),
-    *(
-        "demontage",
-        "dechargement",
-        "furnace",
-        "oven",
-        "thermocouples?",
-        "tc",
-        "power",
-        "mains",
-        "grips?",
-        "machine",
-        "rig",
-        "heaters?",
-        "heating",
-    ),
-    *("controller", "extensometer", "lvdt", "lever", "pull rod", "adapter", "ofen", "ofens", "thermoelemente?s?"),
-    *("strom", "stromausfall", "netz", "einspannung", "maschine", "heizung", "regler", "gestange", "four"),
-    *("thermocouple", "courant", "regulation", "extensometre", "equipment", "chauffage"),
+    r"unloading|removal|dismount\w*|cooling|reload\w*|restart\w*|ausbau|entlasten|abkuhlen|demontage|dechargement",
+    r"furnace|oven|thermocouples?|tc|power|mains|grips?|machine|rig|heaters?|heating|controller|extensometer|lvdt",
+    r"lever|pull rod|adapter|ofen|ofens|thermoelemente?s?|strom|stromausfall|netz|einspannung|maschine|heizung",
+    r"regler|gestange|four|thermocouple|courant|regulation|extensometre|equipment|chauffage",
 )
 """Words of what breaks in the place of a test, or of what it broke by."""
 
@@ -190,64 +151,27 @@ _CODES: Mapping[frozenset[str], Mapping[str, str]] = {
 """Codes that stand together in a column: F and S, R and RO, B and NB, G and L."""
 
 
-_STATUS_WORDS = frozenset(
-    (
-        *("status", "statut", "state", "etat", "zustand", "result", "resultat", "ergebnis", "outcome", "ende", "end"),
-        *("ended", "ending", "fin", "issue", "termination", "versuchsende", "prufende", "prufstatus", "abbruchgrund"),
-        *("versuchsstatus", "code", "versuchsausgang", "ausgang", "endart", "motif"),
-        *("abschaltgrund", "stoppgrund", "endgrund", "reason", "grund"),
-    )
+_STATUS_WORDS = _words(
+    r"status|statut|state|etat|zustand|result|resultat|ergebnis|outcome|ende|end|ended|ending|fin|issue",
+    r"termination|versuchsende|prufende|prufstatus|abbruchgrund|versuchsstatus|code|versuchsausgang|ausgang",
+    r"endart|motif|abschaltgrund|stoppgrund|endgrund|reason|grund",
 )
-_STATUS_FILLERS = frozenset(
-    (
-        *(
-            "test",
-            "of",
-            "the",
-            "specimen",
-            "sample",
-            "final",
-            "de",
-            "l",
-            "d",
-            "essai",
-            "der",
-            "des",
-            "probe",
-            "versuch",
-        ),
-        *("prufung", "reason", "for", "type", "how", "it", "why", "grund", "du", "arret", "eprouvette", "versuchs"),
-        *("mode", "art", "end", "at"),
-    )
+_STATUS_FILLERS = _words(
+    r"test|of|the|specimen|sample|final|de|l|d|essai|der|des|probe|versuch|prufung|reason|for|type|how|it|why",
+    r"grund|du|arret|eprouvette|versuchs|mode|art|end|at",
 )
-_REMARK_WORDS = frozenset(
-    (
-        *("remark", "remarks", "note", "notes", "comment", "comments", "bemerkung", "bemerkungen", "anmerkung", "bem"),
-        *("anmerkungen", "kommentar", "kommentare", "hinweis", "hinweise", "notiz", "notizen", "remarque", "remarques"),
-        *("observation", "observations", "commentaire", "commentaires", "rem", "anm", "beobachtung", "beobachtungen"),
-    )
+_REMARK_WORDS = _words(
+    r"remark|remarks|note|notes|comment|comments|bemerkung|bemerkungen|anmerkung|bem|anmerkungen|kommentar",
+    r"kommentare|hinweis|hinweise|notiz|notizen|remarque|remarques|observation|observations|commentaire",
+    r"commentaires|rem|anm|beobachtung|beobachtungen",
 )
 _OTHER_USES = _words(
-    *(
-        "time",
-        "life",
-        "zeit",
-        "temps",
-        "duree",
-        "elongation",
-        "strain",
-        "dehnung",
-        "load",
-        "stress",
-        "hours",
-        "parameter",
-    ),
-    *("stunden", "heures", "location", "position", "lage", "mode", "type", "typ", "ort", "appearance", "allongement"),
+    r"time|life|zeit|temps|duree|elongation|strain|dehnung|load|stress|hours|parameter|stunden|heures|location",
+    r"position|lage|mode|type|typ|ort|appearance|allongement",
 )
 """Words beside one of rupture that make the name of a column that of a quantity or a description."""
 
 
-_EVENT = frozenset(("event", "evenement", "ereignis"))
 _DESCRIPTION = re.compile(
     rf"(?<!\w)(?:(?:{_RUPTURE}).* (?:location|position|mode|type|appearance|site)"
     rf"|(?:location|mode|type|position|lieu|zone|site) .*(?:{_RUPTURE})"
@@ -257,72 +181,13 @@ _DESCRIPTION = re.compile(
 
 
 _NEUTRAL = _words(
-    *(
-        r"neck\w*",
-        r"oxid\w*",
-        r"scal\w*",
-        "heat",
-        "cast",
-        "batch",
-        "charge",
-        "lot",
-        r"gau?ge\w*",
-        "length",
-        r"thread\w*",
-    ),
-    *(
-        r"shoulder\w*",
-        r"fillet\w*",
-        r"head\w*",
-        r"surface\w*",
-        r"crack\w*",
-        r"cavit\w*",
-        r"void\w*",
-        r"pore\w*",
-        "creep",
-    ),
-    *(r"ductile\w*", r"brittle\w*", r"intergranular\w*", r"transgranular\w*", r"grain\w*", r"notch\w*", r"weld\w*"),
-    *(r"breakthrough\w*", "of", "in", "the", "a", "an", "and", "with", "near", "at", "outside", "inside", r"normal\w*"),
-    *(r"specimen\w*", r"sample\w*", r"bar\w*", "ok", r"air", "argon", r"vacuum", r"batch\w*", r"aged", r"anneal\w*"),
-    *(
-        r"einschnur\w*",
-        r"messlange",
-        r"gewinde",
-        r"schulter",
-        "kopf",
-        "oxidiert",
-        r"verzunder\w*",
-        "charge",
-        r"riss\w*",
-    ),
-    *(
-        r"pore\w*",
-        r"korngrenz\w*",
-        r"duktil\w*",
-        r"sprod\w*",
-        r"schmelze",
-        r"probe\w*",
-        "im",
-        "der",
-        "die",
-        "das",
-        "und",
-    ),
-    *(
-        r"striction\w*",
-        r"fissur\w*",
-        r"ductile",
-        r"fragile",
-        r"coulee\w*",
-        "filetage",
-        "conge",
-        "dans",
-        "la",
-        "le",
-        "du",
-    ),
-    *(r"de", "hors", "partie", "utile", r"intergranulaire\w*", r"transgranulaire\w*", r"oxyd\w*", "et", "tete", "mode"),
-    r"[a-z]{0,3}\d[\w]*",
+    r"neck\w*|oxid\w*|scal\w*|heat|cast|batch|charge|lot|gau?ge\w*|length|thread\w*|shoulder\w*|fillet\w*|head\w*",
+    r"surface\w*|crack\w*|cavit\w*|void\w*|pore\w*|creep|ductile\w*|brittle\w*|intergranular\w*|transgranular\w*",
+    r"grain\w*|notch\w*|weld\w*|breakthrough\w*|of|in|the|a|an|and|with|near|at|outside|inside|normal\w*",
+    r"specimen\w*|sample\w*|bar\w*|ok|air|argon|vacuum|batch\w*|aged|anneal\w*|einschnur\w*|messlange|gewinde",
+    r"schulter|kopf|oxidiert|verzunder\w*|riss\w*|korngrenz\w*|duktil\w*|sprod\w*|schmelze|probe\w*|im|der|die|das",
+    r"und|striction\w*|fissur\w*|ductile|fragile|coulee\w*|filetage|conge|dans|la|le|du|de|hors|partie|utile",
+    r"intergranulaire\w*|transgranulaire\w*|oxyd\w*|et|tete|mode|[a-z]{0,3}\d[\w]*",
 )
 """Words of remarks that tell something else than an end: what a specimen looks like, where it stems from."""
 
@@ -364,10 +229,10 @@ def kind_of_column(name: str) -> str:
     """What the name of a column says: RUPTURED or STOPPED of tests with a yes, "status", "remark", or ""."""
     plain = plain_words(re.sub(r"\(.*?\)|\[.*?\]|\?", " ", name))
     words = set(plain.replace("|", " ").split()) - {"y", "n", "j", "ja", "nein", "yes", "no", "oui", "non"}
-    if words & _REMARK_WORDS:
+    if any(map(_REMARK_WORDS.fullmatch, words)):
         return "remark"
     said = end_said_by(plain)
-    if words & _EVENT and words <= _EVENT | {"indicator", "observed", "occurred"}:
+    if re.fullmatch(r"(?:event|evenement|ereignis)(?: indicator| observed| occurred)*", plain):
         return RUPTURED
     if len(words) == 1 and _CODES.get(frozenset(words), {}).get(next(iter(words))) == STOPPED:
         return STOPPED
@@ -377,7 +242,8 @@ def kind_of_column(name: str) -> str:
         return "description"
     if said in (RUPTURED, STOPPED, INTERRUPTED) and not _OTHER_USES.search(plain) and len(words) <= 4:
         return RUPTURED if said == RUPTURED else STOPPED
-    return "status" if words & _STATUS_WORDS and words <= _STATUS_WORDS | _STATUS_FILLERS else ""
+    others = [word for word in words if not _STATUS_WORDS.fullmatch(word)]
+    return "status" if len(others) < len(words) and all(map(_STATUS_FILLERS.fullmatch, others)) else ""
 
 
 def ends_in_column(name: str, cells: Sequence[str], answers: Mapping[str, str], others_decide: bool) -> EndsOfColumn:

@@ -11,11 +11,11 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError
-from creepkit.readers.column_names import NameTable, split_written_name
+from creepkit.readers.column_names import NameTable, split_unit, split_written_name
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column
 from creepkit.readers.questions import Question
 from creepkit.readers.table import CellTable, some_of
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records.quantities import QuantityKind
 
 NOISE_OF_ZERO = 0.01

@@ -34,12 +34,11 @@ from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.condition_texts import sources_of_names
+from creepkit.readers.conditions import noise_correlation_text
 from creepkit.readers.cut_files import CutNumber
-from creepkit.readers.grouped_rows import TabulatedTest
-from creepkit.readers.noise_correlation import noise_correlation_text
 from creepkit.readers.table import CellTable
-from creepkit.readers.table_heads import is_frame
-from creepkit.readers.table_layouts import names_time, tests_in
+from creepkit.readers.table_heads import is_frame, names_time
+from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.text_files import peek_table, read_head_alone, read_text_table
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (

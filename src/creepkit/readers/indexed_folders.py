@@ -12,7 +12,6 @@ from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.readers.assembly import assemble_history
-from creepkit.readers.column_names import KnownNames
 from creepkit.readers.frames import unknown_text
 from creepkit.readers.table import CellTable, SourceText, TableRow, grouped
 from creepkit.readers.text_files import peek_table, read_table
@@ -123,7 +122,7 @@ class IndexedFolderReader:
         entries = {name: entry for name, entry in index.entries(row).items() if name != self.key_column}
         location = index.location(row.line)
         entries.setdefault("alloy", SourceText(frames.path.absolute().parent.name, location))
-        known = KnownNames.of(self.vocabulary)
+        known = self.vocabulary.terms()
         unknown = [name for name in index.empty_columns(row) if known.is_condition(name) and name not in entries]
         if unknown and "label assumed" not in entries:
             entries["label assumed"] = SourceText(", ".join(map(unknown_text, unknown)), location)

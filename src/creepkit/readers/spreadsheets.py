@@ -24,9 +24,8 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
 from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
-from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, words_of
+from creepkit.readers.column_names import TEST_NAME_COLUMNS, words_of
 from creepkit.readers.frames import unknown_text
-from creepkit.readers.grouped_rows import TabulatedTest
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.table import (
     CellTable,
@@ -38,7 +37,8 @@ from creepkit.readers.table import (
     refuse_long_cells,
     without_ignored,
 )
-from creepkit.readers.table_layouts import names_time, tests_in
+from creepkit.readers.table_heads import names_time
+from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History
 
@@ -358,7 +358,7 @@ def _conditions_by_test(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[
     if not head or head[0] + 1 >= len(sheet.rows):
         return {}
     sheet = replace(sheet, rows=sheet.rows[head[0] :])  # rows above the names are titles
-    table, known = named_columns(without_ignored(sheet, 0, vocabulary.ignored)), KnownNames.of(vocabulary)
+    table, known = named_columns(without_ignored(sheet, 0, vocabulary.ignored)), vocabulary.terms()
     columns = [k for k, name in enumerate(table.columns) if words_of(name) in _TEST_NAMES]
     tests: dict[str, dict[str, SourceText]] = {}
     for row in table.rows if columns else ():

@@ -1,25 +1,39 @@
 """What a file states in creepkit's names and with units: `Stress: 120 MPa` as stress_MPa, a strain as what it is.
 
-A strain without a unit may be a fraction or in per cent. It is decided by, in this order: the key `strain_unit` (1, %),
-the head of a file that earlier versions of creepkit wrote (fractions), and its values: above 1, up to 100, they are per
-cent, for few creep tests are stretched to twice their length; below 0.001 they are fractions, for no extensometer
-resolves 0.001 %. Else it is asked for. What was decided by head or values is recorded in the label "assumed".
+A strain without a unit may be a fraction or in per cent. It is decided by, in this order: the key `strain_unit` (1, %);
+its values: above 1, up to 100, they are per cent, for few creep tests are stretched to twice their length; below 0.001
+they are fractions, for no extensometer resolves 0.001 %. Else it is asked for. What was decided by values is recorded
+in the label "assumed".
+
+Columns of time may hold no numbers: elapsed times `1:02:30`, and time stamps, as seconds.
+
+An elapsed time counts from the beginning of the test. Of time stamps and times of day the first row is time zero, which
+is recorded in the label "assumed". `18:51:22` may be either: the name of the column decides, `Elapsed time (h:mm:ss)`
+or `Time of day`, or the values: elapsed are times that begin below one hour or pass 24 hours.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
-from creepkit.readers.clock_times import with_elapsed_times
-from creepkit.readers.column_names import STATED_BY_NAME, KnownNames, split_written_name, unit_suffix, words_of
+from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve
+from creepkit.readers.column_names import (
+    STATED_BY_NAME,
+    plain_name,
+    split_unit,
+    split_written_name,
+    unit_suffix,
+    words_of,
+)
 from creepkit.readers.questions import Question
-from creepkit.readers.table import CellTable, NumberRows, SourceText, TableRow
-from creepkit.readers.vocabulary import HeaderVocabulary, plain_name, split_unit
+from creepkit.readers.table import CellTable, NumberRows, SourceText, TableRow, cells_of
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 
 SURELY_PER_CENT, SURELY_FRACTION = 1.0, 1e-3
 """Largest strain above which, and below which, a strain without unit is decided by its values."""
@@ -36,15 +50,11 @@ STRAIN_UNITS: Mapping[str, str] = {"1": "1", "pct": "pct", "microstrain": "micro
 _VALUE_WITH_UNIT = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^\d\s.,;:+-][^;:]{0,10})", re.ASCII)
 
 
-_WRITTEN_HEAD = ("name", "specimen", "control", "temperature_K", "strain_measure", "includes_elastic")
-"""Keys that stand in the head of every creep curve that write_history wrote when it left out the unit of strain."""
-
-
 def in_standard_names(
     entries: Mapping[str, SourceText], table: CellTable, vocabulary: HeaderVocabulary
 ) -> tuple[dict[str, SourceText], CellTable]:
     """Entries and columns of one test under creepkit's names, with units, and a strain whose unit is decided."""
-    known = KnownNames.of(vocabulary, specimen_named(entries, vocabulary))
+    known = vocabulary.terms(specimen_named(entries, vocabulary))
     stated = in_standard_keys(entries, known)
     for key, entry in _stated_by_columns(table):
         if stated.setdefault(key, entry).text != entry.text:
@@ -54,7 +64,7 @@ def in_standard_names(
     columns = [known.column(name) for name in table.columns]
     table = replace(table, columns=columns, written=table.columns) if columns != list(table.columns) else table
     table = with_elapsed_times(stated, table, known)
-    return _with_decided_strains(stated, _without_per_cent_signs(table, known), known, entries)
+    return _with_decided_strains(stated, _without_per_cent_signs(table, known), known)
 
 
 def specimen_named(entries: Mapping[str, SourceText], vocabulary: HeaderVocabulary) -> str:
@@ -64,7 +74,7 @@ def specimen_named(entries: Mapping[str, SourceText], vocabulary: HeaderVocabula
     return next(named, "")
 
 
-def in_standard_keys(entries: Mapping[str, SourceText], known: KnownNames) -> dict[str, SourceText]:
+def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[str, SourceText]:
     """Entries under creepkit's names of their keys, with the units that stand in their texts."""
     stated: dict[str, SourceText] = {}
     for key, entry in entries.items():
@@ -91,7 +101,7 @@ def _stated_by_columns(table: CellTable) -> list[tuple[str, SourceText]]:
     ]
 
 
-def _without_per_cent_signs(table: CellTable, known: KnownNames) -> CellTable:
+def _without_per_cent_signs(table: CellTable, known: Terms) -> CellTable:
     """The table without the signs in cells such as `1.2 %`, whose columns are in per cent, as their names must say."""
     if isinstance(table.rows, NumberRows):
         return table
@@ -122,78 +132,154 @@ def _rows_without_signs(table: CellTable, signed: Collection[int]) -> Iterator[T
         yield TableRow(row.line, cells)
 
 
-def _kind(name: str, known: KnownNames) -> bool:
+def _kind(name: str, known: Terms) -> bool:
     """Whether a column holds a quantity that may be in per cent."""
     found = split_unit(name, known.columns.kinds)
     return found is not None and "pct" in known.columns.kinds[found[0]].units
 
 
 def _with_decided_strains(
-    stated: dict[str, SourceText], table: CellTable, known: KnownNames, written: Mapping[str, SourceText]
+    stated: dict[str, SourceText], table: CellTable, known: Terms
 ) -> tuple[dict[str, SourceText], CellTable]:
     """The columns and entries that have no unit, though it matters, under names with one."""
-    unit = stated.pop("strain_unit", None)
-    suffix = None if unit is None else unit_suffix(unit.text)
-    if unit is not None and suffix not in STRAIN_UNITS:
+    unit, names, assumptions = stated.pop("strain_unit", None), dict[str, str](), list[str]()
+    suffix = unit_suffix(unit.text) if unit else None
+    if unit and suffix not in STRAIN_UNITS:
         raise HistoryError(f"{unit.location}: strain_unit is '{unit.text}'; allowed: 1, %, microstrain")
-    undecided = {name for name in table.columns if _is_undecided(name, known)}
-    deviations = {name for name in (*table.columns, *stated) if name.endswith("_sd") and _is_undecided(name, known)}
-    names, assumptions = dict[str, str](), list(table.assumptions)
     if not any(known.quantity(column) == "time" for column in table.columns):
         return stated, table  # no frames at all, which is told first
-    for name in sorted(undecided - deviations):
-        if suffix is None:
-            decided, assumption = _decided_by_table(name, table, written)
-            assumptions.append(assumption)
-        names[name] = f"{name}_{suffix or decided}"
-    for name in sorted(deviations):
-        base = names.get(name.removesuffix("_sd"), "")
-        if not (suffix or base):
+    undecided = {name for name in (*table.columns, *stated) if _is_undecided(name, known)}
+    for name in sorted(undecided.intersection(table.columns)):
+        if not name.endswith("_sd"):
+            decided, assumption = (suffix, "") if suffix else _decided_by_table(name, table)
+            names[name] = f"{name}_{decided}"
+            assumptions += [assumption] if assumption else []
+    for name in sorted(name for name in undecided if name.endswith("_sd")):
+        decided = suffix or names.get(name.removesuffix("_sd"), "").rpartition("_")[2]
+        if not decided:
             place = stated[name].location if name in stated else table.location(table.columns_line)
             raise HistoryError(f"{place}: '{name}' has no unit; allowed: {name}_1, {name}_pct, {name}_microstrain")
-        names[name] = f"{name}_{suffix or base.rpartition('_')[2]}"
-    if not names:
-        return stated, table
+        names[name] = f"{name}_{decided}"
     columns = [names.get(name, name) for name in table.columns]
-    return (
-        {names.get(key, key): entry for key, entry in stated.items()},
-        replace(table, columns=columns, written=table.written or table.columns, assumptions=tuple(assumptions)),
-    )
+    table = table.renamed(columns).assuming(*assumptions) if names else table
+    return {names.get(key, key): entry for key, entry in stated.items()}, table
 
 
-def _is_undecided(name: str, known: KnownNames) -> bool:
-    if name in known.declared:
-        return False
-    kinds = known.columns.kinds
-    found = split_unit(name, kinds)
-    return bool(found) and found == (name, "") and kinds[name].is_ambiguous_without_unit
+def _is_undecided(name: str, known: Terms) -> bool:
+    found = None if name in known.declared else split_unit(name, known.column_kinds)
+    return found == (name, "") and known.column_kinds[name].is_ambiguous_without_unit
 
 
-def _decided_by_table(name: str, table: CellTable, written: Mapping[str, SourceText]) -> tuple[str, str]:
+def _decided_by_table(name: str, table: CellTable) -> tuple[str, str]:
     """The unit of a column that states none, and how it was decided; HistoryError where it cannot be."""
-    if set(_WRITTEN_HEAD) <= written.keys() and "time_s" in table.columns:
-        return "1", f"{name} a fraction as in files of write_history"
     largest = float(np.abs(table.numbers(name)).max())
-    if largest > LARGEST_PER_CENT:
-        place = table.location(table.columns_line, table.column(name))
-        raise Question(
-            table.path,
-            place,
-            f"'{name}' has no unit, and values up to {largest:g} are no fractions and hardly per cent; name it "
-            f"{name}_microstrain or {name}_pct, or write '# strain_unit: microstrain' or '# strain_unit: %' above",
-            "strain_unit",
-            ("microstrain", "%"),
-        )
-    if largest > SURELY_PER_CENT:
+    if SURELY_PER_CENT < largest <= LARGEST_PER_CENT:
         return "pct", f"{name} in per cent (up to {largest:g})"
     if largest < SURELY_FRACTION:
         return "1", f"{name} a fraction (up to {largest:g})"
-    place = table.location(table.columns_line, table.column(name))
+    is_large = largest > LARGEST_PER_CENT
+    other = "microstrain" if is_large else "1"
+    why = "are no fractions and hardly per cent" if is_large else "may be fractions or per cent"
     raise Question(
         table.path,
-        place,
-        f"'{name}' has no unit, and values up to {largest:g} may be fractions or per cent; name it {name}_1 or "
-        f"{name}_pct, or write '# strain_unit: 1' or '# strain_unit: %' above",
+        table.location(table.columns_line, table.column(name)),
+        f"'{name}' has no unit, and values up to {largest:g} {why}; name it {name}_{other} or {name}_pct, or write "
+        f"'# strain_unit: {other}' or '# strain_unit: %' above",
         "strain_unit",
-        ("%", "1"),
+        (other, "%") if is_large else ("%", other),
     )
+
+
+# ---- times of a clock ------------------------------------------------------------------------------------------------
+
+
+_ELAPSED = re.compile(r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d{1,9})?)", re.ASCII)
+
+
+_ELAPSED_NAME = re.compile(r"elapsed|test time|creep time|laufzeit|h:mm|\[h|hh:mm|h:m", re.IGNORECASE)
+
+
+_OF_DAY = ("time of day", "clock", "clock time", "uhrzeit")
+
+
+def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: Terms) -> CellTable:
+    """The table with its times as numbers; takes `date_order` and `time_zone` from what is stated."""
+    order, zone = stated.pop("date_order", None), stated.pop("time_zone", None)
+    if order is not None and order.text not in DATE_ORDERS:
+        raise HistoryError(f"{order.location}: date_order is '{quoted(order.text)}'; allowed: {', '.join(DATE_ORDERS)}")
+    times = [k for k, name in enumerate(table.columns) if known.quantity(name) == "time"]
+    if len(times) != 1 or isinstance(table.rows, NumberRows) or not is_clock_time(table.rows[0].cells[times[0]]):
+        if order is not None or zone is not None:
+            key, entry = ("date_order", order) if order is not None else ("time_zone", zone)
+            assert entry is not None
+            raise HistoryError(f"{entry.location}: {key} says nothing here, for no times are dates; leave it out")
+        return table
+    clock = times[0]
+    cells = list(cells_of(table.rows, clock))
+    elapsed = [_ELAPSED.fullmatch(cell) for cell in cells]
+    if elapsed[0]:
+        hours, assumption = _times_of(elapsed, table, clock)
+    else:
+        hours, assumption = _since_first_row(cells, table, order.text if order else "", zone.text if zone else "")
+    written = table.as_written(clock)
+    columns = list(table.columns)
+    suffix = (split_unit(columns[clock], known.columns.kinds) or ("", ""))[1]
+    if suffix in known.columns.kinds["time"].units and suffix:
+        place = table.location(table.columns_line, clock)
+        raise HistoryError(
+            f"{place}: '{written}' is in {suffix}, and its first cell is '{quoted(cells[0])}', a time of a clock; "
+            "leave "
+            "the unit out of the name, or write numbers"
+        )
+    columns[clock] = "time_s"
+    rows = list(_with_times(table, clock, hours))
+    assumptions = (*table.assumptions, *([assumption] if assumption else []))
+    return replace(table, columns=columns, rows=rows, written=table.written or table.columns, assumptions=assumptions)
+
+
+def _with_times(table: CellTable, clock: int, times: Floats) -> Iterator[TableRow]:
+    """The rows with other times, s."""
+    for row, time in zip(table.rows, times, strict=True):
+        changed = list(row.cells)
+        changed[clock] = repr(float(time)).replace(".", table.dialect.decimal)
+        yield TableRow(row.line, changed)
+
+
+def _times_of(elapsed: Sequence[re.Match[str] | None], table: CellTable, clock: int) -> tuple[Floats, str]:
+    """(rows,) s of times h:mm:ss, elapsed or of the day, and what was assumed of them."""
+    seconds, name = [], table.as_written(clock)
+    for row, match in zip(table.rows, elapsed, strict=True):
+        if match is None:
+            place = table.location(row.line, clock)
+            raise HistoryError(
+                f"{place}: '{name}' is '{quoted(row.cells[clock])}'; write h:mm:ss as in the rows before"
+            )
+        seconds.append(3600.0 * int(match[1]) + 60.0 * int(match[2]) + float(match[3].replace(",", ".")))
+    times = np.array(seconds)
+    if words_of(name) in _OF_DAY:
+        later = np.concatenate([[0.0], np.cumsum(np.diff(times) < -0.5 * DAY)])
+        times = times + DAY * later
+        return times - times[0], f"time since the first row at {table.rows[0].cells[clock]}"
+    if _ELAPSED_NAME.search(name):
+        return times, ""
+    if times[0] < 3600.0 or times.max() >= DAY:
+        return times, f"times such as {table.rows[-1].cells[clock]} elapsed"
+    place = table.location(table.columns_line, clock)
+    raise HistoryError(
+        f"{place}: '{name}' begins at {table.rows[0].cells[clock]}, which may be elapsed or of the day; name the "
+        "column 'Elapsed time (h:mm:ss)' or 'Time of day'"
+    )
+
+
+def _since_first_row(cells: Sequence[str], table: CellTable, order: str, zone: str) -> tuple[Floats, str]:
+    """(rows,) s of time stamps since that of the first row, and what was assumed of them."""
+    column = ClockColumn()
+    column.add(cells, [table.location(row.line) for row in table.rows])
+    if -1 in column.rows[0]:
+        k = int(np.argmax(column.rows[0] == -1))
+        place = table.location(table.rows[k].line)
+        raise HistoryError(f"{place}: time is '{quoted(cells[k])}'; write h:mm:ss, a date with a time, or a number")
+    place = f"{table.path}, sheet '{table.sheet}', row" if table.sheet else str(table.path)
+    times = resolve(column, place, table.lines, order, zone)
+    notes = [note.removeprefix("its ") for note in times.notes if note.startswith("its dates")]
+    return times.times, "; ".join([f"time since the first row at {cells[0]}", *notes]).replace(",", " -")

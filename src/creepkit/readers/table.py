@@ -24,9 +24,8 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import ERROR_VALUES, Dialect, is_missing, is_number, parse_number, parse_numbers
 from creepkit.files.limits import how_to_raise, raised
-from creepkit.readers.column_names import split_written_name
+from creepkit.readers.column_names import plain_name, split_written_name
 from creepkit.readers.cut_files import CutNumber
-from creepkit.readers.vocabulary import plain_name
 
 MAXIMUM_COLUMNS, MAXIMUM_CELL, MAXIMUM_TEXTS = 2000, 10_000, 40_000_000
 """Columns of a table; characters of a cell, in which units are looked for; cells that are not all numbers."""

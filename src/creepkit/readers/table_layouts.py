@@ -1,4 +1,4 @@
-"""Tests in a grid of cells: one test, one column a test beside a shared time, pairs of columns, or one column of names.
+"""Tests in a table: one test, one column a test beside a shared time, pairs of columns, or one column of names.
 
 LAYOUTS lists them, each with an example. Whatever else stands in the head of a table (table_heads.py) holds for the
 test above whose columns it stands, else for all.
@@ -6,52 +6,192 @@ test above whose columns it stands, else for all.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import pairwise
+from typing import NamedTuple
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing, is_number
-from creepkit.readers.column_names import TEST_NAME_COLUMNS, KnownNames, split_written_name, unit_suffix, words_of
+from creepkit.files.time_stamps import is_clock_time
+from creepkit.readers.column_names import TEST_NAME_COLUMNS, split_written_name, unit_suffix, words_of
 from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
-from creepkit.readers.grouped_rows import (
-    TabulatedTest,
-    refuse_twice,
-    rows_by_test,
-    with_groups,
-    without_clocks,
-    without_remarks,
-)
+from creepkit.readers.frames import unknown_text
 from creepkit.readers.table import (
     CellTable,
     NumberRows,
     SourceText,
     TableRow,
+    cells_of,
     cells_of_width,
     check_columns,
-    joined,
+    grouped,
     named_columns,
     some_of,
     with_columns,
-    without_ignored,
 )
-from creepkit.readers.table_heads import (
-    MAXIMUM_ROWS_BELOW,
-    Head,
-    head_of,
-    head_of_one_test,
-    heads_of_tests,
-    is_time,
-    row_of_names,
-    test_and_column,
-)
-from creepkit.readers.vocabulary import HeaderVocabulary
+from creepkit.readers.table_heads import HeadedTable, HeadOfTest, headed_table, heads_of_tests, test_and_column
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records.quantities import STRAIN
+
+# ---- tests in rows ---------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class TestColumns:
+class TabulatedTest:
+    """What a file says of one test: its name, "" where it has none; its conditions; the table of its frames."""
+
+    name: str
+    entries: Mapping[str, SourceText]
+    table: CellTable
+
+
+def refuse_twice(entries: Mapping[str, SourceText], header: Mapping[str, SourceText], known: Terms) -> None:
+    """HistoryError where what the header states is stated anew."""
+    given = {known.condition(key) for key in header}
+    for key, entry in entries.items():
+        if key in given:
+            raise HistoryError(f"{entry.location}: '{key}' was already given; keep one of them")
+
+
+_REMARKS = frozenset(
+    (
+        *("note", "notes", "remark", "remarks", "comment", "comments", "bemerkung", "bemerkungen", "kommentar"),
+        *("anmerkung", "anmerkungen", "remarque", "remarques", "commentaire", "commentaires", "observation"),
+    )
+)
+"""Names of columns of remarks, in small letters."""
+
+
+def without_remarks(table: CellTable, notes: dict[str, SourceText]) -> CellTable:
+    """The table without columns of remarks, whose texts are added to the notes by line."""
+    columns = [k for k, name in enumerate(table.columns) if words_of(name) in _REMARKS]
+    if not columns or isinstance(table.rows, NumberRows):
+        return table
+    for row in table.rows:
+        if text := "; ".join(row.cells[k] for k in columns if row.cells[k]):
+            notes[f"label line {row.line}"] = SourceText(text, table.location(row.line))
+    return table.keeping([k for k in range(len(table.columns)) if k not in columns])
+
+
+_DATES = frozenset(("date", "datum", "day", "jour", "heure"))
+"""Names of columns of days, in small letters, and of the clock times beside them."""
+
+
+def without_clocks(table: CellTable, known: Terms) -> CellTable:
+    """The table without dates and times of a clock, where a column of elapsed times in a unit is beside them."""
+    if isinstance(table.rows, NumberRows) or not table.rows:
+        return table
+    first = table.rows[0].cells
+    times = [k for k, name in enumerate(table.columns) if known.quantity(name) == "time"]
+    elapsed = [k for k in times if is_number(first[k], table.dialect)]
+    dates = [k for k, name in enumerate(table.columns) if words_of(name) in _DATES]
+    clocks = [k for k in {*times, *dates} if is_clock_time(first[k])]
+    if not elapsed or not clocks:
+        return table
+    names = " ".join(f"'{table.columns[k]}'" for k in sorted(clocks))
+    table = table.assuming(f"{names} not used beside '{table.columns[elapsed[0]]}'")
+    return table.keeping([k for k in range(len(table.columns)) if k not in clocks])
+
+
+_GROUP = "test no"
+"""Name of the column that numbers the tests of a table whose times begin anew."""
+
+
+def with_groups(table: CellTable, known: Terms) -> CellTable:
+    """The table with conditions and names of tests in all rows of a group, where they stand in its first row alone.
+
+    A group begins where time falls. Groups that no name tells apart, but a condition does, get numbers.
+    """
+    if isinstance(table.rows, NumberRows) or len(table.rows) < 2:
+        return table
+    time = next((k for k, name in enumerate(table.columns) if known.quantity(name) == "time"), None)
+    clock = [row.cells[time] for row in table.rows] if time is not None else [""]
+    if not all(is_number(cell, table.dialect) for cell in clock):
+        return table
+    times = [float(cell.replace(",", ".")) for cell in clock]
+    starts = {0, *(k for k in range(1, len(times)) if times[k] < times[k - 1])}
+    keys = [k for k, name in enumerate(table.columns) if words_of(name) in TEST_NAME_COLUMNS]
+    stated = keys + [
+        k
+        for k, name in enumerate(table.columns)
+        if known.quantity(name) in (None, "temperature", *known.number_kinds) and known.is_condition(name)
+    ]
+    filled = {k: [row for row, cell in enumerate(cells_of(table.rows, k)) if not is_missing(cell)] for k in stated}
+    sparse = [
+        k
+        for k in stated
+        if filled[k] and filled[k][0] == 0 and set(filled[k]) <= starts and len(filled[k]) < len(times)
+    ]
+    rows, above = list[TableRow](), dict[int, str]()
+    for row in table.rows:
+        above |= {k: row.cells[k] for k in sparse if not is_missing(row.cells[k])}
+        rows.append(TableRow(row.line, [above.get(k, cell) for k, cell in enumerate(row.cells)]))
+    notes = tuple(f"blank cells of '{table.columns[k]}' hold what stands above them" for k in sparse)
+    result = replace(table, rows=rows, assumptions=(*table.assumptions, *notes)) if sparse else table
+    if keys or len(starts) < 2 or not sparse:
+        return result
+    numbers = [str(sum(start <= k for start in starts)) for k in range(len(rows))]
+    rows = [TableRow(row.line, [number, *row.cells]) for number, row in zip(numbers, rows, strict=True)]
+    places = [0, *(result.positions or range(len(result.columns)))]
+    return replace(result, columns=[_GROUP, *result.columns], rows=rows, positions=places)
+
+
+def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Terms) -> list[TabulatedTest]:
+    """The tests of a table in which a column of names tells them apart; columns of words state conditions of a test."""
+    foreign = [
+        k for k, column in enumerate(table.columns) if column not in known.declared and not known.quantity(column)
+    ]
+    keys = [k for k in foreign if words_of(table.columns[k]) in TEST_NAME_COLUMNS]
+    if not foreign:
+        return [TabulatedTest("", entries, table)]
+
+    def check(row: TableRow) -> None:
+        if not row.cells[keys[0]]:
+            column = table.columns[keys[0]]
+            raise HistoryError(f"{table.location(row.line)}: the row names no test; fill the column '{column}'")
+
+    groups = grouped(table.rows, keys[0], check) if keys else {"": table.rows}
+    tests = []
+    for name, rows in groups.items():
+        stated = [k for k in foreign if k not in keys[:1] and _states_condition(table, k, rows, known)]
+        own = _entries_of_columns(table, stated, rows[0], known)
+        refuse_twice(own, entries, known)
+        kept = [k for k in range(len(table.columns)) if k not in (*stated, *keys[:1])]
+        cut = with_columns(rows, kept)
+        empty = [
+            table.columns[k] for k in stated if is_missing(rows[0].cells[k]) and known.is_condition(table.columns[k])
+        ]
+        assumptions = (*table.assumptions, *map(unknown_text, empty))
+        part = replace(table, columns=[table.columns[k] for k in kept], rows=cut, assumptions=assumptions)
+        tests.append(TabulatedTest(name, {**entries, **own}, part))
+    return tests
+
+
+def _states_condition(table: CellTable, column: int, rows: Sequence[TableRow], known: Terms) -> bool:
+    """Whether a column holds one condition, or one text, in all rows of a test."""
+    cells = cells_of(rows, column)
+    first = next(cells)
+    if any(cell != first for cell in cells):
+        return False
+    return not is_number(first, table.dialect) or known.is_condition(table.columns[column])
+
+
+def _entries_of_columns(table: CellTable, columns: Sequence[int], row: TableRow, known: Terms) -> dict[str, SourceText]:
+    entries = {}
+    for k in columns:
+        name = table.columns[k]
+        key = known.condition(name) if known.is_condition(name) else f"label {name}"
+        if not is_missing(row.cells[k]):
+            entries[key] = SourceText(row.cells[k], table.location(row.line), table.dialect.decimal, name)
+    return entries
+
+
+# ---- layouts ---------------------------------------------------------------------------------------------------------
+
+
+class TestColumns(NamedTuple):
     """The columns of one test: its name, "" where the columns do not tell it, and {position: name of the column}."""
 
     test: str
@@ -59,90 +199,228 @@ class TestColumns:
 
 
 @dataclass(frozen=True)
-class HeadedGrid:
-    """A grid from the names of its columns on, and its head.
-
-    times : positions of the columns of time. whole : the rows of the head, columns that are left out included.
-    """
-
-    grid: CellTable
-    head: Head
-    times: Sequence[int]
-    known: KnownNames
-    whole: Sequence[TableRow]
-
-
-@dataclass(frozen=True)
 class Layout:
-    """How tests may stand in a table. example : a text in this layout. match, tests : of a headed grid."""
+    """How tests may stand in a table. example : a text in this layout. match, tests : of a table with its head."""
 
     name: str
     example: str
-    match: Callable[[HeadedGrid], bool]
-    tests: Callable[[HeadedGrid], list[TabulatedTest]]
+    match: Callable[[HeadedTable], bool]
+    tests: Callable[[HeadedTable], list[TabulatedTest]]
 
 
-def tests_in(grid: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
-    """The tests of a grid; HistoryError, in one sentence, where it cannot be told how it is laid out."""
-    for key, (text, place) in vocabulary.stated.items():
-        if key in grid.header and grid.header[key].text != text:
-            raise HistoryError(f"{place}: {key} is '{quoted(text)}', and {grid.header[key].location} says another one")
-    grid = replace(grid, header={**grid.header, **{key: SourceText(*one) for key, one in vocabulary.stated.items()}})
-    stated = grid.header.get("specimen")
-    known = KnownNames.of(vocabulary, stated.text if stated else "")
-    names_at = row_of_names(grid, known)
-    names_line, all_rows = grid.rows[names_at].line, list(grid.rows[: names_at + MAXIMUM_ROWS_BELOW])
-    grid = without_ignored(_with_comments(grid, names_line, known), names_at, vocabulary.ignored)
-    if not any(row.line == names_line for row in grid.rows):
-        raise HistoryError(f"{grid.location(names_line)}: every column is left out by ignore; keep those of the test")
-    head = head_of(grid, known)
-    below = replace(grid, rows=joined([TableRow(head.line, head.names)], grid.rows[head.body :]))
-    times = [k for k, cell in enumerate(head.names) if cell and is_time(cell, known)]
-    lines = {row.line for row in head.rows}
-    whole = [row for k, row in enumerate(all_rows) if k < names_at or row.line in lines]
-    headed = HeadedGrid(below, head, times, known, whole)
+def tests_in(table: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
+    """The tests of a table; HistoryError, in one sentence, where it cannot be told how it is laid out."""
+    headed = headed_table(table, vocabulary)
     return next(layout for layout in LAYOUTS if layout.match(headed)).tests(headed)
 
 
-def names_time(grid: CellTable, vocabulary: HeaderVocabulary) -> bool:
-    """Whether some row of a grid names a time, as that above frames does."""
-    known = KnownNames.of(vocabulary)
-    row = grid.rows[row_of_names(grid, known)]
-    return any(is_time(cell, known) for cell in row.cells)
+# ---- columns of each test side by side -----------------------------------------------------------------------------
 
 
-def _are_pairs(headed: HeadedGrid) -> bool:
-    return len(headed.times) > 1 and not _one_time_in_two_units(headed.head.names, headed.times)
+def _are_pairs(headed: HeadedTable) -> bool:
+    """Whether each of several times has columns of its own; `time_s,time_h,strain_pct` is one in two units."""
+    times = headed.times
+    one_in_two_units = any(b - a == 1 for a, b in pairwise(times)) or len(headed.names) - 1 in times
+    return len(times) > 1 and not one_in_two_units
 
 
-def _tests_of_pairs(headed: HeadedGrid) -> list[TabulatedTest]:
-    tests = _pairs(headed.grid, headed.times, headed.known)
-    return _tests_of_blocks(headed, tests, set(range(headed.times[0])))
+def _tests_of_pairs(headed: HeadedTable) -> list[TabulatedTest]:
+    names, times = headed.names, headed.times
+    if first := next(filter(None, names[: times[0]]), ""):
+        what = f"the column '{quoted(first)}' stands before the first time"
+        raise HistoryError(f"{headed.place}: {what}; begin the columns of each test with time")
+    tests = []
+    for start, end in zip(times, [*times[1:], len(names)], strict=True):
+        named = {k: test_and_column(names[k], headed.known) for k in range(start, end) if names[k]}
+        called = sorted({test for test, _ in named.values() if test})
+        if len(called) > 1:
+            what = f"the columns beside one time name the tests '{quoted(called[0])}' and '{quoted(called[1])}'"
+            raise HistoryError(f"{headed.place}: {what}; begin the columns of each test with time")
+        tests.append(TestColumns("".join(called), {k: column for k, (_, column) in named.items()}))
+    return _tests_of_blocks(headed, tests, range(times[0]))
 
 
-def _are_columns(headed: HeadedGrid) -> bool:
-    return len(headed.times) == 1 and _is_wide(headed)
+# ---- one column a test ---------------------------------------------------------------------------------------------
 
 
-def _tests_of_columns(headed: HeadedGrid) -> list[TabulatedTest]:
+def _are_columns(headed: HeadedTable) -> bool:
+    """Whether the columns beside one time are one a test."""
+    known = headed.known
+    others = [cell for k, cell in enumerate(headed.names) if k not in headed.times and cell]
+    if len(headed.times) != 1 or len(others) < 2 or known.declared.intersection(others):
+        return False
+    named = [test_and_column(cell, known) for cell in others]
+    if all(test for test, _ in named):
+        return len({known.quantity(column) for _, column in named}) < len(named)
+    if any(known.quantity(cell) for cell in others):
+        return bool(headed.rows) and len(set(others)) == 1
+    if _are_conditions(headed):
+        return True
+    if any(words_of(cell) in TEST_NAME_COLUMNS or known.is_condition(cell) for cell in others):
+        return False
+    spelled = {words_of(name) for name in known.column_kinds}
+    return not any(get_close_matches(words_of(split_written_name(cell)[0]), spelled, 1, cutoff=0.75) for cell in others)
+
+
+def _are_conditions(headed: HeadedTable) -> bool:
+    """Whether the columns beside a time are named by a load or a temperature, as `120 MPa`."""
+    written = [cell for k, cell in enumerate(headed.written) if cell and k not in headed.times]
+    return all(conditions_of_head(cell, headed.known) for cell in written)
+
+
+def _tests_of_columns(headed: HeadedTable) -> list[TabulatedTest]:
     time = headed.times[0]
-    return _tests_of_blocks(headed, _columns_beside(headed, time), set(range(time + 1)))
-
-
-def _tests_of_rows(headed: HeadedGrid) -> list[TabulatedTest]:
-    grid, footers = _without_footers(headed.grid)
-    if not headed.times:
-        place, names = grid.location(headed.head.line), some_of(list(filter(None, headed.head.names)))
+    tests = [
+        TestColumns(test, {time: headed.names[time], k: column})
+        for k, cell in enumerate(headed.names)
+        if k != time and cell
+        for test, column in [_test_and_strain(headed, k)]
+    ]
+    beside = [[cell for k, cell in enumerate(row.cells) if cell and k > time] for row in headed.rows]
+    if all(one.test.isdigit() for one in tests) and not any(len(set(cells)) > 1 for cells in beside):
         raise HistoryError(
-            f"{place}: missing column: no time among {names}; name one time_s, time_min or time_h in that row, behind "
-            "its '#' where it has one"
+            f"{headed.place}: several columns of one quantity, and no conditions above each, may be tests or sensors "
+            "of one test; name the tests, such as 'A1 strain (%)', or keep one column, with '# ignore: NAME' for the "
+            "others"
         )
-    head = head_of_one_test(grid, headed.whole, headed.known)
-    refuse_twice(head.entries, grid.header, headed.known)
-    table = without_clocks(named_columns(_without_margin(grid, head.entries)), headed.known)
-    table = replace(table, assumptions=(*table.assumptions, *head.assumptions, *footers), sources=tuple(head.sources))
+    return _tests_of_blocks(headed, tests, range(time + 1))
+
+
+def _test_and_strain(headed: HeadedTable, k: int) -> tuple[str, str]:
+    """Name of the test and of the column of one column; one that names a test alone holds what the head says."""
+    cell, written, stated = headed.names[k], headed.written[k], headed.table.header.get("columns")
+    test, column = test_and_column(cell, headed.known)
+    if headed.known.quantity(column):
+        return test, column
+    name, unit = split_written_name(cell)
+    if stated is None and unit_suffix(unit) in STRAIN.units and headed.rows:
+        return name, f"strain ({unit})"
+    if stated is None and not _are_conditions(headed):
+        raise HistoryError(
+            f"{headed.place}: the column '{quoted(cell)}' does not say what it holds; write '# columns: strain_pct' "
+            "above, or names such as 'A1 strain (%)'"
+        )
+    return written, stated.text if stated else f"strain{cell.removeprefix(written)}"
+
+
+# ---- blocks of columns ---------------------------------------------------------------------------------------------
+
+
+def _tests_of_blocks(
+    headed: HeadedTable, tests: Sequence[TestColumns], key_columns: Collection[int]
+) -> list[TabulatedTest]:
+    """The tests of several columns each, with what the rows above say of each."""
+    table, known, place = headed.table, headed.known, headed.place
+    header = {key: entry for key, entry in table.header.items() if key != "columns"}
+    used, rows, notes = {k for test in tests for k in test.columns}, table.rows[1:], dict[str, SourceText]()
+    is_text = not isinstance(rows, NumberRows)
+    checked = list(
+        _rows_beside_notes(table, rows if is_text else rows[:1], used, notes)
+    )  # every row has the same columns
+    rows = checked if is_text else rows
+    results: dict[str, TabulatedTest] = {}
+    heads = heads_of_tests(headed, [test.columns for test in tests], key_columns)
+    for number, (test, head) in enumerate(zip(tests, heads, strict=True), 1):
+        entries, columns = dict(head.entries), list(test.columns.values())
+        for quantity, text in conditions_of_head(test.test, known):
+            entries[quantity] = SourceText(text, place, table.dialect.decimal, test.test)
+        refuse_twice(entries, header, known)
+        written = entries.pop("name", None)
+        measured = [entry.text for entry in entries.values() if entry.key in known.conditions.kinds]
+        name = test.test or (written.text if written else " ".join(measured) or str(number))
+        name = f"{name} ({number})" if name in results and not (test.test or written) else name
+        if name in results:
+            raise HistoryError(f"{place}: two tests are called '{quoted(name)}'; give each its own name")
+        check_columns(f"{place}, test '{quoted(name)}'", columns)
+        cut = with_columns(rows, list(test.columns))
+        if is_text:  # in pairs its time is among what the columns of a test hold
+            cut = [row for row in cut if not all(map(is_missing, row.cells[1:]))]
+        if not cut:
+            what = f"test '{quoted(name)}' has no rows below the names of its columns"
+            raise HistoryError(f"{place}: {what}; remove it or fill it")
+        own = replace(
+            table.assuming(*head.assumptions),
+            rows=cut,
+            header={},
+            columns=columns,
+            columns_line=table.rows[0].line,
+            positions=[table.positions[k] if table.positions else k for k in test.columns],
+            sources=(*conditions_in_text(test.test, place, known), *head.sources),
+        )
+        results[name] = TabulatedTest(name, {**notes, **header, **entries}, own)
+    return list(results.values())
+
+
+def _rows_beside_notes(
+    table: CellTable, rows: Sequence[TableRow], used: Collection[int], notes: dict[str, SourceText]
+) -> Iterator[TableRow]:
+    """The rows, of as many cells as there are columns in use; texts beside them are added to the notes."""
+    width = max(used) + 1
+    for row in rows:
+        cells = cells_of_width(table, row, width, beside=True)
+        foreign = [cell for k, cell in enumerate(cells) if cell and k not in used]
+        if number := next((cell for cell in foreign if is_number(cell, table.dialect)), ""):
+            what = f"'{quoted(number)}' stands in a column without a name"
+            raise HistoryError(f"{table.location(row.line)}: {what}; name it or remove it")
+        if foreign:
+            notes[f"label line {row.line}"] = SourceText("; ".join(foreign), table.location(row.line))
+        yield TableRow(row.line, cells[:width])
+
+
+# ---- one test, or tests by rows ------------------------------------------------------------------------------------
+
+
+def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
+    if not headed.times:
+        raise HistoryError(
+            f"{headed.place}: missing column: no time among {some_of(list(filter(None, headed.names)))}; name one "
+            "time_s, time_min or time_h in that row, behind its '#' where it has one"
+        )
+    head = HeadOfTest(headed.table, headed.known)
+    for row in headed.whole:
+        head.read(row)
+    refuse_twice(head.entries, headed.table.header, headed.known)
+    table, footers = _without_remarks_around(headed.table, head.entries)
+    table = without_clocks(named_columns(table), headed.known)
+    table = replace(table.assuming(*head.assumptions, *footers), sources=tuple(head.sources))
     table = with_groups(without_remarks(table, head.entries), headed.known)
-    return rows_by_test(table, {**grid.header, **head.entries}, headed.known)
+    return rows_by_test(table, {**table.header, **head.entries}, headed.known)
+
+
+def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> tuple[CellTable, list[str]]:
+    """The table without texts right of its named columns, which become notes, and without remarks below its frames.
+
+    What says so of the latter is returned. Numbers beside the columns are told by who reads them.
+    """
+    if isinstance(table.rows, NumberRows):
+        return table, []
+    count, footers = len(table.rows), list[str]()
+    while count > 2 and _is_remark(row := table.rows[count - 1], table):
+        count -= 1
+        text = " ".join(filter(None, row.cells))
+        footers.insert(0, f"line {row.line} is a remark ({quoted(text)})".replace(",", ";"))
+    rows, width = list[TableRow](), max((k for k, cell in enumerate(table.rows[0].cells, 1) if cell), default=0)
+    for row in table.rows[:count]:
+        beside = [cell for cell in row.cells[width:] if cell]
+        if not beside or any(is_number(cell, table.dialect) for cell in beside):
+            rows.append(row)
+            continue
+        notes[f"label line {row.line}"] = SourceText("; ".join(beside), table.location(row.line))
+        if any(row.cells[:width]):
+            rows.append(TableRow(row.line, row.cells[:width]))
+    return replace(table, rows=rows), footers
+
+
+def _is_remark(row: TableRow, table: CellTable) -> bool:
+    """Whether a row holds one cell of several words, none of them first a number, or `End`; `nan` is a lost number."""
+    cells = [cell for cell in row.cells if cell]
+    if table.dialect.delimiter == " ":
+        cells = [" ".join(cells)]
+    if len(cells) != 1 or not cells[0].lstrip("(*#- ")[:1].isalpha():
+        return False
+    words = cells[0].lower().strip(".:*-= ").split()
+    lost = {"nan", "inf", "na", "n/a", "-", "--", "none", "null", "-nan", "-inf"}
+    return (len(words) > 1 and not lost.intersection(words)) or words in (["end"], ["eof"])
 
 
 LAYOUTS: Sequence[Layout] = (
@@ -166,217 +444,3 @@ LAYOUTS: Sequence[Layout] = (
     ),
 )
 """The first that matches is the layout of a table."""
-
-
-def _with_comments(grid: CellTable, names_line: int, known: KnownNames) -> CellTable:
-    """The grid with the entries of comments between its first row and its names.
-
-    A condition in a comment below the names is refused, for it must not go unread; remarks may stand anywhere.
-    """
-    header = dict(grid.header)
-    for line, key, entry in grid.comments:
-        if line > names_line and known.is_condition(key):
-            raise HistoryError(f"{entry.location}: '{key}' stands below the names of the columns; move it above them")
-        if line < names_line and key in header:
-            raise HistoryError(f"{entry.location}: '{quoted(key, 60)}' was already given; keep one of them")
-        if line < names_line:
-            header[key] = entry
-    return replace(grid, header=header)
-
-
-def _one_time_in_two_units(cells: Sequence[str], times: Sequence[int]) -> bool:
-    """Whether columns of time have no other column between them, as in `time_s,time_h,strain_pct`."""
-    return any(b - a == 1 for a, b in pairwise(times)) or times[-1] == len(cells) - 1
-
-
-def _is_wide(headed: HeadedGrid) -> bool:
-    """Whether the columns beside a time are one a test."""
-    cells, time, known = headed.head.names, headed.times[0], headed.known
-    others = [cell for k, cell in enumerate(cells) if k != time and cell]
-    if len(others) < 2 or known.declared.intersection(others):
-        return False
-    named = [test_and_column(cell, known) for cell in others]
-    if all(test for test, _ in named):
-        return len({known.quantity(column) for _, column in named}) < len(named)
-    if any(known.quantity(cell) for cell in others):
-        return bool(headed.head.rows) and len(set(others)) == 1
-    if _are_conditions(headed):
-        return True
-    if any(words_of(cell) in TEST_NAME_COLUMNS or known.is_condition(cell) for cell in others):
-        return False
-    spelled = {words_of(name) for name in known.columns.kinds}
-    return not any(get_close_matches(words_of(split_written_name(cell)[0]), spelled, 1, cutoff=0.75) for cell in others)
-
-
-def _are_conditions(headed: HeadedGrid) -> bool:
-    """Whether the columns beside a time are named by a load or a temperature, as `120 MPa`."""
-    written = [cell for k, cell in enumerate(headed.head.written) if cell and k not in headed.times]
-    return all(conditions_of_head(cell, headed.known) for cell in written)
-
-
-def _columns_beside(headed: HeadedGrid, time: int) -> list[TestColumns]:
-    """One column a test, beside one time."""
-    names, grid, known = headed.head.names, headed.grid, headed.known
-    stated, place = grid.header.get("columns"), grid.location(headed.head.line)
-    of_conditions = _are_conditions(headed)
-    results: list[TestColumns] = []
-    for k, cell in enumerate(names):
-        if k == time or not cell:
-            continue
-        test, column = test_and_column(cell, known)
-        if not known.quantity(column):
-            strain_unit = split_written_name(cell)[1]
-            if stated is None and unit_suffix(strain_unit) in STRAIN.units and headed.head.rows:
-                results.append(
-                    TestColumns(split_written_name(cell)[0], {time: names[time], k: f"strain ({strain_unit})"})
-                )
-                continue
-            if stated is None and not of_conditions:
-                raise HistoryError(
-                    f"{place}: the column '{quoted(cell)}' does not say what it holds; write '# columns: strain_pct' "
-                    "above, or names such as 'A1 strain (%)'"
-                )
-            written = headed.head.written[k]
-            test, column = written, stated.text if stated else f"strain{cell.removeprefix(written)}"
-        results.append(TestColumns(test, {time: names[time], k: column}))
-    beside = [[cell for k, cell in enumerate(row.cells) if cell and k > time] for row in headed.head.rows]
-    if all(one.test.isdigit() for one in results) and not any(len(set(cells)) > 1 for cells in beside):
-        raise HistoryError(
-            f"{place}: several columns of one quantity, and no conditions above each, may be tests or sensors of one "
-            "test; name the tests, such as 'A1 strain (%)', or keep one column, with '# ignore: NAME' for the others"
-        )
-    return results
-
-
-def _pairs(grid: CellTable, times: Sequence[int], known: KnownNames) -> list[TestColumns]:
-    """Columns of each test side by side, each beginning with its time."""
-    names = grid.rows[0]
-    place = grid.location(names.line)
-    if any(names.cells[: times[0]]):
-        first = next(filter(None, names.cells))
-        raise HistoryError(
-            f"{place}: the column '{quoted(first)}' stands before the first time; begin the columns of each test "
-            "with time"
-        )
-    blocks = []
-    for start, end in zip(times, [*times[1:], len(names.cells)], strict=True):
-        named = {k: test_and_column(names.cells[k], known) for k in range(start, end) if names.cells[k]}
-        tests = sorted({test for test, _ in named.values() if test})
-        if len(tests) > 1:
-            raise HistoryError(
-                f"{place}: the columns beside one time name the tests '{quoted(tests[0])}' and '{quoted(tests[1])}'; "
-                "begin the "
-                "columns of each test with time"
-            )
-        blocks.append(TestColumns("".join(tests), {k: column for k, (_, column) in named.items()}))
-    return blocks
-
-
-def _tests_of_blocks(headed: HeadedGrid, tests: Sequence[TestColumns], key_columns: set[int]) -> list[TabulatedTest]:
-    """The tests of several columns each, with what the rows above say of each."""
-    grid, known = headed.grid, headed.known
-    header = {key: entry for key, entry in grid.header.items() if key != "columns"}
-    used = {k for test in tests for k in test.columns}
-    notes: dict[str, SourceText] = {}
-    rows = grid.rows[1:]
-    if isinstance(rows, NumberRows):
-        list(_checked_cells(grid, rows[:1], used, notes))  # every row has the same columns
-    else:
-        rows = list(_checked_cells(grid, rows, used, notes))
-    place = grid.location(headed.head.line)
-    results: dict[str, TabulatedTest] = {}
-    heads = heads_of_tests(grid, headed.head.rows, [list(test.columns) for test in tests], key_columns, known)
-    for number, (test, head) in enumerate(zip(tests, heads, strict=True), 1):
-        entries = dict(head.entries)
-        for quantity, text in conditions_of_head(test.test, known):
-            entries[quantity] = SourceText(text, place, grid.dialect.decimal, test.test)
-        refuse_twice(entries, header, known)
-        written = entries.pop("name", None)
-        measured = [entry.text for key, entry in entries.items() if entry.key in known.conditions.kinds]
-        name = test.test or (written.text if written else " ".join(measured) or str(number))
-        name = f"{name} ({number})" if name in results and not (test.test or written) else name
-        if name in results:
-            raise HistoryError(f"{place}: two tests are called '{quoted(name)}'; give each its own name")
-        check_columns(f"{place}, test '{quoted(name)}'", list(test.columns.values()))
-        sources = (*conditions_in_text(test.test, place, known), *head.sources)
-        table = _table_of_block(grid, rows, name, test.columns)
-        table = replace(table.assuming(*head.assumptions), sources=sources)
-        results[name] = TabulatedTest(name, {**notes, **header, **entries}, table)
-    return list(results.values())
-
-
-def _checked_cells(
-    grid: CellTable, rows: Sequence[TableRow], used: set[int], notes: dict[str, SourceText]
-) -> Iterator[TableRow]:
-    """The rows, of as many cells as there are columns in use; texts beside them are added to the notes."""
-    width = max(used) + 1
-    for row in rows:
-        for foreign in (cell for k, cell in enumerate(row.cells) if cell and k not in used):
-            _add_note(grid, row, foreign, notes)
-        yield TableRow(row.line, cells_of_width(grid, row, width, beside=True)[:width])
-
-
-def _add_note(grid: CellTable, row: TableRow, text: str, notes: dict[str, SourceText]) -> None:
-    """Keep a text that stands in a column without a name; HistoryError for a number."""
-    place, key = grid.location(row.line), f"label line {row.line}"
-    if is_number(text, grid.dialect):
-        raise HistoryError(f"{place}: '{quoted(text)}' stands in a column without a name; name it or remove it")
-    earlier = f"{notes[key].text}; " if key in notes else ""
-    notes[key] = SourceText(earlier + text, place)
-
-
-def _without_margin(grid: CellTable, notes: dict[str, SourceText]) -> CellTable:
-    """The grid without texts right of its named columns, which become notes; other cells are told by who reads them."""
-    width = max((k for k, cell in enumerate(grid.rows[0].cells, 1) if cell), default=0)
-    if isinstance(grid.rows, NumberRows) or not any(any(row.cells[width:]) for row in grid.rows):
-        return grid
-
-    def rows() -> Iterator[TableRow]:
-        for row in grid.rows:
-            beside = [cell for cell in row.cells[width:] if cell]
-            if any(is_number(cell, grid.dialect) for cell in beside):
-                yield row
-                continue
-            for cell in beside:
-                _add_note(grid, row, cell, notes)
-            if any(row.cells[:width]):
-                yield TableRow(row.line, row.cells[:width])
-
-    return replace(grid, rows=list(rows()))
-
-
-def _table_of_block(grid: CellTable, rows: Sequence[TableRow], name: str, columns: Mapping[int, str]) -> CellTable:
-    """The frames of one test: the rows in which a column of its own holds something, its time in pairs among them."""
-    positions, line = list(columns), grid.rows[0].line
-    own = with_columns(rows, positions)
-    cut = own if isinstance(own, NumberRows) else [row for row in own if not all(map(is_missing, row.cells[1:]))]
-    if not cut:
-        raise HistoryError(
-            f"{grid.location(line)}: test '{quoted(name)}' has no rows below the names of its columns; remove it or "
-            "fill it"
-        )
-    places = [grid.positions[k] if grid.positions else k for k in positions]
-    names = list(columns.values())
-    return replace(grid, rows=cut, header={}, columns=names, columns_line=line, positions=places)
-
-
-def _without_footers(grid: CellTable) -> tuple[CellTable, tuple[str, ...]]:
-    """The grid without remarks below its frames, which hold words alone, and what says so."""
-    count, footers = len(grid.rows), list[str]()
-    while count > 2 and _is_remark(row := grid.rows[count - 1], grid):
-        count -= 1
-        text = " ".join(filter(None, row.cells))
-        footers.append(f"line {row.line} is a remark ({quoted(text)})".replace(",", ";"))
-    return (replace(grid, rows=grid.rows[:count]), tuple(reversed(footers))) if footers else (grid, ())
-
-
-def _is_remark(row: TableRow, grid: CellTable) -> bool:
-    """Whether a row holds one cell of several words, none of them first a number, or `End`; `nan` is a lost number."""
-    cells = [cell for cell in row.cells if cell]
-    if grid.dialect.delimiter == " ":
-        cells = [" ".join(cells)]
-    if len(cells) != 1 or not cells[0].lstrip("(*#- ")[:1].isalpha():
-        return False
-    words = cells[0].lower().strip(".:*-= ").split()
-    lost = {"nan", "inf", "na", "n/a", "-", "--", "none", "null", "-nan", "-inf"}
-    return (len(words) > 1 and not lost.intersection(words)) or words in (["end"], ["eof"])

@@ -16,7 +16,7 @@ from itertools import pairwise
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_missing, is_number
-from creepkit.readers.column_names import KnownNames, split_written_name, unit_suffix, words_of
+from creepkit.readers.column_names import plain_name, split_unit, split_written_name, unit_suffix, words_of
 from creepkit.readers.columns_of_tests import (
     NAMES,
     QUANTITIES,
@@ -32,7 +32,7 @@ from creepkit.readers.condition_texts import conditions_in_text, sources_of_name
 from creepkit.readers.ends_of_tests import LABEL, NO, YES, kind_of_column
 from creepkit.readers.questions import Answer, Question, collected
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width, joined, without_ignored
-from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary, plain_name, split_unit
+from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary, Terms
 from creepkit.records.quantities import TIME
 
 MOST_ASKED = 6
@@ -145,7 +145,7 @@ class TestTable:
 
     def _read(self, sheet: CellTable, head: TestTableHead) -> None:
         """Take apart names, rows, groups, margin, titles and notes."""
-        known, line, dialect = KnownNames.of(self.vocabulary), sheet.rows[head.line].line, sheet.dialect
+        known, line, dialect = self.vocabulary.terms(), sheet.rows[head.line].line, sheet.dialect
         heading = {tuple(row.cells) for row in sheet.rows[head.first : head.body]}
         body = [row for row in sheet.rows[head.body :] if tuple(row.cells) not in heading]
         below = replace(sheet, rows=joined([TableRow(line, list(head.names))], body))
@@ -188,7 +188,7 @@ class TestTable:
             sources=tuple(sources),
         )
 
-    def _around(self, sheet: CellTable, above: Sequence[TableRow], known: KnownNames) -> dict[str, SourceText]:
+    def _around(self, sheet: CellTable, above: Sequence[TableRow], known: Terms) -> dict[str, SourceText]:
         """What lines above a table state of all its tests; all else is a note."""
         header = dict(sheet.header)
         for row in above:

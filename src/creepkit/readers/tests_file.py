@@ -26,12 +26,12 @@ from typing import Any
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.reading import FileKind, read_text
-from creepkit.readers.column_names import KnownNames, NameTable, split_written_name
+from creepkit.readers.column_names import NameTable, split_written_name
 from creepkit.readers.columns_of_tests import NAMES
 from creepkit.readers.ends_of_tests import LABEL, RUPTURED, STOPPED
 from creepkit.readers.frames import UNUSED
 from creepkit.readers.questions import ANSWERS_FILE, raise_all
-from creepkit.readers.vocabulary import HeaderVocabulary
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 
 ANSWERS = FileKind("answers about tests", HistoryError, "correct or remove it", maximum_bytes=1_000_000)
 
@@ -56,7 +56,7 @@ class Answers:
         """The vocabulary of a reader with the answers."""
         ignored = tuple(name for name, meaning in self.columns.items() if meaning == UNUSED)
         labels = tuple(name for name, meaning in self.columns.items() if meaning == LABEL)
-        names = NameTable({**KnownNames.of(vocabulary).columns.kinds, **NAMES.kinds})
+        names = NameTable({**vocabulary.terms().columns.kinds, **NAMES.kinds})
         meant = {name: what for name, what in self.columns.items() if what not in (UNUSED, LABEL)}
         synonyms = {name: names.standard(_with_unit(what, name, names)) for name, what in meant.items()}
         return replace(
@@ -99,7 +99,7 @@ def read_answers(file: Path) -> dict[str, dict[str, Any]]:
         reason = " ".join(str(error).split())
         raise HistoryError(f"{file}: is no TOML ({quoted(reason, 120)}); correct or remove it") from None
     errors = list[HistoryError]()
-    known = KnownNames.of(HeaderVocabulary())
+    known = HeaderVocabulary().terms()
     for pattern, table in data.items():
         if not isinstance(table, dict):
             errors.append(
@@ -116,7 +116,7 @@ def read_answers(file: Path) -> dict[str, dict[str, Any]]:
     return data
 
 
-def _problem(key: str, value: Any, known: KnownNames) -> str:
+def _problem(key: str, value: Any, known: Terms) -> str:
     """What is wrong with a key of a table or its value; "" for nothing."""
     if key == "columns":
         is_table = isinstance(value, dict) and all(isinstance(one, str) and one for one in value.values())
@@ -129,7 +129,7 @@ def _problem(key: str, value: Any, known: KnownNames) -> str:
         is_single = isinstance(value, (str, int, float)) and not isinstance(value, bool)
         return "" if is_single else "write a number or a text"
     near = get_close_matches(key, ["columns", "ended"], 1)
-    meant = near[0] if near else known.terms.suggestion(key)
+    meant = near[0] if near else known.suggestion(key)
     allowed = "allowed are columns, ended, and conditions as in the head of a file, such as stress_MPa or specimen"
     return f"is no key; did you mean '{meant}'?" if meant else f"is no key; {allowed}"
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_missing
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
-from creepkit.readers.column_names import KnownNames, split_written_name, words_of
+from creepkit.readers.column_names import split_written_name, words_of
 from creepkit.readers.columns_of_tests import (
     TestColumn,
     column_called,
@@ -155,7 +155,7 @@ class RowPerTestReader:
         frames, assumptions = _strains_reached(cells, location)
         cells = _with_end({name: one for name, one in cells.items() if one.column.strain is None}, end, location)
         entries = {**sheet.header, **row.stated, **{one.column.key: one.entry for one in cells.values()}}
-        known = KnownNames.of(self.vocabulary, specimen_named(entries, self.vocabulary))
+        known = self.vocabulary.terms(specimen_named(entries, self.vocabulary))
         quantities = {column_called(name).quantity for name in table.names}
         sources = tuple(one for one in sheet.sources if one.key not in quantities)
         entries, of_names = with_weak_sources(

@@ -26,6 +26,7 @@ from creepkit.files.delimited_text import (
 from creepkit.files.labview import is_labview, table_of_labview
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.files.time_stamps import is_clock_time
+from creepkit.readers.column_names import plain_name
 from creepkit.readers.cut_files import cut_number
 from creepkit.readers.table import (
     MAXIMUM_CELL,
@@ -42,7 +43,6 @@ from creepkit.readers.table import (
     refuse_more,
     without_ignored,
 )
-from creepkit.readers.vocabulary import plain_name
 
 TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
 

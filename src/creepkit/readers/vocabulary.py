@@ -9,8 +9,9 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import cached_property, lru_cache
+from functools import cached_property
 
+from creepkit.readers.column_names import TEST_NAME_COLUMNS, NameTable, plain_name, split_unit, words_of
 from creepkit.records import TENSOR_COMPONENTS, dimensions_of, known_specimens, loads_of, outputs_of
 from creepkit.records.quantities import (
     AREA,
@@ -26,12 +27,6 @@ from creepkit.records.quantities import (
     TIME,
     QuantityKind,
 )
-
-
-@lru_cache(maxsize=4096)
-def plain_name(name: str) -> str:
-    """A name in small letters, with underscores for blanks, hyphens, points and what sets a unit apart."""
-    return re.sub(r"[\s_\-.()\[\],]+", "_", name.strip().casefold()).strip("_")
 
 
 def is_misspelling(name: str, known: str) -> bool:
@@ -59,12 +54,6 @@ def _edit_distance(first: str, second: str, limit: int) -> int:
         if min(row) > limit and min(before) > limit:
             return limit + 1
     return row[-1]
-
-
-def split_unit(name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str] | None:
-    """Split `stress_MPa` into the longest known quantity and the unit behind it; None when it begins with none."""
-    found = max((one for one in kinds if name == one or name.startswith(f"{one}_")), key=len, default=None)
-    return None if found is None else (found, name[len(found) + 1 :])
 
 
 COMPONENT_LOADING_KINDS: Mapping[str, QuantityKind] = {
@@ -152,11 +141,12 @@ class HeaderVocabulary:
 
         A file that names none may use the terms of every registered specimen.
         """
-        known = known_specimens()
+        known, specimen = known_specimens(), specimen or self.default_texts.get("specimen", "")
         outputs = {name: {str(o): o.kind for o in outputs_of(one)} for name, one in known.items()} | dict(self.outputs)
         named = {specimen: known[specimen]} if specimen in known else dict(known)
         loads = {load.name: load.kind for one in (*known.values(), *named.values()) for load in loads_of(one)}
         return Terms(
+            vocabulary=self,
             outputs=outputs,
             own_outputs=outputs.get(specimen, {}),
             loads={specimen: [load.name for load in loads_of(one)] for specimen, one in known.items()},
@@ -169,7 +159,7 @@ class HeaderVocabulary:
 
 @dataclass(frozen=True)
 class Terms:
-    """What the headers and columns of one file may say.
+    """What the heads and columns of one file may say, and what names in it mean.
 
     outputs : {specimen: {output: kind}}; own_outputs : those of the specimen that the file names, {} where it names
     none. loads : {specimen: names}. load_kinds : {load: kind} of those that are stated by one number or program;
@@ -177,6 +167,7 @@ class Terms:
     dimensions : {name or alias: length of a test piece}; own_dimensions : of the specimen that the file names.
     """
 
+    vocabulary: HeaderVocabulary
     outputs: Mapping[str, Mapping[str, QuantityKind]]
     own_outputs: Mapping[str, QuantityKind]
     loads: Mapping[str, Sequence[str]]
@@ -185,19 +176,19 @@ class Terms:
     dimensions: Mapping[str, str]
     own_dimensions: Sequence[str]
 
-    @property
+    @cached_property
     def number_kinds(self) -> dict[str, QuantityKind]:
         """Loads whose column is a record of what was imposed, whichever specimen it was: none of those without unit."""
         return {name: kind for name, kind in self.load_kinds.items() if "" not in kind.units}
 
-    @property
+    @cached_property
     def condition_kinds(self) -> dict[str, QuantityKind]:
         """The kinds of all numbers that stand once for a test."""
         stepped = {**self.number_kinds, "temperature": TEMPERATURE}
         levels = {f"{name}_{k}": kind for name, kind in stepped.items() for k in range(1, HIGHEST_STEP + 1)}
         return {**CONDITION_KINDS, **self.load_kinds, **levels, **self._standard_deviation_kinds()}
 
-    @property
+    @cached_property
     def column_kinds(self) -> dict[str, QuantityKind]:
         """The kinds of all columns of frames."""
         return {
@@ -206,12 +197,57 @@ class Terms:
             **{"temperature": TEMPERATURE, "used": FLAG, "step": COUNT},
         }
 
-    @property
+    @cached_property
     def text_keys(self) -> set[str]:
         """Words that stand once for a whole test."""
         programs = (*self.load_kinds, "temperature", *COMPONENT_LOADING_KINDS)
         forms = {f"{name}_{form}" for name in programs for form in ("steps", "program")}
         return {*TEXT_KEYS, *forms, *(f"stated_{name}_program" for name in (*self.number_kinds, "temperature"))}
+
+    @cached_property
+    def columns(self) -> NameTable:
+        """What names of columns may mean."""
+        return NameTable(self.column_kinds)
+
+    @cached_property
+    def conditions(self) -> NameTable:
+        """What names of conditions may mean."""
+        return NameTable({**dict.fromkeys(self.dimensions, LENGTH), **self.condition_kinds}, self.text_keys)
+
+    def column(self, name: str) -> str:
+        """A name of a column in creepkit's form, where it is understood."""
+        return name if name in self.declared else self.columns.standard(name)
+
+    def quantity(self, name: str) -> str | None:
+        """The quantity of a column, None where its name means none."""
+        found = split_unit(self.column(self.vocabulary.synonyms.get(name, name)), self.columns.kinds)
+        return found[0] if found else None
+
+    def condition(self, name: str) -> str:
+        """A name of a condition in creepkit's form, where it is understood."""
+        words = words_of(name)
+        if name in self.vocabulary.synonyms or name in self.vocabulary.labels:
+            return name
+        if name.startswith(("label ", "geometry ")):
+            return name
+        if words in (*TEST_NAME_COLUMNS, "specimen name"):
+            return "name"
+        return f"label {LABEL_KEYS[words]}" if words in LABEL_KEYS else self.conditions.standard(name)
+
+    def is_condition(self, name: str) -> bool:
+        """Whether a name is that of a condition."""
+        standard = self.condition(name)
+        return (
+            standard in (*self.conditions.texts, *self.vocabulary.synonyms)
+            or split_unit(standard, self.conditions.kinds) is not None
+            or standard.startswith(("label ", "geometry "))
+        )
+
+    @property
+    def declared(self) -> set[str]:
+        """Names of columns that the vocabulary declares, which mean what it says."""
+        averaged = (name for names in self.vocabulary.averaged_columns.values() for name in names)
+        return {*self.vocabulary.synonyms, *averaged}
 
     @cached_property
     def spellings(self) -> dict[str, str]:

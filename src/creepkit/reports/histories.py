@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.readers.table_summary import TableSummary
+from creepkit.readers.reading import TableSummary
 from creepkit.records import SECONDS_PER_HOUR, History, output_unit
 from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, save_figure

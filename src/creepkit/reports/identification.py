@@ -196,13 +196,13 @@ def _weights(settings: IdentificationSettings) -> str:
         return (
             'the intervals rest on the likelihood (weights "likelihood"): readings count by their estimated noise, so '
             "that the shape of every curve counts beside the comparison of tests; readings of equal weight "
-            '(weights "noise", the default of one law by itself) give other values and, as a rule, wider intervals'
+            '(weights "noise") give other values and, as a rule, wider intervals'
         )
     if settings.weights == "noise":
         return (
             'the intervals rest on readings of equal weight (weights "noise") and all the scatter that was estimated, '
-            'with what the law cannot follow; the likelihood (weights "likelihood", by which several laws are '
-            "compared) gives other values and, as a rule, narrower intervals"
+            'with what the law cannot follow; the likelihood (weights "likelihood", the default) gives other values '
+            "and, as a rule, narrower intervals"
         )
     weights = settings.weights if isinstance(settings.weights, str) else f"{dict(settings.weights)}"
     return (
@@ -476,9 +476,7 @@ def scatter_text(fit: Identification, percent: str, tests: str) -> str:
             return "No scatter of the creep rates of single tests about the law was detected."
         return f"The creep rates of single tests scatter by {size}, as was estimated."
     cannot = f"{tests} cannot show it"
-    if fit.noise_model.rate == 0.0 or fit.settings.weights == "likelihood":
-        return f"How the creep rates of single tests scatter is not known, for {cannot}: the intervals hold for these."
-    return f"The creep rates of single tests were assumed to scatter by {size}, for {cannot}."
+    return f"How the creep rates of single tests scatter is not known, for {cannot}: the intervals hold for these."
 
 
 def _judged_noise(fit: Identification, output: str) -> str:

@@ -138,30 +138,32 @@ def _weights(fit: Identification, references: References) -> list[str]:
     settings = fit.settings
     offsets = any(n.kind == "offset" for n in settings.nuisances)
     estimated = [*(["offsets of tests"] if offsets else []), *(["the scatter of rates"] if rate_estimated(fit) else [])]
+    parts = listed(["white noise", "autocorrelated noise", *estimated])
+    noise = f"The {parts} were estimated by restricted maximum likelihood{references.cite('reml')}; 95 % intervals"
+    freedom = f"Satterthwaite's degrees of freedom{references.cite('satterthwaite')}"
     if settings.weights == "likelihood":
-        parts = listed(["white noise", "autocorrelated noise", *estimated])
         return [
-            f"The {parts} were estimated by restricted maximum likelihood{references.cite('reml')}; 95 % intervals "
-            "follow from the whole covariance with Satterthwaite's degrees of freedom"
-            f"{references.cite('satterthwaite')}. Parameters have weak Gaussian priors, with the variance of a uniform "
-            "distribution between their bounds."
+            f"{noise} follow from the whole covariance with {freedom}. Parameters have weak Gaussian priors, with the "
+            "variance of a uniform distribution between their bounds."
         ]
-    if settings.weights == "noise":
-        parts = listed(["noise", *estimated, "what the law cannot follow"])
-        return [
-            f"Readings have equal weights; {parts} were estimated as variance components. 95 % intervals are those of "
-            "the covariance of this weighted least-squares estimate under the estimated noise model"
-            f"{references.cite('weighted least squares')}, H⁻¹ (Jᵀ W C W J + P) H⁻¹ with H = Jᵀ W J + P, where J are "
-            "the derivatives of the residuals, W the weights, C the covariance of the noise and P the precision of the "
-            "priors, with Student's quantiles."
-        ]
-    if settings.weights == "equal":
-        return ["The sum of the relative squared errors of the outputs was minimised, each output with equal weight."]
-    if settings.weights == "paper":
-        chen = references.cite("chen")
-        return [f"The sum of the relative squared errors was minimised with 0.99 of the weight on the amplitude{chen}."]
-    weights = ", ".join(f"{name.replace('_', ' ')} {number(value, 3)}" for name, value in settings.weights.items())
-    return [f"The sum of the relative squared errors of the outputs was minimised, with the weights {weights}."]
+    chen = references.cite("chen")
+    minimised = "The sum of the relative squared errors of the outputs was minimised"
+    if not isinstance(settings.weights, str):
+        weights = ", ".join(f"{name.replace('_', ' ')} {number(value, 3)}" for name, value in settings.weights.items())
+        values = f"{minimised}, with the weights {weights}."
+    else:
+        values = {
+            "noise": "Values were found by least squares of readings of equal weight.",
+            "equal": f"{minimised}, each output with equal weight.",
+            "paper": f"{minimised}, with 0.99 of the weight on the amplitude{chen}.",
+        }[settings.weights]
+    return [
+        values,
+        f"{noise} are those of the covariance of this weighted estimate under that noise"
+        f"{references.cite('weighted least squares')}, H⁻¹ (Jᵀ W C W J + P) H⁻¹ with H = Jᵀ W J + P, where J are the "
+        "derivatives of the residuals, W the weights, C the covariance of the noise and P the precision of the priors, "
+        f"with {freedom}.",
+    ]
 
 
 def _offsets(fit: Identification, *, numbers: bool) -> list[str]:
@@ -185,8 +187,6 @@ def _offsets(fit: Identification, *, numbers: bool) -> list[str]:
 def _autocorrelation(fit: Identification, *, numbers: bool) -> list[str]:
     """What is autocorrelated, and how; numbers : whether sizes and lengths are stated."""
     noise = fit.noise_model
-    if fit.settings.weights != "likelihood":
-        return []
     sentences = [
         "Autocorrelated parts have the covariance s² exp(-d / l) at a distance d, in ln t of outputs that are compared "
         f"by their logarithm and else in time over the duration of a test; those were kept by which the likelihood "
@@ -281,15 +281,12 @@ def ranking_sentences(found: GroupFindings, references: References, *, numbers: 
     ranking = found.ranking
     if ranking is None:
         return []
-    by_likelihood = found.fit.settings.weights == "likelihood"
     if ranking.criterion in CRITERIA:
         name, penalty = CRITERIA[ranking.criterion]
         n = f" (n = {number(ranking.independent_frames, 4)})" if numbers and _known(ranking.independent_frames) else ""
         deviance = (
             "chi-square, under the covariance of the law that fits the tests best, plus the logarithm of the "
             "determinant that integrates nuisance parameters out"
-            if by_likelihood
-            else "-2 ln L, multiplied by the number of independent readings over that of all"
         )
         criterion = (
             f"{name}{references.cite(ranking.criterion)}: {deviance}, plus {penalty} for K parameters that the tests "

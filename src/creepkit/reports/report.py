@@ -265,7 +265,7 @@ def _commands(group: ReportGroup, histories: Sequence[History]) -> Iterator[str]
         known = all(resolve_law(fit.law.name).fingerprint == fit.law.fingerprint for fit in fits)
     except CreepkitError:
         known = False
-    defaults = IdentificationSettings(weights="likelihood") if len(fits) > 1 else IdentificationSettings()
+    defaults = IdentificationSettings()
     changed = {
         one.name: getattr(found.fit.settings, one.name)
         for one in fields(defaults)

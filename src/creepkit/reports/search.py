@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.inverse.search.global_search import SearchTrace
-    from creepkit.inverse.sparsity.bootstrap import SelectionFrequencies
     from creepkit.inverse.sparsity.result import PenaltyPath, Sparsity
 
 
@@ -79,17 +78,6 @@ def sparsity_text(sparsity: Sparsity) -> str:
         rows.append((term, *(f"{one:.3f}" for one in numbers), "dropped" if after is None else f"{after:.3f}"))
     lines = [f"{sparsity.penalty}{strength}: {sparsity.verdict}", *aligned(("", "without", "with", "after"), rows)]
     return "\n".join([*lines, f"(contributions; below {LEAST_CONTRIBUTION:g} a term is dropped)"])
-
-
-def selection_frequencies_text(frequencies: SelectionFrequencies) -> str:
-    """How often each term was kept, with its 95 % interval, and each set of terms."""
-    lines = [f"{frequencies.resamples} draws of {frequencies.unit}:"]
-    for term, count in frequencies.term_counts.items():
-        low, high = frequencies.interval(term)
-        lines.append(f"  {term}: kept {count} times ({low:.2f} to {high:.2f})")
-    for terms, count in frequencies.set_counts.items():
-        lines.append(f"  {' + '.join(terms)} alone: {count} times")
-    return "\n".join(lines)
 
 
 def penalty_path_text(path: PenaltyPath) -> str:

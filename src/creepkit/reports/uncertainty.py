@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import FitError
-from creepkit.records import ZERO_CELSIUS
 from creepkit.records.units import celsius_text
 from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, panels_of, place_legend_right, save_figure, set_range, wrapped
@@ -20,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.inverse.uncertainty.correlation import Correlation
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage, RateBand
-    from creepkit.inverse.uncertainty.posterior import PosteriorSamples
+    from creepkit.inverse.uncertainty.importance_sampling import PosteriorSamples
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
 
 
@@ -87,13 +84,9 @@ def _with_margin(values: Floats, logarithmic: bool) -> tuple[float, float]:
 
 
 def posterior_text(samples: PosteriorSamples) -> str:
-    """How the chain went, then the median and 95 % interval of every parameter."""
+    """The median and 95 % interval of every parameter."""
     width = max(len(name) for name in samples.coordinates.names)
-    lines = [
-        f"{samples.chain.shape[1]} walkers, {len(samples.chain)} steps ({samples.burn_in} left out): acceptance "
-        f"{samples.acceptance_fraction:.2f}, autocorrelation {samples.autocorrelation_time.max():.3g} steps, some "
-        f"{samples.effective_sample_size:.0f} independent draws"
-    ]
+    lines = [f"{len(samples.u)} draws from the posterior"]
     for name, param in samples.coordinates.law.table.items():
         median, low, high = samples.interval(name)
         lines.append(f"  {name:{width}} = {median:.5g}  [{low:.4g}, {high:.4g}]{_unit_text(param.unit)}")
@@ -185,39 +178,3 @@ def model_average_text(average: ModelAverage) -> str:
         f"over the laws {names}: rate at {reference.stress:.4g} MPa, {celsius_text(reference.temperature)} {rate:.3g} "
         f"[{low:.3g}, {high:.3g}] 1/s, local stress exponent {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]"
     )
-
-
-def rate_band_text(band: RateBand) -> str:
-    """Median rate and 95 % band, one line a stress."""
-    temperature = f"{band.temperature - ZERO_CELSIUS:.0f} +- {band.temperature_uncertainty:g} °C"
-    lines = [f"creep rate at {temperature}, 95 % band"]
-    for stress, rate, low, high in zip(band.stress, band.rate, band.low, band.high, strict=True):
-        lines.append(f"  {stress:8.4g} MPa  {rate:9.3g}  [{low:.3g}, {high:.3g}] 1/s")
-    return "\n".join([*lines, *(f"  note: {note}" for note in band.notes)])
-
-
-def rate_band_figure(band: RateBand, path: str | Path | None = None) -> Figure:
-    """Rates over stress of one band."""
-    return rate_bands_figure([band], path)
-
-
-def rate_bands_figure(bands: Sequence[RateBand], path: str | Path | None = None) -> Figure:
-    """Rates over stress with their bands: lighter with the temperature's uncertainty, darker without."""
-    if not bands:
-        raise FitError("there are no bands to draw")
-    figure, axes = panels_of(6.6, 4.6)
-    for k, band in enumerate(bands):
-        colour = f"C{k % 10}"
-        label = f"{band.temperature - ZERO_CELSIUS:.0f} ± {band.temperature_uncertainty:g} °C"
-        axes.fill_between(band.stress, band.low, band.high, color=colour, alpha=0.2, lw=0)
-        axes.fill_between(band.stress, *band.parameter_band, color=colour, alpha=0.35, lw=0)
-        axes.plot(band.stress, band.rate, color=colour, lw=1.4, label=label)
-    stresses, rates = (
-        np.concatenate(v) for v in ([b.stress for b in bands], [r for b in bands for r in (b.low, b.high)])
-    )
-    set_range(axes, "x", float(stresses.min()), float(stresses.max()), logarithmic=True)
-    set_range(axes, "y", float(rates.min()), float(rates.max()), logarithmic=True)
-    axes.set(xlabel="stress, MPa", ylabel="creep rate, 1/s")
-    place_legend_right(axes, "95 %: law and\ntemperature\n(dark: law alone)")
-    axes.set_title("\n".join(dict.fromkeys(band.name for band in bands)), fontsize=9)
-    return save_figure(figure, path)

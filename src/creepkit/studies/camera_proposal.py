@@ -43,18 +43,8 @@ ALLOYS_FILE = "alloys.csv"
 
 
 OF_ANY_FRAMES = (
-    "frames",
-    "frame",
-    "images",
-    "image",
-    "dic",
-    "dice",
-    "vic",
-    "exports",
-    "export",
-    "camera",
-    "cam",
-    "results",
+    *("frames", "frame", "images", "image", "exports", "export", "results"),
+    *("dic", "dice", "vic", "camera", "cam"),
 )
 """Words in the name of a folder that say only that it holds frames."""
 
@@ -116,8 +106,8 @@ class FoundCamera:
     def questions(self) -> tuple[str, ...]:
         """What only who made the test knows, one sentence each."""
         asked = []
-        for choice, what in ((self.times, "times") if self.untimed else (Choice(), ""), (self.record, "record")):
-            if choice.open:
+        for choice, what in ((self.times, "times"), (self.record, "record")):
+            if choice.open and (what == "record" or self.untimed):
                 asked.append(f"which of {', '.join(one.name for one in choice.open)} is the {what} of {self.name}?")
         if self.untimed and self.times == Choice():
             asked.append(f"when were the frames of {self.name} taken? give times = a file, or interval_s")
@@ -165,8 +155,14 @@ class FoundCameras:
 
     def channels_of(self, record: InstrumentRecord) -> list[str]:
         """The first load, and the thermocouples of a plate: those that are about as hot as the hottest."""
-        load = next(name for name, one in record.channels.items() if one.quantity in LOADS)
-        means = {name: float(np.nanmean(one.values)) for name, one in _warm(record).items()}
+        channels = record.channels.items()
+        load = next(name for name, one in channels if one.quantity in LOADS)
+        warm = {
+            name: one.values
+            for name, one in channels
+            if one.quantity == "temperature" and one.missing < one.values.size
+        }
+        means = {name: float(np.nanmean(values)) for name, values in warm.items()}
         hottest = max(means.values(), default=0.0)
         return [load, *(name for name, mean in means.items() if mean > hottest - LIKE_TEMPERATURES)]
 
@@ -229,17 +225,10 @@ def found_cameras(folder: Path, path: Path, others: Sequence[Path], base: str) -
     kept = {file: record for file, record in records.items() if file in used | offered}
     names = {camera.name: camera.dimples or ("D1",) for camera in cameras}
     file_names = {file: place + file.relative_to(folder).as_posix() for file in (*named, *files, *tables)}
+    alloys = (ALLOYS_FILE, empty_table(names))
     if tables or (path.parent / ALLOYS_FILE).exists():
-        return FoundCameras(file_names, tuple(cameras), kept, file_names[tables[0]] if len(tables) == 1 else "")
-    return FoundCameras(file_names, tuple(cameras), kept, ALLOYS_FILE, empty_table(names))
-
-
-def _warm(record: InstrumentRecord) -> dict[str, Any]:
-    return {
-        name: one
-        for name, one in record.channels.items()
-        if one.quantity == "temperature" and one.missing < one.values.size
-    }
+        alloys = (file_names[tables[0]] if len(tables) == 1 else "", "")
+    return FoundCameras(file_names, tuple(cameras), kept, *alloys)
 
 
 def _words(text: str) -> list[str]:

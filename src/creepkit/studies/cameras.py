@@ -253,16 +253,9 @@ class StudyCamera:
         part = self.part.infrared
         if part is None:
             return None
-        camera = InfraredCamera(
-            (part.center_mm[0], part.center_mm[1]),
-            part.mm_per_pixel,
-            part.emissivity,
-            part.emissivity_sd,
-            part.camera_emissivity,
-            part.surroundings_C + ZERO_CELSIUS,
-            part.wavelength_um,
-            part.unit,
-        )
+        seen = ((part.center_mm[0], part.center_mm[1]), part.mm_per_pixel)
+        surface = (part.emissivity, part.emissivity_sd, part.camera_emissivity, part.surroundings_C + ZERO_CELSIUS)
+        camera = InfraredCamera(*seen, *surface, part.wavelength_um, part.unit)
         with self.file.at(*self.key("infrared")):
             return camera.read(self.images)
 
@@ -376,19 +369,18 @@ class StudyCamera:
 
     def histories(self, results: Any) -> list[History]:
         """The tests, where no stage failed, without those that the table of alloys excludes."""
-        tests = [
-            (name, one, under)
-            for name, one, under in self.tests(results)
-            if under is not None or self.record_number is None
-        ]
-        rows = self._rows(results)
+        rows, cameras = self._rows(results), range(len(self.file.model.camera))
         if self.alloys is not None and self.name in results:
+            labels = [StudyCamera(self.file, k).label for k in cameras]
             with self.file.at("alloys", "file"):
-                self.alloys.check(self.label, self._shown(results), [one.label for one in self._all])
+                self.alloys.check(self.label, self._shown(results), labels)
         with self.file.at(*self.key()):
-            kept = [test for test in tests if (row := rows.get(test[1].name)) is None or not row.excluded]
-            several = len(rows) > 1
-            return [self._history(name, one, under, rows.get(one.name), several) for name, one, under in kept]
+            return [
+                self._history(name, one, under, row, several=len(rows) > 1)
+                for name, one, under in self.tests(results)
+                for row in [rows.get(one.name, Dimple("", self.label, one.name))]
+                if not row.excluded and (under is not None or self.record_number is None)
+            ]
 
     def _shown(self, results: Any) -> list[str]:
         """The test pieces in its field of view."""
@@ -400,30 +392,15 @@ class StudyCamera:
             return {}
         return self.alloys.of_camera(self.label, self._shown(results))
 
-    @property
-    def _all(self) -> list[StudyCamera]:
-        return [StudyCamera(self.file, k) for k in range(len(self.file.model.camera))]
-
-    def _history(self, name: str, one: Extraction, under: Imposed | None, row: Dimple | None, several: bool) -> History:
-        part, stated = self.part, self.stated_loading
-        row = row or Dimple("", self.label, one.name)
-        if stated is None:
-            assert under is not None
-            history = history_of(one, under)
-        else:
-            loading, kelvin = stated
-            labels = {}
-            if kelvin is None:
-                assert self.infrared is not None
-                kelvin, sd = self.infrared.at((float(one.center[0]), float(one.center[1])), 0.5 * one.region.moving)
-                labels = {"temperature_sd_K": f"{sd:.2g}"}
-            history = one.history_under(loading, kelvin)
-            history = history.replace(labels={**history.labels, **labels})
+    def _history(self, name: str, one: Extraction, under: Imposed | None, row: Dimple, *, several: bool) -> History:
+        """A test; several : whether the camera shows several test pieces of the table of alloys."""
+        part = self.part
+        history = self._under_stated(one) if under is None else history_of(one, under)
         modulus = row.modulus or (None if part.modulus_GPa is None else 1e3 * part.modulus_GPa)
         alloy = row.alloy or part.alloy or (name if several else "")
-        assumed = "an alloy of its own, for the table of alloys names none" if several and alloy == name else ""
         labels = {**history.labels, **part.labels, **row.labels}
-        if assumed:
+        if several and alloy == name:
+            assumed = "an alloy of its own, for the table of alloys names none"
             labels["assumed"] = "; ".join(filter(None, (labels.get("assumed"), assumed)))
         return history.replace(
             name=name,
@@ -434,19 +411,31 @@ class StudyCamera:
             source=f"{part.frames[0]} ({one.name})",
         )
 
+    def _under_stated(self, one: Extraction) -> History:
+        """A test under the load and the temperature that the study states, or that infrared images show."""
+        assert self.stated_loading is not None
+        loading, kelvin = self.stated_loading
+        if kelvin is not None:
+            return one.history_under(loading, kelvin)
+        assert self.infrared is not None
+        x, y = one.center
+        kelvin, sd = self.infrared.at((float(x), float(y)), 0.5 * one.region.moving)
+        history = one.history_under(loading, kelvin)
+        return history.replace(labels={**history.labels, "temperature_sd_K": f"{sd:.2g}"})
+
     def priors(self, histories: Sequence[History]) -> list[Nuisance]:
         """What is known of single test pieces but for an error: their lengths and their temperatures."""
-        places = {history.name: history.labels.get("place", "") for history in histories}
-        own = [history for history in histories if history.name == f"{self.label} {places[history.name]}"]
+        places = {one.name: one.labels.get("place", "") for one in histories}
+        own = [one for one in histories if one.name == f"{self.label} {places[one.name]}"]
         rows = {} if self.alloys is None else self.alloys.of_camera(self.label, [places[one.name] for one in own])
         kinds = {one.name: one.alias or one.name for one in dimensions_of(self.specimen)}
         found = []
         for history in own:
-            tolerances = rows[places[history.name]].tolerances if places[history.name] in rows else {}
-            found += [Nuisance(kinds[name], sd=sd, tests=(history.name,)) for name, sd in tolerances.items()]
+            row = rows.get(places[history.name])
+            known = {kinds[name]: sd for name, sd in row.tolerances.items()} if row else {}
             if "temperature_sd_K" in history.labels:
-                sd = float(history.labels["temperature_sd_K"])
-                found.append(Nuisance("temperature", sd=sd, tests=(history.name,)))
+                known["temperature"] = float(history.labels["temperature_sd_K"])
+            found += [Nuisance(kind, sd=sd, tests=(history.name,)) for kind, sd in known.items()]
         return found
 
 

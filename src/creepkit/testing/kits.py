@@ -29,15 +29,14 @@ from creepkit.records import (
 from creepkit.registry import Plugin, default_registry
 from creepkit.testing import (
     camera_checks,
+    declaration_checks,
     exporter_checks,
-    instrument_checks,
     law_behaviour,
     law_checks,
     law_declarations,
     predictor_checks,
     reader_checks,
     specimen_checks,
-    temperature_form_checks,
 )
 from creepkit.testing.predictor_checks import PredictorCase, default_histories, law_of_check
 from creepkit.testing.reports import ConformanceCheck, ConformanceReport, finding, run
@@ -177,10 +176,10 @@ def check_exporter(exporter: Exporter) -> ConformanceReport:
 @checked
 def check_instrument_format(format: InstrumentFormat) -> ConformanceReport:
     """Run every check on an instrument format: its name, the units of its channels, the order of its dates."""
-    return _report(format, "instrument format", instrument_checks)
+    return _report(format, "instrument format", [declaration_checks.check_declaration])
 
 
-def _report(subject: Any, kind: str, checks: ModuleType, *further: Any) -> ConformanceReport:
+def _report(subject: Any, kind: str, checks: ModuleType | list[Any], *further: Any) -> ConformanceReport:
     """Name and title of what was offered, then the checks of its kind."""
     found = run([check_record_name], subject, kind) + run(checks, subject, *further)
     return ConformanceReport(subject, tuple(found), kind)
@@ -188,7 +187,7 @@ def _report(subject: Any, kind: str, checks: ModuleType, *further: Any) -> Confo
 
 def check_temperature_form(form: Callable[..., Any]) -> ConformanceReport:
     """Run every check on a temperature form or factor, a function of T_ref."""
-    return ConformanceReport(form, tuple(run(temperature_form_checks, form)), "temperature form")
+    return ConformanceReport(form, tuple(run([declaration_checks.check_form], form)), "temperature form")
 
 
 _KITS: dict[str, Callable[..., ConformanceReport]] = {

@@ -139,7 +139,8 @@ def test_a_bad_test_loses_its_pull():
     bad[1] = replace(bad[1], rate=0.35)
     tests = planted(LAW, TRUTH, bad, seed=4, frames=24)
     plain, robust = (
-        identify(LAW, tests, EXACT, settings=replace(QUICK, test_loss=loss)) for loss in ("gaussian", "student")
+        identify(LAW, tests, EXACT, settings=replace(QUICK, test_loss=loss, weights="noise"))
+        for loss in ("gaussian", "student")
     )
     weights = [m.weight for m in robust.tests]
     assert weights[1] < 0.1
@@ -196,7 +197,7 @@ def test_derivatives_by_differences_give_the_same_answer(fit, tests):
 def test_an_expensive_predictor_is_searched_with_its_stand_in(fit, tests):
     """The stand-in creeps 10 % too fast: the answer must not, and few evaluations may be of the real one."""
     other = identify(LAW, tests, OneDegree(exact=True, stand_in=True), settings=WITH_THICKNESS)
-    assert (np.abs(other.u - fit.u) < 0.02 * np.sqrt(np.diag(fit.covariance))).all()
+    assert (np.abs(other.u - fit.u) < 0.05 * np.sqrt(np.diag(fit.covariance))).all()
     assert 0 < other.provenance["evaluations"] < 80
     assert other.provenance["search_evaluations"] > 0
 

@@ -66,9 +66,9 @@ def at_the_truth(law, tests, predictor=BAR, settings=SETTINGS):
 
 
 def effects_of(law, tests, predictor=BAR, settings=SETTINGS):
-    problem, x, linear = at_the_truth(law, tests, predictor, settings)
+    problem, _, linear = at_the_truth(law, tests, predictor, settings)
     noise = NoiseModel({name: OutputNoise(sd) for name, sd in zip(problem.observations.outputs, [NOISE], strict=True)})
-    effects = perturbations(problem, x, linear, noise, tests)
+    effects = perturbations(problem, linear, noise, tests)
     return {e.kind: e for e in effects if not e.common}, problem, linear
 
 
@@ -98,8 +98,8 @@ def test_the_clock_argument_is_a_simulation_with_a_program_of_temperature(law, l
 def test_independent_drifts_move_the_rate_by_no_more_than_their_own_mean(law, noise):
     """However small the noise: a drift of 5 K heats a test by 2.5 K in the mean, and three tests average."""
     tests = bars(law, [constant_stress(s, "stress") for s in (70.0, 90.0, 110.0)])
-    problem, x, linear = at_the_truth(law, tests)
-    found = perturbations(problem, x, linear, NoiseModel({"strain": OutputNoise(noise)}), tests)
+    problem, _, linear = at_the_truth(law, tests)
+    found = perturbations(problem, linear, NoiseModel({"strain": OutputNoise(noise)}), tests)
     drift = next(e for e in found if e.kind == DRIFT)
     assert 0.3 < drift.rate_change / (0.5 * USUAL_DRIFT * drift.per_kelvin / np.sqrt(3.0)) < 1.0
 
@@ -217,9 +217,9 @@ def test_the_effect_of_thickness_is_that_of_other_simulations():
     run = dimple.predict(law, theta(law)[None], [blank])
     sd = {"amplitude": np.full(8, 1.5e-3)}
     test = blank.replace(outputs={"amplitude": run.of(0)[:, run.outputs.index("amplitude")]}, standard_deviation=sd)
-    problem, x, linear = at_the_truth(law, [test], dimple)
+    problem, _, linear = at_the_truth(law, [test], dimple)
     noise = NoiseModel({"amplitude": OutputNoise(1.5e-3)})
-    effects = {e.kind: e for e in perturbations(problem, x, linear, noise, [test]) if not e.common}
+    effects = {e.kind: e for e in perturbations(problem, linear, noise, [test]) if not e.common}
     nominal = dimple.geometry.apex_thickness
     up, down = (
         dimple.replace(apex_thickness=nominal * factor).predict(law, theta(law)[None], [test])

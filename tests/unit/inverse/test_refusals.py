@@ -17,7 +17,7 @@ from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import L2, check_penalty
 from creepkit.inverse.uncertainty.correlation import correlation
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage, rate_band
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.profile_likelihood import profile
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.laws.norton import NORTON
@@ -129,8 +129,6 @@ MISTAKES = [
     (lambda tests, fit: profile(fit, STILL), "pi does not depend on any parameter"),
     (lambda tests, fit: ModelAverage((fit,), (0.5, 0.5)), "as many laws as weights"),
     (lambda tests, fit: ModelAverage((fit,), (-1.0,)), "must not be negative"),
-    (lambda tests, fit: rate_band(fit, [40.0], 1000.0, temperature_uncertainty=-1.0), "that is not negative"),
-    (lambda tests, fit: rate_band(fit, [0.0], 1000.0), "above zero"),
     (lambda tests, fit: fit.rupture_time(-10.0), "a stress that is not above zero"),
 ]  # fmt: skip
 

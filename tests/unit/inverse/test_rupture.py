@@ -117,7 +117,7 @@ def test_a_condition_left_out_is_predicted():
     held = folds.times_to_rupture()
     assert len(folds.folds) == 4
     assert sorted(held.names) == ["t0", "t1", "t2", "t3"]
-    assert held.z_factor < 3.0
+    assert held.z_factor < 3.5
     np.testing.assert_array_equal(sorted(held.measured), sorted(h.rupture_time for h in tests))
 
 

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from creepkit.inverse.judged_residuals import life_sensitivity
-from creepkit.inverse.residuals import orthogonal_distance
+from creepkit.inverse.residuals import life_sensitivity, orthogonal_distance
 
 
 @pytest.mark.parametrize("share", [0.05, 0.5, 0.8, 0.95, 0.99])

@@ -60,16 +60,6 @@ def test_measured_strains_may_include_the_elastic_part():
         np.testing.assert_allclose(found[name] - creep[name], elastic, atol=1e-15)
 
 
-def test_plane_strain_ends_with_the_axial_stress_in_the_middle():
-    """Norton in plane strain: s33 tends to (s11 + s22)/2, and the rate to that of q = sqrt(3)/2 s."""
-    times = np.array([0.0, 9e5, 1e6])
-    found = shown(PointLoading(stress={"11": 80}, strain={"33": 0.0}), times=times)
-    assert found["stress_33"][0] == pytest.approx(NU * 80)
-    assert found["stress_33"][-1] == pytest.approx(40.0, rel=1e-5)
-    q = np.sqrt(0.75) * 80
-    assert np.diff(found["strain"])[-1] / 1e5 == pytest.approx(1e-14 * q**4, rel=1e-5)
-
-
 def test_a_held_twist_relaxes():
     """k = 3G: q = [q0^-3 + 3 (3G) A t]^(-1/3), tau = q/sqrt(3)."""
     G = E / (2 * (1 + NU))

@@ -14,26 +14,20 @@ population: Auger & Hansen (2005), IPOP-CMA-ES. The best candidates that differ 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from scipy.stats import qmc
 
-from creepkit.arrays import Bools, Floats
+from creepkit import limits
+from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.global_search import SearchResult, SearchTrace
-from creepkit.inverse.search.local_refinement import IterationCallback
-from creepkit.inverse.search.term_mask import (
-    CONVERGED_DECREASE,
-    SearchCandidates,
-    TermMask,
-    check_whole_numbers,
-    refine_candidates,
-)
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 
 if TYPE_CHECKING:
     from cmaes import CMA
@@ -151,11 +145,6 @@ class ParticleSwarm:
         settings for 300 x 100 (Table S1) nor what happens at the bounds.
     inertia : w of the first and of the last iteration, for form="inertia" (Shi & Eberhart 1999).
     boundary : "absorb" stops a particle there, which suits optima on bounds; "reflect" sends it back.
-    maskable_terms : names of terms of a sum, or "any", that a particle may switch off: a coefficient in {0} U [bounds].
-        A particle has a mask beside its position, inherited at random from its own best and the global best, with a
-        mutation now and then, and follows the best of its subset. This makes zero possible, not preferred: more terms
-        never fit worse, so that it takes a penalty to choose among subsets. The minima are the best of each of the best
-        subsets, and say which terms are off.
     refined_candidates : how many of the best particles that differ are refined; 0 leaves the best as it is.
     patience : end after so many iterations in which the best cost fell by less than 1e-3 (half of chi-square), or None.
     """
@@ -168,7 +157,6 @@ class ParticleSwarm:
     inertia: tuple[float, float] = (0.9, 0.4)
     max_velocity: float = 0.15
     boundary: Literal["absorb", "reflect"] = "absorb"
-    maskable_terms: str | Sequence[str] = ()
     refined_candidates: int = 3
     patience: int | None = None
 
@@ -235,69 +223,34 @@ class _Swarm:
 
     def __init__(self, rules: ParticleSwarm, problem: LeastSquaresProblem) -> None:
         self.rules, self.problem, seed = rules, problem, problem.settings.seed
-        self.rng, self.term_mask = (np.random.default_rng(seed), TermMask.from_problem(problem, rules.maskable_terms))
+        self.rng = np.random.default_rng(seed)
         count, size = rules.particles, problem.bounds.lower.size
         self.x, self.velocity = _sobol_points(count, size, seed), np.zeros((count, size))
-        self.masks = self.term_mask.initial_masks(count, self.rng)
-        self.best_position, self.best_masks, self.best_cost = self.x.copy(), self.masks.copy(), np.full(count, np.inf)
+        self.best_position, self.best_cost = self.x.copy(), np.full(count, np.inf)
         self.lowest_costs: list[float] = []
-        self.best_by_mask: dict[bytes, tuple[float, Floats, Bools]] = {}
 
     def evaluate(self) -> Floats:
         """(particles,) - costs at their positions, in one prediction; the best are kept."""
-        cost = self.problem.cost(self._coordinates(self.x, self.masks))
+        cost = self.problem.cost(self._coordinates(self.x))
         better = cost < self.best_cost
-        self.best_position[better], self.best_masks[better], self.best_cost[better] = (
-            self.x[better],
-            self.masks[better],
-            cost[better],
-        )
+        self.best_position[better], self.best_cost[better] = self.x[better], cost[better]
         self.lowest_costs.append(float(self.best_cost.min()))
-        for k in np.flatnonzero(better) if self.term_mask.terms else ():
-            self._store_best_of_mask(self.masks[k], float(cost[k]), self.x[k])
         return cost
 
-    def _store_best_of_mask(self, mask: Bools, cost: float, position: Floats) -> None:
-        """The best of each subset."""
-        key = mask.tobytes()
-        if key not in self.best_by_mask or cost < self.best_by_mask[key][0]:
-            self.best_by_mask[key] = cost, position.copy(), mask.copy()
-
     def move(self, iteration: int) -> None:
-        """One step of all; coordinates that are masked in the better ones attract no particle."""
-        shape, rules = self.x.shape, self.rules
-        self.masks = self.term_mask.recombined(self.best_masks, self.best_masks[self.best_cost.argmin()], self.rng)
-        leaders, masks = self._leaders()
-        to_personal_best = np.where(self.term_mask.active_parameters(self.best_masks), self.best_position - self.x, 0.0)
-        to_global_best = np.where(self.term_mask.active_parameters(masks), leaders - self.x, 0.0)
-        attraction = (
-            rules.cognitive * self.rng.random(shape) * to_personal_best
-            + rules.social * self.rng.random(shape) * to_global_best
-        )
+        """One step of all."""
+        shape, rules, leader = self.x.shape, self.rules, self.best_position[self.best_cost.argmin()]
+        attraction = rules.cognitive * self.rng.random(shape) * (self.best_position - self.x)
+        attraction += rules.social * self.rng.random(shape) * (leader - self.x)
         self.velocity = rules.next_velocity(self.velocity, attraction, iteration)
         self._apply_boundary(self.x + self.velocity)
 
-    def _leaders(self) -> tuple[Floats, Bools]:
-        """Positions and masks that attract each particle: the best of its subset, or of all."""
-        k = int(self.best_cost.argmin())
-        if not self.term_mask.terms:
-            return self.best_position[k], self.best_masks[k]
-        global_best = (0.0, self.best_position[k], self.best_masks[k])
-        _, positions, masks = zip(
-            *(self.best_by_mask.get(mask.tobytes(), global_best) for mask in self.masks), strict=True
-        )
-        return np.array(positions), np.array(masks)
-
     def candidates(self) -> SearchCandidates:
-        """The best of each particle; where terms may be off, the best of each subset."""
-        if self.term_mask.terms:
-            costs, positions, masks = (np.array(each) for each in zip(*self.best_by_mask.values(), strict=True))
-            return SearchCandidates(self._coordinates(positions, masks), costs, self.term_mask, masks)
-        return SearchCandidates(self._coordinates(self.best_position, self.best_masks), self.best_cost)
+        """The best of each particle."""
+        return SearchCandidates(self._coordinates(self.best_position), self.best_cost)
 
-    def _coordinates(self, positions: Floats, masks: Bools) -> Floats:
-        bounds = self.problem.bounds
-        return self.term_mask.applied(bounds.lower + positions * bounds.width, masks)
+    def _coordinates(self, positions: Floats) -> Floats:
+        return self.problem.bounds.lower + positions * self.problem.bounds.width
 
     def _apply_boundary(self, x: Floats) -> None:
         inside = np.clip(x, 0.0, 1.0)
@@ -312,3 +265,63 @@ class _Swarm:
 def _sobol_points(count: int, size: int, seed: int) -> Floats:
     """(count, size) the first points of a scrambled Sobol set, which is balanced in powers of two."""
     return np.asarray(qmc.Sobol(size, seed=seed).random_base2(int(np.ceil(np.log2(count))))[:count])
+
+
+SAME_BASIN = 0.1
+"""Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
+
+
+CONVERGED_DECREASE = 1e-3
+"""A decrease of the cost, half of chi-square, below which a search has converged."""
+
+
+@dataclass(frozen=True)
+class SearchCandidates:
+    """Candidates of a search that may be refined.
+
+    u : (candidates, parameters); cost : (candidates,) -.
+    """
+
+    u: Floats
+    cost: Floats
+
+    def most_different(self, width: Floats, max_count: int) -> list[int]:
+        """The best that differ, at most max_count; width : (parameters,) of the bounds."""
+        selected: list[int] = []
+        for k in np.argsort(self.cost, kind="stable"):
+            if all((np.abs(self.u[k] - self.u[other]) > SAME_BASIN * width).any() for other in selected):
+                selected.append(int(k))
+            if len(selected) == max_count:
+                break
+        return selected
+
+
+def refine_candidates(
+    problem: LeastSquaresProblem,
+    candidates: SearchCandidates,
+    max_count: int,
+    trace: SearchTrace,
+    progress: IterationCallback | None = None,
+) -> SearchResult:
+    """The best different candidates refined, best first; with max_count=0 the best one as it is."""
+    selected = candidates.most_different(problem.bounds.width, max(max_count, 1))
+    problem.check_predicted(candidates.u[selected])
+    if max_count == 0:
+        best = Minimum(candidates.u[selected[0]], float(candidates.cost[selected[0]]), converged=False, evaluations=0)
+        return SearchResult((best,), trace)
+    minima = []
+    for done, k in enumerate(selected):
+        minima.append(problem.minimise(candidates.u[k]))
+        if progress is not None:
+            progress("refinement", done + 1, len(selected))
+    minima.sort(key=lambda minimum: minimum.cost)
+    evaluations = sum(minimum.evaluations for minimum in minima)
+    refined = replace(trace, refined_cost=minima[0].cost, refinement_evaluations=evaluations)
+    return SearchResult(tuple(minima), refined)
+
+
+def check_whole_numbers(search: str, values: Mapping[str, float], minimum_values: Mapping[str, int]) -> None:
+    """Refuse settings of a search that must be whole numbers of at least so many, and of SEARCH_STEPS at most."""
+    for name, value in values.items():
+        allowed = limits.Limits(minimum_values[name], limits.SEARCH_STEPS.high)
+        limits.check_number(f"{search}: {name}", value, allowed, FitError)

@@ -50,7 +50,6 @@ class Minimum:
     x : (unknowns,) where it ended; cost : half the sum of squares there; converged : whether it met its tolerance;
     evaluations : how many points it evaluated.
     whitened_residuals : (data,) -, whitened residuals of the data there, where they were kept.
-    terms_off : terms of a sum that the search switched off.
     """
 
     x: Floats
@@ -58,7 +57,6 @@ class Minimum:
     converged: bool
     evaluations: int
     whitened_residuals: Floats | None = field(default=None, repr=False)
-    terms_off: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -127,11 +127,11 @@ class FittedLaw:
     def at_least_chi_square(cls, fit: Identification) -> FittedLaw:
         """That of an identification, where its chi-square under the noise that was found is least.
 
-        Values by frames of equal weight are not there: whatever is fitted under that noise would seem better than the
-        law itself.
+        Values by other weights, or under errors of tests, are not there: whatever is fitted under that noise would seem
+        better than the law itself.
         """
         problem, x = fit.least_squares_problem, fit.x
-        if fit.linearised is not None:  # by likelihood
+        if fit.settings.weights == "likelihood" and not fit.settings.included_errors:
             return cls(problem, x)
         with contextlib.suppress(CreepkitError):
             refined = problem.minimise(x, tolerances=LAST_STEPS).x

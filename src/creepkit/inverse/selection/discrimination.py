@@ -53,7 +53,7 @@ class CommonCovarianceFits:
 
 def under_common_covariance(fits: Sequence[Identification]) -> CommonCovarianceFits:
     """All laws under the covariance of the one that explains best with its own."""
-    problems = [_linearised(fit) for fit in fits]
+    problems = [linearised_problem(fit) for fit in fits]
     own_scores = [_score_under_own_covariance(fit, linear) for fit, linear in zip(fits, problems, strict=True)]
     reference_law = int(np.argmin(own_scores))
     noise_model, reference_residuals = fits[reference_law].noise_model, problems[reference_law].residuals
@@ -89,9 +89,12 @@ def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
     )
 
 
-def _linearised(fit: Identification) -> LinearisedProblem:
-    assert fit.linearised is not None
-    return fit.linearised
+def linearised_problem(fit: Identification) -> LinearisedProblem:
+    """The problem of an identification made linear at its values; of one from a file predicted again."""
+    if fit.linearised is not None:
+        return fit.linearised
+    problem = fit.least_squares_problem
+    return linearised(problem, fit.x, problem.residuals(fit.x))
 
 
 def _score_under_own_covariance(fit: Identification, linearised: LinearisedProblem) -> float:
@@ -181,7 +184,7 @@ class EquivalentLaws:
 def equivalent_laws(ranking: WeightedLaws) -> tuple[EquivalentLaws, ...]:
     """The pairs of a ranking's laws that its tests cannot separate, nearest predictions first."""
     fits = [r.fit for r in ranking.laws]
-    whitened = _whitened_residuals(fits)
+    whitened = under_common_covariance(fits).whitened
     pairs = []
     for a, b in combinations(range(len(fits)), 2):
         chi_square = float(((whitened[a] - whitened[b]) ** 2).sum())
@@ -192,22 +195,9 @@ def equivalent_laws(ranking: WeightedLaws) -> tuple[EquivalentLaws, ...]:
     return tuple(sorted(pairs, key=lambda pair: pair.chi_square))
 
 
-def _whitened_residuals(fits: Sequence[Identification]) -> Floats:
-    """(laws, data) - whitened residuals of all laws at their optima under one covariance."""
-    return under_common_covariance([_with_linearised(fit) for fit in fits]).whitened
-
-
-def _with_linearised(fit: Identification) -> Identification:
-    """The identification with its problem made linear at its values, as those by likelihood have it."""
-    if fit.linearised is not None:
-        return fit
-    problem = fit.least_squares_problem
-    return replace(fit, linearised=linearised(problem, fit.x, problem.residuals(fit.x)))
-
-
 def chi_square_by_test(fits: Sequence[Identification]) -> Floats:
     """(laws, tests) - chi-square of laws in each test at their optima under one covariance, without priors."""
-    whitened = _whitened_residuals(fits)
+    whitened = under_common_covariance(fits).whitened
     return np.asarray((whitened.reshape(len(fits), len(fits[0].tests), -1) ** 2).sum(axis=2))
 
 

@@ -28,6 +28,7 @@ from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.perturbations import effect_columns, sizes_of_effect, with_random_effects, with_unknown_effects
 from creepkit.inverse.selection.discrimination import (
     DISTINGUISHABLE_CHI_SQUARE,
+    linearised_problem,
     under_common_covariance,
     with_covariance_of,
 )
@@ -77,7 +78,7 @@ class Trial:
         """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
         perturbed = [
             with_random_effects(p, [e]) if scope == "test" else with_unknown_effects(p, effect_columns(e, common=True))
-            for p, e in zip(_problems(fits), effects, strict=True)
+            for p, e in zip([linearised_problem(fit) for fit in fits], effects, strict=True)
         ]
         scores, noise_model = _scores(fits, perturbed)
         return cls(scope, effects, scores, criterion_weights(scores)[1], noise_model)
@@ -89,23 +90,19 @@ class Trial:
 
     def sizes(self, fits: Sequence[Identification], law: int) -> Floats:
         """(1,) of all tests or (tests,) sizes of the perturbation by a law, in standard deviations."""
-        linear = fits[law].linearised
-        assert linear is not None
-        return sizes_of_effect(linear, self.effects[law], self.noise_model, common=self.scope == "all")
+        return sizes_of_effect(
+            linearised_problem(fits[law]), self.effects[law], self.noise_model, common=self.scope == "all"
+        )
 
     def description(self, fits: Sequence[Identification], law: int) -> str:
         """The perturbation with the size that it has in the linear problem of a law, by its position."""
         return _description(self, fits[law], law, self.sizes(fits, law))
 
 
-def _problems(fits: Sequence[Identification]) -> list[LinearisedProblem]:
-    return [fit.linearised for fit in fits if fit.linearised is not None]
-
-
 def _scores(fits: Sequence[Identification], problems: Sequence[LinearisedProblem]) -> tuple[Floats, NoiseModel]:
     """(laws,) -2 ln of the evidence by BIC of these linear problems of the laws, and the noise model it is under."""
     common = under_common_covariance([replace(f, linearised=p) for f, p in zip(fits, problems, strict=True)])
-    noise_model, unperturbed = fits[common.reference_law].noise_model, _problems(fits)
+    noise_model, unperturbed = fits[common.reference_law].noise_model, [linearised_problem(fit) for fit in fits]
     reference = unperturbed[common.reference_law].residuals
 
     def log_determinant(linear: LinearisedProblem) -> float:
@@ -139,9 +136,7 @@ def _description(trial: Trial, fit: Identification, law: int, sizes: Floats) -> 
 
 
 def _trials(fits: Sequence[Identification]) -> Iterator[Trial]:
-    """Those of all perturbations that every law has, of which the first states its size; of laws by likelihood."""
-    if any(fit.linearised is None for fit in fits):
-        return
+    """Those of all perturbations that every law has, of which the first states its size."""
     by_kind = [{e.kind: e for e in fit.unmodelled if not e.common and e.residual_change.size} for fit in fits]
     for kind in by_kind[0]:
         effects = tuple(one[kind] for one in by_kind if kind in one)
@@ -182,7 +177,7 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
     if not trials:
         return ()
     rejected = fits[0].adequacy is not None and fits[0].adequacy.rejects
-    as_stated, _ = _scores(fits, _problems(fits))
+    as_stated, _ = _scores(fits, [linearised_problem(fit) for fit in fits])
     raised = [
         (float(trial.scores[law]), law, trial)
         for trial in trials

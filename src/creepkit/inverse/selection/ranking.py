@@ -5,10 +5,9 @@ tests to their noise (see inverse.adequacy), was among the laws asked for, and s
 share of another law explains the tests as well, and no unmodelled effect would change the answer (see
 selection.challenges).
 
-Identifications by likelihood are compared under a common covariance (see selection.discrimination): chi-square + K ln n
-(BIC), or + 2K + 2K(K+1)/(n-K-1) (AICc), with n the independent frames and nuisance parameters integrated out. For
-others -2 ln L is multiplied by independent frames over frames, as is done for correlated residuals; that is a rule, not
-a theorem. Weights are exp(-excess / 2) over their sum.
+Laws are compared under a common covariance (see selection.discrimination), where each fits best under it whatever
+weights its values were found with: chi-square + K ln n (BIC), or + 2K + 2K(K+1)/(n-K-1) (AICc), with n the independent
+frames and nuisance parameters integrated out. Weights are exp(-excess / 2) over their sum.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ Criterion = Literal["bic", "aicc", "hold-out"]
 @dataclass(frozen=True)
 class RankedLaw:
     """One law in a ranking: criterion less the best, its weight, and its chi-square under the covariance
-    of the best (NaN for identifications that were not made by likelihood).
+    of the best (NaN where laws were compared by held out data).
     """
 
     fit: Identification
@@ -230,15 +229,10 @@ def rank(
             "the identifications were made from different histories, frames, losses, nuisances or rupture times and "
             "cannot be ranked; make them alike (rupture_times='use' or 'ignore' for all laws)"
         )
-    chi_square = np.full(len(fits), np.nan)
-    if all(fit.linearised is not None for fit in fits):
-        common_fits = under_common_covariance(fits)
-        independent_frames, chi_square = common_fits.independent_frames, common_fits.chi_square
-        score = chi_square + common_fits.log_determinant
-    else:
-        independent_frames = max(fits, key=lambda fit: fit.log_likelihood).effective_frames
-        score = np.array([_effective_deviance(fit, independent_frames) for fit in fits])
+    common = under_common_covariance(fits)
+    independent_frames, chi_square = common.independent_frames, common.chi_square
     penalty = bic_penalty if criterion == "bic" else aicc_penalty
+    score = chi_square + common.log_determinant
     score = score + [penalty(determined_parameter_count(fit), independent_frames) for fit in fits]
     ranking = ranking_from_scores(
         fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed
@@ -283,12 +277,6 @@ def ranking_from_scores(
     order = np.argsort(excess, kind="stable")
     laws = tuple(RankedLaw(fits[k], float(excess[k]), float(weight[k]), float(chi_squares[k])) for k in order)
     return Ranking(laws, criterion, float(independent_frames), MappingProxyType(dict(failed or {})))
-
-
-def _effective_deviance(fit: Identification, independent_frames: float) -> float:
-    """-2 ln L, in which frames that move together count as one."""
-    frames = sum(m.frames for m in fit.tests)
-    return -2.0 * fit.log_likelihood * min(independent_frames / max(frames, 1), 1.0)
 
 
 def determined_parameter_count(fit: Identification) -> int:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.identification import Identification
@@ -208,22 +207,6 @@ def identify_reduced(
     fit = identify(reduced.law, full.histories, full.predictor, settings=full.settings, start=start, progress=progress)
     record = _sparsity_record(full, fit, reductions, reduced, choice, penalty)
     return replace(fit, search_trace=choice.trace or full.search_trace, sparsity=record)
-
-
-@checked
-def penalty_path(
-    law: CreepLaw,
-    histories: Sequence[History],
-    using: PredictorOrMapping,
-    penalty: ContributionPenalty,
-    *,
-    strengths: Sequence[float] = PATH_STRENGTHS,
-    settings: IdentificationSettings | None = None,
-    progress: IterationCallback | None = None,
-) -> PenaltyPath:
-    """The path of a penalty over its strength, from none to all, with the automatic choice."""
-    _, reductions = identify_full(law, histories, using, None, settings, progress)
-    return trace_path(reductions, penalty, strengths, progress)
 
 
 def identify_full(

@@ -10,20 +10,37 @@ quadratic functions of u where these prove right (see uncertainty.quadratic_resi
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import chi2, multivariate_t, norm, qmc
 
-from creepkit.arrays import Floats
-from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
+from creepkit import limits
+from creepkit.arrays import ArrayLike, Floats, single_threaded_blas
+from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import predictor_for_law, reduced_order_model_of, search_predictor_of
+from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import lies_at_bound
-from creepkit.inverse.uncertainty.posterior import Posterior
+from creepkit.inverse.uncertainty.mixture_distribution import INTERVAL_PROBABILITIES
+from creepkit.inverse.uncertainty.posterior import TESTS_ALONE, Posterior
 from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals, quadratic_terms
+from creepkit.inverse.uncertainty.quantities import (
+    DerivedQuantity,
+    Interval,
+    PointQuantity,
+    RateStatements,
+    quantity_of,
+)
+from creepkit.presentation import Presentable, present
 from creepkit.records import Predictor
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ROUNDS, MOST_ROUNDS = 4, 12
 """Of proposals: at least, and where the samples are still worth too few."""
@@ -71,8 +88,7 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     if cheaper is not None:
         problem = with_cheaper_predictor(problem, fit.x, search_predictor_of(cheaper))
     posterior = Posterior.from_identification(replace(fit, problem=problem))
-    centre, seed, covariance = np.array(fit.u), fit.settings.seed, fit.by_tests_alone.covariance
-    shape = shortened_covariance(posterior, centre, covariance + 1e-12 * np.diag(np.diag(covariance)))
+    centre, seed, shape = np.array(fit.u), fit.settings.seed, _first_shape(fit, posterior)
     samples = _samples_by_quadratic_residuals(posterior, centre, shape, seed)
     samples = posterior_samples(posterior, centre, shape, seed) if samples is None else samples
     if samples is None:
@@ -81,6 +97,67 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
         )
         return replace(fit, notes=(*fit.notes, f"{note}rates may be too narrow"))
     return replace(fit, samples=samples)
+
+
+@dataclass(frozen=True, eq=False)
+class PosteriorSamples(RateStatements, Presentable, text="reports.uncertainty:posterior_text"):
+    """Draws of a law's values from their posterior.
+
+    u : (draws, parameters) conditioned coordinates of equal weight. ranges : that the tests cover, as of an
+    Identification.
+    """
+
+    coordinates: Coordinates
+    u: Floats
+    ranges: Mapping[str, tuple[float, float]]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def values(self) -> dict[str, Floats]:
+        """{parameter: (draws,)} in the author's units."""
+        return self.coordinates.law.from_internal(self.coordinates.theta(self.u))
+
+    def interval(self, quantity_or_name: str | DerivedQuantity) -> tuple[float, float, float]:
+        """Median and 95 % interval of a parameter, by name, or another quantity: (median, low, high)."""
+        quantity = quantity_of(self.coordinates, quantity_or_name)
+        quantiles = quantity.to_unit(np.quantile(quantity.function(self.coordinates)(self.u), INTERVAL_PROBABILITIES))
+        return float(quantiles[0]), float(quantiles[1]), float(quantiles[2])
+
+    def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
+        """Median and 95 % interval of a quantity; point : {name: (...,) or None}."""
+        draws = quantity(self.coordinates, **point)(self.u)
+        median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
+        return median, low, high
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Every pair of parameters, and each alone; written to `path` when given."""
+        return present("reports.uncertainty:pairs_figure", self, path)
+
+
+def sample_posterior(
+    fit: Identification, *, draws: int = 1000, seed: int = 0, using: Predictor | None = None
+) -> PosteriorSamples:
+    """Draws from the posterior of an identification's values, by population Monte Carlo.
+
+    draws : how many, worth half as many independent ones at least. using : another predictor of the same tests than
+        the fit's, such as a surrogate where the fit's is a finite element model.
+    """
+    limits.check_number("draws", draws, limits.DRAWS_OF_POSTERIOR, FitError)
+    sampled = fit if using is None else fit.with_histories(fit.histories, predictor_for_law(using, fit.law))
+    with single_threaded_blas():
+        posterior = Posterior.from_identification(sampled)
+        shape = _first_shape(fit, posterior)
+        u = posterior_samples(posterior, np.array(fit.u), shape, seed, draws=draws, least=0.5 * draws)
+    if u is None:
+        raise FitError(f"law '{fit.law.name}': its posterior could not be sampled; profile(name) follows it")
+    notes = () if fit.error_covariance is None else (TESTS_ALONE,)
+    return PosteriorSamples(fit.coordinates, u, fit.ranges, notes)
+
+
+def _first_shape(fit: Identification, posterior: Posterior) -> Floats:
+    """(parameters, parameters) covariance of the first proposal."""
+    covariance = fit.by_tests_alone.covariance
+    return shortened_covariance(posterior, fit.u, covariance + 1e-12 * np.diag(np.diag(covariance)))
 
 
 def covariance_root(covariance: Floats) -> Floats:
@@ -157,14 +234,23 @@ LARGEST_ERROR = 0.2
 """Standard deviation of the error of ln p by quadratic residuals: weights of samples then are right to 20 %."""
 
 
-def posterior_samples(density: Callable[[Floats], Floats], centre: Floats, shape: Floats, seed: int) -> Floats | None:
-    """(samples, parameters) conditioned coordinates of equal weight; None where too few of the draws count.
+def posterior_samples(
+    density: Callable[[Floats], Floats],
+    centre: Floats,
+    shape: Floats,
+    seed: int,
+    *,
+    draws: int = SAMPLES,
+    least: float = LEAST_EFFECTIVE_SIZE,
+) -> Floats | None:
+    """(draws, parameters) conditioned coordinates of equal weight; None where too few of those tried count.
 
     density : ln p (candidates,), but for a constant, of u (candidates, parameters).
-    centre : (parameters,) of the first proposal. shape : (parameters, parameters) its covariance.
+    centre : (parameters,) of the first proposal. shape : (parameters, parameters) its covariance. least : effective
+    number of draws at which it ends.
     """
     size = centre.size
-    least = 1e-6 * np.diag(np.diag(shape))
+    smallest = 1e-6 * np.diag(np.diag(shape))
     points, log_density = np.zeros((0, size)), np.zeros(0)
     proposals: list[tuple[Floats, Floats]] = []
     weights = np.zeros(0)
@@ -182,12 +268,12 @@ def posterior_samples(density: Callable[[Floats], Floats], centre: Floats, shape
         weights /= weights.sum()
         centre = weights @ points
         deviation = points - centre
-        shape = (weights[:, None] * deviation).T @ deviation + least
-        if k + 1 >= ROUNDS and 1.0 / float((weights**2).sum()) >= LEAST_EFFECTIVE_SIZE:
+        shape = (weights[:, None] * deviation).T @ deviation + smallest
+        if k + 1 >= ROUNDS and 1.0 / float((weights**2).sum()) >= least:
             break
     if 1.0 / float((weights**2).sum()) < LEAST_EFFECTIVE_SIZE:
         return None
-    positions = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    positions = (np.arange(draws) + 0.5) / draws
     return np.asarray(points[np.searchsorted(np.cumsum(weights), positions).clip(max=len(points) - 1)])
 
 

@@ -12,9 +12,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from creepkit.arrays import Floats
-from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
+from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import (
     NEGLIGIBLE_DISCREPANCY,
     NEGLIGIBLE_DRIFT,
@@ -23,8 +22,6 @@ from creepkit.inverse.noise_model import (
     components_fixed_by_priors,
     covariance,
 )
-from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.observation_vector import SINGLE_VALUES
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, scaled_inverse
 from creepkit.language import CreepLaw, Param
 from creepkit.records import Nuisance
@@ -44,7 +41,7 @@ def restricted_covariance(
     fixed: Collection[tuple[str, str]] = (),
     parameter_count: int | None = None,
 ) -> tuple[Floats, float]:
-    """Posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom.
+    """Posterior covariance of x = (u, e) by likelihood, (unknowns, unknowns), and its degrees of freedom.
 
     fixed : (output, component) that are known beside those that nuisances give. parameter_count : of the law; the
     degrees of freedom are the median over its parameters, by default over all unknowns.
@@ -183,82 +180,26 @@ def positive_semidefinite(covariance: Floats) -> Floats:
     return np.asarray(repaired * np.outer(sd, sd))
 
 
-def laplace_covariance(
-    residuals: Residuals,
-    working_noise: NoiseModel,
-    noise_model: NoiseModel,
-    bounds: Bounds,
-    nuisance_parameters: NuisanceParameters,
-    *,
-    rate_known: bool = False,
-) -> tuple[Floats, float]:
-    """Posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom.
+def covariance_of_values(
+    linearised: LinearisedProblem, noise_model: NoiseModel, working_noise: NoiseModel | None = None
+) -> Floats:
+    """(unknowns, unknowns) posterior covariance of x = (u, e), all of them free, where the problem was made linear.
 
-    rate_known : the scatter of the rate between tests was given and not estimated from them.
+    Of values by likelihood (J'C^-1 J + P)^-1, with C the covariance of the residuals and P the precision of the priors.
+    working_noise : under whose covariance, 1 / W, values were found that are not by likelihood, with the covariance
+    M (J'W C W J + P) M, M = (J'W J + P)^-1.
     """
-    assert residuals.jacobian is not None
-    count, tests = bounds.width.size - nuisance_parameters.size, len(residuals.values)
-    weighted = CovarianceFactor.of_residuals(residuals, working_noise).inverse_times(residuals.jacobian)
-    prior = np.diag(np.concatenate([12.0 / bounds.width[:count] ** 2, nuisance_parameters.precision]))
-    inverse_normal_matrix = scaled_inverse(np.einsum("tfp,tfq->pq", residuals.jacobian, weighted) + prior)
-
-    def meat(c: Floats) -> Floats:
-        return np.asarray(np.einsum("tfp,tfg,tgq->pq", weighted, c, weighted, optimize=True))
-
-    without_rate = replace(noise_model, rate=0.0)
-    within_meat = meat(_covariance_within_tests(residuals, without_rate))
-    within = inverse_normal_matrix @ (within_meat + prior) @ inverse_normal_matrix
-    between = inverse_normal_matrix @ (meat(covariance(residuals, noise_model)) - within_meat) @ inverse_normal_matrix
-    determined = (residuals.jacobian[residuals.present][:, :count] != 0).any(axis=0)
-    parameters = max(int(determined.sum()), 1)
-    freedoms = max(tests - parameters, 1.0), max(effective_sample_size(residuals, without_rate) - parameters, 1.0)
-    if rate_known:
-        freedoms = (1e9, freedoms[1])
-    else:
-        between *= tests / freedoms[0]
-    between_share = np.diag(between)[:count] / np.maximum(np.diag(between + within)[:count], 1e-300)
-    mean_between_share = float(between_share[determined].sum() / parameters)
-    return within + between, 1.0 / (mean_between_share**2 / freedoms[0] + (1 - mean_between_share) ** 2 / freedoms[1])
-
-
-def _covariance_within_tests(residuals: Residuals, without_rate: NoiseModel) -> Floats:
-    """(tests, observations, observations) -, without what scatters between tests.
-
-    Of a test without frames that is also the misfit of its one minimum rate and its one rupture time.
-    """
-    c, outputs = covariance(residuals, without_rate), list(without_rate.outputs)
-    single = [name for name in outputs if name in SINGLE_VALUES]
-    of_frames = residuals.present & ~np.isin(residuals.output_index, [outputs.index(name) for name in single])
-    without_misfit = without_rate
-    for name in single:
-        without_misfit = without_misfit.with_output(name, misfit=0.0)
-    has_frames = of_frames.sum(axis=1)[:, None, None] > 0
-    return c if has_frames.all() else np.where(has_frames, c, covariance(residuals, without_misfit))
-
-
-def normal_matrix(residuals: Residuals, working_noise: NoiseModel) -> Floats:
-    """J' W J of x = (u, e), (unknowns, unknowns)."""
-    assert residuals.jacobian is not None
-    whitened = CovarianceFactor.of_residuals(residuals, working_noise).whiten(residuals.jacobian)
-    return np.asarray(np.einsum("tfp,tfq->pq", whitened, whitened))
-
-
-def marginal_log_likelihood(
-    log_likelihood: float, normal_matrix: Floats, e: Floats, nuisance_parameters: NuisanceParameters
-) -> float:
-    """Log-likelihood with the nuisance parameters integrated out, by Laplace's approximation.
-
-    normal_matrix : (unknowns, unknowns) J' W J of x; e : (nuisances,). A flat prior counts as one of the width of the
-    limits.
-    """
-    if not nuisance_parameters.size:
-        return log_likelihood
-    sd = np.minimum(nuisance_parameters.sd, (nuisance_parameters.high - nuisance_parameters.low) / np.sqrt(12.0))
-    scaled_normal_matrix = normal_matrix[-nuisance_parameters.size :, -nuisance_parameters.size :] * np.outer(
-        sd, sd
-    ) + np.eye(nuisance_parameters.size)
-    prior_residuals = (e - nuisance_parameters.mean) * np.sqrt(nuisance_parameters.precision)
-    return float(log_likelihood - 0.5 * (prior_residuals**2).sum() - 0.5 * np.linalg.slogdet(scaled_normal_matrix)[1])
+    residuals, free = linearised.residuals, replace(linearised, free=np.ones_like(linearised.free))
+    if working_noise is None:
+        return free.solve(CovarianceFactor.of_residuals(residuals, noise_model)).covariance
+    plain = replace(residuals, random_effect_sensitivities=None, common_effects=None)
+    solution = free.solve(CovarianceFactor.of_residuals(plain, working_noise))
+    weighted = solution.weighted_jacobian
+    meat = np.einsum("tfp,tfg,tgq->pq", weighted, covariance(residuals, noise_model), weighted, optimize=True)
+    if residuals.common_effects is not None:
+        common = np.einsum("tfp,tfk->pk", weighted, residuals.common_effects)
+        meat += common @ common.T
+    return np.asarray(solution.covariance @ (meat + np.diag(linearised.precision)) @ solution.covariance)
 
 
 def parameter_estimates(

@@ -1,4 +1,4 @@
-"""The posterior of a law's conditioned coordinates u: its density for many candidates at once, and samples by MCMC.
+"""The posterior of a law's conditioned coordinates u: its density for many candidates at once.
 
 The prior of u is flat within the law's bounds, and chi2 is taken under the covariance that the fit found. With nu
 degrees of freedom of that covariance and K parameters
@@ -10,39 +10,24 @@ large nu. Nuisance parameters of tests are integrated out to first order about t
 residuals at the estimates, J their derivatives to the nuisance parameters, priors below, chi2(u) = |r|^2 - |Q' r|^2,
 J = Q R. The effect of a test's own rate is taken half way between the optimum and the candidate (see
 uncertainty.profile_likelihood).
-
-Samples are drawn by emcee with moves of differential evolution (ter Braak (2006), Stat. Comput. 16, 239), a fifth of
-them its snooker update (ter Braak & Vrugt (2008), Stat. Comput. 18, 435).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit import limits
-from creepkit.arrays import ArrayLike, Bools, Floats, single_threaded_blas
-from creepkit.checked_arguments import checked
-from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import predictor_for_law
-from creepkit.inverse.coordinates import Coordinates
+from creepkit.arrays import Bools, Floats
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import determined_parameters
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import MINIMUM_TESTS, NoiseModel
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
-from creepkit.inverse.uncertainty.mixture_distribution import INTERVAL_PROBABILITIES
+from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals
-from creepkit.inverse.uncertainty.quantities import DerivedQuantity, local_exponent, log_rate, quantity_of
-from creepkit.presentation import Presentable, present
-from creepkit.records import Predictor
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 TESTS_ALONE = "by the tests alone: their temperatures, loads and dimensions are taken as exactly known"
@@ -51,23 +36,6 @@ TESTS_ALONE = "by the tests alone: their temperatures, loads and dimensions are 
 
 REFIT_TOLERANCES = Tolerances(max_steps=25, tolerance=1e-7)
 """Of minima about an optimum that is known."""
-
-
-def interval_noise_model(fit: Identification) -> NoiseModel:
-    """The noise model of a fit, with the scatter of the rate as its Laplace intervals have it.
-
-    That scatter, found by maximum likelihood from T tests beside K parameters, is too small by a factor of
-    T / (T - K) in variance (see inverse.uncertainty); restricted likelihood, and a given scatter, are not.
-    """
-    test_count = len(fit.histories)
-    is_rate_given = test_count < MINIMUM_TESTS or any(
-        n.kind == "rate" and n.sd is not None for n in fit.settings.nuisances
-    )
-    if is_rate_given or fit.settings.weights == "likelihood" or fit.noise_model.rate == 0:
-        return fit.noise_model
-    determined_count = determined_parameters(fit.residuals_of(fit.least_squares_problem), fit.u.size)
-    rate_scatter = fit.noise_model.rate * float(np.sqrt(test_count / max(test_count - max(determined_count, 1), 1)))
-    return replace(fit.noise_model, rate=rate_scatter)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +66,7 @@ class Posterior:
     @classmethod
     def from_identification(cls, fit: Identification) -> Posterior:
         """The posterior of an identification, about its optimum."""
-        problem, noise_model = fit.least_squares_problem, interval_noise_model(fit)
+        problem, noise_model = fit.least_squares_problem, fit.noise_model
         residuals, nuisances, count = fit.residuals_of(problem), problem.nuisance_parameters, fit.u.size
         assert residuals.jacobian is not None
         e = fit.x[count:]
@@ -214,187 +182,4 @@ def _whitened(factor: CovarianceFactor, rate_effect: Floats, values: Floats) -> 
     correction = (1.0 - 1.0 / np.sqrt(1.0 + squared_norm)) / squared_norm
     return np.asarray(
         whitened - correction * whitened_effect * (whitened_effect * whitened).sum(axis=-1, keepdims=True)
-    )
-
-
-CONVERGED_LENGTH = 50.0
-"""Steps over autocorrelation time that emcee's authors require before its estimate is reliable."""
-
-
-MAX_START_DRAWS = 50
-"""Draws of a walker's start that may fall outside the bounds."""
-
-
-@dataclass(frozen=True, eq=False)
-class PosteriorSamples(Presentable, text="reports.uncertainty:posterior_text"):
-    """Draws of a law's values from their posterior.
-
-    chain : (steps, walkers, parameters) conditioned coordinates u, all of them; log_probability : (steps, walkers).
-    burn_in : steps left out at the beginning. acceptance_fraction : mean share of accepted moves.
-    autocorrelation_time : (parameters,) steps.
-    """
-
-    coordinates: Coordinates
-    chain: Floats
-    log_probability: Floats
-    burn_in: int
-    acceptance_fraction: float
-    autocorrelation_time: Floats
-    notes: tuple[str, ...] = ()
-
-    @property
-    def u(self) -> Floats:
-        """(draws, parameters) after the burn-in."""
-        return self.chain[self.burn_in :].reshape(-1, self.chain.shape[-1])
-
-    @property
-    def values(self) -> dict[str, Floats]:
-        """{parameter: (draws,)} in the author's units."""
-        return self.coordinates.law.from_internal(self.coordinates.theta(self.u))
-
-    @property
-    def converged(self) -> bool:
-        """Whether the chain is long against its autocorrelation time."""
-        return bool(len(self.chain) > CONVERGED_LENGTH * self.autocorrelation_time.max())
-
-    @property
-    def effective_sample_size(self) -> float:
-        """Number of independent draws that are worth as much."""
-        return float(len(self.u) / self.autocorrelation_time.max())
-
-    def interval(self, quantity_or_name: str | DerivedQuantity) -> tuple[float, float, float]:
-        """Median and 95 % interval of a parameter, by name, or another quantity: (median, low, high)."""
-        quantity = quantity_of(self.coordinates, quantity_or_name)
-        quantiles = quantity.to_unit(np.quantile(quantity.function(self.coordinates)(self.u), INTERVAL_PROBABILITIES))
-        return float(quantiles[0]), float(quantiles[1]), float(quantiles[2])
-
-    @checked
-    def rate(
-        self,
-        stress: ArrayLike,
-        temperature: ArrayLike | None = None,
-        *,
-        strain: ArrayLike | None = None,
-        time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:
-        """Median creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape.
-
-        stress, temperature, strain, time : numbers or arrays that broadcast, in MPa, K, - and s.
-        """
-        draws = log_rate(self.coordinates, stress, temperature, strain, time)(self.u)
-        median, low, high = np.exp(np.quantile(draws, INTERVAL_PROBABILITIES, axis=0))
-        return median, low, high
-
-    @checked
-    def local_exponent(
-        self,
-        stress: ArrayLike,
-        temperature: ArrayLike | None = None,
-        *,
-        strain: ArrayLike | None = None,
-        time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:
-        """Median local stress exponent with its 95 % interval: (exponent, low, high).
-
-        stress, temperature, strain, time : as in `rate`, numbers or arrays that broadcast; the results have that shape.
-        """
-        draws = local_exponent(self.coordinates, stress, temperature, strain, time)(self.u)
-        median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
-        return median, low, high
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Every pair of parameters, and each alone; written to `path` when given."""
-        return present("reports.uncertainty:pairs_figure", self, path)
-
-
-def sample_posterior(
-    fit: Identification,
-    *,
-    walkers: int = 32,
-    steps: int = 1000,
-    seed: int = 0,
-    using: Predictor | None = None,
-    progress: IterationCallback | None = None,
-) -> PosteriorSamples:
-    """Sample the posterior of an identification's values; needs emcee.
-
-    walkers : an even number of at least twice the parameters. using : another predictor of the same tests than the
-        fit's, such as a surrogate where the fit's is a finite element model.
-    """
-    limits.check_number("walkers", walkers, limits.WALKERS, FitError)
-    limits.check_number("steps", steps, limits.WALKER_STEPS, FitError)
-    emcee, size = _import_emcee(), fit.u.size
-    if walkers % 2 or walkers < 2 * size + 2 or steps < 10:
-        raise FitError(
-            f"{walkers} walkers and {steps} steps were asked for; a law of {size} parameters needs an even number of "
-            f"at least {2 * size + 2} walkers, and at least 10 steps"
-        )
-    sampled = fit if using is None else fit.with_histories(fit.histories, predictor_for_law(using, fit.law))
-    posterior = Posterior.from_identification(sampled)
-    rng = np.random.default_rng(seed)
-    moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)]
-    sampler = emcee.EnsembleSampler(walkers, size, posterior, vectorize=True, moves=moves)
-    start = emcee.State(
-        _initial_walkers(fit, posterior, walkers, rng), random_state=np.random.RandomState(seed).get_state()
-    )
-    with single_threaded_blas():
-        for k, _ in enumerate(sampler.sample(start, iterations=steps)):
-            if progress is not None:
-                progress("step", k + 1, steps)
-    return _posterior_samples(fit, sampler.get_chain(), sampler.get_log_prob(), sampler.acceptance_fraction, emcee)
-
-
-def _import_emcee() -> Any:
-    try:
-        import emcee
-    except ImportError:
-        raise FitError("sampling needs emcee, which is not installed: pip install 'creepkit[mcmc]'") from None
-    return emcee
-
-
-def _initial_walkers(fit: Identification, posterior: Posterior, walkers: int, rng: np.random.Generator) -> Floats:
-    """(walkers, parameters) from Laplace's approximation, drawn again where a bound cuts it, ever closer to the fit."""
-    covariance = fit.by_tests_alone.covariance
-    root = np.linalg.cholesky(covariance + 1e-14 * np.diag(np.diag(covariance)))
-    centre = np.clip(fit.u, posterior.lower, posterior.upper)
-    starts = np.empty((walkers, fit.u.size))
-    missing = np.ones(walkers, bool)
-    for k in range(MAX_START_DRAWS):
-        starts[missing] = centre + 0.9**k * rng.normal(size=(int(missing.sum()), fit.u.size)) @ root.T
-        starts = np.where(missing[:, None], _reflected(starts, posterior), starts)
-        missing &= ~np.isfinite(posterior(starts))
-        if not missing.any():
-            return starts
-    raise FitError(
-        f"law '{fit.law.name}': no walker can start, the values lie at the edge of the law's bounds; widen the bounds"
-    )
-
-
-def _reflected(u: Floats, posterior: Posterior) -> Floats:
-    """Points beyond a bound thrown back by as much: values at their bound leave half a normal distribution."""
-    u = np.where(u < posterior.lower, 2 * posterior.lower - u, u)
-    return np.where(u > posterior.upper, 2 * posterior.upper - u, u)
-
-
-def _posterior_samples(
-    fit: Identification, chain: Floats, log_probability: Floats, accepted: Floats, emcee: Any
-) -> PosteriorSamples:
-    steps = len(chain)
-    autocorrelation_time = np.array(
-        [float(emcee.autocorr.integrated_time(chain[:, :, k], tol=0)[0]) for k in range(fit.u.size)]
-    )
-    autocorrelation_time = np.where(np.isfinite(autocorrelation_time), np.maximum(autocorrelation_time, 1.0), steps)
-    burn_in = int(min(np.ceil(5 * autocorrelation_time.max()), steps // 2))
-    notes = [] if fit.error_covariance is None else [TESTS_ALONE]
-    if steps <= CONVERGED_LENGTH * autocorrelation_time.max():
-        notes.append(
-            f"not converged: the chain is {steps / autocorrelation_time.max():.0f} autocorrelation times long, "
-            f"{CONVERGED_LENGTH:.0f} are needed; "
-            f"ask for {int(np.ceil(CONVERGED_LENGTH * autocorrelation_time.max() / 100.0)) * 100 + 100} steps or more"
-        )
-    acceptance_fraction = float(np.mean(accepted))
-    if not 0.05 < acceptance_fraction < 0.8:
-        notes.append(f"a share of {acceptance_fraction:.2f} of the moves was accepted, where 0.2 to 0.5 is usual")
-    return PosteriorSamples(
-        fit.coordinates, chain, log_probability, burn_in, acceptance_fraction, autocorrelation_time, tuple(notes)
     )

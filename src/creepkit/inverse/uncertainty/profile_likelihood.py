@@ -29,7 +29,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, TESTS_ALONE, interval_noise_model
+from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, TESTS_ALONE
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
 from creepkit.presentation import Presentable, present
 
@@ -115,7 +115,7 @@ class _ProfileTrace:
     """Points of a profile, one after the other outwards from the optimum."""
 
     def __init__(self, fit: Identification, quantity: DerivedQuantity, root: float) -> None:
-        self.root, self.size, self.noise_model = root, fit.u.size, interval_noise_model(fit)
+        self.root, self.size, self.noise_model = root, fit.u.size, fit.noise_model
         self.residuals = fit.residuals_of(fit.least_squares_problem)
         covariance_factor = CovarianceFactor.of_residuals(self.residuals, self.noise_model)
         self.problem = fit.least_squares_problem.with_covariance(covariance_factor)

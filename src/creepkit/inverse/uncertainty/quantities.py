@@ -16,6 +16,7 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.extrapolation import warn_of_extrapolation
 from creepkit.language.symbols import GAS_CONSTANT
 
 EXPONENT_STRESS_RATIO = 1.0005
@@ -28,6 +29,74 @@ ENERGY_TEMPERATURE_RATIO = 1.0005
 
 CoordinateFunction = Callable[[Floats], Floats]
 """u (..., parameters) to numbers (..., points)."""
+
+
+PointQuantity = Callable[..., CoordinateFunction]
+"""log_rate or local_exponent: of coordinates, and stress, temperature, strain and time by name."""
+
+
+Interval = tuple[Floats, Floats, Floats]
+"""Value with the ends of its 95 % interval, (...,) each."""
+
+
+class RateStatements:
+    """What states creep rates and local exponents with intervals: an identification, laws together, posterior draws.
+
+    ranges : {"stress", "temperature", "strain", "time": (low, high)} that the tests cover; MPa, K, - and s.
+    """
+
+    ranges: Mapping[str, tuple[float, float]]
+
+    def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
+        """Value and 95 % interval of a quantity; point : {name: (...,) or None for that of the reference point}."""
+        raise NotImplementedError
+
+    @checked
+    def rate(
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+        warn: bool = True,
+    ) -> Interval:
+        """Creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape; of draws the median.
+
+        stress, temperature, strain, time : numbers or arrays that broadcast, in MPa, K, - and s; by default those of
+        the reference point: without a temperature the rate is that at `reference.temperature`, the median of the tests.
+        warn : whether a point outside `ranges` gives a FitWarning, and a temperature that seems to be in Celsius a
+            FitError.
+
+        Outside the tests, and by a law that they contradict, the interval of an identification is widened by what the
+        law misses there as far as the tests tell (see uncertainty.law_misfit).
+        """
+        value, low, high = self._interval(log_rate, warn, stress, temperature, strain, time)
+        return np.exp(value), np.exp(low), np.exp(high)
+
+    @checked
+    def local_exponent(
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+        warn: bool = True,
+    ) -> Interval:
+        """Local stress exponent d ln rate / d ln stress with its 95 % interval: (exponent, low, high).
+
+        stress, temperature, strain, time : as in `rate`, numbers or arrays that broadcast; results have that shape.
+        warn : as in `rate`.
+        """
+        return self._interval(local_exponent, warn, stress, temperature, strain, time)
+
+    def _interval(self, quantity: PointQuantity, warn: bool, *point: ArrayLike | None) -> Interval:
+        named = dict(zip(("stress", "temperature", "strain", "time"), point, strict=True))
+        check_state(**named)
+        if warn:
+            warn_of_extrapolation(self.ranges, named, stacklevel=5)
+        return self.interval_at(quantity, named)
 
 
 @dataclass(frozen=True)

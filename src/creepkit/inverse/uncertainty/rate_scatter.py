@@ -34,7 +34,7 @@ from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel, Residuals
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_condition
-from creepkit.inverse.variance_components import scaled_inverse
+from creepkit.inverse.variance_components import LinearisedProblem, scaled_inverse
 from creepkit.records import History, Nuisance
 
 USUAL_SD = {"test": ASSUMED_RATE_SD, "heat": 0.5, "laboratory": 0.3}
@@ -268,30 +268,27 @@ class ScatterPosterior:
 
 def rate_scatter(
     problem: LeastSquaresProblem,
-    x: Floats,
-    residuals: Residuals,
+    linear: LinearisedProblem,
     noise_model: NoiseModel,
     test_effects: Sequence[Floats] = (),
     errors: Floats | None = None,
 ) -> RateScatter:
-    """The scatter of rates between tests at an estimate x (unknowns,).
+    """The scatter of rates between tests, of a problem made linear at its optimum.
 
-    residuals : there, with derivatives to all unknowns. noise_model : of the data. test_effects : (tests, observations)
-        each, one standard deviation of what differs between tests beside their rates, such as a thickness within its
-        tolerance. errors : (unknowns, unknowns) as RateScatter has them.
+    noise_model : of the data. test_effects : (tests, observations) each, one standard deviation of what differs between
+        tests beside their rates, such as a thickness within its tolerance. errors : (unknowns, unknowns) as
+        RateScatter has them.
     """
-    count, nuisances = problem.parameter_count, problem.nuisance_parameters
-    prior_precision = np.concatenate([12.0 / problem.bounds.width[:count] ** 2, nuisances.precision])
-    prior_gradient = np.concatenate(
-        [np.zeros(count), nuisances.precision * (x[count:] - nuisances.mean[: nuisances.size])]
-    )
+    count, nuisances, residuals = problem.parameter_count, problem.nuisance_parameters, linear.residuals
+    from_prior_means = linear.prior_residual[count:]
+    prior_gradient = linear.precision * linear.prior_residual
     integrated = [
         count + k
         for k, n in enumerate(nuisances.nuisances[: nuisances.size])
         if n.scope == "test" and np.isfinite(nuisances.sd[k])
     ]
     prior_gradient[integrated] = 0.0
-    at_prior_means = nuisances.integrate_out(residuals, x[count:])
+    at_prior_means = nuisances.integrate_out(residuals, nuisances.mean[: nuisances.size] + from_prior_means)
     observations = problem.observations
     conditions = np.array([reference_condition(h, problem.predictor) for h in problem.histories])
     transforms = dict(zip(observations.outputs, observations.transforms, strict=True))
@@ -307,7 +304,7 @@ def rate_scatter(
         output_scales={n: t.scale for n, t in transforms.items() if isinstance(t, LinearTransform)},
         output_floors={n: t.floor for n, t in transforms.items() if isinstance(t, LogTransform)},
         **_evidence(
-            at_prior_means, replace(noise_model, rate=0.0), integrated, (prior_precision, prior_gradient), test_effects
+            at_prior_means, replace(noise_model, rate=0.0), integrated, (linear.precision, prior_gradient), test_effects
         ),
     )
 

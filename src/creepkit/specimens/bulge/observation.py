@@ -25,10 +25,20 @@ from creepkit.fem.surface_interpolation import (
 )
 from creepkit.records import Output
 from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
-from creepkit.specimens.bulge.ring_displacements import ProfileOutputs, RingDisplacements, checked_ring_radii
 
 if TYPE_CHECKING:  # heavy, and a list of specimens needs none of it
     from creepkit.fem.time_interpolation import TimeInterpolation
+
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Protocol
+
+from creepkit.specimens.bulge.outputs import MOST_RINGS
+
+if TYPE_CHECKING:
+    from creepkit.fem.time_interpolation import TimeInterpolation
+
 
 Form = Literal["profile", "field", "rings"]
 
@@ -268,3 +278,59 @@ def _disc(operator: Observation) -> tuple[Floats, Floats, Floats, Floats]:
     turn, share = np.polynomial.legendre.leggauss(_ANGLES)
     shares = 0.5 * (place + 1.0)
     return shares, weight * shares, np.pi / 8.0 * (turn + 1.0), share
+
+
+def checked_ring_radii(radii: Sequence[Any]) -> tuple[float, ...]:
+    """Radii of rings, mm; SolveError unless there are one to eight, not negative and increasing."""
+    numbers = all(isinstance(r, Real) and 0.0 <= float(r) <= 1e4 for r in radii)
+    if not (numbers and 1 <= len(radii) <= MOST_RINGS and all(a < b for a, b in pairwise(radii))):
+        raise SolveError(
+            f"observation: rings have the radii {tuple(radii)}; allowed are one to {MOST_RINGS} increasing radii in "
+            "mm, as in radii=(0, 2, 4)"
+        )
+    return tuple(float(r) for r in radii)
+
+
+class ProfileOutputs(Protocol):
+    """Outputs of profiles that are sampled at some radii: a GaussianFit, or RingDisplacements."""
+
+    def observe(self, profiles: Floats, derivatives: bool) -> tuple[Floats, Floats]:
+        """Outputs (frames, outputs); derivatives (frames or 0, outputs, radii) to the displacements at the radii.
+
+        profiles : (frames, nodes) mm.
+        """
+        ...
+
+    def observe_at_times(self, profiles: Floats, steps: TimeInterpolation, times: Floats) -> tuple[Floats, Floats]:
+        """As `observe` of the accepted steps, interpolated: (times, outputs), and derivatives to nothing.
+
+        profiles : (steps, nodes) mm. times : (times,) s.
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class RingDisplacements:
+    """u_z on rings, which needs no fit.
+
+    nodes : (radii, nodes) from the displacements of the nodes to those at the radii.
+    """
+
+    nodes: Floats
+
+    def observe(self, profiles: Floats, derivatives: bool) -> tuple[Floats, Floats]:
+        """u_z (frames, radii) mm; derivatives (frames or 0, radii, radii), of each to itself.
+
+        profiles : (frames, nodes) mm.
+        """
+        rings = len(self.nodes)
+        own = np.broadcast_to(np.eye(rings), (len(profiles) if derivatives else 0, rings, rings))
+        return np.asarray(profiles @ self.nodes.T), own
+
+    def observe_at_times(self, profiles: Floats, steps: TimeInterpolation, times: Floats) -> tuple[Floats, Floats]:
+        """As `observe` of the accepted steps, interpolated: (times, radii), and derivatives to nothing.
+
+        profiles : (steps, nodes) mm. times : (times,) s.
+        """
+        outputs = steps.interpolate(self.observe(profiles, derivatives=False)[0], times)
+        return outputs, np.empty((*outputs.shape, 0))

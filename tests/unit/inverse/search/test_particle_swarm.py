@@ -1,15 +1,12 @@
 """ParticleSwarm: known minima, the rules of its sources, walls, seeds, and terms that may be off."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.search.derivative_free import ParticleSwarm
-from creepkit.inverse.search.term_mask import TermMask
 from creepkit.inverse.settings import IdentificationSettings
-from helpers.cost_functions import SUM, TRIPLE, Known, cube, quadratic, rastrigin, rosenbrock
+from helpers.cost_functions import SUM, Known, cube, quadratic, rastrigin, rosenbrock
 
 BARE = ParticleSwarm(refined_candidates=0)
 SMALL = ParticleSwarm(particles=40, iterations=30)
@@ -151,69 +148,6 @@ def planted(*terms, price=5.0):
         return 0.5 * (((curve(u) - data) / WAVE) ** 2).sum(axis=1) + price * (size / (size + 1e-3)).sum(axis=1)
 
     return Known(cost, BOX, law=SUM, rates=(0, 2))
-
-
-CAREFUL = ParticleSwarm(particles=100, iterations=60, maskable_terms="any")
-
-
-@pytest.mark.parametrize("terms", [(POWER,), (HARDENING,), (POWER, HARDENING)])
-@pytest.mark.parametrize("off", ["any", (POWER, HARDENING)])
-def test_an_absent_term_is_switched_off_and_a_present_one_is_not(terms, off):
-    """What is off rests at the bottom of its rate."""
-    found = replace(CAREFUL, maskable_terms=off).minima(planted(*terms)).minima[0]
-    assert {POWER, HARDENING} - set(found.terms_off) == set(terms)
-    assert all(found.x[2 * (term == HARDENING)] == -12.0 for term in found.terms_off)
-    assert found.cost < 5 * len(terms) + 10  # half of the chi-square of the planted waves is 5
-
-
-def test_only_what_may_be_off_is():
-    found = replace(SMALL, maskable_terms=POWER).minima(planted(POWER)).minima
-    assert all(HARDENING not in m.terms_off for m in found)
-    assert SMALL.minima(planted(POWER)).minima[0].terms_off == ()
-
-
-def test_minima_are_the_best_of_each_subset_and_more_terms_fit_no_worse():
-    """Without a price, zero is possible and not preferred."""
-    found = CAREFUL.minima(planted(POWER, HARDENING, price=0.0)).minima
-    costs = {m.terms_off: m.cost for m in found}
-    assert len(costs) == len(found)
-    assert set(costs) == {(), (POWER,), (HARDENING,)}
-    assert costs[()] < min(costs[(HARDENING,)], costs[(POWER,)])
-
-
-def test_of_subsets_that_fit_alike_the_simplest_comes_first():
-    """Data without waves of a single term: the sum of both is not better by more than its bottom allows."""
-    flat = Known(
-        lambda u: 0.5 * np.exp(u[:, 2]) + (u[:, 0] - 1) ** 2 + 0.01 * (u[:, 1] - 3) ** 2, BOX, law=SUM, rates=(0, 2)
-    )
-    found = CAREFUL.minima(flat).minima
-    assert found[0].terms_off == (HARDENING,)
-    assert found[0].cost == pytest.approx(0.0, abs=1e-4)
-
-
-def test_masks_of_three_terms_are_never_empty_and_reach_every_subset():
-    landscape = Known(quadratic, cube(len(TRIPLE.names)), law=TRIPLE, rates=(0, 2, 5))
-    switches, rng = TermMask.from_problem(landscape, "any"), np.random.default_rng(0)
-    masks = switches.initial_masks(2000, rng)
-    assert masks.any(axis=1).all()
-    assert len(np.unique(masks, axis=0)) == 7
-    later = switches.recombined(np.zeros((2000, 3), bool), np.zeros(3, bool), rng)
-    assert later.any(axis=1).all()
-    assert len(np.unique(later, axis=0)) == 7
-
-
-def test_a_parameter_shared_with_another_term_does_not_rest():
-    from creepkit.language import arrhenius
-
-    law = SUM.times(arrhenius(T_ref=1000.0))
-    landscape = Known(quadratic, cube(len(law.names)), law=law, rates=(0, 2))
-    switches = TermMask.from_problem(landscape, "any")
-    live = dict(zip(law.names, switches.active_parameters(np.array([True, False])), strict=True))
-    assert live.pop("Q")
-    assert [name for name, is_live in live.items() if not is_live] == ["A_2", "n_2", "m"]
-
-
-# ---- refinement ----------------------------------------------------------------------------------------------------
 
 
 def test_refined_minima_differ_and_come_best_first():

@@ -1,4 +1,4 @@
-"""Mixtures over laws, and bands over an uncertain temperature, against closed forms."""
+"""Mixtures over laws against closed forms."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -8,8 +8,7 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution, ModelAverage, rate_band
-from creepkit.language import arrhenius
+from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution, ModelAverage
 from creepkit.laws.norton import NORTON
 from helpers.log_rate_predictor import known_scatter, measured
 
@@ -80,37 +79,3 @@ def test_a_ranking_is_a_mixture_of_its_laws(fit):
     assert found.weights == (0.75, 0.25)
     sd = float(np.sqrt(fit.covariance[1, 1]))
     assert float(found.local_exponent(60.0)[1]) == pytest.approx(fit.u[1] + sd * norm.ppf(0.025 / 0.75), abs=1e-4)
-    assert rate_band(ranking, [60.0], 1000.0, temperature_uncertainty=0.0).low == pytest.approx(found.rate([60.0])[1])
-
-
-@pytest.fixture(scope="module")
-def warm(fit):
-    """Norton times Arrhenius, Q = 300 kJ/mol known exactly: only the temperature is uncertain."""
-    law = NORTON.times(arrhenius(T_ref=1000.0))
-    coordinates = replace(fit, law=law).coordinates
-    theta = np.array([np.log(TRUTH["A"]), TRUTH["n"], 3e5])
-    return replace(fit, law=law, u=coordinates.u(theta), covariance=1e-14 * np.eye(3), ranges={
-        **fit.ranges, "temperature": (950.0, 1050.0)})  # fmt: skip
-
-
-@pytest.mark.parametrize(("shape", "edge"), [("uniform", 0.95 * 10.0), ("normal", 10.0)])
-def test_the_band_over_temperature_is_arrhenius(warm, shape, edge):
-    """95 % of a uniform +- 10 K lie within 9.5 K, of a normal one of that 95 % interval within 10 K."""
-    found = rate_band(warm, [40.0, 60.0], 1000.0, temperature_uncertainty=10.0, temperature_distribution=shape)
-    for end, T in ((found.low, 1000.0 - edge), (found.high, 1000.0 + edge)):
-        expected = TRUTH["A"] * np.array([40.0, 60.0]) ** 4 * np.exp(-3e5 / R * (1 / T - 1 / 1000.0))
-        assert end == pytest.approx(expected, rel=0.02)
-    assert found.rate == pytest.approx(TRUTH["A"] * np.array([40.0, 60.0]) ** 4, rel=1e-3)
-    assert found.notes == ()
-
-
-def test_without_uncertainty_of_temperature_it_is_the_band_of_the_law(fit):
-    found = rate_band(fit, [40.0, 60.0], 1000.0, temperature_uncertainty=0.0)
-    assert np.array([found.rate, found.low, found.high]) == pytest.approx(np.array(fit.rate([40.0, 60.0])), rel=1e-6)
-    assert np.array(found.parameter_band) == pytest.approx(np.array([found.low, found.high]))
-
-
-def test_a_law_without_temperature_cannot_know(fit):
-    found = rate_band(fit, [40.0, 60.0], 1000.0)
-    assert (found.low <= found.parameter_band[0]).all()
-    assert "without a temperature in the law norton the band cannot hold what 10 K do" in found.notes[0]

@@ -9,7 +9,8 @@ from scipy.stats import t as student
 
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.uncertainty.posterior import Posterior, sample_posterior
+from creepkit.inverse.uncertainty.importance_sampling import sample_posterior
+from creepkit.inverse.uncertainty.posterior import Posterior
 from creepkit.inverse.uncertainty.quantities import exponent_at, rate_at
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
@@ -33,7 +34,7 @@ def fit(tests):
 
 @pytest.fixture(scope="module")
 def samples(fit):
-    return sample_posterior(fit, walkers=32, steps=800, seed=1)
+    return sample_posterior(fit, seed=1)
 
 
 def test_of_a_linear_problem_they_are_normal(samples, tests):
@@ -41,8 +42,6 @@ def test_of_a_linear_problem_they_are_normal(samples, tests):
     best, covariance = least_squares(tests, SD)
     draws = np.stack([np.log(samples.values["A"]), samples.values["n"]])
     sd = np.sqrt(np.diag(covariance))
-    assert samples.converged
-    assert samples.effective_sample_size > 1000
     assert np.abs(draws.mean(axis=1) - best) == pytest.approx(0.0 * sd, abs=0.15 * sd.max())
     assert np.cov(draws) == pytest.approx(covariance, rel=0.15)
     assert np.corrcoef(draws)[0, 1] == pytest.approx(covariance[0, 1] / sd.prod(), abs=0.005)
@@ -52,7 +51,7 @@ def test_intervals_of_rate_and_exponent(samples, tests):
     best, covariance = least_squares(tests, SD)
     way = np.array([1.0, np.log(100.0)])
     middle, half = float(way @ best), 1.96 * float(np.sqrt(way @ covariance @ way))
-    rate, low, high = samples.rate([50.0, 100.0])
+    rate, low, high = samples.rate([50.0, 100.0], warn=False)
     assert np.log(low[1]) == pytest.approx(middle - half, abs=0.15 * half)
     assert np.log(high[1]) == pytest.approx(middle + half, abs=0.15 * half)
     assert samples.interval(rate_at(100.0)) == pytest.approx((rate[1], low[1], high[1]))
@@ -63,7 +62,7 @@ def test_intervals_of_rate_and_exponent(samples, tests):
 def test_poorly_known_scatter_widens_them(fit, tests):
     """With 4 degrees of freedom the marginal of n is Student's t, whose 95 % interval is 2.78 standard errors."""
     best, covariance = least_squares(tests, SD)
-    found = sample_posterior(replace(fit, freedom=4.0), walkers=32, steps=500, seed=4)
+    found = sample_posterior(replace(fit, freedom=4.0), seed=4)
     half = student.ppf(0.975, 4.0) * np.sqrt(covariance[1, 1])
     assert found.interval("n") == pytest.approx((best[1], best[1] - half, best[1] + half), abs=0.15 * half)
 
@@ -81,7 +80,7 @@ def test_rates_that_scatter_between_tests_count_once_a_test():
     slope, level = np.polyfit(x, y, 1)
     sd = np.sqrt(((y - level - slope * x) ** 2).sum() / 10)
     half = student.ppf(0.975, 10) * sd / np.sqrt(((x - x.mean()) ** 2).sum())
-    assert sample_posterior(fit, walkers=16, steps=250, seed=1).interval("n") == pytest.approx(
+    assert sample_posterior(fit, seed=1).interval("n") == pytest.approx(
         (slope, slope - half, slope + half), abs=0.25 * half
     )
 
@@ -89,7 +88,7 @@ def test_rates_that_scatter_between_tests_count_once_a_test():
 def test_a_bound_cuts_the_posterior(tests):
     """Far more than n = 3 allows: against its bound the density is an exponential tail, all of it below."""
     short = replace(NORTON, params={A: NORTON.params[A], N: replace(NORTON.params[N], bounds=(1.0, 3.0))})
-    found = sample_posterior(known_scatter(short, tests, SD), walkers=32, steps=800, seed=2)
+    found = sample_posterior(known_scatter(short, tests, SD), seed=2)
     best, covariance = least_squares(tests, SD)
     middle, sd = best[1], float(np.sqrt(covariance[1, 1]))
     expected = middle + sd * norm.ppf(norm.cdf((3.0 - middle) / sd) * np.array([0.5, 0.025]))
@@ -121,6 +120,6 @@ def test_nuisances_are_integrated_out(tests):
 
 
 def test_a_seed_repeats_the_draws(fit):
-    first, again = (sample_posterior(fit, walkers=8, steps=20, seed=5) for _ in range(2))
-    assert np.array_equal(first.chain, again.chain)
-    assert not np.array_equal(first.chain, sample_posterior(fit, walkers=8, steps=20, seed=6).chain)
+    first, again = (sample_posterior(fit, seed=5) for _ in range(2))
+    assert np.array_equal(first.u, again.u)
+    assert not np.array_equal(first.u, sample_posterior(fit, seed=6).u)

@@ -1,4 +1,4 @@
-"""Checks of temperature forms and factors: at the reference temperature they leave a law as it is."""
+"""Checks of what is declared or made by one function: instrument formats and temperature forms."""
 
 from __future__ import annotations
 
@@ -8,17 +8,32 @@ from typing import Any
 import numpy as np
 
 from creepkit.errors import LawError
+from creepkit.files.time_stamps import DATE_ORDERS
+from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
 from creepkit.kernels.lowering import lower
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
+from creepkit.records import InstrumentFormat
 from creepkit.registry import default_registry
 from creepkit.testing.reports import finding
 
+
+@finding("declaration")
+def check_declaration(declared: InstrumentFormat) -> str:
+    """Units and the order of dates mean something; what else is declared was checked when the format was made."""
+    unknown = [unit for unit in declared.units.values() if channel_unit(unit) is None]
+    assert not unknown, f"'{unknown[0]}' is no unit of a channel; write one such as barg, psia, C"
+    unit, order = declared.time_unit, declared.date_order
+    assert unit in ("", *TIME_UNITS), f"'{unit}' is no unit of times; write one of {', '.join(TIME_UNITS)}"
+    assert order in ("", *DATE_ORDERS), f"'{order}' is no order of dates; write one of {', '.join(DATE_ORDERS)}"
+    return "units of channels and times, and the order of dates, are known"
+
+
 REFERENCE = 1073.15
-"""K."""
+"""K, at which temperature forms leave a law as it is."""
 
 
 TEMPERATURES = (900.0, 1000.0, 1200.0)
-"""K, at which the rate must be a number above zero."""
+"""K, at which the rate of a law with a temperature form must be a number above zero."""
 
 
 @finding("temperature form")

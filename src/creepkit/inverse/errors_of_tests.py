@@ -1,0 +1,151 @@
+"""Errors that tests usually have, in the covariance under which the values of a law are found.
+
+Those of the perturbations (see inverse.perturbations) that the settings name, settings.usual_errors, are in the
+covariance under which values are found by likelihood: with s their effects on the residuals, one standard deviation of
+the usual size each,
+
+    C = C0 + sum of s s',
+
+one s for each test of what its tests have independently, one s over all tests of what an instrument has in all of them,
+which no number of tests averages out. So tests count by how exactly they are known, and the covariance of the values,
+(J'C^-1 J + P)^-1, includes the errors; a further test never widens it. The noise model, and what a law is judged by, is
+C0. Values that are not found by likelihood stay as they are, and their covariance is that under C.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.inverse.noise_model import NoiseModel, Residuals, components_fixed_by_priors
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
+from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.perturbations import (
+    LOADS,
+    log_rate_per_kelvin,
+    of_lengths_and_instruments,
+    stress_exponent,
+    test_conditions,
+)
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.rate_perturbations import RatePerturbations
+from creepkit.inverse.residuals import life_sensitivity
+from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values
+from creepkit.inverse.variance_components import LinearisedProblem
+
+SCATTER_NODES = 60
+"""Standard deviations over which the scatter by errors of single tests is averaged."""
+
+
+@dataclass(frozen=True, eq=False)
+class TestErrors:
+    """The errors that an identification includes.
+
+    perturbations : of lengths and instruments, of which those count that are included. scatter : (tests,) standard
+    deviation of ln rate, by temperatures and loads that are off in each test by itself, beyond what was estimated.
+    lives : (tests, observations) -, what one standard deviation of the scatter of lives, as estimated of rupture times,
+    does to the curves of tests that are followed to rupture.
+    """
+
+    __test__ = False  # not a test case, whatever its name says to pytest
+
+    perturbations: tuple[Perturbation, ...]
+    scatter: Floats
+    lives: Floats
+
+    def common(self) -> Floats:
+        """(tests, observations, errors) effects on the residuals of what all tests have alike."""
+        return self._stacked([e.residual_change for e in self.perturbations if e.included and e.common])
+
+    def own(self, residuals: Residuals) -> Floats:
+        """(tests, observations, errors) of what each test has by itself."""
+        of_rates = [self.scatter[:, None] * residuals.log_rate_sensitivity] if self.scatter.any() else []
+        own = [e.residual_change for e in self.perturbations if e.included and not e.common]
+        return self._stacked([*own, *of_rates, *([self.lives] if self.lives.any() else [])])
+
+    def within(self, residuals: Residuals) -> Residuals:
+        """The residuals with the errors in their covariance."""
+        return residuals.with_effects(self.own(residuals), self.common())
+
+    def _stacked(self, effects: Sequence[Floats]) -> Floats:
+        return np.stack(effects, axis=-1) if effects else np.zeros((self.scatter.size, 0, 0))
+
+
+def errors_of_tests(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
+) -> TestErrors | None:
+    """The errors that the settings include, at x (unknowns,); None where they include none."""
+    if not problem.settings.included_errors:
+        return None
+    found = of_lengths_and_instruments(problem, x, linear)
+    scatter = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
+    lives = scatter * life_sensitivity(linear.residuals, problem.observations)
+    return TestErrors(found, _usual_scatter(problem, x, linear, noise_model), lives)
+
+
+def _usual_scatter(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
+) -> Floats:
+    """(tests,) standard deviation of ln rate by temperatures and loads that are off in each test by itself.
+
+    x : (unknowns,) the optimum. The standard deviation that the usual errors make is that of a prior of the scatter,
+    half of a normal distribution: what is added is its mean square, given the estimate, beyond that; all of it where no
+    test is redundant: where no combination of rates of tests is left that the law does not move. Nothing is added where
+    the settings state the scatter, and in one test, whose error is the common one.
+    """
+    included, settings, tests = problem.settings.included_errors, problem.settings, len(problem.histories)
+    if tests == 1 or ("", "rate") in components_fixed_by_priors(settings.nuisances, list(noise_model.outputs)):
+        return np.zeros(tests)
+    own = any(n.kind == "temperature" for n in settings.nuisances)
+    kelvin, load = 0.0 if own else included.get("temperature", 0.0), included.get("load", 0.0)
+    redundant = RatePerturbations(linear, noise_model, scatter_known=True).contrasts if noise_model.rate > 0 else 0
+    added = []
+    for test in range(tests):
+        per_kelvin = log_rate_per_kelvin(problem, x, *test_conditions(problem, test))
+        loaded = problem.histories[test].loading.quantity in LOADS
+        exponent = stress_exponent(problem, x, test) if loaded else 0.0
+        usual = (per_kelvin * kelvin) ** 2 + (exponent * load) ** 2
+        added.append(_mean_square(usual, noise_model.rate, redundant))
+    return np.asarray(np.sqrt(added))
+
+
+def _mean_square(usual: float, estimate: float, redundant: int) -> float:
+    """Mean square of ln rate by scatter of which `usual` is the prior variance, beyond the square of its estimate."""
+    if not usual > 0:
+        return 0.0
+    s = np.geomspace(1e-3, 5.0, SCATTER_NODES) * np.sqrt(usual)
+    log_weight = (1 - redundant) * np.log(s) - 0.5 * redundant * (estimate / s) ** 2 - 0.5 * s**2 / usual
+    weight = np.exp(log_weight - log_weight.max())
+    return max(float(weight @ s**2 / weight.sum()) - estimate**2, 0.0)
+
+
+def error_covariances(
+    linear: LinearisedProblem, noise_model: NoiseModel, errors: TestErrors | None, working_noise: NoiseModel | None
+) -> tuple[Floats, Floats]:
+    """(unknowns, unknowns) what errors of tests add to the covariance of x: all of them, and those common to all tests.
+
+    working_noise : under which values were found that are not by likelihood.
+    """
+    size = linear.precision.size
+    if errors is None:
+        return np.zeros((size, size)), np.zeros((size, size))
+    own, common = errors.own(linear.residuals), errors.common()
+    without, with_common, with_all = (
+        covariance_of_values(replace(linear, residuals=residuals), noise_model, working_noise)
+        for residuals in (
+            linear.residuals,
+            linear.residuals.with_effects(own[..., :0], common),
+            linear.residuals.with_effects(own, common),
+        )
+    )
+    return _excess(with_all, without), _excess(with_common, without)
+
+
+def _excess(covariance: Floats, least: Floats) -> Floats:
+    """(unknowns, unknowns) what a covariance is more than another, without eigenvalues below zero by rounding."""
+    scale = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh((covariance - least) / np.outer(scale, scale))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale))

@@ -1,0 +1,345 @@
+"""Stress and strain of a plain bar from load and extension; a strain without what loading and interruptions left.
+
+    stress = load / initial area,    strain = extension / gauge length,    E = d(stress) / d(strain) on the ramp.
+
+A file that states another specimen, lengths of a notch or outputs of another specimen is left as it is.
+
+What a strain record holds of the loading: elastic and initial plastic strain, and frames taken while the load rose.
+
+Creep strain is zero when the load has been reached. A record of total strain is not, and its first frame after time
+zero is often not the end of loading. ISO 204 calls the strain at the end of loading the initial total extension; keys
+state it (`loading_strain`, `includes_loading`), and when loading ended (`loading_time`). Where a file states neither
+these nor `includes_elastic`, the first frames decide:
+
+- a strain at time zero that is the stress over the modulus is elastic; any other is subtracted, for part of it is
+  plastic or the modulus is off, and creep has had no time yet;
+- a strain that jumps to about the stress over the modulus from less than half of it, and then stays while time
+  trebles, is elastic strain at the end of loading. Creep rises in that time by 44 % or more: as the cube root of time,
+  or faster.
+
+What was decided is recorded, and what looks like loading but is neither, a jump that is not about the stress over the
+modulus or has no modulus beside it, is told by the check of data quality. A file that states `includes_elastic` is
+taken at its word.
+
+An extensometer that was bumped or set anew, as in an interruption, adds a step to all later readings. Its size is the
+distance, midway between the frames around it, of straight lines through the frames before and after it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats, Ints
+from creepkit.errors import HistoryError
+from creepkit.readers.column_names import unit_suffix
+from creepkit.readers.conditions import StatedConditions
+from creepkit.readers.frames import TableFrames
+from creepkit.readers.table import SourceText
+from creepkit.records.quantities import TIME
+from creepkit.records.recorded_programs import noise_of_readings
+from creepkit.records.units import time_text
+
+# ---- load and extension of a plain bar -------------------------------------------------------------------------------
+
+
+PLAIN = ("", "uniaxial", "relaxation")
+"""Specimens, as files state them, that are plain bars; "" where a file states none."""
+
+
+RAMP_RANGE, CREEP_RANGE = (0.05, 1.02), 0.6
+"""Of the stress at the end of a ramp: between them the ramp is elastic; below CREEP_RANGE alone where creep shows."""
+
+
+CREEP_SHOWS = 0.01
+"""Fraction of the stress that is lost within one frame of the ramp after its end, above which it bends the ramp."""
+
+
+FEWEST_RAMP_FRAMES = 3
+
+
+def as_plain_bar(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
+    """The frames with stress and strain in the place of load and extension; HistoryError for lengths that lack."""
+    values, terms = dict(frames.values), conditions.terms
+    foreign = {name for outputs in terms.outputs.values() for name in outputs} - {
+        "elongation",
+        "strain",
+        "stress",
+        "force",
+    }
+    notch = {name for name in conditions.geometry if name.startswith("notch")}
+    has_load = "force" in values or conditions.states("force")
+    if conditions.text_of("specimen") not in PLAIN or notch or foreign & values.keys():
+        return frames
+    if "elongation" not in values and not (has_load and "strain" in values):
+        return frames
+    what = list[str]()
+    if "elongation" in values:
+        what += _with_strain(conditions, frames, values)
+    if has_load:
+        what += _with_stress(conditions, frames, values)
+    conditions.record_assumption(f"a plain bar: {' and '.join(what)}", first=True)
+    return replace(frames, values=values)
+
+
+def _with_strain(conditions: StatedConditions, frames: TableFrames, values: dict[str, Floats]) -> list[str]:
+    """Put the strain in the place of the extension, and say so."""
+    elongation, length = values.pop("elongation"), conditions.geometry.get("gauge_length")
+    if "strain" in values:
+        return ["the extension beside the strain not used"]
+    if length is None:
+        raise conditions.question(
+            "an extension is a strain by its gauge length, which is not stated; write gauge_length_mm (or 'specimen: "
+            "notched-bar' with its lengths)",
+            "gauge_length_mm",
+            location=frames.table.location(frames.table.columns_line),
+        )
+    values["strain"] = elongation / length
+    return [f"strain = extension / gauge length {length:g} mm"]
+
+
+def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict[str, Floats]) -> list[str]:
+    """Put the stress in the place of the load, and say so; a load beside a stress is redundant."""
+    column = values.pop("force", None)
+    stated = conditions.take_number("force")
+    area, how = _area(conditions)
+    if "stress" in values or conditions.states_load("stress"):
+        return ["the load beside the stress not used"]
+    if area is None:
+        where = stated.location if stated is not None else frames.table.location(frames.table.columns_line)
+        raise conditions.question(
+            "a load is a stress by the cross-section, which is not stated; write diameter_mm, or width_mm and "
+            "thickness_mm, or area_mm2, or the stress itself",
+            "diameter_mm",
+            location=where,
+        )
+    if column is not None:
+        values["stress"] = np.where((column < 0.0) & (column >= -0.01 * column.max()), 0.0, column) / area
+    elif stated is not None:
+        conditions.put_number("stress", replace(stated, value=stated.value / area))
+    return [f"stress = load / area {area:.4g} mm2{how}"]
+
+
+def _area(conditions: StatedConditions) -> tuple[float | None, str]:
+    """The initial area, mm2, and of which lengths it is."""
+    lengths: Mapping[str, float] = conditions.geometry
+    stated = conditions.take_number("area")
+    if stated is not None:
+        return stated.value, ""
+    if "diameter" in lengths:
+        return 0.25 * math.pi * lengths["diameter"] ** 2, f" of diameter {lengths['diameter']:g} mm"
+    thickness = lengths.get("thickness", lengths.get("apex_thickness"))
+    if "width" in lengths and thickness is not None:
+        return lengths["width"] * thickness, f" of {lengths['width']:g} mm x {thickness:g} mm"
+    return None, ""
+
+
+def modulus_of_ramp(strain: Floats, stress: Floats) -> tuple[float, str] | None:
+    """Young's modulus, MPa, of the frames of a loading ramp, and what is said of it; None where too few show it.
+
+    strain, stress : (frames,) of the program that was imposed, without the noise of its record, and MPa. The line is
+    fitted by least squares; its 95 % interval is that of Student's t.
+    """
+    end = int(np.argmax(strain >= strain.max())) + 1
+    low, high = (part * float(stress[end - 1]) for part in RAMP_RANGE)
+    if stress.size > end and stress[end] < (1.0 - CREEP_SHOWS) * stress[end - 1]:
+        high = CREEP_RANGE * float(stress[end - 1])
+    kept = np.flatnonzero((stress[:end] >= low) & (stress[:end] <= high) & (np.diff(strain[:end], prepend=-1.0) > 0.0))
+    if kept.size < FEWEST_RAMP_FRAMES:
+        return None
+    from scipy.stats import linregress, t
+
+    line = linregress(strain[kept], stress[kept])
+    modulus, half = float(line.slope), float(t.ppf(0.975, kept.size - 2) * line.stderr)
+    if not modulus > 0.0 or half > 0.25 * modulus:
+        return None
+    value, least, most = (f"{1e-3 * one:.4g}" for one in (modulus, modulus - half, modulus + half))
+    return modulus, f"modulus {value} GPa of {kept.size} frames of the loading ramp (95 %: {least} to {most})"
+
+
+# ---- what loading left -----------------------------------------------------------------------------------------------
+
+
+ELASTIC_RANGE = (0.9, 1.15)
+"""Ratios of a strain at time zero to the stress over the modulus at which it is elastic, and not plastic too."""
+
+
+PLATEAU_RANGE = (0.6, 1.6)
+"""The same of a plateau behind frames of loading, which no frame at time zero tells from creep."""
+
+
+PLATEAU_GROWTH, PLATEAU_TIMES = 0.25, 3.0
+"""By less than this fraction a strain grows after the end of loading while time grows by this factor."""
+
+
+JUMP_FROM, LARGEST_NOISE = 0.5, 0.2
+"""Of the strain at the end of loading: the strain in the frame before, and the noise in which a jump is seen."""
+
+
+SEARCHED_FRAMES = 20
+"""Frames among which the end of loading is looked for."""
+
+
+SMALLEST_STRAIN, NOISE_FACTOR = 2e-5, 6.0
+"""A strain at time zero below it, or below so many standard deviations of the noise, is none."""
+
+
+@dataclass(frozen=True)
+class StrainRecord:
+    """A strain record without what loading left in it.
+
+    strain, used : (frames,). includes_elastic : whether the strain still holds the elastic one.
+    """
+
+    strain: Floats
+    used: Bools
+    includes_elastic: bool
+
+
+def without_loading(
+    conditions: StatedConditions, times: Floats, strain: Floats, used: Bools, elastic_strain: float | None
+) -> StrainRecord:
+    """The strain as its model means it.
+
+    times : (frames,) s. strain : (frames,). used : (frames,) which may be fitted. elastic_strain : stress over modulus
+    at the beginning, None where the modulus is not known.
+    """
+    location = conditions.location_of("includes_loading", "loading_strain", "loading_time", "includes_elastic")
+    total, end = conditions.take_number("loading_strain"), conditions.take_number("loading_time")
+    includes_loading = conditions.take_choice("includes_loading", ("yes", "no"), required=False)
+    stated = conditions.states("includes_elastic")
+    if end is not None:
+        used = used & (times >= end.value * (1 - 1e-9))
+        if not used.any():
+            raise HistoryError(f"{end.location}: every frame lies before '{end.key}', {end.value:g} s; correct it")
+        conditions.record_assumption(f"frames before the end of loading at {end.value:g} s not used")
+    if total is not None:
+        conditions.labels["loading_strain"] = f"{total.value:.6g}"
+    if not (stated or includes_loading or total is not None):
+        return _decided(conditions, times, strain, used, elastic_strain)
+    elastic = conditions.take_choice("includes_elastic", ("yes", "no"), required=not includes_loading and total is None)
+    first = int(np.argmax(used))
+    if total is not None and not (includes_loading or stated):
+        includes_loading = "yes" if strain[first] > 0.5 * total.value else "no"
+        contained = "contained" if includes_loading == "yes" else "not contained"
+        conditions.record_assumption(f"loading strain {contained} (the first strain is {strain[first]:.3g})")
+    if includes_loading != "yes":
+        return StrainRecord(strain, used, elastic == "yes")
+    if elastic == "yes":
+        raise HistoryError(
+            f"{location}: includes_loading is yes, so the strain at the end of loading is subtracted and no elastic "
+            "strain is left; leave out includes_elastic: yes"
+        )
+    if total is None and end is None and times[first] > 0.0:
+        raise HistoryError(
+            f"{location}: includes_loading is yes, but not by how much; state loading_strain_pct, the strain at the "
+            "end of loading, or loading_time_s, when it ended"
+        )
+    subtracted = strain[first] if total is None else total.value
+    conditions.record_assumption(f"loading strain {subtracted:.3g} subtracted")
+    return StrainRecord(strain - subtracted, used, includes_elastic=False)
+
+
+def _decided(
+    conditions: StatedConditions, times: Floats, strain: Floats, used: Bools, elastic_strain: float | None
+) -> StrainRecord:
+    """What the first frames say, where the file says nothing."""
+    frames = np.flatnonzero(used)
+    if frames.size > 2 and times[frames[0]] == 0.0:
+        first = float(strain[frames[0]])
+        if first > max(SMALLEST_STRAIN, NOISE_FACTOR * noise_of_readings(strain[frames[:SEARCHED_FRAMES]])):
+            ratio = f"{first / elastic_strain:.2f} of stress over modulus" if elastic_strain else ""
+            if elastic_strain and _is_elastic(first, elastic_strain, ELASTIC_RANGE):
+                conditions.record_assumption(f"includes_elastic yes (the strain at time 0 is {ratio})")
+                return StrainRecord(strain, used, includes_elastic=True)
+            conditions.record_assumption(
+                f"includes_elastic no (loading strain {first:.3g} at time 0 subtracted{ratio and f'; {ratio}'})"
+            )
+            return StrainRecord(strain - first, used, includes_elastic=False)
+        end = _end_of_loading(times[frames], strain[frames], elastic_strain) if elastic_strain else None
+        if end is not None and elastic_strain:
+            ratio, time = strain[frames[end]] / elastic_strain, times[frames[end]]
+            conditions.record_assumption(
+                f"includes_elastic yes and frames before {time:g} s not used (the strain then stays at {ratio:.2f} "
+                "of stress over modulus)"
+            )
+            return StrainRecord(strain, used & (times >= time), includes_elastic=True)
+    included = conditions.take_choice("includes_elastic", ("yes", "no"), required=True)
+    return StrainRecord(strain, used, included == "yes")
+
+
+def _end_of_loading(times: Floats, strain: Floats, elastic_strain: float) -> int | None:
+    """The first frame of a plateau of about the elastic strain, None where the strain shows none."""
+    noise = noise_of_readings(strain[:SEARCHED_FRAMES])
+    for k in range(1, min(SEARCHED_FRAMES, times.size - 2)):
+        if not _is_elastic(float(strain[k]), elastic_strain, PLATEAU_RANGE):
+            continue
+        if max(strain[k - 1], noise * JUMP_FROM / LARGEST_NOISE) > JUMP_FROM * strain[k]:
+            return None
+        after = slice(k + 1, int(np.searchsorted(times, PLATEAU_TIMES * times[k], side="right")))
+        covered = times[after].size >= 2 and times[after][-1] >= 0.5 * PLATEAU_TIMES * times[k]
+        growth = float(np.median(strain[after][-2:])) - strain[k] if covered else np.inf
+        return k if abs(growth) < PLATEAU_GROWTH * strain[k] else None
+    return None
+
+
+def _is_elastic(strain: float, elastic_strain: float, ratios: tuple[float, float]) -> bool:
+    return ratios[0] * elastic_strain <= strain <= ratios[1] * elastic_strain
+
+
+# ---- steps that are taken off ----------------------------------------------------------------------------------------
+
+
+FITTED_FRAMES = 6
+"""Frames on either side of a step through which a straight line is laid."""
+
+
+def without_steps(
+    conditions: StatedConditions, times: Floats, outputs: Mapping[str, Floats], used: Bools
+) -> dict[str, Floats]:
+    """The outputs (frames,) without the steps that are to be taken off, each of which is recorded with its size.
+
+    times : (frames,) s. outputs : {name: (frames,)}. used : (frames,) those that a line may be laid through.
+    """
+    results = dict(outputs)
+    entry = conditions.take_entry("steps_taken_off")
+    if entry is None:
+        return results
+    for time in _times_in(entry):
+        first = int(np.searchsorted(times, time * (1 - 1e-9)))
+        if not 0 < first < times.size:
+            raise HistoryError(f"{entry.location}: no frames lie before and after a step at {time_text(time)}")
+        middle = 0.5 * (times[first - 1] + times[first])
+        indices = np.arange(times.size)
+        before, after = indices[used & (indices < first)], indices[used & (indices >= first)]
+        sizes = list[str]()
+        for name, values in results.items():
+            ends = [_line_at(middle, times, values, one) for one in (before[-FITTED_FRAMES:], after[:FITTED_FRAMES])]
+            results[name] = np.where(indices >= first, values - (ends[1] - ends[0]), values)
+            sizes.append(f"{ends[1] - ends[0]:.3g} of {name}")
+        conditions.record_assumption(f"a step of {' and '.join(sizes)} at {time_text(time)} taken off")
+    return results
+
+
+def _times_in(entry: SourceText) -> list[float]:
+    """s; HistoryError for what is no times with units."""
+    times = list[float]()
+    for item in entry.text.split(";"):
+        number, _, unit = item.strip().partition(" ")
+        suffix = unit_suffix(unit)
+        if suffix is None or suffix not in TIME.units:
+            what = f"steps_taken_off is '{entry.text}'; write times such as 36.75 h; 120 h"
+            raise HistoryError(f"{entry.location}: {what}")
+        value = SourceText(number, entry.location).number("steps_taken_off")
+        times.append(TIME.convert(value, suffix, entry.location, "steps_taken_off"))
+    return sorted(times)
+
+
+def _line_at(time: float, times: Floats, values: Floats, frames: Ints) -> float:
+    """A straight line through some frames, a mean of few, at a time."""
+    if frames.size < 3:
+        return float(np.mean(values[frames])) if frames.size else 0.0
+    return float(np.polynomial.Polynomial.fit(times[frames], values[frames], 1)(time))
