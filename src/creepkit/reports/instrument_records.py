@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from creepkit.records import Channel, ClockAlignment, InstrumentRecord
 
 UNITS = {"pressure": "MPa", "temperature": "C", "length": "mm", "force": "N"}
-MOST_DRAWN = 4000
-"""Points of a line; of a longer record the least and largest readings of equal spans are drawn."""
 
 
 def record_text(record: InstrumentRecord) -> str:
@@ -86,25 +84,13 @@ def record_figure(record: InstrumentRecord, path: str | Path | None = None) -> F
         shift = ZERO_CELSIUS if quantity == "temperature" else 0.0
         for name, channel in record.channels.items():
             if channel.quantity == quantity:
-                rows = _drawn_rows(channel.values)
-                axes.plot(record.times[rows], channel.values[rows] - shift, lw=0.8, label=name)
+                axes.plot(record.times, channel.values - shift, lw=0.8, label=name)
         unit = UNITS.get(quantity, "")
         axes.set_ylabel(f"{quantity}, {unit}" if unit else quantity)
         if sum(channel.quantity == quantity for channel in record.channels.values()) <= 6:
             axes.legend(fontsize=7)
     panels[-1].set_xlabel("time of the record, s")
     return save_figure(figure, path)
-
-
-def _drawn_rows(values: np.ndarray) -> np.ndarray:
-    """Rows of the least and largest reading in each of equal spans, in order; all rows of a short record."""
-    if values.size <= MOST_DRAWN:
-        return np.arange(values.size)
-    size = -(-values.size // (MOST_DRAWN // 2))
-    filled = np.pad(np.nan_to_num(values), (0, -values.size % size), mode="edge").reshape(-1, size)
-    first = np.arange(len(filled)) * size
-    rows = np.concatenate([first + filled.argmin(axis=1), first + filled.argmax(axis=1)])
-    return np.unique(np.minimum(rows, values.size - 1))
 
 
 def alignment_text(alignment: ClockAlignment) -> str:

@@ -6,12 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 
 def finite(value: Any) -> Any:
     """A value with null for numbers that are infinite or not known, at any depth; arrays and tuples as lists."""
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):
         return {name: finite(one) for name, one in value.items()}

@@ -1,4 +1,4 @@
-"""Text and plots of simulated tests: outputs over time, deformed section, points of a reduced-order model."""
+"""Text and plots of simulated tests: outputs over time, deformed section."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from creepkit.fem.reduced_order_model import ReducedOrderModel
     from creepkit.specimens.bulge.run import BulgeRun
     from creepkit.specimens.run import Run
 
@@ -157,19 +156,3 @@ def _draw_outline(axes: Axes, nodes: Floats, elements: Ints, side: float, **styl
 
 def _duration(time: float) -> str:
     return f"{time / 3600:.4g} h" if time >= 3600 else f"{time:.4g} s"
-
-
-def cubature_figure(model: ReducedOrderModel, path: str | Path | None = None) -> Figure:
-    """The section at rest with the points where a reduced-order model evaluates the law; areas are weights."""
-    body, basis = model.model, model.basis
-    figure, axes = panels_of(9.0, 2.6)
-    _draw_outline(axes, body.nodes, body.elements, 1.0, color=_GREY, linewidth=0.8)
-    places = np.einsum("pa,eai->epi", shape_functions(GAUSS_POINTS), body.nodes[body.elements]).reshape(-1, 2)
-    weights = basis.factors * body.weights.ravel()[basis.points]
-    axes.plot(*places.T, ".", markersize=1.0, color=_GREY)
-    axes.scatter(places[basis.points, 0], places[basis.points, 1], s=60.0 * weights / weights.max(), color="tab:blue")
-    axes.set_aspect("equal")
-    axes.set_xlabel("radius, mm")
-    axes.set_ylabel("height, mm")
-    axes.set_title(f"{len(basis.points)} of {len(places)} points, {len(basis.modes)} modes", fontsize=10)
-    return save_figure(figure, path)

@@ -10,7 +10,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.records.units import celsius_text
 from creepkit.reports.blocks import aligned
-from creepkit.reports.figures import empty_figure, panels_of, place_legend_right, save_figure, set_range, wrapped
+from creepkit.reports.figures import empty_figure, panels_of, place_legend_right, save_figure, set_range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -149,23 +149,6 @@ def correlation_text(correlation: Correlation) -> str:
     """The matrix with its names, four digits."""
     rows = [(name, *(f"{v:.4f}" for v in row)) for name, row in zip(correlation.names, correlation.matrix, strict=True)]
     return "\n".join(aligned(("", *correlation.names), rows, numeric=range(1, 1 + len(rows))))
-
-
-def correlation_figure(correlation: Correlation, path: str | Path | None = None) -> Figure:
-    """The matrix in colours from -1 to 1, with its numbers."""
-    count = len(correlation.names)
-    figure, axes = panels_of(2.0 + 0.8 * count, 1.6 + 0.8 * count)
-    image = axes.imshow(correlation.matrix, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
-    for row in range(count):
-        for column in range(count):
-            value = correlation.matrix[row, column]
-            colour = "white" if abs(value) > 0.6 else "black"
-            axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8, color=colour)
-    axes.set_xticks(range(count), correlation.names, rotation=45, ha="right")
-    axes.set_yticks(range(count), correlation.names)
-    axes.set_title(wrapped(correlation.title, 0.7 * float(figure.get_size_inches()[0])), fontsize=10)
-    figure.colorbar(image, ax=axes, shrink=0.8, label="correlation")
-    return save_figure(figure, path)
 
 
 def model_average_text(average: ModelAverage) -> str:
