@@ -121,9 +121,9 @@ from .specimens.test_piece import TestPiece as TestPiece
 from .specimens.test_piece import dimension as dimension
 from .studies.result import StudyResult as StudyResult
 from .studies.study import Study as Study
-from .surrogates.loading import surrogate as surrogate
 from .surrogates.parameter_gru import ParameterGru as ParameterGru
 from .surrogates.recipe import Training as Training
+from .surrogates.surrogate import surrogate as surrogate
 from .surrogates.training import train as train
 from .testing import check_camera_format as check_camera_format
 from .testing import check_exporter as check_exporter

@@ -28,17 +28,8 @@ from measured_creep import STRAIN_LIMIT
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit.forecasts.draws import dimensions_of, law_draws
-from creepkit.forecasts.simulation import (
-    at_times,
-    central_curves,
-    corrected,
-    crossing_times,
-    curves,
-    drawing_predictor,
-    drawn_theta,
-    followed_history,
-)
+from creepkit.forecasts.drawn_law import SimulatedTest, crossing_times
+from creepkit.forecasts.draws import law_draws, uncertain_quantities
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
@@ -149,17 +140,10 @@ def law_only_of(case: Case, fit: Identification, history: History, output: str) 
     predictor = fit.predictor
     assert predictor is not None
     draws = law_draws(fit, DRAWS, rng)
-    centre = {d.kind: d.mean for d in dimensions_of(fit, history, predictor, {})}
-    followed = followed_history(history, predictor)
-    cheaper = drawing_predictor(fit, predictor, history, [*centre])
+    centre = {d.kind: d.mean for d in uncertain_quantities(fit, history, predictor, {})}
     fixed = {kind: np.full((DRAWS, 1), value) for kind, value in centre.items()}
-    drawn = curves(fit, cheaper, followed, drawn_theta(fit, draws.u), np.zeros(DRAWS), fixed)
-    if history.specimen == "bulge":
-        central, _ = central_curves(fit, predictor, followed, centre, 0.0)
-        one = {kind: np.array([[value]]) for kind, value in centre.items()}
-        theta = fit.coordinates.theta(fit.u)[None]
-        drawn = corrected(drawn, curves(fit, cheaper, followed, theta, np.zeros(1), one), central)
-    values = at_times(drawn, history.times).of(output)
+    drawn = SimulatedTest(fit, predictor, history, centre).drawn(draws.u, np.zeros(DRAWS), fixed)
+    values = drawn.of(output, history.times)
     ordered = np.sort(np.where(np.isfinite(values), values, np.inf), axis=0)
     low, high = (ordered[int(p * DRAWS)] for p in (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL))
     used = usable_frames(history, output)

@@ -1,8 +1,7 @@
 """Cost functions with known minima, for searches: functions of u within bounds, refined by scipy."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from types import SimpleNamespace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -10,13 +9,6 @@ from scipy.optimize import minimize
 from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.search.local_refinement import Minimum
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
-from creepkit.laws.norton import NORTON
-from creepkit.laws.strain_hardening import STRAIN_HARDENING
-
-SUM = (NORTON + STRAIN_HARDENING).rename("two terms")
-"""Parameters A_1 n_1 A_2 n_2 m; rates at 0 and 2."""
-TRIPLE = SUM + HYPERBOLIC_SINE
 
 
 @dataclass
@@ -26,14 +18,8 @@ class Known:
     of: Callable[[np.ndarray], np.ndarray]
     bounds: Bounds
     settings: IdentificationSettings = field(default_factory=IdentificationSettings)
-    law: object = NORTON
-    rates: tuple[int, ...] = (0,)
     calls: list[int] = field(default_factory=list)
     seen: list[np.ndarray] = field(default_factory=list)
-
-    @property
-    def coordinates(self):
-        return SimpleNamespace(term_rates=self.rates)
 
     def cost(self, u):
         self.calls.append(len(u))
@@ -43,20 +29,10 @@ class Known:
     def check_predicted(self, u: np.ndarray) -> None:
         """A function has a value everywhere."""
 
-    def minimise(self, u: np.ndarray, fixed: Mapping[int, float] | None = None) -> Minimum:
-        free = np.setdiff1d(np.arange(u.size), list(fixed or {}))
-        whole = np.array(u, float)
-        whole[list(fixed or {})] = list((fixed or {}).values())
-
-        def cost(part):
-            moved = whole.copy()
-            moved[free] = part
-            return float(self.of(moved[None])[0])
-
-        bounds = list(zip(self.bounds.lower[free], self.bounds.upper[free], strict=True))
-        found = minimize(cost, whole[free], bounds=bounds, method="L-BFGS-B")
-        whole[free] = found.x
-        return Minimum(whole, float(found.fun), bool(found.success), int(found.nfev))
+    def minimise(self, u: np.ndarray) -> Minimum:
+        bounds = list(zip(self.bounds.lower, self.bounds.upper, strict=True))
+        found = minimize(lambda x: float(self.of(x[None])[0]), u, bounds=bounds, method="L-BFGS-B")
+        return Minimum(found.x, float(found.fun), bool(found.success), int(found.nfev))
 
 
 def cube(size: int, half_width: float = 5.0) -> Bounds:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from creepkit import kernels
-from creepkit.fem.finite_element_model import finite_element_model
-from creepkit.fem.mesh import Mesh, StripMesh, discretize, strip_mesh
+from creepkit.arrays import Floats
+from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
+from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, Mesh, StripMesh, discretize, local_tangents, strip_mesh
+from creepkit.fem.reduced_order_model import ReducedBasis
 from creepkit.fem.simulation import LoadHistory, Simulation, simulate
 from creepkit.fem.solver import SolverSettings
 from creepkit.kernels.interface import CompiledLaw
@@ -122,3 +125,31 @@ def orders(errors) -> np.ndarray:
     """Observed orders of errors that belong to twice as many parts each."""
     errors = np.abs(np.asarray(errors))
     return np.log2(errors[:-1] / errors[1:])
+
+
+class MeshQuality(NamedTuple):
+    """The worst of each element over its corners and integration points, 1 for a rectangle and 0 for a collapsed one.
+
+    sine : (elements,) sine of the angle between its two local directions.
+    evenness : (elements,) smallest over largest local area.
+    """
+
+    sine: Floats
+    evenness: Floats
+
+
+def mesh_quality(mesh: Mesh) -> MeshQuality:
+    """How far the elements of a mesh are from parallelograms with right angles."""
+    tangents = local_tangents(mesh.nodes[mesh.elements], np.vstack([CORNERS, GAUSS_POINTS]))
+    areas = np.linalg.det(tangents)
+    lengths = np.linalg.norm(tangents, axis=3).prod(axis=2)
+    return MeshQuality((areas / lengths).min(axis=1), areas.min(axis=1) / areas.max(axis=1))
+
+
+def full_basis(model: FiniteElementModel) -> ReducedBasis:
+    """A basis of all displacements and points: finite elements themselves."""
+    free = np.flatnonzero(model.equations >= 0)
+    modes = np.zeros((free.size, model.equations.size))
+    modes[np.arange(free.size), free] = 1.0
+    points = np.arange(model.weights.size)
+    return ReducedBasis(modes.reshape(free.size, -1, 2), points, np.ones(points.size))

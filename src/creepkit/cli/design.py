@@ -9,7 +9,7 @@ import typer
 
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import Json, Seed
-from creepkit.experiments.design_options import GoalOptions
+from creepkit.experiments.design_task import GoalOptions
 from creepkit.experiments.rig import Rig, changed_rigs, rigs_of
 from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
 

@@ -14,8 +14,7 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import quoted
 from creepkit.presentation import Presentable
 from creepkit.records import Status, outputs_of
-from creepkit.sampling.conditions import planned_test
-from creepkit.sampling.specimen_conditions import specimen_conditions
+from creepkit.sampling.conditions import planned_test, specimen_conditions
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw

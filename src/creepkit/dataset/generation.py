@@ -13,8 +13,7 @@ from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.dataset import shards, storage
 from creepkit.dataset.dataset import Dataset, concatenate, first_difference
-from creepkit.dataset.progress import ProgressRecord, ProgressReporter
-from creepkit.dataset.shards import GenerationJob
+from creepkit.dataset.shards import GenerationJob, ProgressRecord, ProgressReporter
 from creepkit.errors import DatasetError
 from creepkit.files.hdf5_files import open_hdf5, write_hdf5
 from creepkit.files.json_documents import as_read_back

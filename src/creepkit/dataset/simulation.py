@@ -17,9 +17,8 @@ from creepkit.dataset.dataset import FAILED, NOT_SIMULATED, Dataset, empty_colum
 from creepkit.errors import DatasetError
 from creepkit.jobs.worker_process import error_text
 from creepkit.records import Predictor, Status, SupportsReducedOrderModel, predict_with
-from creepkit.sampling.conditions import hold_times
+from creepkit.sampling.conditions import creep_output, hold_times
 from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion, SimulationOutcome
-from creepkit.sampling.specimen_conditions import creep_output
 
 if TYPE_CHECKING:
     from creepkit.records import Specimen

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.discovery.forms import ARRHENIUS, CandidateForm, law_with_forms
-from creepkit.discovery.regression import IsothermalEstimates, Regression, regress
+from creepkit.discovery.regression import FormCombination, IsothermalEstimates, regress
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.information_criteria import criterion_weights
 from creepkit.inverse.search.local_refinement import IterationCallback
@@ -48,20 +48,6 @@ CHI_SQUARE_95 = 3.84
 """chi^2 of one degree of freedom at 95 %: curves closer than that, by the points' own covariances, are equivalent."""
 
 
-@dataclass(frozen=True, eq=False)
-class WeightedCombination:
-    """One combination of forms, its quasi AICc less the best, and its Akaike weight."""
-
-    regression: Regression
-    criterion_difference: float
-    weight: float
-
-    @property
-    def forms(self) -> dict[str, str]:
-        """{parameter: name of its form}."""
-        return self.regression.forms
-
-
 @dataclass(frozen=True)
 class FormWeight:
     """A form of one parameter: its weight, and whether the estimates cannot distinguish it from the best one."""
@@ -82,7 +68,7 @@ class RankedCombinations:
     failed : {forms, in the order of the parameters: why nothing came of them}.
     """
 
-    combinations: tuple[WeightedCombination, ...]
+    combinations: tuple[FormCombination, ...]
     overdispersion: float
     plausible_forms: Mapping[str, tuple[FormWeight, ...]]
     candidates: Mapping[str, Sequence[CandidateForm]]
@@ -91,13 +77,13 @@ class RankedCombinations:
     optimizer: Any = None
 
     @property
-    def best(self) -> Regression:
+    def best(self) -> FormCombination:
         """The combination of the highest weight."""
-        return self.combinations[0].regression
+        return self.combinations[0]
 
-    def with_form(self, parameter: str, form: str) -> Regression:
+    def with_form(self, parameter: str, form: str) -> FormCombination:
         """The best combination that has this form of a parameter."""
-        return next(combination.regression for combination in self.combinations if combination.forms[parameter] == form)
+        return next(one for one in self.combinations if one.forms[parameter] == form)
 
 
 def rank_combinations(
@@ -141,7 +127,9 @@ def rank_combinations(
         reason = next(iter(cache.failed.values()), "none within its bounds has fewer numbers than these points allow")
         raise FitError(f"no combination of forms of {', '.join(names)} is possible: {reason}")
     excess, weights = criterion_weights(scores)
-    combinations = [WeightedCombination(admissible[k], float(excess[k]), float(weights[k])) for k in order]
+    combinations = [
+        replace(admissible[k], criterion_difference=float(excess[k]), weight=float(weights[k])) for k in order
+    ]
     plausible_forms = {name: _plausible_forms(name, combinations, points, overdispersion) for name in names}
     return RankedCombinations(
         tuple(combinations), overdispersion, plausible_forms, candidates, law, cache.failed, optimizer
@@ -171,10 +159,10 @@ class _RegressionCache:
         self, points: IsothermalEstimates, total: int, progress: IterationCallback | None, optimizer: Any
     ) -> None:
         self.points, self.total, self.progress, self.optimizer = points, total, progress, optimizer
-        self.regressions: dict[tuple[str, ...], Regression] = {}
+        self.regressions: dict[tuple[str, ...], FormCombination] = {}
         self.failed: dict[tuple[str, ...], str] = {}
 
-    def __call__(self, forms: Sequence[CandidateForm]) -> Regression | None:
+    def __call__(self, forms: Sequence[CandidateForm]) -> FormCombination | None:
         key = tuple(form.name for form in forms)
         if key not in self.regressions and key not in self.failed:
             try:
@@ -202,7 +190,7 @@ def _coordinate_search(cache: _RegressionCache, candidates: Mapping[str, Sequenc
             return
 
 
-def _quasi_aicc(regression: Regression, overdispersion: float) -> float:
+def _quasi_aicc(regression: FormCombination, overdispersion: float) -> float:
     k, rows = regression.parameter_count, regression.rows
     if rows - k - 1 <= 0:
         return np.inf
@@ -213,7 +201,7 @@ def _quasi_aicc(regression: Regression, overdispersion: float) -> float:
 
 
 def squared_mahalanobis(
-    first: Regression, second: Regression, points: IsothermalEstimates, overdispersion: float
+    first: FormCombination, second: FormCombination, points: IsothermalEstimates, overdispersion: float
 ) -> float:
     """chi^2 between the curves of two combinations, by the covariances of the points.
 
@@ -230,27 +218,29 @@ def weight_of_better_forms(weights: Mapping[str, float]) -> dict[str, float]:
     return dict(zip(ranked, cumulative[:-1].tolist(), strict=True))
 
 
-def _plausible_forms(
-    name: str, combinations: Sequence[WeightedCombination], points: IsothermalEstimates, overdispersion: float
-) -> tuple[FormWeight, ...]:
+def weights_of_forms(combinations: Sequence[FormCombination], parameter: str) -> dict[str, float]:
+    """{form of a parameter: weight of all combinations that have it}."""
     weights: dict[str, float] = {}
-    best_regression: dict[str, Regression] = {}
-    for combination in combinations:
-        form = combination.forms[name]
-        weights[form] = weights.get(form, 0.0) + combination.weight
-        best_regression.setdefault(form, combination.regression)
+    for one in combinations:
+        weights[one.forms[parameter]] = weights.get(one.forms[parameter], 0.0) + one.weight
+    return weights
+
+
+def _plausible_forms(
+    name: str, combinations: Sequence[FormCombination], points: IsothermalEstimates, overdispersion: float
+) -> tuple[FormWeight, ...]:
+    weights = weights_of_forms(combinations, name)
+    of_form = {one.forms[name]: one for one in reversed(combinations)}
     weight_before = weight_of_better_forms(weights)
-    ranked = list(weight_before)
-    equivalent = {
-        form: squared_mahalanobis(best_regression[form], best_regression[ranked[0]], points, overdispersion)
-        < CHI_SQUARE_95
-        for form in ranked
-    }
-    sizes = {form: _parameter_count(best_regression[form], name) for form in ranked}
-    equivalent_and_no_larger = {form: equivalent[form] and sizes[form] <= sizes[ranked[0]] for form in ranked}
-    retained = [form for form in ranked if weight_before[form] < CREDIBLE_MASS or equivalent_and_no_larger[form]]
-    return tuple(FormWeight(form, weights[form], equivalent[form]) for form in retained)
+    first, *_ = weight_before
+    plausible = []
+    for form, before in weight_before.items():
+        distance = squared_mahalanobis(of_form[form], of_form[first], points, overdispersion)
+        no_larger = _parameter_count(of_form[form], name) <= _parameter_count(of_form[first], name)
+        if before < CREDIBLE_MASS or (distance < CHI_SQUARE_95 and no_larger):
+            plausible.append(FormWeight(form, weights[form], distance < CHI_SQUARE_95))
+    return tuple(plausible)
 
 
-def _parameter_count(regression: Regression, parameter: str) -> int:
+def _parameter_count(regression: FormCombination, parameter: str) -> int:
     return next(library.parameter_count for library in regression.candidate_forms if library.parameter == parameter)

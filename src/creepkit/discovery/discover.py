@@ -75,10 +75,7 @@ def discover(
     estimates = IsothermalEstimates.from_identifications(fits)
     candidates = candidate_forms_of(estimates, forms, prior or {}, parameters)
     combinations = rank_combinations(estimates, candidates, progress, optimizer)
-    odds = {
-        name: {form.name: form.prior_odds for form in forms_of_parameter}
-        for name, forms_of_parameter in candidates.items()
-    }
+    odds = {name: {form.name: form.prior_odds for form in own} for name, own in candidates.items()}
     temperature_law = temperature_law_from_combinations(estimates, combinations, odds)
     if histories is None:
         return temperature_law
@@ -100,19 +97,12 @@ def candidate_forms_of(
     check_form_options(law, forms, prior, parameters)
     coordinates = Coordinates(law, estimates.reference)
     rate_coefficients = {law.names[k] for k in coordinates.coefficients}
-    forms_by_parameter = {}
+    T_ref, forms_by_parameter = estimates.reference.temperature, {}
     for name in law.names:
-        form_names = _listed(forms.get(name) if isinstance(forms, Mapping) else forms)
-        if parameters is not None and name not in parameters:
-            form_names = (CONSTANT,)
+        own = _listed(forms.get(name) if isinstance(forms, Mapping) else forms)
+        own = (CONSTANT,) if parameters is not None and name not in parameters else own
         forms_by_parameter[name] = candidate_forms(
-            law,
-            name,
-            name in rate_coefficients,
-            estimates.reference.temperature,
-            estimates.temperatures,
-            form_names,
-            prior.get(name),
+            law, name, name in rate_coefficients, T_ref, estimates.temperatures, own, prior.get(name)
         )
     return forms_by_parameter
 

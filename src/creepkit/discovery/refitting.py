@@ -10,7 +10,7 @@ BIC under one covariance; one represents those that the estimates cannot disting
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,43 +25,36 @@ from creepkit.discovery.combinations import (
     rank_combinations,
     squared_mahalanobis,
     weight_of_better_forms,
+    weights_of_forms,
 )
 from creepkit.discovery.forms import ARRHENIUS, CONSTANT, CandidateForm, evaluate_forms, law_with_forms
 from creepkit.discovery.regression import (
+    FormCombination,
     IsothermalEstimates,
-    Regression,
     check_temperatures,
     isothermal_groups,
     regress,
 )
-from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw, averaged_estimates
+from creepkit.discovery.temperature_law import TemperatureLaw, averaged_estimates
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify, identify_values
 from creepkit.inverse.information_criteria import criterion_weights
+from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.iterative_estimation import linearised, starting_point
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection import rank
+from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
 
-@dataclass(frozen=True, eq=False)
-class RefittedCombination:
-    """A combination of forms, its regression on the points, and the identification of its law."""
-
-    forms: tuple[CandidateForm, ...]
-    regression: Regression
-    fit: Identification
-
-
 def weigh_refits(
     temperature_law: TemperatureLaw,
-    refits: Sequence[RefittedCombination],
+    refits: Sequence[FormCombination],
     failed: Mapping[tuple[str, ...], str],
     points: IsothermalEstimates,
 ) -> TemperatureLaw:
@@ -70,26 +63,23 @@ def weigh_refits(
     failed : {forms: why they could not be refitted}, which become notes. points : those that combinations were ranked
         on last.
     """
-    ranking = rank([refit.fit for refit in refits], challenge=False)
-    bic_differences = {id(entry.fit): entry.excess for entry in ranking.laws}
-    odds = np.array([one.regression.prior_odds for one in refits])
-    scores = np.array([bic_differences[id(one.fit)] for one in refits]) - 2.0 * np.log(odds)
+    bic_differences = {id(entry.fit): entry.excess for entry in _ranked(refits).laws}
+    scores = np.array([bic_differences[id(one.fit)] - 2.0 * np.log(one.prior_odds) for one in refits])
     excess, weights = criterion_weights(scores)
     order = np.argsort(scores, kind="stable")
-    candidates = tuple(_candidate_law(refits[k], float(excess[k]), float(weights[k])) for k in order)
-    best = candidates[0]
-    assert best.fit is not None
+    candidates = tuple(_with_numbers_of_fit(refits[k], float(excess[k]), float(weights[k])) for k in order)
+    best = _identified(candidates[0].fit)
     return replace(
         temperature_law,
-        law=best.fit.law,
-        estimates=averaged_estimates(best.fit.law, candidates),
+        law=best.law,
+        estimates=averaged_estimates(best.law, candidates),
         criterion_data="histories",
         plausible_forms={
             name: _plausible_forms_of_refits(temperature_law.combinations, points, candidates, name)
             for name in temperature_law.isothermal_law.names
         },
         candidates=candidates,
-        fit=best.fit,
+        fit=best,
         notes=(
             *temperature_law.notes,
             *(f"not refitted: {', '.join(key)}: {reason}" for key, reason in failed.items()),
@@ -97,25 +87,36 @@ def weigh_refits(
     )
 
 
-def _candidate_law(refit: RefittedCombination, criterion_difference: float, weight: float) -> CandidateLaw:
-    fit, names = refit.fit, [name for library in refit.forms for name in library.parameter_names]
-    theta = dict(zip(fit.law.names, fit.coordinates.theta(fit.u), strict=True))
-    jacobian = fit.coordinates.jacobian(fit.u)
-    covariance = jacobian @ fit.covariance @ jacobian.T
-    indices = [fit.law.names.index(name) for name in names]
-    internal = {name: float(theta[name]) for name in names}
-    return CandidateLaw(
-        refit.forms, internal, covariance[np.ix_(indices, indices)], fit.freedom, criterion_difference, weight, fit
+def _identified(fit: Identification | None) -> Identification:
+    assert fit is not None  # of a combination that was refitted
+    return fit
+
+
+def _with_numbers_of_fit(refit: FormCombination, criterion_difference: float, weight: float) -> FormCombination:
+    """A refitted combination with the numbers that the tests give."""
+    fit, names = _identified(refit.fit), [name for form in refit.candidate_forms for name in form.parameter_names]
+    jacobian, indices = fit.coordinates.jacobian(fit.u), [fit.law.names.index(name) for name in names]
+    covariance = (jacobian @ fit.covariance @ jacobian.T)[np.ix_(indices, indices)]
+    values = _internal_values(fit)
+    return replace(
+        refit,
+        values={name: values[name] for name in names},
+        covariance=covariance,
+        degrees_of_freedom=fit.freedom,
+        criterion_difference=criterion_difference,
+        weight=weight,
     )
 
 
+def _internal_values(fit: Identification) -> dict[str, float]:
+    return dict(zip(fit.law.names, fit.coordinates.theta(fit.u).tolist(), strict=True))
+
+
 def _plausible_forms_of_refits(
-    combinations: RankedCombinations, points: IsothermalEstimates, candidates: Sequence[CandidateLaw], name: str
+    combinations: RankedCombinations, points: IsothermalEstimates, candidates: Sequence[FormCombination], name: str
 ) -> tuple[FormWeight, ...]:
     """Forms that have 95 % of the weight, then those not refitted whose nearest neighbour is among them."""
-    weights: dict[str, float] = {}
-    for candidate in candidates:
-        weights[candidate.forms[name]] = weights.get(candidate.forms[name], 0.0) + candidate.weight
+    weights = weights_of_forms(candidates, name)
     retained = [form for form, weight in weight_of_better_forms(weights).items() if weight < CREDIBLE_MASS]
     known = {combination.forms[name] for combination in combinations.combinations}
     tried = [form for form in weights if form in known]
@@ -229,7 +230,7 @@ class _RefitCache:
     settings: IdentificationSettings
     progress: IterationCallback | None
     max_refits: int
-    fitted: dict[tuple[str, ...], RefittedCombination] = field(default_factory=dict)
+    fitted: dict[tuple[str, ...], FormCombination] = field(default_factory=dict)
     failed: dict[tuple[str, ...], str] = field(default_factory=dict)
 
     @property
@@ -252,51 +253,51 @@ class _RefitCache:
             self.failed[key] = str(error)
         else:
             fit = max(fits, key=lambda end: end.log_likelihood)
-            self.fitted[key] = RefittedCombination(tuple(forms), regression, fit)
+            self.fitted[key] = replace(regression, fit=fit)
         if self.progress is not None:
             self.progress("", self.count, self.max_refits)
 
     def refit_credible(self, combinations: RankedCombinations, points: IsothermalEstimates) -> None:
         """Refit the combinations that have 95 % of the weight, but those that another represents."""
         weight, before = 0.0, self.count
-        tried = [one.regression for one in combinations.combinations if tuple(one.forms.values()) in self.fitted]
+        tried = [one for one in combinations.combinations if tuple(one.forms.values()) in self.fitted]
         for one in combinations.combinations:
             represented = any(
-                other.parameter_count <= one.regression.parameter_count
-                and squared_mahalanobis(one.regression, other, points, 1.0) < SIMILAR_CHI_SQUARE
+                other.parameter_count <= one.parameter_count
+                and squared_mahalanobis(one, other, points, 1.0) < SIMILAR_CHI_SQUARE
                 for other in tried
             )
             if weight > CREDIBLE_MASS or self.count >= min(self.max_refits, before + REFITS_PER_ROUND):
                 return
             weight += one.weight
             if not represented:
-                self(one.regression.candidate_forms, points)
-                tried.append(one.regression)
+                self(one.candidate_forms, points)
+                tried.append(one)
 
     def refit_simpler(self, baseline: Sequence[CandidateForm], points: IsothermalEstimates) -> None:
         """Refit what remains with one parameter at a time in its simplest form, where that may be enough.
 
         Two parameters that both have a wrong form make up for each other, so that combinations near the best count too.
         """
-        ranking = rank([refit.fit for refit in self.fitted.values()], challenge=False)
-        near = {id(one.fit) for one in ranking.laws if one.excess < NEAR_BIC}
+        near = {id(one.fit) for one in _ranked(self.fitted.values()).laws if one.excess < NEAR_BIC}
         for refit in [one for one in self.fitted.values() if id(one.fit) in near]:
-            forms = list(refit.forms)
+            forms = list(refit.candidate_forms)
             enough = regress(points, forms).chi_square + ENOUGH_CHI_SQUARE
             for k, simple in enumerate(baseline):
                 simpler = [*forms[:k], simple, *forms[k + 1 :]]
                 if simple.name != forms[k].name and regress(points, simpler).chi_square < enough:
                     self(simpler, points)
 
-    def linearised_about(self, refit: RefittedCombination) -> IsothermalEstimates:
+    def linearised_about(self, refit: FormCombination) -> IsothermalEstimates:
         """Estimates at each temperature by one step of Gauss and Newton from the curves of a refit.
 
         Each temperature keeps the noise that its identification found; that of the refit holds what its forms miss.
         """
         points, law = self.estimates, self.estimates.law
-        internal = dict(zip(refit.fit.law.names, refit.fit.coordinates.theta(refit.fit.u), strict=True))
-        curves = np.clip(evaluate_forms(refit.forms, internal, points.temperatures), *law.internal_bounds)
-        nuisances = {(n.key, n.owner): n.value for n in refit.fit.nuisances}
+        fit_of_all = _identified(refit.fit)
+        curves = evaluate_forms(refit.candidate_forms, _internal_values(fit_of_all), points.temperatures)
+        curves = np.clip(curves, *law.internal_bounds)
+        nuisances = {(n.key, n.owner): n.value for n in fit_of_all.nuisances}
         groups = isothermal_groups([h.mean_temperature for h in self.histories])
         theta, covariance = [], []
         for fit, curve in zip(points.fits, curves, strict=True):
@@ -322,15 +323,18 @@ class _RefitCache:
     def finish(self) -> None:
         """The best law with all that an identification says."""
         best = self.best
-        start = StartingEstimate.from_identification(best.fit)
-        fit = identify(best.fit.law, self.histories, self.predictor, settings=self.settings, start=start)
-        self.fitted[tuple(form.name for form in best.forms)] = replace(best, fit=fit)
+        fit = _identified(best.fit)
+        start = StartingEstimate.from_identification(fit)
+        fit = identify(fit.law, self.histories, self.predictor, settings=self.settings, start=start)
+        self.fitted[tuple(best.forms.values())] = replace(best, fit=fit)
 
     def _identify(self, law: CreepLaw, start: Floats | None) -> Identification:
         estimate = StartingEstimate(start, reference=self.estimates.reference)
         return identify_values(law, self.histories, self.predictor, settings=self.settings, start=estimate)
 
-    def _starts(self, law: CreepLaw, regression: Regression, joint_fit: Identification | None) -> list[Floats | None]:
+    def _starts(
+        self, law: CreepLaw, regression: FormCombination, joint_fit: Identification | None
+    ) -> list[Floats | None]:
         """Where a fit of this law ended, or else the regression.
 
         None stands for a search of the whole bounds: where the first law begins without a fit of it and points leave
@@ -339,14 +343,19 @@ class _RefitCache:
         values, undetermined = regression.values, self.estimates.has_undetermined_parameters()
         is_known = joint_fit is not None and set(joint_fit.law.names) == set(law.names)
         if joint_fit is not None and is_known:
-            values = dict(zip(joint_fit.law.names, joint_fit.coordinates.theta(joint_fit.u), strict=True))
+            values = _internal_values(joint_fit)
         theta = np.clip([values[name] for name in law.names], *law.internal_bounds)
         start = Coordinates(law, self.estimates.reference).u(theta)
         starts = [start if np.isfinite(start).all() else None]
         return [*starts, None] if undetermined and not is_known and not self.fitted else starts
 
     @property
-    def best(self) -> RefittedCombination:
+    def best(self) -> FormCombination:
         """The combination of lowest BIC so far; odds of forms count at the end."""
-        ranking = rank([refit.fit for refit in self.fitted.values()], challenge=False)
-        return next(one for one in self.fitted.values() if one.fit is ranking.best)
+        best = _ranked(self.fitted.values()).best
+        return next(one for one in self.fitted.values() if one.fit is best)
+
+
+def _ranked(refits: Iterable[FormCombination]) -> Ranking:
+    """The identifications of refits by BIC."""
+    return rank([_identified(one.fit) for one in refits], challenge=False)

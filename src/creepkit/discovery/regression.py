@@ -183,12 +183,15 @@ BOUND_TOLERANCE_SD = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Regression:
-    """Forms of all parameters, fitted to the points.
+class FormCombination:
+    """A form for each parameter with its numbers, found by regression on estimates or, once refitted, from the tests.
 
     values : {name: internal value} of coefficients and of what is inside exponentials (the logarithm of a coefficient
-        of log scale). covariance : (numbers, numbers) in the same order.
-    fitted_theta : (temperatures, parameters) internal values on the curves. chi_square : of `rows` residuals.
+        of log scale). covariance : (numbers, numbers) in the same order, of so many degrees of freedom.
+    fitted_theta : (temperatures, parameters) internal values on the curves of the regression. chi_square : of its
+        `rows` residuals.
+    criterion_difference : its criterion less that of the best that it was compared with. weight : its Akaike weight.
+    fit : the identification of the law with these forms, once refitted.
     """
 
     candidate_forms: tuple[CandidateForm, ...]
@@ -197,6 +200,10 @@ class Regression:
     fitted_theta: Floats
     chi_square: float
     rows: int
+    degrees_of_freedom: float = INFINITE_FREEDOM
+    criterion_difference: float = 0.0
+    weight: float = 1.0
+    fit: Identification | None = None
 
     @property
     def parameter_count(self) -> int:
@@ -217,6 +224,18 @@ class Regression:
     def table(self) -> dict[str, Param]:
         """{name: Param} of its numbers."""
         return {name: form.table[name] for form in self.candidate_forms for name in form.parameter_names}
+
+    def theta(self, T: Floats) -> Floats:
+        """(temperatures, parameters) internal values.
+
+        T : (temperatures,) K.
+        """
+        return evaluate_forms(self.candidate_forms, self.values, T)
+
+    def standard_deviation(self, name: str) -> float:
+        """Standard deviation of the internal value of one number."""
+        k = list(self.values).index(name)
+        return float(np.sqrt(max(self.covariance[k, k], 0.0)))
 
     def within_bounds(self) -> bool:
         """Whether its numbers lie within their bounds, or near."""
@@ -291,7 +310,7 @@ def whitened_system(
     return WhitenedSystem(np.stack(columns, axis=1), target, block_diag(*estimates.covariance), tuple(terms), rows)
 
 
-def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm], optimizer: Any = None) -> Regression:
+def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm], optimizer: Any = None) -> FormCombination:
     """The best numbers of one library for each parameter, with their covariance.
 
     optimizer : of pysindy, which drops terms first; the parameters' values at T_ref stay.
@@ -312,7 +331,7 @@ def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm], opti
     )
     names = [name for form in forms for name in form.terms] + [s.name for s in design.nonlinear_parameters]
     values = dict(zip(names, map(float, (*coefficients, *nonlinear_values)), strict=True))
-    return Regression(
+    return FormCombination(
         tuple(forms),
         values,
         _parameter_covariance(sensitivities, design),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,8 +12,14 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.discovery.combinations import FormWeight, RankedCombinations
-from creepkit.discovery.forms import CandidateForm, evaluate_forms
-from creepkit.discovery.regression import INFINITE_FREEDOM, IsothermalEstimates, WhitenedSystem, whitened_system
+from creepkit.discovery.forms import CandidateForm
+from creepkit.discovery.regression import (
+    INFINITE_FREEDOM,
+    FormCombination,
+    IsothermalEstimates,
+    WhitenedSystem,
+    whitened_system,
+)
 from creepkit.errors import FitError, nearest
 from creepkit.files.json_documents import DocumentFormat, write_json
 from creepkit.files.reading import FileKind
@@ -59,7 +65,7 @@ def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
         "candidates": [
             {
                 "forms": candidate.forms,
-                "internal_values": candidate.internal_values,
+                "internal_values": candidate.values,
                 "covariance": candidate.covariance,
                 "criterion_difference": candidate.criterion_difference,
                 "weight": candidate.weight,
@@ -94,42 +100,6 @@ NOTED_OVERDISPERSION = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class CandidateLaw:
-    """One combination of forms with its numbers.
-
-    internal_values : {name: value} of all numbers, the logarithm where the scale is log.
-    covariance : (numbers, numbers) of the internal values, in the same order.
-    criterion_difference : criterion less that of the best. weight : Akaike weight. fit : the identification, once
-        refitted.
-    """
-
-    candidate_forms: tuple[CandidateForm, ...]
-    internal_values: Mapping[str, float]
-    covariance: Floats
-    degrees_of_freedom: float
-    criterion_difference: float
-    weight: float
-    fit: Identification | None = None
-
-    @property
-    def forms(self) -> dict[str, str]:
-        """{parameter: name of its form}."""
-        return {form.parameter: form.name for form in self.candidate_forms}
-
-    def theta(self, T: Floats) -> Floats:
-        """(temperatures, parameters) internal values.
-
-        T : (temperatures,) K.
-        """
-        return evaluate_forms(self.candidate_forms, self.internal_values, T)
-
-    def standard_deviation(self, name: str) -> float:
-        """Standard deviation of the internal value of one parameter."""
-        k = list(self.internal_values).index(name)
-        return float(np.sqrt(max(self.covariance[k, k], 0.0)))
-
-
-@dataclass(frozen=True, eq=False)
 class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_text"):
     """The result of discover() and of refit().
 
@@ -149,7 +119,7 @@ class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_
     temperature_range: tuple[float, float]
     criterion_data: Literal["points", "histories"]
     plausible_forms: Mapping[str, tuple[FormWeight, ...]]
-    candidates: tuple[CandidateLaw, ...]
+    candidates: tuple[FormCombination, ...]
     prior_odds: Mapping[str, Mapping[str, float]]
     isothermal_estimates: IsothermalEstimates
     combinations: RankedCombinations
@@ -183,9 +153,8 @@ class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_
 
     def estimate(self, name: str) -> Estimate:
         """One number of the law, such as Q, with its interval."""
-        for estimate in self.estimates:
-            if estimate.name == name:
-                return estimate
+        if name in self.values:
+            return next(one for one in self.estimates if one.name == name)
         raise FitError(f"law '{self.law.name}' has no parameter '{name}': {nearest(name, self.law.names)}")
 
     def parameters_at(self, T: ArrayLike) -> dict[str, Floats]:
@@ -215,28 +184,18 @@ def temperature_law_from_combinations(
     estimates: IsothermalEstimates, combinations: RankedCombinations, prior_odds: Mapping[str, Mapping[str, float]]
 ) -> TemperatureLaw:
     """The temperature law that the isothermal estimates alone give."""
-    degrees_of_freedom = [
-        INFINITE_FREEDOM
-        if combinations.overdispersion == 1.0
-        else max(combination.regression.rows - combination.regression.parameter_count, 1)
-        for combination in combinations.combinations
-    ]
+    c = combinations.overdispersion
     candidates = tuple(
-        CandidateLaw(
-            weighted.regression.candidate_forms,
-            weighted.regression.values,
-            weighted.regression.covariance * combinations.overdispersion,
-            float(freedom_of_one),
-            weighted.criterion_difference,
-            weighted.weight,
+        replace(
+            one,
+            covariance=one.covariance * c,
+            degrees_of_freedom=INFINITE_FREEDOM if c == 1.0 else float(max(one.rows - one.parameter_count, 1)),
         )
-        for weighted, freedom_of_one in zip(combinations.combinations, degrees_of_freedom, strict=True)
+        for one in combinations.combinations
     )
-    law = combinations.law
-    notes = failure_notes(combinations.failed)
-    if combinations.overdispersion > NOTED_OVERDISPERSION:
-        widening = np.sqrt(combinations.overdispersion)
-        notes.append(f"no form follows the points within their errors, which were taken {widening:.2g} times wider")
+    law, notes = combinations.law, failure_notes(combinations.failed)
+    if c > NOTED_OVERDISPERSION:
+        notes.append(f"no form follows the points within their errors, which were taken {np.sqrt(c):.2g} times wider")
     return TemperatureLaw(
         law=law,
         isothermal_law=estimates.law,
@@ -260,7 +219,7 @@ def failure_notes(failed: Mapping[tuple[str, ...], str]) -> list[str]:
     return [f"{count}; the first, {', '.join(first)}, with: {failed[first]}"] if failed else []
 
 
-def averaged_estimates(law: CreepLaw, candidates: Sequence[CandidateLaw]) -> tuple[Estimate, ...]:
+def averaged_estimates(law: CreepLaw, candidates: Sequence[FormCombination]) -> tuple[Estimate, ...]:
     """The best candidate's numbers; intervals over all that have the same form of the parameter concerned."""
     best, estimates = candidates[0], {}
     for form in best.candidate_forms:
@@ -270,13 +229,11 @@ def averaged_estimates(law: CreepLaw, candidates: Sequence[CandidateLaw]) -> tup
     return tuple(estimates[name] for name in law.names)
 
 
-def _estimate(name: str, form: CandidateForm, candidates: Sequence[CandidateLaw]) -> Estimate:
-    param, value = form.table[name], candidates[0].internal_values[name]
-    weights = np.array([candidate.weight for candidate in candidates])
-    values, standard_deviations = (
-        np.array(v)
-        for v in zip(*[(one.internal_values[name], one.standard_deviation(name)) for one in candidates], strict=True)
-    )
+def _estimate(name: str, form: CandidateForm, candidates: Sequence[FormCombination]) -> Estimate:
+    param, value = form.table[name], candidates[0].values[name]
+    weights = np.array([one.weight for one in candidates])
+    values = np.array([one.values[name] for one in candidates])
+    standard_deviations = np.array([one.standard_deviation(name) for one in candidates])
     mixture = MixtureDistribution(
         weights / weights.sum(),
         np.maximum([one.degrees_of_freedom for one in candidates], 1.0),

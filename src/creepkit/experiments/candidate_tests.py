@@ -1,4 +1,4 @@
-"""Candidates for further tests: runs of the machine that a rig can make, and variations of the tests that were made."""
+"""Candidates for further tests: runs of the machine that a rig can make, and tests that a user plans."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.experiments.rig import HIGHER_LEVEL, LOWER_LEVEL, Rig
+from creepkit.experiments.rig import Rig
 from creepkit.records import History, Loading, TwoLevels, load_unit, loading_of
 from creepkit.records.units import celsius_text, time_text
 
@@ -54,9 +54,6 @@ class CandidateTest:
         """The first load above zero of its first test."""
         levels = self.histories[0].loading.program().values
         return float(levels[levels > 0][0])
-
-
-# ---- grids -----------------------------------------------------------------------------------------------------------
 
 
 def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperature: bool = True) -> list[CandidateTest]:
@@ -172,69 +169,6 @@ def _ramp_of(base: History) -> float:
 
 NOT_PLANNED = "components"
 """The load of a material point: there are too many of it to plan."""
-
-
-# ---- variations of tests that were made ------------------------------------------------------------------------------
-
-
-def variations_of_tests(
-    histories: Sequence[History], rigs: Sequence[Rig], exponent: float = 0.0
-) -> tuple[CandidateTest, ...]:
-    """Variations of tests that were made: other levels, a change of level, longer; other dimensions.
-
-    Each is made on the longest test of its specimen. A bar at another stress is tested for a time that goes with
-    stress^-exponent, so that it strains as much, but never for longer than the rig can.
-    """
-    candidates: list[CandidateTest] = []
-    for rig in rigs:
-        tests = [h for h in histories if h.specimen == rig.specimen and h.loading.quantity != NOT_PLANNED]
-        if tests:
-            levels = np.concatenate([h.loading.program().values for h in tests])
-            candidates += _variations(rig, max(tests, key=lambda h: float(h.times[-1])), levels[levels > 0], exponent)
-    if not candidates:
-        kinds = ", ".join(dict.fromkeys(h.loading.quantity for h in histories))
-        raise FitError(f"no further tests are known for a loading by {kinds}; give candidates=, a list of histories")
-    return tuple(candidates)
-
-
-def _variations(rig: Rig, base: History, made_levels: Floats, exponent: float) -> Iterator[CandidateTest]:
-    low, high = float(made_levels.min()), float(made_levels.max())
-    end, longest = float(base.times[-1]), rig.longest_hours * 3600.0
-    base_level = float(base.loading.program().values.max())
-    at_levels = rig.replace(load_changes=False)
-    for level in dict.fromkeys((rig.levels[0], LOWER_LEVEL * high, rig.levels[1])):
-        is_bar = base.loading.quantity == "stress"
-        duration = min(end * (level / base_level) ** -exponent, longest) if is_bar else end
-        yield from _made(at_levels.replace(levels=(level, level)), base, duration)
-    middle = float(np.sqrt(low * high))
-    for first, second in ((low, HIGHER_LEVEL * high), (middle, LOWER_LEVEL * middle), (middle, HIGHER_LEVEL * middle)):
-        pair = rig.replace(levels=(min(first, second), max(first, second)))
-        for candidate in _made(pair, base, end):
-            program = candidate.histories[0].loading.program().values
-            begin, end_level = candidate.first_level, float(program[-1])
-            if abs(begin - first) < 0.01 * first and abs(end_level - second) < 0.01 * second:
-                yield candidate
-    if longest > end:
-        yield _like(base, "the same loading for", longest, rig)
-    for name, values in rig.dimensions.items():
-        for value in values:
-            changed = replace(base, geometry={**base.geometry, name: value})
-            if abs(value / base.geometry.get(name, rig.dimensions[name][len(values) // 2]) - 1.0) > 1e-3:
-                text = f"a test piece of {name.replace('_', ' ')} {value:.3g} mm"
-                yield _like(changed, f"{text} under the same loading for", end, rig)
-
-
-def _made(rig: Rig, base: History, duration: float) -> Iterator[CandidateTest]:
-    for loading, text in _loadings(rig, base, duration):
-        yield _like(replace(base, loading=loading), text, duration, rig)
-
-
-def _like(base: History, text: str, duration: float, rig: Rig) -> CandidateTest:
-    description = f"{text} {time_text(duration)}"
-    history = base.replace(
-        times=frame_times(duration, rig.frame_interval), outputs={}, standard_deviation={}, name=f"plan: {description}"
-    )
-    return CandidateTest(description, (history,), duration / 3600.0 + rig.setup_hours)
 
 
 def candidates_given(histories: Sequence[History | CandidateTest], rigs: Sequence[Rig]) -> list[CandidateTest]:

@@ -8,7 +8,8 @@ service (c-optimal), and the law.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -16,23 +17,23 @@ from creepkit import limits
 from creepkit.arrays import single_threaded_blas
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
-from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig, variations_of_tests
-from creepkit.experiments.design_checks import edges_of, notes_of, rigs_for
-from creepkit.experiments.design_task import DesignTask, Goal, task_of
-from creepkit.experiments.expectations import DesignCriterion, Expectation, PrecisionCriterion
+from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig
+from creepkit.experiments.design_task import DesignTask, Goal, RemainingLaws, task_of
+from creepkit.experiments.expectations import Expectation, PrecisionCriterion
 from creepkit.experiments.known_laws import KnownLaw
 from creepkit.experiments.law_discrimination import Alteration, LawCriterion
 from creepkit.experiments.planned_design import ALIKE, Design, PlannedTest
 from creepkit.experiments.planned_outcomes import PlannedOutcomes
-from creepkit.experiments.remaining_laws import RemainingLaws
-from creepkit.experiments.rig import Rig
+from creepkit.experiments.rig import Rig, rigs_for
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
+from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
 from creepkit.records import History
+from creepkit.records.units import time_text
 
 Progress = Callable[[str, int, int], None]
 
@@ -97,25 +98,13 @@ def design(
     return search.run(planned, refuse=candidates is not None)
 
 
-def further_tests(ranking: Ranking, *, progress: Progress | None = None) -> Design:
-    """Variations of the tests that were made, by how well they would separate the remaining laws in every direction."""
-    remaining = RemainingLaws.of(ranking)
-    fit = remaining.fits[0]
-    rigs = rigs_for(fit, None)
-    search = _Search(task_of(remaining, "law", None), rigs, 0, progress)
-    if search.nothing_to_do is not None:
-        return search.nothing_to_do
-    exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
-    return search.run(list(variations_of_tests(fit.histories, rigs, exponent)))
-
-
 def _grids(laws: Sequence[Identification], rigs: Sequence[Rig], budget: float | None) -> list[CandidateTest]:
-    by_temperature = all(fit.law.uses(temperature) for fit in laws)
+    by_temperature, most = all(fit.law.uses(temperature) for fit in laws), np.inf if budget is None else budget
     candidates: list[CandidateTest] = []
     for rig in rigs:
         tests = [h for h in laws[0].histories if h.specimen == rig.specimen]
-        base = max(tests, key=lambda h: float(h.times[-1]))
-        candidates += grid_of_rig(rig, base, budget=np.inf if budget is None else budget, by_temperature=by_temperature)
+        longest = max(tests, key=lambda h: float(h.times[-1]))
+        candidates += grid_of_rig(rig, longest, budget=most, by_temperature=by_temperature)
     return candidates
 
 
@@ -123,13 +112,14 @@ class _Search:
     """The evaluation of candidates: all to first order, the best at draws, and for the law with refits in full."""
 
     def __init__(self, task: DesignTask, rigs: Sequence[Rig], seed: int, progress: Progress | None) -> None:
-        self.task, self.rigs, self.progress = task, {rig.specimen: rig for rig in rigs}, progress
+        self.task, self.rigs = task, {rig.specimen: rig for rig in rigs}
+        self.progress: Progress = progress or (lambda *_: None)
         with single_threaded_blas():
             noise_model = task.laws[0].noise_model
             known = [KnownLaw.from_identification(fit, noise_model) for fit in task.laws]
             known += [KnownLaw.from_altered(task.laws[k], altered, noise_model) for k, altered in task.altered]
         self.outcomes = PlannedOutcomes(known, progress, len(task.laws))
-        self.criterion: DesignCriterion
+        self.criterion: PrecisionCriterion | LawCriterion
         if task.goal == "law":
             self.criterion = _law_criterion(task, self.outcomes, seed)
         else:
@@ -228,18 +218,15 @@ class _Search:
                 self.tests.remove(test)
             else:
                 self._evaluate_at_draws(test)
-            if self.progress is not None:
-                self.progress("best tests at draws of the posteriors", done + 1, len(promising))
+            self.progress("best tests at draws of the posteriors", done + 1, len(promising))
         if isinstance(self.criterion, LawCriterion):
             self._refit(self.criterion)
 
     def _promising(self) -> list[PlannedTest]:
         """The first candidates, no more than two of one load and duration."""
-        chosen: list[PlannedTest] = []
-        places: dict[tuple[float, float], int] = {}
+        chosen, places = list[PlannedTest](), Counter[tuple[float, float]]()
         for test in self.tests:
-            place = test.first_level, test.candidate.duration
-            places[place] = places.get(place, 0) + 1
+            places[place := (test.first_level, test.candidate.duration)] += 1
             if places[place] <= MOST_ALIKE and len(chosen) < EVALUATED_AT_DRAWS:
                 chosen.append(test)
         return chosen
@@ -266,11 +253,9 @@ class _Search:
             refitted.add(id(first.candidate))
             for a, b in criterion.directions():
                 refits += int(refits < MOST_REFITS and criterion.refit(first.histories, a, b))
-                if self.progress is not None:
-                    self.progress("refits in full", min(refits, MOST_REFITS), MOST_REFITS)
+                self.progress("refits in full", min(refits, MOST_REFITS), MOST_REFITS)
             self._evaluate_at_draws(first)
-        if self.progress is not None:
-            self.progress("refits in full", MOST_REFITS, MOST_REFITS)
+        self.progress("refits in full", MOST_REFITS, MOST_REFITS)
 
     def _order(self, test: PlannedTest) -> tuple[float, ...]:
         """Least for the best: the cheapest that decides between laws, else the likeliest to; for values by the hour.
@@ -311,8 +296,7 @@ class _Search:
                 k = int(np.argmax(gains))
             chosen.append(fitting[k])
             left, known = left - fitting[k].hours, known + gains[k]
-            if self.progress is not None:
-                self.progress("runs for the budget", len(chosen), MOST_RUNS)
+            self.progress("runs for the budget", len(chosen), MOST_RUNS)
         return tuple(chosen)
 
     def _notes_of_plan(self, plan: Sequence[PlannedTest]) -> list[str]:
@@ -360,3 +344,53 @@ def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> La
     return LawCriterion(
         outcomes, task.remaining.weights, excess, chi_squares, ranking.independent_frames, altered, seed
     )
+
+
+def edges_of(chosen: CandidateTest, considered: Sequence[CandidateTest], rigs: Mapping[str, Rig]) -> list[str]:
+    """Where the first run of a plan lies at an edge of what was considered, one sentence each."""
+    rig = rigs.get(chosen.histories[0].specimen)
+    durations = [c.duration for c in considered]
+    if rig is None or len(durations) < 3:
+        return []
+    notes = []
+    if chosen.duration <= 1.001 * min(durations) and min(durations) < 0.999 * max(durations):
+        notes.append(
+            f"it is as short as any test that was considered ({time_text(min(durations))}, for frames each "
+            f"{time_text(rig.frame_interval)}): more frequent frames may make a shorter one better"
+        )
+    levels = chosen.histories[0].loading.program().values
+    levels = levels[levels > 0]
+    if levels.max() >= 0.999 * rig.levels[1] > rig.levels[0]:
+        notes.append(f"it takes the rig to the greatest load that it was said to reach ({rig.levels[1]:.3g})")
+    return notes
+
+
+def notes_of(laws: Sequence[Identification], rigs: Sequence[Rig]) -> tuple[str, ...]:
+    """What an expectation takes for granted."""
+    notes = []
+    if any(len(rig.temperatures) > 1 for rig in rigs) and not all(fit.law.uses(temperature) for fit in laws):
+        names = ", ".join(fit.law.name for fit in laws if not fit.law.uses(temperature))
+        notes.append(f"the temperatures of the rig were not varied: {names} says nothing of temperature")
+    scatters = any(n.kind == "rate" and n.sd is None for n in laws[0].settings.nuisances)
+    if scatters and len(laws[0].histories) < MINIMUM_TESTS and laws[0].noise_model.rate == 0.0:
+        notes.append(
+            f"fewer than {MINIMUM_TESTS} tests do not show by how much the rate scatters from test to test; it is "
+            'taken as none: give Nuisance("rate", sd=...) where it is known'
+        )
+    if laws[0].noise_model.rate > 0 and any(rig.tests_per_run > 1 for rig in rigs):
+        notes.append(
+            "the rates of test pieces in one run are taken to scatter like those of tests one by one: where the oven "
+            "scatters, several of them tell less"
+        )
+    if any(fit.settings.weights != "likelihood" for fit in laws):
+        notes.append(
+            'values were found with other weights than weights="likelihood", by which expectations are worked out: '
+            "intervals after further tests may differ from what is expected here by a factor of two"
+        )
+    for fit in laws:
+        if fit.adequacy is not None and fit.adequacy.rejects:
+            notes.append(
+                f"{fit.law.name} does not explain the tests that were made: what a test is expected to tell holds for "
+                "laws that do; find one first"
+            )
+    return tuple(notes)

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
@@ -61,22 +60,6 @@ class Expectation:
     probability: float = float("nan")
     wrong: float = float("nan")
     chi_squares: tuple[ExpectedChiSquare, ...] = ()
-
-
-class DesignCriterion(Protocol):
-    """A goal, made a number for planned tests that were added to the outcomes.
-
-    differs_at_draws : whether it is worked out at draws of the posterior where that is asked for.
-    """
-
-    @property
-    def differs_at_draws(self) -> bool:
-        """Whether expectations at draws are others than those about the estimates."""
-        ...
-
-    def expectation(self, histories: Sequence[History], *, at_draws: bool = False) -> Expectation:
-        """What these tests together tell; at draws of the posterior, or linearised about the estimates."""
-        ...
 
 
 @dataclass(eq=False)

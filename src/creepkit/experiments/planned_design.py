@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -177,9 +178,7 @@ def _question(design: Design) -> str:
 
 def _repeated(plan: tuple[PlannedTest, ...]) -> list[str]:
     """The runs of a plan in words; the same ones are counted."""
-    counts: dict[str, int] = {}
-    for test in plan:
-        counts[test.description] = counts.get(test.description, 0) + 1
+    counts = Counter(test.description for test in plan)
     return [text if count == 1 else f"{count} times {text}" for text, count in counts.items()]
 
 

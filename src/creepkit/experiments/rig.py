@@ -14,6 +14,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.held_levels import held_temperatures
+from creepkit.inverse.identification import Identification
 from creepkit.limits import Limits
 from creepkit.limits import numbers as numbers_between
 from creepkit.options import CELSIUS, Options, option
@@ -162,6 +163,37 @@ def _rig_of(tests: Sequence[History], predictor: Predictor) -> Rig:
         frame_interval=float(np.median([h.times[-1] / h.times.size for h in tests])),
         largest_output=LARGEST_GROWTH * largest if largest > 0 else float("inf"),
     )
+
+
+def rigs_for(fit: Identification, rig: Rig | Sequence[Rig] | None) -> tuple[Rig, ...]:
+    """The rigs given, or those that the tests suggest; FitError for one of another specimen."""
+    assert fit.predictor is not None
+    if rig is None:
+        return rigs_of(fit.histories, fit.predictor)
+    rigs = (rig,) if isinstance(rig, Rig) else tuple(rig)
+    if not rigs:
+        raise FitError("rig= takes a ck.Rig, or several in a list; found none")
+    known = dict.fromkeys(h.specimen for h in fit.histories)
+    for one in rigs:
+        if one.specimen not in known:
+            raise FitError(
+                f"the rig tests specimen '{one.specimen}', but the law was identified from tests of "
+                f"{' and '.join(repr(name) for name in known)}"
+            )
+        check_dimensions(one, fit)
+    return rigs
+
+
+def check_dimensions(rig: Rig, fit: Identification) -> None:
+    """FitError for a dimension that the test pieces of a rig do not have."""
+    assert fit.predictor is not None
+    history = next(h for h in fit.histories if h.specimen == rig.specimen)
+    predictor = predictor_for(fit.predictor, history)
+    known = [d.name for d in dimensions_of(predictor)]
+    for name in rig.dimensions:
+        if name not in history.geometry and name not in known:
+            listed = f"; it has {', '.join(known)}" if known else ""
+            raise FitError(f"a test piece of '{rig.specimen}' has no dimension '{name}'{listed}")
 
 
 def _largest_output(history: History, predictor: Predictor) -> float:

@@ -202,25 +202,6 @@ SIDE_SLOPES = np.stack([_SIDE_PLACES - 0.5, -2 * _SIDE_PLACES, _SIDE_PLACES + 0.
 """(Gauss points, nodes) their derivatives to x."""
 
 
-class MeshQuality(NamedTuple):
-    """The worst of each element over its corners and integration points, 1 for a rectangle and 0 for a collapsed one.
-
-    sine : (elements,) sine of the angle between its two local directions.
-    evenness : (elements,) smallest over largest local area.
-    """
-
-    sine: Floats
-    evenness: Floats
-
-
-def mesh_quality(mesh: Mesh) -> MeshQuality:
-    """How far the elements of a mesh are from parallelograms with right angles."""
-    tangents = local_tangents(mesh.nodes[mesh.elements], np.vstack([CORNERS, GAUSS_POINTS]))
-    areas = np.linalg.det(tangents)
-    lengths = np.linalg.norm(tangents, axis=3).prod(axis=2)
-    return MeshQuality((areas / lengths).min(axis=1), areas.min(axis=1) / areas.max(axis=1))
-
-
 def half_bandwidth(elements: Ints) -> int:
     """Diagonals beside the main one in a matrix of two unknowns a node; elements : (elements, 8) nodes of each."""
     return int(2 * np.ptp(elements, axis=1).max() + 1)

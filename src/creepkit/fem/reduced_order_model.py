@@ -48,15 +48,6 @@ class ReducedBasis:
         return ReducedBasis(self.modes[:count], self.points, self.factors)
 
 
-def full_basis(model: FiniteElementModel) -> ReducedBasis:
-    """A basis of all displacements and points: finite elements themselves."""
-    free = np.flatnonzero(model.equations >= 0)
-    modes = np.zeros((free.size, model.equations.size))
-    modes[np.arange(free.size), free] = 1.0
-    points = np.arange(model.weights.size)
-    return ReducedBasis(modes.reshape(free.size, -1, 2), points, np.ones(points.size))
-
-
 def mode_gradients(model: FiniteElementModel, modes: Floats, points: Ints) -> Floats:
     """Changes (points, 5, modes) of the deformation gradient's F11, F12, F21, F22 and F33 with each mode.
 

@@ -70,12 +70,10 @@ class Forecast(Presentable, text="reports.forecast:forecast_text"):
 
     def __getitem__(self, test: str) -> TestForecast:
         """The forecast of one test, by name."""
-        for one in self.tests:
-            if one.name == test:
-                return one
-        raise FitError(
-            f"there is no forecast of a test '{test}'; there are those of {', '.join(t.name for t in self.tests)}"
-        )
+        known = {one.name: one for one in self.tests}
+        if test not in known:
+            raise FitError(f"there is no forecast of a test '{test}'; there are those of {', '.join(known)}")
+        return known[test]
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Curves with bands, measured points over them, times on the axis, and what the bands are made of."""
@@ -148,7 +146,10 @@ def forecast(
     tried = len(source.fits) if isinstance(source, ModelAverage) else len(getattr(source, "laws", weighted))
     adequacy = weighted[0][0].adequacy
     rejected = adequacy is not None and adequacy.verdict == "leaves a discrepancy"
-    return Forecast(_named_weights(weighted), level, tuple(made), tried - len(weighted), rejected, most_draws)
+    weights: dict[str, float] = {}  # identifications of one law add theirs
+    for fit, weight in weighted:
+        weights[fit.law.name] = weights.get(fit.law.name, 0.0) + float(weight)
+    return Forecast(weights, level, tuple(made), tried - len(weighted), rejected, most_draws)
 
 
 def _predictor(
@@ -171,21 +172,9 @@ def _weighted_laws(source: Identification | WeightedLaws | ModelAverage) -> list
     """The laws that count, with weights that add up to one: those of least weight are left out."""
     average = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
     ordered = sorted(zip(average.fits, average.weights, strict=True), key=lambda pair: -pair[1])
-    kept, total = [], 0.0
-    for fit, weight in ordered:
-        if total >= 1.0 - LEAST_WEIGHT:
-            break
-        kept.append((fit, weight))
-        total += weight
-    return [(fit, weight / total) for fit, weight in kept]
-
-
-def _named_weights(weighted: Sequence[tuple[Identification, float]]) -> dict[str, float]:
-    """{law: weight}; identifications of one law add their weights."""
-    weights: dict[str, float] = {}
-    for fit, weight in weighted:
-        weights[fit.law.name] = weights.get(fit.law.name, 0.0) + float(weight)
-    return weights
+    before = np.cumsum([0.0, *(weight for _, weight in ordered)])
+    kept = [pair for pair, total in zip(ordered, before, strict=False) if total < 1.0 - LEAST_WEIGHT]
+    return [(fit, weight / before[len(kept)]) for fit, weight in kept]
 
 
 MOST_TARGETS = 50

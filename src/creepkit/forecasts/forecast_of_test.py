@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -10,8 +11,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
-from creepkit.forecasts.bands import band_of_draws
-from creepkit.forecasts.drawn_law import DrawnLaw, drawn_law
+from creepkit.forecasts.banded_output import BandedOutput
+from creepkit.forecasts.drawn_law import DrawnLaw, crossing_times, drawn_law, first_crossing
 from creepkit.forecasts.draws import LawDraws, has_sampled_draws
 from creepkit.forecasts.measured_test import TestScore, score_test
 from creepkit.forecasts.results import (
@@ -25,14 +26,6 @@ from creepkit.forecasts.results import (
     TestForecast,
     TimeForecast,
 )
-from creepkit.forecasts.simulation import at_times, crossing_times, first_crossing
-from creepkit.forecasts.variance_shares import (
-    band_transform,
-    discrepancy_variance,
-    noise_in_output,
-    offset_draws,
-    variance_shares,
-)
 from creepkit.inverse.extrapolation import HOUR, extrapolation_text
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
@@ -41,7 +34,7 @@ from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.tested_region import outside_combinations
 from creepkit.inverse.uncertainty.laplace_approximation import is_open
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
-from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, is_logarithmic, output_unit
+from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, output_unit
 
 
 def forecast_test(
@@ -63,11 +56,11 @@ def forecast_test(
     best = max(drawn, key=lambda one: one.weight)
     fit = best.draws.fit
     outputs = {
-        name: _output_forecast(drawn, best, banded, name, level, rng)
+        name: BandedOutput(drawn, banded, name).forecast(level, rng)
         for name in best.central.outputs
-        if np.isfinite(at_times(best.central, banded.times).of(name)).any()
+        if np.isfinite(best.central.of(name, banded.times)).any()
     }
-    times = _times(drawn, best, history, targets, level, rng)
+    times = _times(drawn, history, targets, level, rng)
     notes = _notes(fit, history, outputs)
     failed = sum(one.failed for one in drawn)
     if RUPTURE_OUTPUT not in fit.noise_model.outputs and any(not t.output for t in times):
@@ -75,7 +68,7 @@ def forecast_test(
     notes += [f"the solver did not finish {failed} of the draws; they are left out"] if failed else []
     score = None
     if any(usable_frames(history, name).any() for name in history.outputs if name in outputs):
-        score, problem = _score(drawn, (history, banded), predictor, outputs)
+        score, problem = _score(drawn, history, banded, predictor, outputs)
         notes += [problem] if problem else []
     includes = _includes(drawn, best, outputs)
     extrapolation = _extrapolation(banded, predictor, best, times)
@@ -105,96 +98,44 @@ def _banded_history(history: History) -> History:
     )
 
 
-# ---- curves --------------------------------------------------------------------------------------------------
-
-
-def _output_forecast(
-    drawn: Sequence[DrawnLaw], best: DrawnLaw, history: History, name: str, level: float, rng: np.random.Generator
-) -> OutputForecast:
-    fit, central = best.draws.fit, at_times(best.central, history.times).of(name)[0]
-    transform = band_transform(fit, history, name, central)
-    leading = best.central.outputs[0] == name
-    smooth, white = noise_in_output(fit, history, name, central, transform)
-    parts = []
-    for one in drawn:
-        values = at_times(one.drawn, history.times).of(name)
-        values = values + offset_draws(fit, name, len(values), rng)[:, None]
-        parts.append(values + one.numerical.get(name, 0.0) * rng.standard_normal((len(values), 1)))
-    values = np.concatenate(parts)
-    alive = np.isfinite(values)
-    g = transform.forward(np.where(alive, values, 0.0)) + rng.standard_normal((len(values), smooth.shape[1])) @ smooth.T
-    values = np.where(alive, transform.inverse(g), np.nan)
-    grows = leading and _increases(central)
-    band = band_of_draws(values, history.times, white, transform, level, rng, grows=grows)
-    shares = variance_shares(drawn, best, history, name, transform, smooth, white)
-    return OutputForecast(name, history.times, central, band, shares)
-
-
-def _increases(values: Floats) -> bool:
-    finite = values[np.isfinite(values)]
-    return bool(finite.size < 2 or finite[-1] >= finite[0])
-
-
 # ---- times ---------------------------------------------------------------------------------------------------
 
 
 def _times(
-    drawn: Sequence[DrawnLaw],
-    best: DrawnLaw,
+    laws: Sequence[DrawnLaw],
     history: History,
     targets: Mapping[str, Sequence[float]],
     level: float,
     rng: np.random.Generator,
 ) -> tuple[TimeForecast, ...]:
     """Times to targets of outputs that are predicted, and to rupture."""
-    forecasts = []
-    for output, values in targets.items():
-        for target in values if output in best.central.outputs else ():
-            curve = best.central.of(output)[0]
-            rising = bool(np.append(curve[np.isfinite(curve)], target)[0] <= target)
-            crossings = np.concatenate(
-                [
-                    crossing_times(
-                        one.drawn, output, _targets_of_curves(best, history, output, target, one, rng), rising=rising
-                    )
-                    for one in drawn
-                ]
-            )
-            value = float(crossing_times(best.central, output, np.array([target]))[0])
-            measure = f"{history.strain_measure} " if output == "strain" else ""
-            event = f"{measure}{output.replace('_', ' ')} {target:g} {output_unit(output)}".strip()
-            measured = _measured_crossing(history, output, target)
-            made = _time_forecast(event, value, crossings, history, level, measured, censored=False)
-            forecasts.append(replace(made, output=output, target=float(target)))
-    ends = np.concatenate([one.drawn.end_times for one in drawn])
-    fit = best.draws.fit
-    if RUPTURE_OUTPUT in fit.noise_model.outputs:
-        ends = ends * np.exp(fit.noise_model[RUPTURE_OUTPUT].misfit * rng.standard_normal(ends.size))
-    asked = history.end_known or RUPTURE_OUTPUT in fit.noise_model.outputs or RUPTURE_OUTPUT in targets
+    forecasts, best = [], max(laws, key=lambda one: one.weight)
+    for name, target in ((name, target) for name, values in targets.items() for target in values):
+        if name not in best.central.outputs:
+            continue
+        output = BandedOutput(laws, history, name)
+        curve = best.central.of(name)[0]
+        rising = bool(np.append(curve[np.isfinite(curve)], target)[0] <= target)
+        crossings = [
+            crossing_times(one.drawn, name, output.reached(target, len(one.drawn.values), rng), rising=rising)
+            for one in laws
+        ]
+        value = float(crossing_times(best.central, name, np.array([target]))[0])
+        measure = f"{history.strain_measure} " if name == "strain" else ""
+        event = f"{measure}{name.replace('_', ' ')} {target:g} {output_unit(name)}".strip()
+        measured = _measured_crossing(history, name, target)
+        made = _time_forecast(event, value, np.concatenate(crossings), history, level, measured, censored=False)
+        forecasts.append(replace(made, output=name, target=float(target)))
+    ends = np.concatenate([one.drawn.end_times for one in laws])
+    ruptures = best.draws.fit.noise_model.outputs.get(RUPTURE_OUTPUT)
+    if ruptures is not None:
+        ends = ends * np.exp(ruptures.misfit * rng.standard_normal(ends.size))
+    asked = history.end_known or ruptures is not None or RUPTURE_OUTPUT in targets
     if np.isfinite(ends).any() and (asked or (ends <= history.times[-1]).mean() > NOTEWORTHY_CHANCE):
         measured = history.rupture_time or (float(history.times[-1]) if history.unruptured else float("nan"))
         value = float(best.central.end_times[0])
         forecasts.append(_time_forecast("rupture", value, ends, history, level, measured, censored=history.unruptured))
     return tuple(forecasts)
-
-
-def _targets_of_curves(
-    best: DrawnLaw, history: History, name: str, target: float, one: DrawnLaw, rng: np.random.Generator
-) -> Floats:
-    """(draws,) what predicted curves must reach, so that measured ones reach the target: without what lies beside them.
-
-    These are the offset of the test and what lasts over many frames; the noise of a single frame is left out.
-    """
-    fit, count = best.draws.fit, len(one.drawn.values)
-    known = fit.noise_model.outputs.get(name)
-    if known is None:
-        return np.full(count, target)
-    shifted = target - offset_draws(fit, name, count, rng)
-    transform = band_transform(fit, history, name, at_times(best.central, history.times).of(name)[0])
-    slow = np.sqrt(known.drift**2 + discrepancy_variance(fit, name, transform)) * rng.standard_normal(count)
-    if is_logarithmic(name):
-        return np.asarray(shifted * np.exp(-slow))
-    return np.asarray(shifted - float(getattr(transform, "scale", 1.0)) * slow)
 
 
 def _time_forecast(
@@ -225,57 +166,47 @@ def _measured_crossing(history: History, output: str, target: float) -> float:
 
 def _score(
     drawn: Sequence[DrawnLaw],
-    tests: tuple[History, History],
+    full: History,
+    banded: History,
     predictor: Predictor,
     outputs: Mapping[str, OutputForecast],
 ) -> tuple[TestScore | None, str]:
-    """The score of a measured test, or why it has none; tests : the history, and the same at the times of bands."""
-    full, history = tests
+    """The score of a measured test, or why it has none; banded : the test at the times of bands."""
     inside, whole = {}, {}
     for name, forecast in outputs.items():
-        if name not in history.outputs or not usable_frames(history, name).any():
+        if name not in banded.outputs or not usable_frames(banded, name).any():
             continue
-        used = usable_frames(history, name) & (history.times > 0)
-        values, band = history.outputs[name][used], forecast.band
-        within = (values >= band.low[used]) & (values <= band.high[used])
-        inside[name] = float(within.mean())
-        whole[name] = bool(((values >= band.lowest[used]) & (values <= band.highest[used])).all())
+        used, band = usable_frames(banded, name) & (banded.times > 0), forecast.band
+        values = banded.outputs[name]
+        inside[name] = float(((values >= band.low) & (values <= band.high))[used].mean())
+        whole[name] = bool(((values >= band.lowest) & (values <= band.highest))[used].all())
     try:
-        laws = [(one.draws.fit, one.weight, one.dimensions, one.misfit) for one in drawn]
-        score = score_test(laws, predictor, full, inside, whole)
+        return score_test(drawn, predictor, full, inside, whole), ""
     except CreepkitError as error:
         return None, f"no score: {error}"
-    return score, ""
 
 
 def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, OutputForecast]) -> dict[str, str]:
     """{part of the band: its size in words}."""
-    fit = best.draws.fit
-    sampled = has_sampled_draws(best.draws.fit)
-    whence = "samples of the posterior of its parameters" if sampled else "posterior covariance of its parameters"
-    parts = {LAW: f"{whence}, within their bounds"}
+    fit, sizes = best.draws.fit, defaultdict[str, list[str]](list)
+    whence = "samples of the posterior" if has_sampled_draws(fit) else "posterior covariance"
+    sizes[LAW].append(f"{whence} of its parameters, within their bounds")
     if len(drawn) > 1:
-        parts[CHOICE_OF_LAW] = ", ".join(f"{one.draws.fit.law.name} ({one.weight:.2g})" for one in drawn)
+        sizes[CHOICE_OF_LAW] += [f"{one.draws.fit.law.name} ({one.weight:.2g})" for one in drawn]
     for source, variance in best.own_variances.items():
         if variance > 0:
-            parts[source] = f"{100 * np.sqrt(variance):.2g} % of the rate"
+            sizes[source].append(f"{100 * np.sqrt(variance):.2g} % of the rate")
     for dimension in best.dimensions:
         unit = "mm" if is_length_nuisance(dimension.kind) else UNITS.get(dimension.kind, "")
-        parts[dimension.kind] = f"{dimension.mean:.4g} ± {dimension.sd:.2g} {unit}".strip()
-    for name in outputs:
-        known, unit = fit.noise_model.outputs.get(name), output_unit(name)
-        if known is None:
-            continue
-        for part, size in ((OFFSET, known.offset), (NOISE, known.noise)):
+        sizes[dimension.kind].append(f"{dimension.mean:.4g} ± {dimension.sd:.2g} {unit}".strip())
+    for name in (name for name in outputs if name in fit.noise_model.outputs):
+        known = fit.noise_model[name]
+        for part, size in (OFFSET, known.offset), (NOISE, known.noise), (NUMERICAL, best.numerical.get(name, 0.0)):
             if size > 0:
-                text = f"{name} {size:.2g} {unit}".strip()
-                parts[part] = f"{parts[part]}, {text}" if part in parts else text
-        if best.numerical.get(name, 0.0) > 0:
-            text = f"{name} {best.numerical[name]:.2g} {unit}".strip()
-            parts[NUMERICAL] = f"{parts[NUMERICAL]}, {text}" if NUMERICAL in parts else text
+                sizes[part].append(f"{name} {size:.2g} {output_unit(name)}".strip())
         if known.misfit > 0 or fit.noise_model.discrepancy > 0:
-            parts[MISFIT] = "what the fitted tests showed beside the law"
-    return parts
+            sizes[MISFIT] = ["what the fitted tests showed beside the law"]
+    return {part: ", ".join(texts) for part, texts in sizes.items()}
 
 
 FAR = 100.0
@@ -296,17 +227,16 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked
     stresses = reference_stresses(history, predictor)
     point = {"stress": stresses[stresses > 0], "temperature": temperatures, "time": history.times[-1:]}
     if "stress" in best.central.outputs:
-        point["stress"] = at_times(best.central, history.times).of("stress")[0]
+        point["stress"] = best.central.of("stress", history.times)[0]
     if "strain" in best.central.outputs:
-        strain = at_times(best.central, history.times).of("strain")[0]
+        strain = best.central.of("strain", history.times)[0]
         point["strain"] = np.array([np.nanmax(strain, initial=0.0)])
     parts = [extrapolation_text(fit.ranges, point, NEARBY).removeprefix("extrapolated: ")]
     if "stress" not in extrapolated_names(parts[0]) and point["stress"].size == stresses[stresses > 0].size:
         grid = [(float(s), float(T)) for s in point["stress"] for T in np.unique(np.round(temperatures, 1))]
         conditions = np.array(grid, float).reshape(-1, 2)
         parts.append(outside_combinations(fit, conditions[:, 0], conditions[:, 1]))
-    parts += _extrapolated_times(fit, history, asked)
-    parts = [part for part in parts if part]
+    parts = [part for part in (*parts, *_extrapolated_times(fit, asked)) if part]
     text = f"extrapolated: {', '.join(parts)}" if parts else ""
     low, high = fit.ranges["temperature"]
     celsius = float(temperatures.max())
@@ -319,56 +249,47 @@ def extrapolated_names(text: str) -> list[str]:
     return [name for name in ("stress", "temperature", "time", "strain") if re.search(rf"(^|, ){name} [0-9]", text)]
 
 
-def _extrapolated_times(fit: Identification, history: History, asked: Sequence[TimeForecast]) -> list[str]:
+def _extrapolated_times(fit: Identification, asked: Sequence[TimeForecast]) -> list[str]:
     """Of each time that is stated whether it, or the strain that is reached then, lies beyond the tests."""
     longest, largest = fit.ranges["time"][1], fit.ranges["strain"][1]
+    broke = any(m.rupture is not None and m.rupture.used for m in fit.tests)
     parts = []
     for one in asked:
         if np.isfinite(one.value) and one.value > (1.0 + NEARBY["time"]) * longest:
             parts.append(f"{one.event} after {one.value / HOUR:.3g} h (the longest test: {longest / HOUR:.3g} h)")
         elif one.output == "strain" and one.target > (1.0 + NEARBY["strain"]) * largest:
             parts.append(f"{one.event} (the tests reach {largest:.3g})")
-        elif (
-            not one.output
-            and np.isfinite(one.value)
-            and not any(m.rupture is not None and m.rupture.used for m in fit.tests)
-        ):
+        elif not one.output and np.isfinite(one.value) and not broke:
             parts.append(f"{one.event} (no test broke)")
     return parts
 
 
 def _notes(fit: Identification, history: History, outputs: Mapping[str, OutputForecast]) -> list[str]:
-    notes = []
+    notes, scatter = [], fit.scatter_of_rates
+    test, (mean, covariance) = scatter.new_test(history), scatter.mean_joint
     if any(m.name == history.name for m in fit.tests):
         notes.append("this test was fitted: the forecast is that of another one like it")
-    scatter = fit.scatter_of_rates
     for level in LEVELS:
         if history.labels.get(level) and not (level in scatter.levels or level in scatter.common):
             notes.append(f"its {level} ('{history.labels[level]}') says nothing: the fitted tests state none")
     unknown = [name for name in outputs if name not in fit.noise_model.outputs]
     if unknown:
         notes.append(f"no fitted test shows the noise of {' and '.join(unknown)}; it is not in the band")
-    scatter = fit.scatter_of_rates
-    test = scatter.new_test(history)
-    if scatter.known is None and len(fit.tests) < FEW_TESTS:
-        notes.append(
-            f"{len(fit.tests)} test{'s say' if len(fit.tests) > 1 else ' says'} little of the scatter between tests: "
-            f"what is usual holds it, {100 * USUAL_SD['test']:.0f} % of the rate"
-        )
-    for level, names in scatter.members.items():
-        stated = {name for name in names if not name.startswith("(of ")}
-        if len(stated) < FEW_TESTS:
-            plural = {"heat": "heats", "laboratory": "laboratories"}[level]
+    counts = {level: len({n for n in names if not n.startswith("(of ")}) for level, names in scatter.members.items()}
+    counts = {"test": len(fit.tests), **counts} if scatter.known is None else counts
+    for level, count in counts.items():
+        if count < FEW_TESTS:
+            plural = {"test": f"test{'s' * (count > 1)}", "heat": "heats", "laboratory": "laboratories"}[level]
+            says, among = "says" if plural == "test" else "say", "tests" if level == "test" else "them"
+            usual = f"{100 * USUAL_SD[level]:.0f} % of the rate"
             notes.append(
-                f"{len(stated)} {plural} say little of the scatter between them: what is usual holds it, "
-                f"{100 * USUAL_SD[level]:.0f} % of the rate"
+                f"{count} {plural} {says} little of the scatter between {among}: what is usual holds it, {usual}"
             )
     for level in test.unseen:
         notes.append(
             f"all fitted tests are of one {level}, and this is of another: the scatter between them is what is usual, "
             f"{100 * USUAL_SD[level]:.0f} % of the rate"
         )
-    mean, covariance = scatter.mean_joint
     for level, position in test.known.items():
         factor, sd = float(np.exp(mean[position])), float(np.sqrt(covariance[position, position]))
         notes.append(

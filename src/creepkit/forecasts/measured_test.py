@@ -22,6 +22,7 @@ from scipy.special import logsumexp
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats, Ints
+from creepkit.forecasts.drawn_law import DrawnLaw
 from creepkit.forecasts.draws import UncertainQuantity, systematic
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
@@ -30,7 +31,6 @@ from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVecto
 from creepkit.inverse.output_transforms import LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.importance_sampling import covariance_root
-from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 from creepkit.inverse.uncertainty.rate_scatter import NewTest
 from creepkit.records import History, Nuisance, Predictor
 
@@ -117,13 +117,12 @@ class LinearForecast:
     own: tuple[UncertainQuantity, ...]
     dimensions: tuple[UncertainQuantity, ...]
     log_scale: float
-    misfit: float = 0.0
+    misfit: float
 
     @classmethod
-    def of_test(
-        cls, fit: Identification, predictor: Predictor, history: History, dimensions: Sequence[UncertainQuantity]
-    ) -> LinearForecast:
+    def of_test(cls, law: DrawnLaw, predictor: Predictor, history: History) -> LinearForecast:
         """The linear forecast of a measured test by one law."""
+        fit, dimensions = law.draws.fit, law.dimensions
         kinds = tuple(Nuisance(d.kind, mean=d.mean, sd=d.sd if d.sd > 0 else EXACTLY_KNOWN) for d in dimensions)
         if RUPTURE_OUTPUT not in fit.noise_model.outputs:  # nothing is known of how lives scatter beside rates
             history = replace(history, rupture_time=None, unruptured=False)
@@ -160,6 +159,7 @@ class LinearForecast:
             tuple(dimensions[k] for k in own),
             tuple(dimensions),
             float(np.log(np.maximum(np.abs(slopes), 1e-300)).sum()),
+            0.0 if law.misfit is None else law.misfit.sd,
         )
 
     def evaluated(self, history: History) -> tuple[float, float, Floats]:
@@ -265,39 +265,30 @@ class LinearForecast:
 
 
 def score_test(
-    laws: Sequence[tuple[Identification, float, Sequence[UncertainQuantity], LawMisfit | None]],
+    laws: Sequence[DrawnLaw],
     predictor: Predictor,
     history: History,
     inside: Mapping[str, float],
     whole_inside: Mapping[str, bool],
 ) -> TestScore:
-    """The score of a measured test.
-
-    laws : each with its weight, the dimensions of the test, and what it misses there. inside, whole_inside : as
-        TestScore has them.
-    """
-    forecasts = [
-        replace(
-            LinearForecast.of_test(fit, predictor, history, dimensions), misfit=0.0 if misfit is None else misfit.sd
-        )
-        for fit, _, dimensions, misfit in laws
-    ]
-    weight = np.array([w for _, w, *_ in laws]) / sum(w for _, w, *_ in laws)
-    evaluated = [one.evaluated(history) for one in forecasts]
-    log_density = logsumexp([logsumexp(e[2]) - np.log(SCORED_NODES) for e in evaluated], b=weight)
+    """The score of a measured test by weighted laws; inside, whole_inside : as TestScore has them."""
+    forecasts = [LinearForecast.of_test(one, predictor, history) for one in laws]
+    weight = np.array([one.weight for one in laws]) / sum(one.weight for one in laws)
+    p_values, departures, densities = zip(*(one.evaluated(history) for one in forecasts), strict=True)
+    log_density = logsumexp([logsumexp(one) - np.log(SCORED_NODES) for one in densities], b=weight)
     best = forecasts[int(weight.argmax())]
     estimates, before, after = best.explained(history)
-    squares = float(((before / best.white) ** 2).sum())
+    squares, left = (float(((residuals / best.white) ** 2).sum()) for residuals in (before, after))
     return TestScore(
         inside,
         whole_inside,
         before.size,
-        float(weight @ [e[0] for e in evaluated]),
-        float(weight @ [e[1] for e in evaluated]),
+        float(weight @ p_values),
+        float(weight @ departures),
         float(log_density) / max(before.size, 1),
         best.rms(before),
         best.rms(after),
-        1.0 - float(((after / best.white) ** 2).sum()) / squares if squares > 0 else 0.0,
+        1.0 - left / squares if squares > 0 else 0.0,
         estimates,
     )
 

@@ -121,16 +121,5 @@ def merge_programs(*programs: Program, end: float) -> Floats:
     starts, ends = marks[:-1], marks[1:]
     columns = [starts, ends]
     for program in programs:
-        columns += [program.at(starts), _just_before(program, ends)]
+        columns += [program.at(starts), program.before(ends)]
     return np.ascontiguousarray(np.stack(columns, axis=1))
-
-
-def _just_before(program: Program, times: Floats) -> Floats:
-    """Values (times,) of a program as each of the times (times,), s, is approached from the left."""
-    after = np.searchsorted(program.times, times, side="left")
-    before = np.maximum(after - 1, 0)
-    after = np.minimum(after, program.times.size - 1)
-    width = program.times[after] - program.times[before]
-    share = np.divide(times - program.times[before], width, out=np.zeros_like(times), where=width > 0)
-    values = program.values
-    return np.asarray(values[before] + np.minimum(share, 1.0) * (values[after] - values[before]))

@@ -1,15 +1,18 @@
-"""The global search that an identification begins with: its starts, and how often its ends agree."""
+"""Where an identification begins: with a global search, or with an estimate that was made before."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple
 
 from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import (
@@ -19,6 +22,24 @@ from creepkit.inverse.search.multistart import (
     minima_counts,
 )
 from creepkit.records import Predictor
+
+
+@dataclass(frozen=True, eq=False)
+class StartingEstimate:
+    """Where an identification begins instead of with a global search; it takes two rounds at most.
+
+    u : (parameters,) conditioned coordinates about `reference`, None for a global search in these coordinates.
+    nuisances : explicit nuisances as they were estimated before.
+    """
+
+    u: Floats | None
+    nuisances: Sequence[NuisanceEstimate] = ()
+    reference: ReferencePoint | None = None
+
+    @classmethod
+    def from_identification(cls, fit: Identification) -> StartingEstimate:
+        """The estimates of another identification of the same law."""
+        return cls(fit.u, fit.nuisances, fit.reference)
 
 
 class SearchOutcome(NamedTuple):

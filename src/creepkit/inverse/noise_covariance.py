@@ -39,9 +39,8 @@ def _check(code: int) -> None:
 class CovarianceFactor:
     """The covariance C = L L' of all tests; L^-1 r is white.
 
-    series : of the observations. components : (5 outputs + 3,) as NoiseModel.components has them. counts : (tests,
-    observations) how often the square of each whitened value counts, or None for once. common : (tests, observations,
-    effects) S of errors that tests have alike, or None for none.
+    series : of the observations. components : (5 outputs + 3,) as NoiseModel.components has them. common : (tests,
+    observations, effects) S of errors that tests have alike, or None for none.
 
     With B = L_0 L_0' the blocks of single tests and U D V' the singular value decomposition of L_0^-1 S,
     C = B + S S' is L_0 (1 + U D^2 U') L_0', and its inverse root [1 - U (1 - (1 + D^2)^-1/2) U'] L_0^-1.
@@ -49,7 +48,6 @@ class CovarianceFactor:
 
     series: ObservationSeries
     components: Floats
-    counts: Floats | None = None
     common: Floats | None = None
 
     @classmethod
@@ -59,13 +57,9 @@ class CovarianceFactor:
         weighted = None if common is None else common / np.sqrt(residuals.test_weights)[:, None, None]
         return cls(residuals.series, noise_model.components, common=weighted)
 
-    def with_counts(self, counts: Floats) -> CovarianceFactor:
-        """The same with squares of whitened values counted (tests, observations) times."""
-        return replace(self, counts=counts)
-
     def whiten(self, values: Floats) -> Floats:
         """L^-1 v of values (tests, observations[, columns]), of the same shape; observations without data stay."""
-        whitened = self._whitened_by_tests(values)
+        whitened = self._transformed(values, inverse=False)[0]
         if self.common is None:
             return whitened
         left, squares = self._common_modes
@@ -89,19 +83,11 @@ class CovarianceFactor:
         own = self._transformed(np.zeros((*self.series.shape, 0)), inverse=False)[1]
         return own if self.common is None else own + float(np.log1p(self._common_modes[1]).sum())
 
-    def _whitened_by_tests(self, values: Floats) -> Floats:
-        """L_0^-1 v, each test by itself."""
-        whitened = self._transformed(values, inverse=False)[0]
-        if self.counts is None:
-            return whitened
-        roots = np.sqrt(self.counts)
-        return np.asarray(whitened * (roots if values.ndim == 2 else roots[..., None]))
-
     @cached_property
     def _common_modes(self) -> tuple[Floats, Floats]:
         """U, (tests x observations, effects), and the squares of D, (effects,)."""
         assert self.common is not None
-        rows = self._whitened_by_tests(self.common).reshape(-1, self.common.shape[-1])
+        rows = self._transformed(self.common, inverse=False)[0].reshape(-1, self.common.shape[-1])
         left, values, _ = np.linalg.svd(rows, full_matrices=False)
         return left, values**2
 
@@ -171,13 +157,6 @@ class NoiseLikelihood:
         self._components[:] = components
         _check(function("creepkit_restricted_likelihood")(*self._arguments))
         return float(self._value[0]), self._gradient.copy()
-
-
-def log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
-    """Gaussian log-likelihood of the residuals under a noise model."""
-    factor = CovarianceFactor.of_residuals(residuals, noise_model)
-    whitened, count = factor.whiten(residuals.values), int(residuals.present.sum())
-    return float(-0.5 * ((whitened**2).sum() + factor.log_determinant + count * np.log(2 * np.pi)))
 
 
 def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, Floats]:

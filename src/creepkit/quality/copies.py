@@ -201,36 +201,27 @@ def _last_digits(values: Floats) -> Floats:
     finite = values[np.isfinite(values)]
     if not finite.size or not np.abs(finite).max() > 0:
         return np.zeros(values.size)
-    own = np.maximum(_fixed_decimals(finite), _fixed_decimals(finite - finite[0]))
+    fixed = [_common_power(each) for each in (finite, finite - finite[0])]
+    own = max((10.0**power for power in fixed if power is not None), default=0.0)
     magnitude = np.where(np.isfinite(values) & (values != 0), np.abs(values), 1.0)
     exponent = np.floor(np.log10(magnitude))
-    digits = _significant_digits(finite)
-    by_size = np.zeros(values.size) if digits is None else 10.0 ** (exponent + 1 - digits)
+    power = _common_power((magnitude / 10.0**exponent)[np.isfinite(values) & (values != 0)])
+    by_size = np.zeros(values.size) if power is None else 10.0 ** (exponent + power)
     return np.asarray(np.where(np.isfinite(values), np.maximum(own, by_size), 0.0))
 
 
-def _fixed_decimals(values: Floats) -> float:
-    """The largest power of ten of which all values are multiples; 0 where there is none above their round-off."""
+def _common_power(values: Floats) -> int | None:
+    """The exponent of the largest power of ten of which all values are multiples; None where that is their round-off.
+
+    The round-off is the last one of DIGITS digits of the largest value.
+    """
     largest = float(np.abs(values).max())
     if largest <= 0:
-        return 0.0
-    top = int(np.floor(np.log10(largest)))
-    for power in range(top, top - DIGITS, -1):
-        scaled = values / 10.0**power
-        if (np.abs(scaled - np.round(scaled)) <= 1e-15 * np.abs(scaled).max() * 8 + 1e-12).all():
-            return float(10.0**power)
-    return 0.0
-
-
-def _significant_digits(values: Floats) -> int | None:
-    """The number of significant digits with which all values are written; None where they are exact."""
-    magnitude = np.abs(values[values != 0])
-    mantissa = magnitude / 10.0 ** np.floor(np.log10(magnitude))
-    for digits in range(1, DIGITS):
-        scaled = mantissa * 10.0 ** (digits - 1)
-        if (np.abs(scaled - np.round(scaled)) <= 1e-14 * scaled.max() * 8).all():
-            return digits
-    return None
+        return None
+    last = int(np.floor(np.log10(largest))) - DIGITS
+    common = str(np.gcd.reduce(np.rint(values / 10.0**last).astype(np.int64)))
+    zeros = len(common) - len(common.rstrip("0"))
+    return last + zeros if zeros else None
 
 
 class _Condition(NamedTuple):

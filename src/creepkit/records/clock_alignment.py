@@ -55,14 +55,6 @@ class ClockAlignment(Presentable, text="reports.instrument_records:alignment_tex
         """An alignment that is known: the record's time is t - zero + lag + drift (t - zero)."""
         return cls(zero, lag, drift, zero, (lag, lag), (drift, drift))
 
-    def record_time(self, camera_times: ArrayLike) -> Floats:
-        """(...,) s on the record's own clock.
-
-        camera_times : (...,) s on the camera's clock.
-        """
-        times = np.asarray(camera_times, dtype=float)
-        return np.asarray(times - self.zero + self.lag + self.drift * (times - self.middle))
-
     def camera_time(self, record_times: ArrayLike) -> Floats:
         """(...,) s on the camera's clock.
 

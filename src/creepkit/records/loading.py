@@ -70,8 +70,15 @@ class Program:
 
     def at(self, times: ArrayLike) -> Floats:
         """(...,) values at times (...,) s: the later one at a jump, the last one beyond the end."""
+        return self._interpolated(times, "right")
+
+    def before(self, times: ArrayLike) -> Floats:
+        """(...,) values as times (...,) s are approached from the left: the earlier one at a jump."""
+        return self._interpolated(times, "left")
+
+    def _interpolated(self, times: ArrayLike, side: Literal["left", "right"]) -> Floats:
         t = np.asarray(times, dtype=float)
-        index = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, self.times.size - 1)
+        index = np.clip(np.searchsorted(self.times, t, side=side) - 1, 0, self.times.size - 1)
         following = np.minimum(index + 1, self.times.size - 1)
         width = self.times[following] - self.times[index]
         fraction = np.divide(t - self.times[index], width, out=np.zeros_like(t), where=width > 0)

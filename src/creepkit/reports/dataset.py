@@ -13,12 +13,11 @@ from creepkit.errors import DatasetError
 from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, make_folder, panels_of, place_legend_below, save_figure, set_range
 from creepkit.reports.terminal import print_json, tell, tell_written
-from creepkit.sampling.conditions import ROOM_TEMPERATURE
+from creepkit.sampling.conditions import ROOM_TEMPERATURE, specimen_conditions
 from creepkit.sampling.criteria import OutcomeCriterion, RateLimit
 from creepkit.sampling.domains import Acceptance, SamplingDomain
 from creepkit.sampling.domains import acceptance as evaluate_acceptance
 from creepkit.sampling.rates import RateArguments, ln_rate
-from creepkit.sampling.specimen_conditions import specimen_conditions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

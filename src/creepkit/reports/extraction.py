@@ -24,6 +24,11 @@ _WIDTH, _HEIGHT, _PANEL = 14.0, 11.5, 1.75
 """Inches, of the sheet and of one map."""
 
 
+_MAPS = {"left": 0.05, "right": 0.91, "bottom": 0.06, "top": 0.89, "wspace": 0.06, "hspace": 0.22}
+_COURSES = {"left": 0.05, "right": 0.98, "bottom": 0.08, "top": 0.93, "wspace": 0.18, "hspace": 0.38}
+"""Places of maps and of what is drawn over time, as fractions of their halves of the sheet."""
+
+
 def extraction_figure(extraction: Extraction, path: str | Path | None = None) -> Figure:
     """A contact sheet, written to a file where a path is given.
 
@@ -33,13 +38,14 @@ def extraction_figure(extraction: Extraction, path: str | Path | None = None) ->
     """
     e = extraction
     figure = empty_figure(_WIDTH, _HEIGHT)
+    figure.set_layout_engine("none")  # a constrained layout of so many panels takes as long as all else
     outputs = list(e.outputs)
     shown = e.maps
     parts: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.15])
     top, bottom = parts
-    maps = top.subplots(2, len(shown), squeeze=False)
+    maps = top.subplots(2, len(shown), squeeze=False, gridspec_kw=_MAPS)
     _draw_maps(top, maps, e, shown)
-    panels = bottom.subplots(2, max(3, (len(outputs) + 4) // 2), squeeze=False).ravel()
+    panels = bottom.subplots(2, max(3, (len(outputs) + 4) // 2), squeeze=False, gridspec_kw=_COURSES).ravel()
     for axes, name in zip(panels, outputs, strict=False):
         _draw_output(axes, e, name)
     rest = panels[len(outputs) :]
@@ -83,18 +89,8 @@ def _draw_maps(figure: Any, axes: Any, e: Extraction, shown: tuple[FieldMap, ...
             panel = axes[row, k]
             seen = np.isfinite(values)
             size = sizes[row]
-            image = panel.scatter(
-                *e.places[seen].T,
-                c=values[seen],
-                s=size,
-                marker="s",
-                cmap=colours,
-                vmin=limits[0],
-                vmax=limits[1],
-                lw=0,
-                rasterized=True,
-            )
-            images.append(image)
+            look: Any = {"s": size, "marker": "s", "cmap": colours, "vmin": limits[0], "vmax": limits[1], "lw": 0}
+            images.append(panel.scatter(*e.places[seen].T, c=values[seen], rasterized=True, **look))
             lost = ~np.isfinite(one.heights)
             panel.scatter(*e.places[lost].T, c="0.6", s=0.7 * size, marker="x", lw=0.5)
             panel.plot(0.0, 0.0, "+", color="r", ms=6)
@@ -117,7 +113,8 @@ def _draw_maps(figure: Any, axes: Any, e: Extraction, shown: tuple[FieldMap, ...
     axes[0, 0].set_ylabel("heights, mm about the centre", fontsize=7)
     axes[1, 0].set_ylabel("residuals of the fit", fontsize=7)
     for row, label in ((0, "height, um"), (1, "residual, um")):
-        bar = figure.colorbar(images[row], ax=list(axes[row]), shrink=0.8, pad=0.01)
+        below, above = axes[row, -1].get_position().intervaly
+        bar = figure.colorbar(images[row], cax=figure.add_axes((0.925, below, 0.012, above - below)))
         bar.set_label(label, fontsize=7)
         bar.ax.tick_params(labelsize=6)
 

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from creepkit.discovery.combinations import FormWeight
     from creepkit.discovery.discover import TemperatureStudy
     from creepkit.discovery.elastic_moduli import ModulusEstimates
-    from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw
+    from creepkit.discovery.regression import FormCombination
+    from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.reports.svg import PageFigures
 
 
@@ -143,15 +144,15 @@ def _standard_deviations(function: Callable[[Floats], Floats], theta: Floats, co
     return np.array(deviations, float)
 
 
-def _curve_standard_deviations(function: Callable[[Floats], Floats], candidate: CandidateLaw, T: Floats) -> Floats:
+def _curve_standard_deviations(function: Callable[[Floats], Floats], candidate: FormCombination, T: Floats) -> Floats:
     """(temperatures,) standard deviations of a function of theta along a candidate's curve."""
-    names = list(candidate.internal_values)
+    names = list(candidate.values)
 
     def along(values: Floats) -> Floats:
-        displaced = replace(candidate, internal_values=dict(zip(names, map(float, values), strict=True)))
+        displaced = replace(candidate, values=dict(zip(names, map(float, values), strict=True)))
         return function(displaced.theta(T))
 
-    return delta_method(along, np.array(list(candidate.internal_values.values())), candidate.covariance)[1]
+    return delta_method(along, np.array(list(candidate.values.values())), candidate.covariance)[1]
 
 
 MAX_COMBINATIONS_LISTED = 6
@@ -217,7 +218,7 @@ def _combinations(law: TemperatureLaw) -> Table:
     rows = [
         (
             ", ".join(f"{name}:{form}" for name, form in one.forms.items()),
-            str(len(one.internal_values)),
+            str(len(one.values)),
             f"{one.criterion_difference:.1f}",
             f"{one.weight:.3f}",
         )

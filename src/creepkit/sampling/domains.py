@@ -29,12 +29,14 @@ from creepkit.sampling.coefficients import (
     term_groups,
 )
 from creepkit.sampling.conditions import (
+    END,
     PAPER_END,
     PAPER_INTERVAL,
     ConditionRanges,
     TimeGrid,
     condition_range,
     condition_ranges,
+    specimen_conditions,
 )
 from creepkit.sampling.criteria import Criterion, DrawCriterion, conditioned_criteria, paper_criteria
 from creepkit.sampling.draws import (
@@ -52,7 +54,6 @@ from creepkit.sampling.rates import (
     mean_ln_rate,
     reference_stress_of,
 )
-from creepkit.sampling.specimen_conditions import END, specimen_conditions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,19 +18,21 @@ from creepkit.errors import DatasetError
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, time
 from creepkit.records import History, Specimen
-from creepkit.sampling.conditions import ROOM_TEMPERATURE, TimeGrid, planned_test
-from creepkit.sampling.draws import Draws
-from creepkit.sampling.specimen_conditions import (
+from creepkit.sampling.conditions import (
     END,
+    ROOM_TEMPERATURE,
     TEMPERATURE,
     SpecimenConditions,
+    TimeGrid,
     check_stated,
     creep_output,
     mean_reference_stress,
+    planned_test,
     record_of,
     specimen_conditions,
     tested_piece,
 )
+from creepkit.sampling.draws import Draws
 from creepkit.specimens.load_scaling import LoadScaling
 
 

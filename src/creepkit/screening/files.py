@@ -20,7 +20,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +39,6 @@ from creepkit.records import History
 from creepkit.screening.results import AlloyResult, PredictedOutputs, WeightedLaw, mean_relative_squared_error
 
 if TYPE_CHECKING:
-    from creepkit.inverse.adequacy import Adequacy
     from creepkit.screening.results import ScreeningResult
 
 
@@ -95,53 +93,35 @@ def write_plate(plate: ScreeningResult, path: Path) -> Path:
 
 def _write_result(group: Any, result: AlloyResult) -> None:
     group.attrs.update(
-        {
-            "law": result.best.law.name if result.identified else "",
-            "verdict": result.verdict,
-            "reason": result.failure,
-            "decisive": result.decisive,
-            "notes": "\n".join(result.notes),
-        }
+        law=result.best.law.name if result.identified else "",
+        verdict=result.verdict,
+        reason=result.failure,
+        decisive=result.decisive,
+        notes="\n".join(result.notes),
     )
-    for k, weighted_law in enumerate(result.laws):
-        _write_law(group.create_group(f"laws/{k}"), weighted_law)
+    for k, weighted in enumerate(result.laws):
+        _write_law(group.create_group(f"laws/{k}"), weighted)
     if result.identified:
-        group["rate"] = np.array([float(v) for v in result.best.rate(COMPARISON_STRESS, warn=False)])
-        group["local_exponent"] = np.array(
-            [float(v) for v in result.best.local_exponent(COMPARISON_STRESS, warn=False)]
-        )
+        for name in COMPARED:
+            group[name] = np.array([float(v) for v in getattr(result.best, name)(COMPARISON_STRESS, warn=False)])
     if result.confirmation is not None:
-        confirmation = result.confirmation
-        confirmation_group = group.create_group("confirmation")
-        confirmation_group.attrs.update(
-            {"holds": confirmation.confirmed, "verdict": confirmation.verdict, "using": confirmation.predictor_name}
-        )
-        names = list(dict.fromkeys(o.output for t in confirmation.tests for o in t.outputs))
-        confirmation_group.attrs["outputs"] = names
-        confirmation_group["chi_square"] = _comparison_matrix(result, names, "chi_square")
-        confirmation_group["difference"] = _comparison_matrix(result, names, "difference")
+        made = result.confirmation
+        names = list(dict.fromkeys(o.output for t in made.tests for o in t.outputs))
+        values = {name: np.full((len(made.tests), len(names)), np.nan) for name in ("chi_square", "difference")}
+        for row, test in enumerate(made.tests):
+            for one in test.outputs:
+                column = names.index(one.output)
+                values["chi_square"][row, column] = one.simulation_errors.chi_square
+                values["difference"][row, column] = one.rms_difference
+        own = group.create_group("confirmation")
+        own.attrs.update(holds=made.confirmed, verdict=made.verdict, using=made.predictor_name, outputs=names)
+        own.update(values)
 
 
-def _comparison_matrix(result: AlloyResult, names: list[str], quantity: str) -> Any:
-    """(tests, outputs) of a confirmation; NaN for an output that a test has not."""
-    assert result.confirmation is not None
-    matrix = np.full((len(result.confirmation.tests), len(names)), np.nan)
-    for row, test in zip(matrix, result.confirmation.tests, strict=True):
-        for comparison in test.outputs:
-            value = comparison.simulation_errors.chi_square if quantity == "chi_square" else comparison.rms_difference
-            row[names.index(comparison.output)] = value
-    return matrix
-
-
-def _write_law(group: Any, weighted_law: WeightedLaw) -> None:
-    fit = weighted_law.fit
+def _write_law(group: Any, weighted: WeightedLaw) -> None:
+    fit = weighted.fit
     group.attrs.update(
-        {
-            "law": fit.law.name,
-            "weight": weighted_law.weight,
-            "excess": weighted_law.bic_difference,
-            "converged": fit.converged,
-        }
+        law=fit.law.name, weight=weighted.weight, excess=weighted.bic_difference, converged=fit.converged
     )
     group.attrs["names"] = [e.name for e in fit.estimates]
     for name in ("value", "low", "high"):
@@ -164,53 +144,49 @@ COMPARISON_STRESS = 100.0
 """MPa, at which rates and local exponents of alloys are compared."""
 
 
-def result_columns(plate: ScreeningResult, result: AlloyResult) -> dict[str, Any]:
+COMPARED = ("rate", "local_exponent")
+"""Methods of an identification that give them, with ends of intervals."""
+
+
+def result_columns(plate: ScreeningResult, result: AlloyResult) -> dict[str, str]:
     """Everything that the CSV says of one alloy."""
-    first_columns: dict[str, Any] = {"alloy": result.alloy, "class": plate.class_of(result.alloy)}
-    if not result.identified:
-        return {**first_columns, "tests": len(plate.histories[result.alloy]), "notes": result.failure}
-    fit = result.best
     columns = {
-        **first_columns,
-        "tests": len(plate.histories[result.alloy]),
-        "law": fit.law.name,
-        "weight": _number_text(result.laws[0].weight),
-        "decisive": "yes" if result.decisive else "no",
-        "verdict": result.verdict,
-        **_adequacy_columns(fit.adequacy),
-        "not_ruled_out": "; ".join(result.credible_laws[1:]),
-        "equivalents": "; ".join(result.equivalents),
-        **_interval_columns("rate_100MPa", fit.rate(COMPARISON_STRESS, warn=False)),
-        **_interval_columns("local_exponent_100MPa", fit.local_exponent(COMPARISON_STRESS, warn=False)),
-        "rate_strain": _number_text(fit.reference.strain),
-        "rate_time_s": _number_text(fit.reference.time),
-        "rate_temperature_K": _number_text(fit.reference.temperature),
-        **{f"rse_{name}": _number_text(e.relative_squared_error) for name, e in fit.errors.items()},
-        **{f"chi_square_{name}": _number_text(e.chi_square) for name, e in fit.errors.items()},
-        "confirmed": confirmation_text(result),
-        **_confirmation_columns(result),
-        "loss_reduced": _number_text(mean_relative_squared_error(result.reduced_fit)),
-        "loss_dense": "" if result.dense_fit is None else _number_text(mean_relative_squared_error(result.dense_fit)),
-        **({} if result.sparse_fit is None else {"law_by_penalty": result.sparse_fit.law.name}),
+        "alloy": result.alloy,
+        "class": plate.class_of(result.alloy),
+        "tests": str(len(plate.histories[result.alloy])),
     }
+    if not result.identified:
+        return {**columns, "notes": result.failure}
+    fit, confirmation, numbers = result.best, result.confirmation, dict[str, float]()
+    columns |= {"law": fit.law.name, "weight": _number_text(result.laws[0].weight)}
+    columns |= {"decisive": "yes" if result.decisive else "no", "verdict": result.verdict}
+    if fit.adequacy is not None:
+        left = {f"discrepancy_{o.output}": _number_text(o.discrepancy) for o in fit.adequacy.outputs}
+        columns |= {"adequacy": fit.adequacy.verdict, "p_value": _number_text(fit.adequacy.p_value), **left}
+    columns |= {"not_ruled_out": "; ".join(result.credible_laws[1:]), "equivalents": "; ".join(result.equivalents)}
+    for name in COMPARED:
+        ends = getattr(fit, name)(COMPARISON_STRESS, warn=False)
+        numbers |= {f"{name}_100MPa{end}": float(v) for end, v in zip(("", "_low", "_high"), ends, strict=True)}
+    for name, unit in (("strain", ""), ("time", "_s"), ("temperature", "_K")):
+        numbers[f"rate_{name}{unit}"] = getattr(fit.reference, name)
+    numbers |= {f"rse_{name}": e.relative_squared_error for name, e in fit.errors.items()}
+    numbers |= {f"chi_square_{name}": e.chi_square for name, e in fit.errors.items()}
+    columns |= {name: _number_text(v) for name, v in numbers.items()} | {"confirmed": confirmation_text(result)}
+    simulated: dict[str, list[float]] = {}
+    for one in (o for test in (confirmation.tests if confirmation is not None else ()) for o in test.outputs):
+        simulated.setdefault(one.output, []).append(one.simulation_errors.chi_square)
+    columns |= {f"confirmed_chi_square_{name}": _number_text(sum(v) / len(v)) for name, v in simulated.items()}
+    columns["loss_reduced"] = _number_text(mean_relative_squared_error(result.reduced_fit))
+    columns["loss_dense"] = (
+        "" if result.dense_fit is None else _number_text(mean_relative_squared_error(result.dense_fit))
+    )
+    if result.sparse_fit is not None:
+        columns["law_by_penalty"] = result.sparse_fit.law.name
     for e in fit.estimates:
-        columns |= {
-            e.name: _number_text(e.value),
-            f"{e.name}_low": _number_text(e.low),
-            f"{e.name}_high": _number_text(e.high),
-        }
-    return {
-        **columns,
-        "notes": "; ".join([*result.notes, *(f"{law}: {why}" for law, why in result.failed_laws.items())]),
-    }
-
-
-def _adequacy_columns(adequacy: Adequacy | None) -> dict[str, str]:
-    """Whether the best law explains the tests, and what it leaves of each output, in its unit."""
-    if adequacy is None:
-        return {}
-    left = {f"discrepancy_{o.output}": _number_text(o.discrepancy) for o in adequacy.outputs}
-    return {"adequacy": adequacy.verdict, "p_value": _number_text(adequacy.p_value), **left}
+        ends = {e.name: e.value, f"{e.name}_low": e.low, f"{e.name}_high": e.high}
+        columns |= {name: _number_text(v) for name, v in ends.items()}
+    notes = [*result.notes, *(f"{law}: {why}" for law, why in result.failed_laws.items())]
+    return {**columns, "notes": "; ".join(notes)}
 
 
 def write_csv(plate: ScreeningResult, path: Path) -> Path:
@@ -225,28 +201,11 @@ def write_csv(plate: ScreeningResult, path: Path) -> Path:
     return write_text(text.getvalue(), path, FitError)
 
 
-def _interval_columns(name: str, interval: Sequence[Any]) -> dict[str, str]:
-    return {
-        f"{name}{suffix}": _number_text(float(v)) for suffix, v in zip(("", "_low", "_high"), interval, strict=True)
-    }
-
-
 def confirmation_text(result: AlloyResult) -> str:
     """Whether the full simulation confirmed the result: yes, no, or nothing where it was not asked."""
     if result.confirmation is None:
         return ""
     return "yes" if result.confirmation.confirmed else "no"
-
-
-def _confirmation_columns(result: AlloyResult) -> dict[str, str]:
-    """{confirmed_chi_square_...}: of the simulation, the mean over tests."""
-    chi_squares: dict[str, list[float]] = {}
-    for test in result.confirmation.tests if result.confirmation is not None else ():
-        for comparison in test.outputs:
-            chi_squares.setdefault(f"confirmed_chi_square_{comparison.output}", []).append(
-                comparison.simulation_errors.chi_square
-            )
-    return {name: _number_text(sum(values) / len(values)) for name, values in chi_squares.items()}
 
 
 def _number_text(number: float) -> str:

@@ -86,10 +86,8 @@ class AlloyResult:
     def with_tests(self, tests: tuple[History, ...], predictor: Predictor) -> AlloyResult:
         """The same with its tests and predictor attached to every identification, for predictions and plots."""
         laws = tuple(replace(w, fit=w.fit.with_histories(tests, predictor)) for w in self.laws)
-        dense_fit, sparse_fit = (
-            None if fit is None else fit.with_histories(tests, predictor) for fit in (self.dense_fit, self.sparse_fit)
-        )
-        return replace(self, laws=laws, dense_fit=dense_fit, sparse_fit=sparse_fit)
+        dense, sparse = (f and f.with_histories(tests, predictor) for f in (self.dense_fit, self.sparse_fit))
+        return replace(self, laws=laws, dense_fit=dense, sparse_fit=sparse)
 
 
 def mean_relative_squared_error(fit: Identification) -> float:
@@ -144,10 +142,10 @@ class ScreeningResult(Presentable, text="reports.screening:screening_text"):
         return {result.alloy: result.failure for result in self.results if not result.identified}
 
     def __getitem__(self, alloy: str) -> AlloyResult:
-        for result in self.results:
-            if result.alloy == alloy:
-                return result
-        raise FitError(f"the plate has no alloy '{alloy}'; {nearest(alloy, [a.alloy for a in self.results])}")
+        known = {result.alloy: result for result in self.results}
+        if alloy not in known:
+            raise FitError(f"the plate has no alloy '{alloy}'; {nearest(alloy, known)}")
+        return known[alloy]
 
     def class_of(self, alloy: str) -> str:
         """The class of an alloy by its principal element; "unknown" without compositions."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.api.options import PlannedTestOptions, elastic_of
 from creepkit.errors import SurrogateError, nearest, quoted
-from creepkit.experiments.design_options import GoalOptions
+from creepkit.experiments.design_task import GoalOptions
 from creepkit.experiments.rig import Rig, changed_rigs
 from creepkit.forecasts.planned_tests import (
     COMPONENTS,
@@ -155,7 +155,7 @@ def check_parameters(file: StudyFile, table: KeyPath, names: Mapping[str, Any], 
 def predictor_of(file: StudyFile) -> Predictor | None:
     """What predicts the tests: the specimen of the study, or a surrogate; None for the specimens that tests name."""
     import creepkit as ck
-    from creepkit.surrogates.loading import reduced_order_models
+    from creepkit.surrogates.surrogate import reduced_order_models
 
     part = file.model.identification
     named = None if part is None else part.predictor

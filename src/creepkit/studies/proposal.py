@@ -127,7 +127,7 @@ def left_out_lines(quality: DataQuality) -> list[str]:
 def _identification(summary: DataSummary) -> dict[str, Any]:
     """What the tables [identification] and [[forecast]] say of the laws, and of the first test that has a curve."""
     import creepkit as ck
-    from creepkit.surrogates.loading import reduced_order_models
+    from creepkit.surrogates.surrogate import reduced_order_models
 
     laws, one = [law.name for law in candidates(summary.framed)], summary.framed[0]
     damage = {name for name in laws if "alpha" in ck.law(name).names}

@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from creepkit.api.options import ExportOptions, ForecastOptions, PlannedTestOptions
 from creepkit.discovery.discover import DiscoveryOptions
-from creepkit.experiments.design_options import GoalOptions
+from creepkit.experiments.design_task import GoalOptions
 from creepkit.experiments.rig import Rig
 from creepkit.extraction.options import ClockOptions, ExtractionOptions
 from creepkit.instruments.reading_options import RecordOptions

@@ -27,7 +27,7 @@ from creepkit.records import (
     dimension_named,
     dimensions_of,
 )
-from creepkit.sampling.specimen_conditions import MODULUS, TEMPERATURE
+from creepkit.sampling.conditions import MODULUS, TEMPERATURE
 from creepkit.surrogates.recipe import ProgressCallback
 
 if TYPE_CHECKING:
@@ -94,23 +94,18 @@ class LoadHistoryInputs:
             if length is not None:
                 values[:, position[length.name]] = given
                 derivatives[kind][:, position[length.name]] = 1.0
-        if "temperature" in nuisances:
-            temperature_change = nuisances["temperature"]
-            values[:, position["temperature"]] += temperature_change
-            derivatives["temperature"][:, position["temperature"]] = 1.0
-            if "modulus" in position:
-                moduli = [
-                    _modulus_at(history, temperature_change + step)
-                    for step in (0.0, -TEMPERATURE_STEP, TEMPERATURE_STEP)
-                ]
-                values[:, position["modulus"]] = moduli[0]
-                derivatives["temperature"][:, position["modulus"]] = (moduli[2] - moduli[1]) / (2 * TEMPERATURE_STEP)
-        if "modulus" in nuisances:
-            factor, k = 1.0 + nuisances["modulus"], position["modulus"]
-            derivatives["modulus"][:, k] = values[:, k]
-            values[:, k] *= factor
-            if "temperature" in nuisances:
-                derivatives["temperature"][:, k] *= factor
+        change, modulus = nuisances.get(TEMPERATURE), position.get(MODULUS)
+        if change is not None:
+            values[:, position[TEMPERATURE]] += change
+            derivatives[TEMPERATURE][:, position[TEMPERATURE]] = 1.0
+        if change is not None and modulus is not None:
+            steps = (0.0, -TEMPERATURE_STEP, TEMPERATURE_STEP)
+            values[:, modulus], below, above = (_modulus_at(history, change + step) for step in steps)
+            derivatives[TEMPERATURE][:, modulus] = (above - below) / (2 * TEMPERATURE_STEP)
+        if MODULUS in nuisances and modulus is not None:
+            derivatives[MODULUS][:, modulus] = values[:, modulus]
+            for array in (values, *(derivatives[kind] for kind in (TEMPERATURE,) if kind in nuisances)):
+                array[:, modulus] *= 1.0 + nuisances[MODULUS]
         return values, derivatives
 
     def series_values(self, history: History, times: Floats) -> Floats:

@@ -28,7 +28,7 @@ from creepkit.records import (
     broadcast_candidates,
     constant_load,
 )
-from creepkit.sampling.specimen_conditions import check_stated, creep_output, mean_reference_stress, tested_piece
+from creepkit.sampling.conditions import check_stated, creep_output, mean_reference_stress, tested_piece
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw

@@ -1,4 +1,4 @@
-"""Surrogates: trained networks as predictors."""
+"""Surrogates: trained networks as predictors, their files, and the tests that they apply to."""
 
 from __future__ import annotations
 
@@ -10,9 +10,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from creepkit.arrays import Floats, Ints
-from creepkit.errors import SurrogateError
-from creepkit.files.safetensors_files import write_safetensors
+from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
+from creepkit.errors import CreepkitError, SurrogateError, nearest
+from creepkit.files.json_documents import DocumentFormat
+from creepkit.files.reading import FileKind
+from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, ValueCodec
+from creepkit.files.safetensors_files import read_safetensors, write_safetensors
+from creepkit.language import CreepLaw
+from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.presentation import Presentable
 from creepkit.records import (
     History,
@@ -27,8 +33,14 @@ from creepkit.records import (
     assemble_prediction,
     broadcast_candidates,
     check_nuisances,
+    dimension_named,
+    known_specimens,
+    outputs_of,
     unpredicted,
 )
+from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
+from creepkit.sampling.conditions import TimeGrid, specimen_conditions
+from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.parameter_gru import ParameterGru
 from creepkit.surrogates.parameter_inputs import (
     LawInputs,
@@ -39,17 +51,124 @@ from creepkit.surrogates.parameter_inputs import (
     zero_coefficients,
 )
 from creepkit.surrogates.recipe import SampleArrays, SurrogateMetadata, Weights
-from creepkit.surrogates.tested_histories import (
-    check_history,
-    interpolation_weights,
-    observation_derivative,
-    observed_outputs,
-    prediction_frames,
-)
-from creepkit.surrogates.weight_files import CODEC, SURROGATE
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
+
+SURROGATE = DocumentFormat(
+    "creepkit-surrogate",
+    2,
+    FileKind("a surrogate", SurrogateError, "train again or take a copy", maximum_bytes=2**30),
+    remedy="train again",
+)
+"""Eight layers of 2048 units of a GRU take 0.8 GB, and one of the default size 1 MB."""
+
+
+CHECKPOINT = DocumentFormat(
+    "creepkit-training-checkpoint",
+    1,
+    FileKind("a checkpoint of a training", SurrogateError, "remove it to begin again", maximum_bytes=2**32),
+    remedy="remove it to begin again",
+)
+"""It holds the weights, the best ones, and two moments of each."""
+
+
+CODEC = RecordCodec(
+    values={
+        CreepLaw: ValueCodec(law_to_json, law_from_json),
+        Specimen: ValueCodec(specimen_to_json, specimen_from_json),
+    },
+    names={
+        "CreepLaw": CreepLaw,
+        "Specimen": Specimen,
+        "TimeGrid": TimeGrid,
+        "ApplicabilityDomain": ApplicabilityDomain,
+    },
+    default_range=ANY_NUMBER,
+)
+"""Of recipes, and of what a surrogate knows beside its weights."""
+
+
+RELATIVE_TOLERANCE = 1e-6
+
+
+def check_history(metadata: SurrogateMetadata, history: History) -> None:
+    """SurrogateError where a history is of another kind of test than those of the training."""
+    where, specimen = history.origin, metadata.specimen
+    quantity = specimen_conditions(specimen).load.name
+    if history.loading.quantity != quantity:
+        raise SurrogateError(f"{where}: its {history.loading.quantity} is prescribed; the surrogate knows {quantity}")
+    control = getattr(history.loading, "control", None)
+    if control not in (None, "load") and quantity == "stress" and metadata.provenance.get("control", "load") != control:
+        raise SurrogateError(f"{where}: true stress is held, and the surrogate was trained under held loads")
+    last = float(history.times[-1])
+    if not metadata.grid.relative and last > metadata.grid.end * (1 + RELATIVE_TOLERANCE):
+        raise SurrogateError(
+            f"{where}: it lasts {last:g} s, and the surrogate was trained up to {metadata.grid.end:g} s; leave later "
+            "frames out or train on longer tests"
+        )
+    observation = getattr(specimen, "observation", None)
+    if observation is not None and history.operator and history.operator != str(observation):
+        raise SurrogateError(f"{where}: observed by '{history.operator}'; the surrogate was trained on '{observation}'")
+    _check_lengths(where, metadata, history)
+
+
+def _check_lengths(where: str, metadata: SurrogateMetadata, history: History) -> None:
+    """Lengths must be those of the specimen, but for those that the applicability domain checks.
+
+    These are the lengths that were varied, and those that differ from test piece to test piece.
+    """
+    for name, value in history.geometry.items():
+        length = dimension_named(metadata.specimen, name)
+        if length is None or length.tolerance > 0.0 or length.name in metadata.conditions:
+            continue
+        if abs(length.default - value) > RELATIVE_TOLERANCE * length.default:
+            raise SurrogateError(f"{where}: {name} is {value:g} mm; the surrogate was trained on {length.default:g} mm")
+
+
+def prediction_frames(grid: TimeGrid, histories: Sequence[History]) -> list[Floats]:
+    """The times (frames,) s of the network for each history: as many for all, as far as the longest needs."""
+    if grid.relative:
+        return [grid.times(float(h.times[-1])) for h in histories]
+    last = max(float(h.times[-1]) for h in histories)
+    count = min(int(np.searchsorted(grid.values, last * (1 - RELATIVE_TOLERANCE))) + 1, grid.values.size)
+    return [grid.values[:count]] * len(histories)
+
+
+def interpolation_weights(frames: Floats, times: Floats) -> Floats:
+    """(times, frames) weights: linear in time between frames, constant before the first and beyond the last.
+
+    frames : (frames,) s. times : (times,) s.
+    """
+    position = np.interp(times, frames, np.arange(frames.size, dtype=float))
+    below = np.minimum(position.astype(int), frames.size - 1)
+    fraction, rows = position - below, np.arange(times.size)
+    weights = np.zeros((times.size, frames.size))
+    weights[rows, below] = 1.0 - fraction
+    weights[rows, np.minimum(below + 1, frames.size - 1)] += fraction
+    return weights
+
+
+def observed_outputs(specimen: Specimen, history: History, values: Floats) -> Floats:
+    """What a history's instrument shows, (candidates, times, outputs): of a creep strain, its own measure of strain.
+
+    values : (candidates, times, outputs) of the network.
+    """
+    observe = _strain_method(specimen, "observed_output")
+    return values if observe is None else np.asarray(observe(history, values[..., 0]))[..., None]
+
+
+def observation_derivative(specimen: Specimen, history: History, values: Floats) -> Floats:
+    """Derivative of what is shown to what the network gives, values (candidates, times, outputs); of that shape."""
+    derivative = _strain_method(specimen, "output_derivative")
+    return np.ones_like(values) if derivative is None else np.asarray(derivative(history, values[..., 0]))[..., None]
+
+
+def _strain_method(specimen: Specimen, name: str) -> Any:
+    """A method of creep strain of a specimen whose only output is a strain; None of others, which show one thing."""
+    outputs = outputs_of(specimen)
+    only_strain = len(outputs) == 1 and outputs[0].quantity == "strain"
+    return getattr(specimen, name, None) if only_strain else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,24 +184,53 @@ class SurrogateHeader:
 class NetworkQuery:
     """Inputs of the network for candidates x tests.
 
-    theta : (candidates, parameters) internal values. law_rows : (candidates, columns) of the law, as network inputs.
-    constants : (candidates, tests, constants). series : (tests, frames, series). base : (candidates, tests, frames).
-    derivatives : {nuisance: (candidates, tests, constants)} of the constants.
+    law_rows : (candidates, columns) of the law. constants : (candidates, tests, constants). derivatives : {nuisance:
+    (candidates, tests, constants)} of the constants. domain : (candidates, tests, inputs) of the applicability domain.
     """
 
-    theta: Floats
     law_rows: Floats
     constants: Floats
-    series: Floats
-    base: Floats | None
     derivatives: Mapping[str, Floats]
+    domain: Floats
 
-    def network_arguments(self) -> tuple[Floats, Floats, Floats | None]:
-        """Constants (rows, columns), series (tests, frames, series), base (rows, frames); rows: candidates x tests."""
-        count, tests = self.constants.shape[:2]
-        rows = np.repeat(self.law_rows, tests, axis=0)
-        constants = np.concatenate([rows, self.constants.reshape(count * tests, -1)], axis=1)
-        return constants, self.series, None if self.base is None else self.base.reshape(count * tests, -1)
+    @classmethod
+    def of_tests(
+        cls, inputs: LoadHistoryInputs, law_rows: Floats, tests: Sequence[tuple[History, Floats]], moved: NuisanceValues
+    ) -> NetworkQuery:
+        """The inputs of tests.
+
+        law_rows : (candidates, columns). tests : with frames, (frames,) s, each. moved : their nuisances.
+        """
+        count = len(law_rows)
+        perturbed = [
+            inputs.with_nuisances(history, {kind: v[:, k] for kind, v in moved.items()}, count)
+            for k, (history, _) in enumerate(tests)
+        ]
+        constants = np.stack([values for values, _ in perturbed], axis=1)
+        derivatives = {kind: np.stack([slopes[kind] for _, slopes in perturbed], axis=1) for kind in moved}
+        of_tests = np.array([[*inputs.domain_inputs(*test).values()] for test in tests])[:, constants.shape[2] :]
+        rows = np.broadcast_to(law_rows[:, None], (count, len(tests), law_rows.shape[1]))
+        domain = [rows, constants, np.broadcast_to(of_tests, (count, *of_tests.shape))]
+        return cls(law_rows, constants, derivatives, np.concatenate(domain, axis=2))
+
+    @property
+    def rows(self) -> Floats:
+        """(candidates x tests, columns + constants) of the network."""
+        count, tests, constants = self.constants.shape
+        law_rows = np.repeat(self.law_rows, tests, axis=0)
+        return np.concatenate([law_rows, self.constants.reshape(count * tests, constants)], axis=1)
+
+    def directions(self, law_derivatives: Floats) -> Floats:
+        """(candidates x tests, directions, columns + constants): how inputs move with parameters, then with nuisances.
+
+        law_derivatives : (candidates, columns, parameters).
+        """
+        (count, tests, constants), (_, columns, parameters) = self.constants.shape, law_derivatives.shape
+        directions = np.zeros((count * tests, parameters + len(self.derivatives), columns + constants))
+        directions[:, :parameters, :columns] = np.repeat(np.swapaxes(law_derivatives, 1, 2), tests, axis=0)
+        for k, slopes in enumerate(self.derivatives.values()):
+            directions[:, parameters + k, columns:] = slopes.reshape(count * tests, constants)
+        return directions
 
 
 class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
@@ -151,34 +299,30 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
             candidates = len(broadcast_candidates(theta, nuisances, len(histories))[0])
             remedy = f"simulate it with the specimen '{self.specimen.name}' itself"
             return unpredicted(histories, self.outputs, candidates, Status.OUTSIDE_CLASS, f"{reason}; {remedy}")
-        return self._predict(law, theta, histories, nuisances, sensitivities)
-
-    def _predict(
-        self,
-        law: CreepLaw,
-        theta: Floats,
-        histories: Sequence[History],
-        nuisances: NuisanceValues | None,
-        sensitivities: bool,
-    ) -> Prediction:
-        """Predict each history's outputs at its times; theta : (candidates, parameters)."""
-        complete_theta = complete_parameters(self.metadata.law, law, theta)
-        complete_theta, nuisances = broadcast_candidates(complete_theta, nuisances, len(histories))
+        theta = complete_parameters(self.metadata.law, law, theta)
+        theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
         frames = prediction_frames(self.metadata.grid, histories)
-        query = self._query(complete_theta, histories, frames, nuisances)
-        positions = [self.metadata.law.names.index(name) for name in law.names]
-        directions = self._directions(query, positions) if sensitivities and self.recipe.base == "none" else None
-        rows, row_derivatives = self.network.outputs_with_derivatives(*query.network_arguments(), directions)
+        inputs, law_inputs, based = self._history_inputs, self._law_inputs, self.recipe.base != "none"
+        tests = [*zip(histories, frames, strict=True)]
+        query = NetworkQuery.of_tests(inputs, law_inputs.input_rows(theta), tests, nuisances)
+        directions = None
+        if sensitivities and not based:
+            positions = [self.metadata.law.names.index(name) for name in law.names]
+            directions = query.directions(law_inputs.derivatives(theta)[:, :, positions])
+        base = self._base(theta, tests, nuisances) if based else None
+        series = np.stack([inputs.series_values(*test) for test in tests])
+        rows, row_derivatives = self.network.outputs_with_derivatives(query.rows, series, base, directions)
         shape = query.constants.shape[:2]
-        outputs = rows.reshape(*shape, *rows.shape[1:])
-        derivatives = None if directions is None else row_derivatives.reshape(*shape, *row_derivatives.shape[1:])
-        status = self._status(query, histories, frames)
+        outputs, derivatives = (v.reshape(*shape, *v.shape[1:]) for v in (rows, row_derivatives))
+        outside = self.metadata.domain.outside(query.domain)
+        status = np.where(outside, int(Status.OUTSIDE_DOMAIN), int(Status.COMPLETE)).astype(np.int64)
         parts = []
-        for k, history in enumerate(histories):
-            test_derivatives = None if derivatives is None else derivatives[:, k]
-            part = self._history_prediction(history, frames[k], outputs[:, k], test_derivatives, tuple(nuisances))
+        for k, (history, times) in enumerate(tests):
+            part = self._history_prediction(
+                history, times, outputs[:, k], None if directions is None else derivatives[:, k], tuple(nuisances)
+            )
             parts.append(replace(part, status=status[:, k]))
-        return assemble_prediction(parts, histories, self.outputs, len(complete_theta))
+        return assemble_prediction(parts, histories, self.outputs, len(theta))
 
     def predict_samples(self, samples: SampleArrays) -> Floats:
         """(rows, frames, outputs) of the network for samples of its recipe, in physical units."""
@@ -245,43 +389,15 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
     def _law_inputs(self) -> LawInputs:
         return LawInputs(self.metadata.law)
 
-    def _query(
-        self, theta: Floats, histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues
-    ) -> NetworkQuery:
-        perturbed = [
-            self._history_inputs.with_nuisances(h, {kind: v[:, k] for kind, v in nuisances.items()}, len(theta))
-            for k, h in enumerate(histories)
-        ]
-        return NetworkQuery(
-            theta=theta,
-            law_rows=self._law_inputs.input_rows(theta),
-            constants=np.stack([numbers for numbers, _ in perturbed], axis=1),
-            series=np.stack([self._history_inputs.series_values(h, t) for h, t in zip(histories, frames, strict=True)]),
-            base=self._base(theta, histories, frames, nuisances) if self.recipe.base != "none" else None,
-            derivatives={kind: np.stack([slopes[kind] for _, slopes in perturbed], axis=1) for kind in nuisances},
-        )
-
-    def _base(
-        self, theta: Floats, histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues
-    ) -> Floats:
-        """(candidates, tests, frames) what the model that is corrected predicts of the first output."""
-        tests = [h.replace(times=t, outputs={}, standard_deviation={}) for h, t in zip(histories, frames, strict=True)]
-        prediction = base_model(self.specimen, self.recipe.base).predict(
-            self.metadata.law, theta, tests, nuisances=nuisances
-        )
-        return hold_last_value(prediction.values[..., prediction.outputs.index(self.outputs[0])])
+    def _base(self, theta: Floats, tests: Sequence[tuple[History, Floats]], nuisances: NuisanceValues) -> Floats:
+        """(candidates x tests, frames) what the model that is corrected predicts of the first output."""
+        planned = [history.replace(times=times, outputs={}, standard_deviation={}) for history, times in tests]
+        model = base_model(self.specimen, self.recipe.base)
+        prediction = model.predict(self.metadata.law, theta, planned, nuisances=nuisances)
+        values = prediction.values[..., prediction.outputs.index(self.outputs[0])]
+        return hold_last_value(values).reshape(-1, values.shape[-1])
 
     # ---- outputs ---------------------------------------------------------------------------------------------------
-
-    def _directions(self, query: NetworkQuery, positions: Sequence[int]) -> Floats:
-        """(rows, directions, constants): how inputs move with parameters at `positions`, then with the nuisances."""
-        (count, tests, constants), columns = query.constants.shape, query.law_rows.shape[1]
-        directions = np.zeros((count * tests, len(positions) + len(query.derivatives), columns + constants))
-        law_derivatives = self._law_inputs.derivatives(query.theta)[:, :, list(positions)]
-        directions[:, : len(positions), :columns] = np.repeat(np.swapaxes(law_derivatives, 1, 2), tests, axis=0)
-        for k, constant_derivatives in enumerate(query.derivatives.values()):
-            directions[:, len(positions) + k, columns:] = constant_derivatives.reshape(count * tests, -1)
-        return directions
 
     def _history_prediction(
         self, history: History, frames: Floats, outputs: Floats, derivatives: Floats | None, nuisances: tuple[str, ...]
@@ -308,16 +424,49 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
             nuisance_jacobian=nuisance_jacobian,
         )
 
-    def _status(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Ints:
-        """(candidates, tests): complete, or outside the domain."""
-        outside = self.metadata.domain.outside(self._domain_inputs(query, histories, frames))
-        return np.where(outside, int(Status.OUTSIDE_DOMAIN), int(Status.COMPLETE)).astype(np.int64)
 
-    def _domain_inputs(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Floats:
-        """(candidates, tests, inputs) of the applicability domain."""
-        count, tests, constants = query.constants.shape
-        pairs = zip(histories, frames, strict=True)
-        test_rows = np.array([[*self._history_inputs.domain_inputs(*pair).values()] for pair in pairs])
-        test_summary = np.broadcast_to(test_rows[None, :, constants:], (count, tests, test_rows.shape[1] - constants))
-        rows = np.broadcast_to(query.law_rows[:, None], (count, tests, query.law_rows.shape[1]))
-        return np.concatenate([rows, query.constants, test_summary], axis=2)
+def reduced_order_models() -> dict[str, SupportsReducedOrderModel]:
+    """{name of a surrogate: the known specimen whose reduced-order model it is}.
+
+    The name is the specimen's `surrogate_name`, by default its own.
+    """
+    return {
+        getattr(specimen, "surrogate_name", name): specimen
+        for name, specimen in known_specimens().items()
+        if isinstance(specimen, SupportsReducedOrderModel)
+    }
+
+
+SUFFIX = ".safetensors"
+
+
+@checked
+def surrogate(name_or_path: str | Path) -> Predictor:
+    """Return a cheap model that stands for a specimen, by its name or from its file.
+
+    name_or_path : "dimple", the reduced-order model of the default bulge specimen; or the file of a trained network,
+        see train().
+    """
+    text = str(name_or_path)
+    if isinstance(name_or_path, str) and not text.endswith(SUFFIX) and text in (named := reduced_order_models()):
+        return named[text].reduced_order_model()
+    if not (text.endswith(SUFFIX) or Path(text).exists()):
+        choices = nearest(text, reduced_order_models())
+        raise SurrogateError(f"no surrogate is called '{text}', and there is no such file; {choices}")
+    return load_surrogate(text)
+
+
+def load_surrogate(path: str | Path) -> Surrogate:
+    """Return the surrogate in a file; SurrogateError says what is wrong with any other file."""
+    weights, header = read_safetensors(path, SURROGATE)
+    try:
+        found = CODEC.from_json(SurrogateHeader, header, "its header")
+        surrogate = Surrogate(found.recipe, weights, found.metadata)
+        infinite = [name for name, one in weights.items() if not np.isfinite(np.asarray(one, dtype=float)).all()]
+        if infinite:
+            raise SurrogateError(f"its weights '{infinite[0]}' are not finite; train it again")
+    except CreepkitError as error:
+        raise SurrogateError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+    except (KeyError, TypeError, ValueError, RuntimeError, AttributeError):
+        raise SurrogateError(f"{path}: its header and its weights do not belong together; train it again") from None
+    return surrogate

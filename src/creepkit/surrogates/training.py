@@ -1,8 +1,13 @@
-"""Training of surrogates: train, resume from a checkpoint, and size studies (Fig. S7 of the paper)."""
+"""Training of surrogates: epochs of Adam, checkpoints from which a training goes on, and size studies (Fig. S7).
+
+Every epoch has its own random seed, derived from the seed of the training and the epoch number, so that a training
+resumed from a checkpoint gives the same result.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -12,6 +17,8 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch import Tensor
+from torch.optim.lr_scheduler import ReduceLROnPlateau
 
 from creepkit.arrays import Ints
 from creepkit.checked_arguments import checked
@@ -20,16 +27,182 @@ from creepkit.dataset.storage import read_dataset
 from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import as_read_back
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
-from creepkit.surrogates.evaluation import evaluate_rows
-from creepkit.surrogates.loading import load_surrogate
+from creepkit.surrogates.evaluation import (
+    dataset_fingerprint,
+    evaluate_rows,
+    output_deviation,
+    trainable_samples,
+    training_split,
+)
 from creepkit.surrogates.network_evaluation import RecurrentCell
 from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru
-from creepkit.surrogates.parameter_network import sample_tensors, weights_of
-from creepkit.surrogates.recipe import ProgressCallback, Training
-from creepkit.surrogates.surrogate import Surrogate
-from creepkit.surrogates.training_loop import NetworkTraining
-from creepkit.surrogates.training_rows import dataset_fingerprint, output_deviation, trainable_samples, training_split
-from creepkit.surrogates.weight_files import CHECKPOINT
+from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors, sample_tensors, weights_of
+from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, Training, Weights
+from creepkit.surrogates.surrogate import CHECKPOINT, Surrogate, load_surrogate
+
+LEAST_LEARNING_RATE = 1e-8
+"""To which a plateau lowers it."""
+
+
+def epochs_since_best(losses: Sequence[float]) -> int:
+    """Epochs since the lowest loss; 0 when the last was the lowest."""
+    finite = [loss if math.isfinite(loss) else math.inf for loss in losses]
+    return len(finite) - 1 - finite.index(min(finite)) if finite else 0
+
+
+VALIDATION_BATCH = 256
+"""Rows in a batch without gradients."""
+
+
+class NetworkTraining:
+    """A network between epochs.
+
+    rows : positions (rows,) of the training and of the validation rows.
+    curves : {"loss": of training rows during the epoch, "validation": of those set aside after it, "rse": Eq. (4) of
+        the latter, "rate": Adam's}, a number each epoch. best : weights of the epoch with the lowest validation loss.
+    """
+
+    def __init__(
+        self,
+        module: ParameterModule,
+        samples: SampleArrays,
+        rows: tuple[Ints, Ints],
+        training: Training,
+        seed: int,
+        device: torch.device,
+    ) -> None:
+        self.module, self.device = module.to(device), device
+        self.samples = {name: tensor.to(device) for name, tensor in sample_tensors(samples).items()}
+        self.train, self.validation = (torch.from_numpy(part).to(device) for part in rows)
+        self.training, self.seed = training, seed
+        self.adam = torch.optim.Adam(module.parameters(), lr=training.rate)
+        self.plateau = ReduceLROnPlateau(self.adam, patience=training.patience, min_lr=LEAST_LEARNING_RATE)
+        self.curves: dict[str, list[float]] = {"loss": [], "validation": [], "rse": [], "rate": []}
+        self.best = self._weights()
+        self._scale = torch.from_numpy(output_deviation(samples, rows[0])).to(device)
+        self._total_squares = self._validation_squares()
+
+    @property
+    def epochs(self) -> int:
+        """Epochs that are done."""
+        return len(self.curves["loss"])
+
+    @property
+    def finished(self) -> bool:
+        """Whether all epochs are done, or enough of them were of no use."""
+        patience = self.training.early_stop
+        stalled = patience is not None and epochs_since_best(self.curves["validation"]) >= patience
+        return self.epochs >= self.training.epochs or stalled
+
+    def run(self, after_epoch: Callable[[NetworkTraining], None], progress: ProgressCallback | None) -> None:
+        """Go through the epochs that are left; `after` is called with the fit when one is done."""
+        while not self.finished:
+            self.epoch()
+            after_epoch(self)
+            if progress is not None:
+                note = f"loss {self.curves['rse'][-1]:.3g}, best {min(self.curves['rse']):.3g}"
+                done = self.training.epochs if self.finished else self.epochs
+                progress("epochs", done, self.training.epochs, note)
+
+    def epoch(self) -> None:
+        """One pass over the training rows, then the loss of the validation rows."""
+        loss, rate = self._train_epoch()
+        validation, rse = self.validate()
+        if not (math.isfinite(loss) and math.isfinite(validation)):
+            raise SurrogateError(
+                f"the training diverged in epoch {self.epochs + 1}: its loss is not a finite number; lower the rate "
+                f"({self.training.rate:g}) or limit the gradient with clip=1"
+            )
+        if validation < min(self.curves["validation"], default=math.inf):
+            self.best = self._weights()
+        for name, value in (("loss", loss), ("validation", validation), ("rse", rse), ("rate", rate)):
+            self.curves[name].append(value)
+        if self.training.schedule == "plateau":
+            self.plateau.step(validation)
+
+    def _train_epoch(self) -> tuple[float, float]:
+        """The mean loss of the batches, and the rate at the beginning."""
+        devices, rates = [self.device] if self.device.type == "cuda" else [], []
+        total = torch.zeros((), dtype=torch.float64, device=self.device)
+        self.module.train()
+        with torch.random.fork_rng(devices=devices):
+            torch.manual_seed(int(np.random.SeedSequence((self.seed, self.epochs)).generate_state(1)[0]))
+            order = self.train[torch.randperm(len(self.train)).to(self.device)]
+            batches = torch.split(order, self.training.batch)
+            for k, rows in enumerate(batches):
+                if self.training.schedule == "cosine":
+                    done = (self.epochs + k / len(batches)) / self.training.epochs
+                    self.adam.param_groups[0]["lr"] = self.training.rate * 0.5 * (1.0 + math.cos(math.pi * done))
+                rates.append(float(self.adam.param_groups[0]["lr"]))
+                total += self._step(rows) * len(rows)
+        return float(total) / len(order), rates[0]
+
+    def _step(self, rows: Tensor) -> Tensor:
+        self.adam.zero_grad()
+        loss = self.module.loss(_batch(self.samples, rows))
+        loss.backward()  # type: ignore[no-untyped-call]
+        if self.training.clip is not None:
+            torch.nn.utils.clip_grad_norm_(self.module.parameters(), self.training.clip)
+        self.adam.step()
+        return loss.detach().double()
+
+    @torch.no_grad()
+    def validate(self) -> tuple[float, float]:
+        """The module's loss, and Eq. (4), of the validation rows."""
+        self.module.eval()
+        total = torch.zeros((), dtype=torch.float64, device=self.device)
+        squares = torch.zeros((), dtype=torch.float64, device=self.device)
+        for rows in torch.split(self.validation, VALIDATION_BATCH):
+            batch = _batch(self.samples, rows)
+            loss, predicted = self.module.loss_and_outputs(batch)
+            total += loss.double() * len(rows)
+            errors = (predicted - batch["targets"]).double() / self._scale
+            squares += torch.where(batch["mask"][..., None], errors, 0.0).square().sum()
+        return float(total) / len(self.validation), float(squares) / self._total_squares
+
+    def _validation_squares(self) -> float:
+        """Squared deviations of the validation rows from their mean at each time."""
+        targets, mask = (
+            self.samples["targets"][self.validation].double(),
+            self.samples["mask"][self.validation][..., None],
+        )
+        mean = torch.where(mask, targets, 0.0).sum(dim=0) / mask.sum(dim=0).clamp(min=1)
+        return max(float(torch.where(mask, (targets - mean) / self._scale, 0.0).square().sum()), 1e-300)
+
+    def _weights(self) -> dict[str, Tensor]:
+        return {name: tensor.detach().cpu().clone() for name, tensor in self.module.state_dict().items()}
+
+    # ---- between runs ----------------------------------------------------------------------------------------------
+
+    def state(self) -> Weights:
+        """{name: (...,)} all arrays that going on needs: weights, the best ones, Adam's moments."""
+        tensors = {f"module/{name}": tensor for name, tensor in self._weights().items()}
+        tensors |= {f"best/{name}": tensor for name, tensor in self.best.items()}
+        for number, moments in self.adam.state_dict()["state"].items():
+            tensors |= {f"adam/{number}/{name}": torch.as_tensor(value).cpu() for name, value in moments.items()}
+        return weights_of(tensors)
+
+    def restore(self, arrays: Weights, curves: dict[str, list[float]]) -> None:
+        """Go back to where `state` was asked; arrays : {name: (...,)} what it gave."""
+        tensors = {name: torch.from_numpy(array) for name, array in arrays.items()}
+        self.module.load_state_dict(_with_prefix(tensors, "module/"))
+        self.best = _with_prefix(tensors, "best/")
+        moments: dict[int, dict[str, Any]] = {}
+        for name, tensor in _with_prefix(tensors, "adam/").items():
+            number, _, moment = name.partition("/")
+            moments.setdefault(int(number), {})[moment] = tensor
+        self.adam.load_state_dict({**self.adam.state_dict(), "state": moments})
+        self.curves = {name: list(values) for name, values in curves.items()}
+        for loss in self.curves["validation"] if self.training.schedule == "plateau" else ():
+            self.plateau.step(loss)
+
+
+def _batch(samples: SampleTensors, rows: Tensor) -> SampleTensors:
+    return {name: tensor[rows] for name, tensor in samples.items()}
+
+
+def _with_prefix(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}
 
 
 def training_request(data: Dataset, recipe: ParameterGru, seed: int) -> dict[str, Any]:
@@ -41,20 +214,20 @@ def training_request(data: Dataset, recipe: ParameterGru, seed: int) -> dict[str
     return request
 
 
+@dataclass(frozen=True)
 class Checkpoint:
-    """Where a training leaves what it needs to go on; without a path it leaves nothing."""
+    """Where a training leaves what it needs to go on; without a path it leaves nothing. request : what was asked."""
 
-    def __init__(self, result_path: Path | None, request: Mapping[str, Any]) -> None:
-        self.path = None if result_path is None else result_path.with_name(f"{result_path.name}.checkpoint")
-        self.request = dict(request)
+    path: Path | None
+    request: dict[str, Any]
 
-    def save(self, state_of_training: NetworkTraining) -> None:
+    def save(self, fit: NetworkTraining) -> None:
         """Leave a fit as it is, in the place of what was left before."""
         if self.path is not None:
-            header = {"call": self.request, "curves": state_of_training.curves}
-            write_safetensors(self.path, state_of_training.state(), header, CHECKPOINT, internal=True)
+            header = {"call": self.request, "curves": fit.curves}
+            write_safetensors(self.path, fit.state(), header, CHECKPOINT, internal=True)
 
-    def restore(self, state_of_training: NetworkTraining) -> None:
+    def restore(self, fit: NetworkTraining) -> None:
         """Bring a fresh fit to where the same call was interrupted, if it was."""
         if self.path is None or not self.path.exists():
             return
@@ -66,14 +239,9 @@ class Checkpoint:
                 "file, or choose another name"
             )
         try:
-            state_of_training.restore(tensors, header["curves"])
+            fit.restore(tensors, header["curves"])
         except (KeyError, RuntimeError, ValueError, TypeError, AttributeError):
             raise SurrogateError(f"{self.path}: this checkpoint is damaged; remove it to begin again") from None
-
-    def remove(self) -> None:
-        """The training is done and its file written."""
-        if self.path is not None:
-            self.path.unlink(missing_ok=True)
 
 
 @checked
@@ -111,7 +279,7 @@ def train(
         module = recipe.module(data, tensors, train_rows)
     metadata = recipe.metadata(data, tensors, train_rows, module)
     fit = NetworkTraining(module, samples, rows, recipe.training, seed, torch_device)
-    checkpoint = Checkpoint(path, request)
+    checkpoint = Checkpoint(None if path is None else path.with_name(f"{path.name}.checkpoint"), request)
     checkpoint.restore(fit)
     fit.run(checkpoint.save, progress)
     weights = weights_of(fit.best)
@@ -122,7 +290,7 @@ def train(
     result = Surrogate(recipe, weights, metadata)
     if path is not None:
         result.save(path)
-        checkpoint.remove()
+        path.with_name(f"{path.name}.checkpoint").unlink(missing_ok=True)
     return result
 
 
@@ -210,17 +378,13 @@ def size_study(
     # an error now, not after hours of training
     training_split(len(data), replace(recipe.training, samples=max(counts)), seed)
     folder.mkdir(parents=True, exist_ok=True)
-    cells, layers, hidden = (
-        sizes.cells or (recipe.cell,),
-        sizes.layers or (recipe.layers,),
-        sizes.hidden or (recipe.hidden,),
-    )
-    combinations = list(product(cells, layers, hidden, counts))
+    widths = sizes.layers or (recipe.layers,), sizes.hidden or (recipe.hidden,)
+    combinations = list(product(sizes.cells or (recipe.cell,), *widths, counts))
     results = []
-    for k, (cell, depth, size, count) in enumerate(combinations):
-        settings = replace(recipe.training, samples=count)
-        variant = replace(recipe, cell=cell, layers=depth, hidden=size, training=settings)
-        path = folder / f"{cell}-{size}x{depth}-{count}.safetensors"
+    for k, (cell, layers, hidden, count) in enumerate(combinations):
+        training = replace(recipe.training, samples=count)
+        variant = replace(recipe, cell=cell, layers=layers, hidden=hidden, training=training)
+        path = folder / f"{cell}-{hidden}x{layers}-{count}.safetensors"
         named_progress = _with_task_name(progress, f"{k + 1} of {len(combinations)}, {path.stem}")
         model = train(data, variant, to=path, seed=seed, device=device, progress=named_progress)
         results.append(_study_result(model, variant, count, path))

@@ -50,7 +50,7 @@ def check_foreign_files(format: CameraFormat, _: Path | None) -> str:
 
 
 def _read(format: CameraFormat, path: Path) -> object:
-    return read_frames(path, [format], format)
+    return read_frames(path, [format], format)[0]
 
 
 @finding("example")

@@ -32,8 +32,7 @@ from creepkit.studies.kept_results import ResultFolder
 from creepkit.studies.lock import STUDY_LOCK, read_lock
 from creepkit.studies.stages import numbers_of_ranking
 from creepkit.studies.study import study_of_report
-from creepkit.surrogates.loading import load_surrogate
-from creepkit.surrogates.weight_files import SURROGATE
+from creepkit.surrogates.surrogate import SURROGATE, load_surrogate
 from helpers.paths import ROOT
 
 MADE = ROOT / "tests" / "data" / "mutated"

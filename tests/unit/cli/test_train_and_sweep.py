@@ -9,9 +9,8 @@ import creepkit as ck
 from creepkit.dataset.storage import write_dataset
 from creepkit.reports.surrogate import size_study_rows
 from creepkit.surrogates import training as sweeping
-from creepkit.surrogates.evaluation import evaluate
+from creepkit.surrogates.evaluation import evaluate, training_split
 from creepkit.surrogates.parameter_gru import NetworkSizes
-from creepkit.surrogates.training_rows import training_split
 from helpers.command_line import answers, creepkit
 from helpers.planted_datasets import bars
 

@@ -104,8 +104,8 @@ def test_planted_forms_remain_and_q_lies_in_its_interval():
         kept += "arrhenius" in names["A"] and "linear" in names["n"]
         alike = [one for one in found.combinations if one.forms["A"] == "arrhenius"]
         weights = np.array([one.weight for one in alike])
-        value = np.array([one.regression.values["Q"] for one in alike])
-        sd = np.array([np.sqrt(o.regression.covariance[(k := list(o.regression.values).index("Q")), k]) for o in alike])
+        value = np.array([one.values["Q"] for one in alike])
+        sd = np.array([np.sqrt(o.covariance[(k := list(o.values).index("Q")), k]) for o in alike])
         scale = sd * np.sqrt(found.overdispersion)
         _, low, high = MixtureDistribution(weights / weights.sum(), np.full(len(alike), 1e9), value, scale).interval()
         inside += low <= Q <= high
@@ -145,7 +145,7 @@ def test_scatter_beyond_the_covariances_widens_them():
 
 def combine_chi(given):
     tried = rank_combinations(given, libraries()).combinations
-    return min(one.regression.chi_square / (one.regression.rows - one.regression.parameter_count) for one in tried)
+    return min(one.chi_square / (one.rows - one.parameter_count) for one in tried)
 
 
 def test_a_form_with_a_number_of_its_own_is_an_offset():

@@ -1,4 +1,4 @@
-"""What a rig can make: grids of planned tests, variations of tests that were made, and what it refuses."""
+"""What a rig can make: grids of planned tests, and what it refuses."""
 
 import copy
 import pickle
@@ -8,10 +8,10 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.experiments.candidate_tests import frame_times, grid_of_rig, variations_of_tests
+from creepkit.experiments.candidate_tests import frame_times, grid_of_rig
 from creepkit.experiments.rig import Rig, rigs_of
 from creepkit.laws.norton import NORTON
-from creepkit.records import PressureJump, constant_strain
+from creepkit.records import PressureJump
 from creepkit.specimens.bulge.specimen import Bulge
 from helpers.log_rate_predictor import END, LogRates, measured
 
@@ -70,28 +70,6 @@ def test_frames_come_at_the_interval_of_the_rig():
     assert frame_times(3600.0, 100.0)[0] == pytest.approx(100.0)
     assert frame_times(3600.0, 900.0).size == 8
     assert frame_times(1e6, 60.0).size == 60
-
-
-def test_variations_are_of_the_longest_test():
-    base = bars_made(40.0, 60.0)
-    found = variations_of_tests(base, rigs_of(base, LogRates()), exponent=4.0)
-    levels = [c.histories[0].loading.program().values for c in found]
-    assert [float(v[0]) for v in levels[:3]] == pytest.approx([28.0, 42.0, 84.0])
-    assert float(found[0].histories[0].times[-1]) == pytest.approx(2.0 * END)  # more strain would take too long
-    assert float(found[2].histories[0].times[-1]) == pytest.approx(END * (84 / 40) ** -4)
-    assert any(np.ptp(v) > 0 for v in levels)
-    assert float(found[-1].histories[0].times[-1]) == pytest.approx(2.0 * END)
-    relaxed = base[0].replace(loading=constant_strain(0.002))
-    assert variations_of_tests([relaxed], rigs_of([relaxed], LogRates()))
-
-
-def test_variations_of_bulge_tests_change_pressure_and_thickness():
-    base = dimple(geometry={"apex_thickness": 0.5})
-    told = {c.description: c for c in variations_of_tests([base], rigs_of([base], Bulge()))}
-    assert any(text.startswith("14 MPa for") for text in told)
-    assert any(text.startswith("8 MPa to ") and " h, then 14 MPa to " in text for text in told)
-    thicknesses = {h.geometry["apex_thickness"] for c in told.values() for h in c.histories}
-    assert thicknesses == {0.45, 0.5, 0.55}
 
 
 def test_any_load_is_varied_in_its_unit_after_the_ramp_that_was_made():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.experiments.design import design, further_tests
+from creepkit.experiments.design import design
 from creepkit.experiments.rig import Rig
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection import rank
@@ -183,7 +183,7 @@ def test_the_expected_chi_square_is_met_when_the_test_is_made(hardening):
 
 def test_where_one_law_remains_nothing_is_proposed(hardening):
     alone = rank([hardening.best])
-    assert further_tests(alone).tests == ()
+    assert alone.further_tests().tests == ()
     assert "one law remains, " in design(alone, goal="law").sentence
 
 

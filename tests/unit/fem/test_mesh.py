@@ -13,13 +13,13 @@ from creepkit.fem.mesh import (
     discretize,
     geometry_derivative,
     half_bandwidth,
-    mesh_quality,
     outline,
     shape_functions,
     shape_gradients,
     strip_mesh,
     strip_nodes,
 )
+from helpers.fem_cases import mesh_quality
 
 MIDDLES = 0.5 * (CORNERS + np.roll(CORNERS, -1, axis=0))
 NODES = np.vstack([CORNERS, MIDDLES])

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from creepkit.errors import SolveError
-from creepkit.fem.mesh import Mesh, discretize, half_bandwidth, mesh_quality
+from creepkit.fem.mesh import Mesh, discretize, half_bandwidth
 from creepkit.fem.mesh_builder import renumbered
 from creepkit.fem.mesh_files import read_input_deck, read_mesh
 from creepkit.specimens.bulge.geometry import DimpleGeometry
+from helpers.fem_cases import mesh_quality
 from helpers.paths import SHARED, needs_shared_data
 
 DATA = SHARED

@@ -11,7 +11,7 @@ import pytest
 
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import geometry_derivative
-from creepkit.fem.reduced_order_model import ReducedBasis, ReducedOrderModel, full_basis, mode_gradients
+from creepkit.fem.reduced_order_model import ReducedBasis, ReducedOrderModel, mode_gradients
 from creepkit.fem.reduced_order_training import non_negative_least_squares, principal_modes, snapshots
 from creepkit.fem.simulation import LoadHistory, Simulation, sensitivity_directions, simulate
 from creepkit.fem.solver import SolverSettings, StageConditions, assemble
@@ -20,7 +20,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
 from creepkit.specimens import reduced_order_training
 from creepkit.specimens.reduced_order_training import power_law_runs, trained_basis
-from helpers.fem_cases import FREE, STILL, block, left_of, lowered, mesh_of
+from helpers.fem_cases import FREE, STILL, block, full_basis, left_of, lowered, mesh_of
 from helpers.literature_laws import RATE, damage, number, omega
 
 TIGHT = SolverSettings(newton=1e-12, **FREE)

@@ -38,7 +38,6 @@ def test_a_planted_lag_is_found(lag: float) -> None:
     found = ck.align_clocks(record, "P", frames, apex, drift=0.0)
     assert found.lag_interval[0] <= lag <= found.lag_interval[1]
     assert found.lag_interval[1] - found.lag_interval[0] < 2.0
-    np.testing.assert_allclose(found.camera_time(found.record_time(frames)), frames, atol=1e-9)
     assert found.probability.sum() == pytest.approx(1.0)
 
 
@@ -54,7 +53,7 @@ def test_unix_times_of_frames_and_a_record_of_known_start() -> None:
     known = InstrumentRecord(record.name, record.times, record.channels, start=1.7e9)
     found = ck.align_clocks(known, "P", frames + 1.7e9, apex, drift=0.0)
     assert found.lag == pytest.approx(5.0, abs=0.6)
-    assert found.record_time(1.7e9 + 100.0) == pytest.approx(105.0, abs=0.6)
+    assert found.camera_time(105.0) == pytest.approx(1.7e9 + 100.0, abs=0.6)
 
 
 def test_where_nothing_decides_it_is_said() -> None:
@@ -82,7 +81,7 @@ def test_equal_steps_fit_at_several_lags_unless_the_search_says_which() -> None:
 
 def test_a_stated_alignment() -> None:
     stated = ClockAlignment.stated(10.0, drift=1e-3, zero=100.0)
-    assert stated.record_time(1100.0) == pytest.approx(1011.0)
+    assert stated.camera_time(1011.0) == pytest.approx(1100.0)
     assert stated.lag_interval == (10.0, 10.0)
     with pytest.raises(HistoryError, match="give finite numbers"):
         ClockAlignment.stated(float("nan"))

@@ -104,7 +104,7 @@ def test_an_exporter_that_raises() -> None:
 
 
 def test_what_creepkit_itself_does_wrong_is_not_put_down_to_a_plugin(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("creepkit.specimens.uniaxial.Uniaxial._predict", None)
+    monkeypatch.setattr("creepkit.specimens.uniaxial.Uniaxial.point_test", None)
 
     with pytest.raises(TypeError):
         ck.identify(

@@ -12,10 +12,9 @@ import pytest
 import creepkit as ck
 from creepkit.errors import DatasetError
 from creepkit.records import Program, Status
-from creepkit.sampling.conditions import TimeGrid, hold_times, planned_test
+from creepkit.sampling.conditions import TimeGrid, creep_output, hold_times, planned_test, specimen_conditions
 from creepkit.sampling.criteria import SimulationOutcome, paper_criteria
 from creepkit.sampling.domains import sampling_design
-from creepkit.sampling.specimen_conditions import creep_output, specimen_conditions
 from helpers.cantilever import Cantilever
 from helpers.mistakes import said_otherwise
 

@@ -65,7 +65,7 @@ def test_a_confirmation_that_fails_is_a_note_and_no_failure(monkeypatch):
     def fail(fit, tests, using):
         raise FitError("the mesh is torn")
 
-    monkeypatch.setattr("creepkit.screening.job.confirm", fail)
+    monkeypatch.setattr("creepkit.screening.screen.confirm", fail)
     found = screened(TWO[:3], confirm=True)["X"]
     assert found.identified
     assert "not confirmed: the mesh is torn" in found.notes

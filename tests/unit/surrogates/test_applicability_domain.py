@@ -8,7 +8,7 @@ import pytest
 
 from creepkit.errors import CreepkitError
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
-from creepkit.surrogates.weight_files import CODEC
+from creepkit.surrogates.surrogate import CODEC
 
 
 def mahalanobis(row: np.ndarray, others: np.ndarray) -> float:

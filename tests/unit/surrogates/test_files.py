@@ -12,8 +12,7 @@ from creepkit.errors import SurrogateError
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.files.writing import RECORD
 from creepkit.inverse.composite_predictor import refined_of
-from creepkit.surrogates.loading import load_surrogate, surrogate
-from creepkit.surrogates.weight_files import SURROGATE
+from creepkit.surrogates.surrogate import SURROGATE, load_surrogate, surrogate
 
 HEADER = {"kind": "parameter-gru"}
 WEIGHTS = {"a": np.arange(6.0, dtype=np.float32).reshape(2, 3), "b": np.array(3)}

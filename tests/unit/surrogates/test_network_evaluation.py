@@ -139,7 +139,7 @@ assert "torch" not in sys.modules
 """
 
 
-TRAINING = {"surrogates.parameter_network", "surrogates.training", "surrogates.training_loop"}
+TRAINING = {"surrogates.parameter_network", "surrogates.training"}
 """Modules that import torch when they are imported, beside the functions of the torch target of kernels."""
 
 

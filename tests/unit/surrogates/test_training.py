@@ -10,13 +10,11 @@ import torch
 
 from creepkit.dataset.dataset import Dataset
 from creepkit.errors import DatasetError, SurrogateError
-from creepkit.surrogates.evaluation import evaluate
+from creepkit.surrogates.evaluation import dataset_fingerprint, evaluate, training_split
 from creepkit.surrogates.parameter_gru import ParameterGru
 from creepkit.surrogates.parameter_network import ParameterModule
 from creepkit.surrogates.recipe import Training
-from creepkit.surrogates.training import train
-from creepkit.surrogates.training_loop import epochs_since_best, learning_rate
-from creepkit.surrogates.training_rows import dataset_fingerprint, training_split
+from creepkit.surrogates.training import epochs_since_best, train
 from helpers.mistakes import said_otherwise
 from helpers.planted_datasets import bars
 from helpers.written_files import names_in
@@ -121,21 +119,9 @@ def test_training_learns_and_the_file_holds_the_same_network(data: Dataset, tmp_
     assert sorted(model.metadata.metrics["times"]) == ["18750"[:5], "31250", "6250"]
 
 
-def test_the_plateau_is_torchs() -> None:
-    training = Training(rate=1e-3, patience=3)
-    losses = np.exp(-np.minimum(np.arange(40), 9) / 5.0) + np.where(np.arange(40) == 25, -0.1, 0.0)
-    adam = torch.optim.Adam([torch.zeros(1, requires_grad=True)], lr=1e-3)
-    plateau = torch.optim.lr_scheduler.ReduceLROnPlateau(adam, patience=3)
-    for k, loss in enumerate(losses):
-        assert learning_rate(training, list(losses[:k])) == pytest.approx(adam.param_groups[0]["lr"], rel=1e-12)
-        plateau.step(loss)
-
-
-def test_the_cosine_ends_at_zero() -> None:
-    training = Training(rate=1e-2, schedule="cosine", epochs=4)
-    assert learning_rate(training, []) == 1e-2
-    assert learning_rate(training, [1.0], epoch_fraction=1.0) == pytest.approx(5e-3)
-    assert learning_rate(training, [1.0] * 3, epoch_fraction=1.0) == pytest.approx(0.0, abs=1e-12)
+def test_the_cosine_ends_at_zero(data: Dataset) -> None:
+    model = train(data, SMALL, training=Training(rate=1e-2, schedule="cosine", epochs=4, batch=128))
+    assert model.metadata.curves["rate"] == pytest.approx(5e-3 * (1 + np.cos(np.pi * np.arange(4) / 4)))
 
 
 def test_rows_set_aside_are_a_fifth_and_none_is_lost() -> None:

@@ -1,9 +1,9 @@
-"""What a global search takes and gives: its interface, its result, and the trace of its costs."""
+"""What a global search takes and gives: its interface, result and trace of costs, and the refinement of its best."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -69,3 +69,49 @@ class SearchTrace:
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw the lowest cost, and how the candidates spread; written to `path` when given."""
         return present("reports.search:search_figure", self, path)
+
+
+SAME_BASIN = 0.1
+"""Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
+
+
+CONVERGED_DECREASE = 1e-3
+"""A decrease of the cost, half of chi-square, below which a search has converged."""
+
+
+def refine_candidates(
+    problem: LeastSquaresProblem,
+    u: Floats,
+    costs: Floats,
+    max_count: int,
+    trace: SearchTrace,
+    progress: IterationCallback | None = None,
+) -> SearchResult:
+    """The best different candidates refined by least squares, best first; with max_count=0 the best one as it is.
+
+    u : (candidates, parameters); costs : (candidates,) -.
+    """
+    selected = _most_different(u, costs, problem.bounds.width, max(max_count, 1))
+    problem.check_predicted(u[selected])
+    if max_count == 0:
+        best = selected[0]
+        return SearchResult((Minimum(u[best], float(costs[best]), converged=False, evaluations=0),), trace)
+    minima = []
+    for done, k in enumerate(selected):
+        minima.append(problem.minimise(u[k]))
+        if progress is not None:
+            progress("refinement", done + 1, len(selected))
+    evaluations = sum(minimum.evaluations for minimum in minima)
+    minima.sort(key=lambda minimum: minimum.cost)
+    return SearchResult(tuple(minima), replace(trace, refined_cost=minima[0].cost, refinement_evaluations=evaluations))
+
+
+def _most_different(u: Floats, costs: Floats, width: Floats, max_count: int) -> list[int]:
+    """Positions of the best candidates that differ, at most max_count; width : (parameters,) of the bounds."""
+    selected: list[int] = []
+    for k in np.argsort(costs, kind="stable"):
+        if all((np.abs(u[k] - u[other]) > SAME_BASIN * width).any() for other in selected):
+            selected.append(int(k))
+        if len(selected) == max_count:
+            break
+    return selected

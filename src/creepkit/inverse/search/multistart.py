@@ -22,6 +22,7 @@ from creepkit.inverse.residuals import median_log_rate_excess, median_log_ruptur
 from creepkit.inverse.search.global_search import SearchResult, SearchTrace
 from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
+from creepkit.options import Options, option
 
 INTERNAL_RATE_RANGE = (-4.0, 0.0)
 """Range of draws for an internal variable: ln of its rate times the duration of a test."""
@@ -29,23 +30,17 @@ INTERNAL_RATE_RANGE = (-4.0, 0.0)
 
 @checked
 @dataclass(frozen=True)
-class MultiStart:
+class MultiStart(Options, title="multi-start", error=FitError, prefix="multi-start: "):
     """Least squares from the centre of the bounds and the best of screened Sobol draws.
 
     starts, draws : None for those of the settings. For a sum of terms each term's own optimum is a start too.
     """
 
-    starts: int | None = None
-    draws: int | None = None
+    starts: int | None = option(None, "Starts of least squares.", limits.STARTS)
+    draws: int | None = option(None, "Sobol points that are screened for them.", limits.SOBOL_POINTS)
 
     def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
         """The minima of all starts, best first; a sum's best single term stands behind the best."""
-        for name, value, allowed in (
-            ("starts", self.starts, limits.STARTS),
-            ("draws", self.draws, limits.SOBOL_POINTS),
-        ):
-            if value is not None:
-                limits.check_number(f"multi-start: {name}", value, allowed, FitError)
         starts, draws = self.starts or problem.settings.starts, self.draws or default_draws(problem)
         screened = screened_starts(problem, starts=starts, draws=draws)
         problem.check_predicted(np.array(screened))  # from where nothing is predicted, no direction leads away

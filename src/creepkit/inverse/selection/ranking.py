@@ -147,8 +147,8 @@ class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="r
         return present("forecasts.forecast:forecast", self, tests, level=level, **options)
 
     def further_tests(self) -> Any:
-        """A Design: variations of the tests, by how well they would separate the remaining laws (some seconds)."""
-        return present("experiments.design:further_tests", self)
+        """A Design: tests like those that were made, by how well they would separate the remaining laws."""
+        return present("experiments.design:design", self, goal="law")
 
     def save(self, path: str | Path) -> Path:
         """Write the ranking as JSON, and each law's identification as LAW.json beside it; load_ranking() reads them."""

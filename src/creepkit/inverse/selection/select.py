@@ -19,12 +19,12 @@ from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify, identify_values
+from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, challenged, rank, ranking_from_scores
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Predictor
 from creepkit.registry import default_registry

@@ -12,7 +12,7 @@ parabolas, which lie above a concave penalty: steps are short rather than long.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal, Protocol, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 
@@ -35,34 +35,54 @@ MIN_CONTRIBUTION = 1e-9
 """A contribution below this counts as this in a weight."""
 
 
-class ContributionPenalty(Protocol):
-    """A function of contributions, (candidates, terms) to (candidates,), that is added to half the chi-square."""
+@dataclass(frozen=True)
+class PowerSum:
+    """sum (a_i + offset)^power of amounts a_i, and the parabolas w a^2 + const that touch it; least : a in a weight."""
 
-    @property
-    def strength(self) -> Strength:
-        """By what its value is multiplied."""
-        ...
+    power: float
+    offset: float = 0.0
+    least: float = MIN_CONTRIBUTION
 
-    @property
-    def exponents(self) -> float:
-        """Weight of the exponents that can be off (see of_exponents), 0 where they cost nothing."""
-        ...
+    def value(self, amounts: Floats) -> Floats:
+        """(candidates,) of amounts (candidates, terms)."""
+        return np.asarray(((amounts + self.offset) ** self.power).sum(axis=-1))
 
-    def value(self, c: Floats) -> Floats:
-        """(candidates,) without the strength; c : (candidates, terms) contributions."""
-        ...
+    def weights(self, amounts: Floats) -> Floats:
+        """w, (candidates, terms) at amounts (candidates, terms): a parabola lies above a concave function."""
+        a = np.maximum(amounts, self.least)
+        return np.asarray(0.5 * self.power * (a + self.offset) ** (self.power - 1.0) / a)
 
-    def weights(self, c: Floats) -> Floats:
-        """w, (candidates, terms): the parabola w c^2 + const touches the value at c, and lies above a concave one.
 
-        c : (candidates, terms) contributions.
-        """
-        ...
+OF_EXPONENTS = PowerSum(0.5, offset=0.02, least=1e-6)
+"""Of the distances of exponents from where they are off."""
 
 
 @checked
 @dataclass(frozen=True)
-class L2:
+class ContributionPenalty:
+    """strength x [ sum over contributions + exponents x sum over exponents that can be off ], see OF_CONTRIBUTIONS.
+
+    exponents : weight of the exponents of linear scale that can be off within their bounds, 0 where they cost nothing.
+    """
+
+    strength: Strength = DEFAULT_STRENGTH
+    exponents: float = 0.0
+
+    OF_CONTRIBUTIONS: ClassVar[PowerSum]
+
+    def __post_init__(self) -> None:
+        if isinstance(self.strength, str):
+            if self.strength != "auto":
+                raise FitError(f'strength is "{self.strength}"; allowed are numbers and "auto"')
+        elif not (np.isfinite(self.strength) and self.strength >= 0):
+            raise FitError(f"strength is {self.strength}; it must be a finite number, 0 or above")
+        if not (np.isfinite(self.exponents) and self.exponents >= 0):
+            raise FitError(f"the weight of exponents is {self.exponents}; it must be a number, 0 or above")
+
+
+@checked
+@dataclass(frozen=True)
+class L2(ContributionPenalty):
     """strength x sum c_i^2: the word of the paper, "L2 sparsity", read as the squared norm of contributions.
 
     It does not select. As the c_i add up to about one, their squares are smallest at *equal* shares: every term is
@@ -70,24 +90,12 @@ class L2:
     determinate, no more.
     """
 
-    strength: Strength = DEFAULT_STRENGTH
-    exponents: ClassVar[float] = 0.0
-
-    def __post_init__(self) -> None:
-        check_strength(self.strength)
-
-    def value(self, c: Floats) -> Floats:
-        """sum c_i^2, (candidates,), of c (candidates, terms)."""
-        return np.asarray((c**2).sum(axis=-1))
-
-    def weights(self, c: Floats) -> Floats:
-        """1, of the shape of c (candidates, terms): it is a sum of squares."""
-        return np.ones_like(c)
+    OF_CONTRIBUTIONS = PowerSum(2.0)
 
 
 @checked
 @dataclass(frozen=True)
-class GroupL2:
+class GroupL2(ContributionPenalty):
     """strength x sum c_i: each c_i is itself the L2 norm of a group, the rates of term i at the points visited.
 
     The group lasso of regression, where it selects. Here the c_i add up to about one, so that it is nearly the same
@@ -95,24 +103,12 @@ class GroupL2:
     ever drops a term.
     """
 
-    strength: Strength = DEFAULT_STRENGTH
-    exponents: ClassVar[float] = 0.0
-
-    def __post_init__(self) -> None:
-        check_strength(self.strength)
-
-    def value(self, c: Floats) -> Floats:
-        """sum c_i, (candidates,), of c (candidates, terms)."""
-        return np.asarray(c.sum(axis=-1))
-
-    def weights(self, c: Floats) -> Floats:
-        """1 / (2 c_i), (candidates, terms), of c (candidates, terms)."""
-        return np.asarray(0.5 / np.maximum(c, MIN_CONTRIBUTION))
+    OF_CONTRIBUTIONS = PowerSum(1.0)
 
 
 @checked
 @dataclass(frozen=True)
-class Sqrt:
+class Sqrt(ContributionPenalty):
     """strength x [ sum (c_i + d)^(1/2) + exponents x sum (|m_j| + 0.02)^(1/2) ], d = 0.003.
 
     Concave, hence smallest where one term has it all: this one selects. m_j are the exponents of linear scale that can
@@ -121,23 +117,9 @@ class Sqrt:
     grow where the data require it. Being concave it has a minimum at each corner, and needs many starts.
     """
 
-    strength: Strength = DEFAULT_STRENGTH
     exponents: float = 1.0 / 3.0
 
-    OFFSET: ClassVar[float] = 0.003
-
-    def __post_init__(self) -> None:
-        check_strength(self.strength)
-        if not (np.isfinite(self.exponents) and self.exponents >= 0):
-            raise FitError(f"the weight of exponents is {self.exponents}; it must be a number, 0 or above")
-
-    def value(self, c: Floats) -> Floats:
-        """sum (c_i + d)^(1/2), (candidates,), of c (candidates, terms)."""
-        return np.asarray(np.sqrt(c + self.OFFSET).sum(axis=-1))
-
-    def weights(self, c: Floats) -> Floats:
-        """1 / (4 c_i (c_i + d)^(1/2)), (candidates, terms), of c (candidates, terms)."""
-        return np.asarray(0.25 / (np.maximum(c, MIN_CONTRIBUTION) * np.sqrt(c + self.OFFSET)))
+    OF_CONTRIBUTIONS = PowerSum(0.5, offset=0.003)
 
 
 @checked
@@ -154,37 +136,9 @@ class Subsets:
 
 def check_penalty(penalty: object) -> None:
     """A penalty is a record, such as L2(), and not its class or name."""
-    if isinstance(penalty, (type, str)) or not (isinstance(penalty, Subsets) or hasattr(penalty, "weights")):
+    if not isinstance(penalty, ContributionPenalty | Subsets):
         text = penalty.__name__ if isinstance(penalty, type) else repr(penalty)
         raise FitError(f"penalty is {text}; write L2(), GroupL2(), Sqrt() or Subsets()")
-
-
-def check_strength(strength: Strength) -> None:
-    """A strength is a finite number of at least zero, or "auto"."""
-    if isinstance(strength, str):
-        if strength != "auto":
-            raise FitError(f'strength is "{strength}"; allowed are numbers and "auto"')
-    elif not (np.isfinite(strength) and strength >= 0):
-        raise FitError(f"strength is {strength}; it must be a finite number, 0 or above")
-
-
-EXPONENT_OFFSET = 0.02
-
-
-def exponent_penalty(distances: Floats) -> Floats:
-    """sum (|m_j| + 0.02)^(1/2), (candidates,).
-
-    distances : (candidates, exponents) |m_j|, of exponents from where they are off.
-    """
-    return np.asarray(np.sqrt(distances + EXPONENT_OFFSET).sum(axis=-1))
-
-
-def exponent_weights(distances: Floats) -> Floats:
-    """w, (candidates, exponents): the parabola w m^2 + const touches it at m.
-
-    distances : (candidates, exponents) |m|, of exponents from where they are off.
-    """
-    return np.asarray(0.25 / (np.maximum(distances, 1e-6) * np.sqrt(distances + EXPONENT_OFFSET)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,17 +166,11 @@ class PenalisedTerms:
             DEFAULT_STRENGTH if isinstance(given_strength, str) else float(given_strength),
         )
 
-    def with_strength(self, strength: float) -> PenalisedTerms:
-        """The same with another strength."""
-        return replace(self, strength=float(strength))
-
     def values(self, u: Floats) -> Floats:
         """(candidates,) what is added to half the chi-square; u : (candidates, parameters or more)."""
         parameters = u[:, : self._parameter_count]
-        penalties = self.penalty.value(self.contributions.values(parameters))
-        if self.penalty.exponents:
-            penalties = penalties + self.penalty.exponents * exponent_penalty(self._distances(parameters))
-        return np.asarray(self.strength * penalties)
+        amounts = np.concatenate([self.contributions.values(parameters), self._distances(parameters)], axis=-1)
+        return np.asarray(self.strength * self._penalty(amounts))
 
     def frozen_weights_at(self, u: Floats) -> PenalisedTerms:
         """With weights taken at u (parameters,), and kept."""
@@ -268,14 +216,18 @@ class PenalisedTerms:
         u = x[: self._parameter_count]
         return np.concatenate([self.contributions.values(u[None])[0], self._distances(u)])
 
+    def _penalty(self, amounts: Floats) -> Floats:
+        """(...,) without the strength; amounts : (..., terms + exponents)."""
+        contributions, distances = np.split(amounts, [len(self.contributions.terms)], axis=-1)
+        value = self.penalty.OF_CONTRIBUTIONS.value(contributions)
+        return value + self.penalty.exponents * OF_EXPONENTS.value(distances)
+
     def _root_weights(self, amounts: Floats) -> tuple[Floats, float]:
         """Square roots of twice the weights, and the residual that stays when all amounts are zero."""
         contributions, distances = np.split(amounts, [len(self.contributions.terms)])
-        weights, value = self.penalty.weights(contributions), float(self.penalty.value(contributions))
-        if distances.size:
-            weights = np.concatenate([weights, self.penalty.exponents * exponent_weights(distances)])
-            value += self.penalty.exponents * float(exponent_penalty(distances))
-        constant = max(value - float((weights * amounts**2).sum()), 0.0)
+        of_terms = self.penalty.OF_CONTRIBUTIONS.weights(contributions)
+        weights = np.concatenate([of_terms, self.penalty.exponents * OF_EXPONENTS.weights(distances)])
+        constant = max(float(self._penalty(amounts) - (weights * amounts**2).sum()), 0.0)
         return np.sqrt(2 * self.strength * weights), float(np.sqrt(2 * self.strength * constant))
 
 

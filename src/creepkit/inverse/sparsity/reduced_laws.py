@@ -200,13 +200,10 @@ class ReducedLaw:
 
 
 class ReducedLaws:
-    """The laws of some of the terms of a sum, each fitted once.
+    """The laws of some of the terms of a sum, each fitted once."""
 
-    previous : the same laws fitted on other weights of the same data, whose optima are then the only starts.
-    """
-
-    def __init__(self, problem: TermProblem, previous: ReducedLaws | None = None) -> None:
-        self.problem, self.terms, self.previous = problem, tuple(problem.law.terms), previous
+    def __init__(self, problem: TermProblem) -> None:
+        self.problem, self.terms = problem, tuple(problem.law.terms)
         self._fitted_laws: dict[TermNames, ReducedLaw] = {}
         self._full: ReducedLaw | None = None
 
@@ -268,9 +265,6 @@ class ReducedLaws:
 
     def _starts(self, problem: TermProblem, terms: TermNames) -> list[Floats]:
         """What the whole law says of these terms; for one term the middle of its bounds, for more their own optima."""
-        if self.previous is not None:
-            fitted = self.previous.with_terms(terms)
-            return [problem.embedded(fitted.law, fitted.x)]
         if len(terms) > 1:
             return [problem.start, *(_start_in_larger_law(problem, self.with_terms((label,))) for label in terms)]
         centre = problem.problem.bounds.centre

@@ -17,6 +17,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
+from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.inverse.search.multistart import distinct
@@ -24,7 +25,6 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, PenalisedTerms, Subsets, check_penalty
 from creepkit.inverse.sparsity.reduced_laws import ReducedLaw, ReducedLaws, TermProblem, terms_above
 from creepkit.inverse.sparsity.result import FitStatistics, PenaltyPath, Sparsity, TermNames
-from creepkit.inverse.starting_estimate import StartingEstimate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
@@ -71,7 +71,7 @@ def trace_path(
     corners = penalised_starts(reductions)[-len(labels) :]
     optima = [full.x]
     for k, strength in enumerate(sorted(strengths)):
-        optima.append(_next_fit(reductions, penalised.with_strength(strength), optima[-1], corners).x)
+        optima.append(_next_fit(reductions, replace(penalised, strength=strength), optima[-1], corners).x)
         if progress is not None:
             progress("strength", k + 1, len(strengths))
         if len(terms_above(problem.contributions_at(optima[-1]))) == 1:

@@ -157,17 +157,6 @@ class BulgeReducedOrderModel:
         """The model of the specimen's own dimple, whose points can be drawn."""
         return self.reduced_model_of(self.specimen)
 
-    def prediction_error(
-        self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, nuisances: NuisanceValues | None = None
-    ) -> Floats:
-        """(candidates, tests, times, outputs) by which a prediction is too large, found by finite elements.
-
-        theta : (candidates, parameters) internal values. Costs a simulation each; NaN where either has ended.
-        """
-        reduced = self.predict(law, theta, histories, nuisances=nuisances)
-        exact = predict_tests(BulgeTest, self.specimen, law, theta, histories, nuisances or {}, False)
-        return np.asarray(reduced.values - exact.values)
-
     @property
     def error(self) -> dict[str, float]:
         """{output: standard deviation of its error}, in the output's unit, from runs that training did not see.

@@ -5,16 +5,12 @@ import pytest
 
 import creepkit as ck
 from creepkit.inverse.identify import identify
-from creepkit.inverse.initial_search import search_problem
-from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
-from creepkit.inverse.settings import IdentificationSettings
 
 TRUTH = {"A": 2e-16, "n": 4.5}
 TIMES = np.arange(1800.0, 43201.0, 1800.0)
 LOADING, ELASTIC = ck.PressureJump(P1=8, P2=10, Tj=14400), ck.Elastic(E=150e3)
 NORTON = ck.law("norton")
-SUM = NORTON + ck.law("time-hardening")
 SEARCHES = {
     "swarm": ParticleSwarm(particles=40, iterations=15, refined_candidates=2),
     "cma": CmaEs(iterations=30, restarts=0, refined_candidates=1),
@@ -44,23 +40,3 @@ def test_a_planted_law_lies_in_its_intervals_whatever_searched(stand_in, test, n
     assert fit.search_trace is not None
     assert fit.search_trace.refined_cost <= fit.search_trace.best_cost[-1] + 1e-3 < fit.search_trace.best_cost[0]
     assert fit.search_trace.evaluations[-1] <= fit.provenance["search_evaluations"]
-
-
-@pytest.mark.nightly
-def test_of_a_sum_the_swarm_keeps_the_best_of_each_subset(stand_in, test):
-    """Norton alone is refined as if it were alone, and a second term gains no more than its three parameters may.
-
-    Half of a chi-square of three, 99 %: 5.7 (the landscape's scatter is wider than the planted one, so less here).
-    """
-    problem = LeastSquaresProblem.from_histories(SUM, [test], stand_in, IdentificationSettings(), None)
-    swarm = ParticleSwarm(particles=80, iterations=25, maskable_terms="any")
-    found = {m.terms_off: m for m in swarm.minima(search_problem(problem, stand_in)).minima}
-    _, hardening = SUM.terms
-    single = LeastSquaresProblem.from_histories(
-        NORTON, [test], stand_in, IdentificationSettings(), problem.coordinates.reference
-    )
-    alone = found[(hardening,)]
-    (expected,) = ParticleSwarm(40, 15, refined_candidates=1).minima(search_problem(single, stand_in)).minima
-    assert alone.cost == pytest.approx(expected.cost, abs=0.01)
-    np.testing.assert_allclose(alone.x[:2], expected.x, atol=0.02)
-    assert alone.cost - min(m.cost for m in found.values()) < 5.7

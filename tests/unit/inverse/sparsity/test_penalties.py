@@ -21,26 +21,26 @@ def simplex(count=60):
 
 def test_squared_l2_is_smallest_at_equal_shares():
     """By Cauchy and Schwarz, sum c^2 >= (sum c)^2 / 3 with equality only there: it spreads, it does not select."""
-    values = L2().value(simplex())
+    values = L2.OF_CONTRIBUTIONS.value(simplex())
     assert values.argmin() == 3
     assert values[3] == pytest.approx(1 / 3)
     assert_allclose(values[:3], 1.0)
 
 
 def test_the_square_root_is_smallest_in_a_corner():
-    values = Sqrt().value(simplex())
+    values = Sqrt.OF_CONTRIBUTIONS.value(simplex())
     assert values.argmin() in (0, 1, 2)
     assert values[3] == values.max()
 
 
 def test_group_l2_is_the_same_all_over_the_simplex():
-    assert_allclose(GroupL2().value(simplex()), 1.0)
+    assert_allclose(GroupL2.OF_CONTRIBUTIONS.value(simplex()), 1.0)
 
 
 @pytest.mark.parametrize("penalty", EVERY, ids=lambda p: type(p).__name__)
 def test_parabolas_touch_the_penalty_and_lie_above_it(penalty):
     """w c^2 + const through c_0, of equal slope there; for concave functions of c^2 it majorises."""
-    grid = np.linspace(0.0, 1.0, 201)[:, None]
+    penalty, grid = penalty.OF_CONTRIBUTIONS, np.linspace(0.0, 1.0, 201)[:, None]
     for c in (0.01, 0.2, 0.9):
         at = np.array([[c]])
         w = penalty.weights(at)

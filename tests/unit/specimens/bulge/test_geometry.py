@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from creepkit.fem.mesh import discretize, half_bandwidth, mesh_quality, outline, refuse_inverted, strip_nodes
+from creepkit.fem.mesh import discretize, half_bandwidth, outline, refuse_inverted, strip_nodes
 from creepkit.specimens.bulge.geometry import DimpleGeometry, column_lines, mesh_layout
+from helpers.fem_cases import mesh_quality
 
 TAPERED = DimpleGeometry()
 FILLET = DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",))
