@@ -15,9 +15,9 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 342,
-    "app": 630,
+    "app": 617,
     "cameras": 949,
-    "cli": 2369,
+    "cli": 2346,
     "core": 70,
     "dataset": 795,
     "discovery": 1459,
@@ -39,12 +39,12 @@ BUDGET = {
     "readers": 5434,
     "records": 1979,
     "registry": 615,
-    "reports": 7445,
+    "reports": 7229,
     "rupture_assessment": 1878,
     "sampling": 1056,
     "screening": 687,
     "specimens": 3592,
-    "studies": 3092,
+    "studies": 3055,
     "surrogates": 1697,
     "testing": 1892,
 }
