@@ -14,20 +14,20 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 342,
+    "api": 329,
     "app": 617,
-    "cameras": 949,
+    "cameras": 931,
     "cli": 2346,
     "core": 70,
     "dataset": 795,
     "discovery": 1459,
     "experiments": 1598,
     "exporters": 2680,
-    "extraction": 1314,
+    "extraction": 1312,
     "fem": 1827,
     "files": 1420,
     "forecasts": 1416,
-    "instruments": 1286,
+    "instruments": 1283,
     "integration": 774,
     "inverse": 11679,
     "jobs": 254,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34440
+TESTS = 34434
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
