@@ -14,31 +14,31 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 342,
+    "api": 329,
     "app": 630,
-    "cameras": 949,
+    "cameras": 931,
     "cli": 2369,
     "core": 70,
     "dataset": 795,
     "discovery": 1459,
     "experiments": 1598,
     "exporters": 2680,
-    "extraction": 1314,
+    "extraction": 1312,
     "fem": 1827,
     "files": 1420,
     "forecasts": 1416,
-    "instruments": 1286,
+    "instruments": 1283,
     "integration": 774,
-    "inverse": 11740,
+    "inverse": 11679,
     "jobs": 254,
     "kernels": 1703,
     "language": 1506,
     "laws": 136,
     "modules": 781,
     "quality": 1458,
-    "readers": 5435,
+    "readers": 5434,
     "records": 1979,
-    "registry": 616,
+    "registry": 615,
     "reports": 8011,
     "rupture_assessment": 1878,
     "sampling": 1056,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34464
+TESTS = 34440
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

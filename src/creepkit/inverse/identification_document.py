@@ -14,12 +14,11 @@ from creepkit.errors import FitError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError, ValueCodec
-from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
+from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.explanation import Explanation, LeftOut
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance

@@ -13,7 +13,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
-from creepkit.inverse.judged_residuals import JudgedResiduals, judged_residuals_of
+from creepkit.inverse.judging import JudgedResiduals, judged_residuals_of
 from creepkit.inverse.observation_vector import ObservationVector
 
 if TYPE_CHECKING:

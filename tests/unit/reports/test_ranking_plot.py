@@ -11,7 +11,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.reports.ranking_plot import MOST_TESTS_DRAWN, misfit_name, misfits
 from helpers.steady_rate_predictor import Steady, planted
 
-QUICK = IdentificationSettings(starts=2, sobol_points=16, frames=20)
+QUICK = IdentificationSettings(starts=2, sobol_points=16, frames=20, weights="noise")
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from creepkit.inverse.adequacy import LARGEST_SCATTER
-from creepkit.inverse.chi_square_test import SIGNIFICANCE
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
+from creepkit.inverse.judging import SIGNIFICANCE
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
 from creepkit.reports.html.citations import References
 from creepkit.reports.html.elements import number

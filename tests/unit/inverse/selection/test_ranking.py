@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
+from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
 from creepkit.inverse.identify import identify
-from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.selection.perturbation_trials import Challenge
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores, verdict_of
 from creepkit.inverse.settings import IdentificationSettings
