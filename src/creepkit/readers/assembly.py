@@ -105,6 +105,7 @@ def assemble_history(
     else:
         elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
     outputs = without_steps(conditions, frames.times, outputs, used)
+    merged = {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
     rupture_time, unruptured = _end_of_test(conditions, frames, used, name)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
     history = History(
@@ -123,7 +124,7 @@ def assemble_history(
         **_stated_fields(conditions, name, elastic),
         noise_correlation=read_noise_correlation(conditions, outputs),
         # Last: entries that nothing has used by now are refused.
-        labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
+        labels={**conditions.all_labels(), **column_means(table, vocabulary), **merged},
     )
     _check_operator(history, columns)
     return history
@@ -268,10 +269,6 @@ def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Ela
         return None
     start = temperature.values[0] if isinstance(temperature, Program) else temperature
     return float(loading.program().values[0]) / float(elastic.at(float(start)).E)
-
-
-def _merge_label(frames: TableFrames) -> dict[str, str]:
-    return {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
 
 
 def _lengths_by_default(specimen: str, geometry: Mapping[str, float]) -> dict[str, float]:
