@@ -15,9 +15,9 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 322,
-    "app": 630,
+    "app": 617,
     "cameras": 931,
-    "cli": 2369,
+    "cli": 2346,
     "core": 70,
     "dataset": 795,
     "discovery": 1459,
@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1416,
     "instruments": 1283,
     "integration": 774,
-    "inverse": 11679,
+    "inverse": 11465,
     "jobs": 254,
     "kernels": 1703,
     "language": 1506,
@@ -39,18 +39,18 @@ BUDGET = {
     "readers": 5434,
     "records": 1979,
     "registry": 615,
-    "reports": 8011,
+    "reports": 7229,
     "rupture_assessment": 1878,
     "sampling": 1056,
     "screening": 687,
     "specimens": 3592,
-    "studies": 3092,
+    "studies": 3055,
     "surrogates": 1697,
     "testing": 1892,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34440
+TESTS = 34418
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.cli.generated_options import given_value
+from creepkit.cli.command_options import given_value
 from creepkit.cli.shared import selected
 from creepkit.errors import FitError, HistoryError, LawError
 from creepkit.inverse.candidate_laws import LawChanges
