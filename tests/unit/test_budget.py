@@ -22,7 +22,7 @@ BUDGET = {
     "dataset": 795,
     "discovery": 1459,
     "experiments": 1598,
-    "exporters": 2680,
+    "exporters": 2663,
     "extraction": 1314,
     "fem": 1827,
     "files": 1420,
