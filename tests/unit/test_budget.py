@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1416,
     "instruments": 1283,
     "integration": 774,
-    "inverse": 11468,
+    "inverse": 11465,
     "jobs": 254,
     "kernels": 1703,
     "language": 1506,
