@@ -111,18 +111,11 @@ class LawCriterion:
             decided = _shares(score) > DECISIVE_WEIGHT
             right += weight[a] * float((decided[a] & (more > NOT_EXCLUDED).all(axis=0)).mean())
             wrong += weight[a] * float(np.delete(decided, a, axis=0).any(axis=0).mean())
-            for b, other in enumerate(self.names):
-                if a != b:
-                    current = float(self.chi_squares[b] - self.chi_squares[a])
-                    expected = current + float(np.median(Q[b] - Q[a]))
-                    is_refitted = (_key(histories), a, b) in self.ratios
-                    chi_squares.append(ExpectedChiSquare(name, other, current, expected, is_refitted))
-            for k, expected_more in zip(own, more, strict=True):
-                altered, key = self.outcomes.laws[count + k].fit.law.name, (_key(histories), a, count + k)
-                expected = float(np.median(expected_more))
-                chi_squares.append(
-                    ExpectedChiSquare(name, altered, self.altered[k].excess, expected, key in self.ratios)
-                )
+            current = [*(self.chi_squares - self.chi_squares[a]).tolist(), *(one.excess for one in self.altered)]
+            for b in (b for b in self._compared(a) if b != a):
+                expected, other = current[b] + float(np.median(Q[b] - Q[a])), self.outcomes.laws[b].fit.law.name
+                refitted = (_key(histories), a, b) in self.ratios
+                chi_squares.append(ExpectedChiSquare(name, other, current[b], expected, refitted))
         chi_squares.sort(key=lambda each: -weight[self.names.index(each.reference_law)])
         return Expectation(max(information, 0.0), probability=right, wrong=wrong, chi_squares=tuple(chi_squares))
 
