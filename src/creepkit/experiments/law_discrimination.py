@@ -344,8 +344,8 @@ def _refit_in_full(
         searched = search_problem(broad, search_predictor_of(measured.predictor))
         minima = MultiStart().minima(searched).minima
         begun += [m.x for m in distinct(minima, searched.bounds, equal_predictions=EQUAL_REDUCED_ORDER_PREDICTIONS)]
-    outputs = {name: noise_model[name] for name in observations.outputs}
-    own = replace(noise_model, outputs=outputs)
+    own = replace(noise_model, outputs={name: noise_model[name] for name in observations.outputs})
+    weights = np.concatenate([[test.weight for test in law.fit.tests], np.ones(len(further))])
     found = []
     for u in begun:
         x = problem.bounds.clip(starting_point(nuisances, u, known))
@@ -354,13 +354,8 @@ def _refit_in_full(
             present=observations.present,
             offset_sensitivity=residuals_at_measured_values(observations).offset_sensitivity,
         )
-        residuals = residuals.with_test_weights(_test_weights(law, len(further)))
+        residuals = residuals.with_test_weights(weights)
         under = problem.with_covariance(CovarianceFactor.of_residuals(residuals, own))
         minimum = under.minimise(x, tolerances=REFIT_TOLERANCES)
         found.append((FittedLaw(under, minimum.x), 2.0 * float(minimum.cost)))
     return min(found, key=lambda pair: pair[1])
-
-
-def _test_weights(law: KnownLaw, further: int) -> Floats:
-    """(tests,) of the fit, and one for further tests."""
-    return np.concatenate([[test.weight for test in law.fit.tests], np.ones(further)])
