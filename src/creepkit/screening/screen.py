@@ -119,12 +119,9 @@ def _confirm_best(job: ScreeningJob, best: Identification, alloy: Alloy, notes: 
 
 def _predict_tests(best: Identification, tests: Sequence[History], predictor: Predictor) -> dict[str, PredictedOutputs]:
     prediction = best.predict(tests, predictor)
+    columns = [*enumerate(prediction.outputs)]
     return {
-        test.name: {
-            name: prediction.of(k)[:, prediction.outputs.index(name)]
-            for name in prediction.outputs
-            if name in test.outputs
-        }
+        test.name: {name: prediction.of(k)[:, column] for column, name in columns if name in test.outputs}
         for k, test in enumerate(tests)
     }
 
