@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from creepkit import limits
 from creepkit.checked_arguments import checked
@@ -16,7 +15,7 @@ from creepkit.jobs.progress import ProgressCallback as ProgressCallback
 from creepkit.options import Options, option
 from creepkit.records import Specimen, outputs_of
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
-from creepkit.surrogates.network_evaluation import ParameterNetwork, RecurrentCell
+from creepkit.surrogates.network_evaluation import ParameterNetwork, RecurrentCell, SampleArrays, Weights
 from creepkit.surrogates.parameter_inputs import (
     SERIES_INPUTS,
     LawInputs,
@@ -33,14 +32,6 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
     from creepkit.sampling.conditions import TimeGrid
     from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors
-
-SampleArrays: TypeAlias = dict[str, NDArray[Any]]
-"""Arrays whose leading axis is the sample. Always there: "targets" (n, frames, outputs), physical, float32, zero where
-there is none; "mask" (n, frames), which frames are data. The rest is the recipe's own: the inputs of its network."""
-
-
-Weights: TypeAlias = Mapping[str, NDArray[Any]]
-"""{name: (...,)} weights and scales of a network, as they stand in its file."""
 
 
 @checked

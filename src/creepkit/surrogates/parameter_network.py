@@ -10,8 +10,7 @@ from typing import TypeAlias
 import torch
 from torch import Tensor, nn
 
-from creepkit.surrogates.network_evaluation import RecurrentCell
-from creepkit.surrogates.parameter_gru import SampleArrays, Weights
+from creepkit.surrogates.network_evaluation import RecurrentCell, SampleArrays, Weights
 
 SampleTensors: TypeAlias = dict[str, Tensor]
 """recipe.SampleArrays as tensors."""

@@ -41,7 +41,8 @@ from creepkit.records import (
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid, specimen_conditions
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
-from creepkit.surrogates.parameter_gru import ParameterGru, SampleArrays, SurrogateMetadata, Weights
+from creepkit.surrogates.network_evaluation import SampleArrays, Weights
+from creepkit.surrogates.parameter_gru import ParameterGru, SurrogateMetadata
 from creepkit.surrogates.parameter_inputs import (
     LawInputs,
     LoadHistoryInputs,

@@ -34,15 +34,8 @@ from creepkit.surrogates.evaluation import (
     trainable_samples,
     training_split,
 )
-from creepkit.surrogates.network_evaluation import RecurrentCell
-from creepkit.surrogates.parameter_gru import (
-    NetworkSizes,
-    ParameterGru,
-    ProgressCallback,
-    SampleArrays,
-    Training,
-    Weights,
-)
+from creepkit.surrogates.network_evaluation import RecurrentCell, SampleArrays, Weights
+from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru, ProgressCallback, Training
 from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors, sample_tensors, weights_of
 from creepkit.surrogates.surrogate import CHECKPOINT, Surrogate, load_surrogate
 
