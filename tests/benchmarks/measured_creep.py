@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from measured import Page, arguments, progress
 from public_calls import cross_validated_times
+from time_comparison import loading_strains, measured_time_to_strain, times_to_strain
 
 import creepkit as ck
-from creepkit.inverse.cross_validation import loading_strains, measured_time_to_strain, times_to_strain
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures
 from creepkit.inverse.selection import rank
 from creepkit.quality.copies import duplicate_tests

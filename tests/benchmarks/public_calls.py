@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from time_comparison import TimeComparison, held_out_times_to_strain, times_to_rupture
+
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.inverse.cross_validation import CrossValidation, TimeComparison, cross_validate
+from creepkit.inverse.cross_validation import CrossValidation, cross_validate
 from creepkit.inverse.identification import Identification
 from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor
@@ -37,4 +39,6 @@ def cross_validated_tests(fit: Identification, histories: Sequence[History]) -> 
 def cross_validated_times(fit: Identification, histories: Sequence[History], strain: float | None) -> TimeComparison:
     """Times to a strain (None: to rupture), each condition predicted by the law identified from all others."""
     validated = cross_validate(fit, histories, by="condition")
-    return validated.times_to_rupture() if strain is None else validated.times_to_strain(strain, histories)
+    if strain is not None:
+        return held_out_times_to_strain(validated, strain, histories)
+    return times_to_rupture((name, one.get("rupture time")) for name, one in validated.single_values.items())

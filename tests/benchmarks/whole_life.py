@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 from measured import Page, arguments, progress
 from public_calls import cross_validated_times
+from time_comparison import times_to_rupture
 
 import creepkit as ck
-from creepkit.inverse.cross_validation import times_to_rupture
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures
 from creepkit.inverse.selection import rank
 from creepkit.quality.copies import duplicate_tests

@@ -16,9 +16,8 @@ import pytest
 import creepkit as ck
 from creepkit.errors import CreepkitError
 from creepkit.exporters.law_files import read_valued_law
-from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
+from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
 from creepkit.inverse.defect_correction import NumericalError
-from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.perturbation import Perturbation
 from helpers.paths import ROOT

@@ -14,43 +14,43 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 342,
-    "app": 630,
-    "cameras": 949,
-    "cli": 2382,
+    "api": 329,
+    "app": 617,
+    "cameras": 931,
+    "cli": 2346,
     "core": 70,
     "dataset": 795,
     "discovery": 1459,
     "experiments": 1598,
     "exporters": 2680,
-    "extraction": 1314,
+    "extraction": 1312,
     "fem": 1827,
     "files": 1420,
     "forecasts": 1416,
-    "instruments": 1286,
+    "instruments": 1283,
     "integration": 774,
-    "inverse": 11740,
+    "inverse": 11468,
     "jobs": 254,
     "kernels": 1703,
     "language": 1506,
     "laws": 136,
     "modules": 781,
     "quality": 1458,
-    "readers": 5490,
+    "readers": 5434,
     "records": 1979,
-    "registry": 616,
-    "reports": 8011,
+    "registry": 615,
+    "reports": 7229,
     "rupture_assessment": 1878,
     "sampling": 1056,
     "screening": 687,
     "specimens": 3592,
-    "studies": 3092,
+    "studies": 3055,
     "surrogates": 1697,
     "testing": 1892,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34464
+TESTS = 34418
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -99,29 +99,16 @@ def extract_as_described(
         progress("frames", len(done), len(frames))
         return frames.read_frame(index)
 
-    centers = {name: (x, y) for name, (x, y) in zip(names, described.centers, strict=False)}
-    found = extract_surfaces(
+    return extract_surfaces(
         replace(frames, read_frame=read),
         _watched(specimen),
         operator=operator,
-        centers=centers or None,
+        centers={name: (x, y) for name, (x, y) in zip(names, described.centers, strict=False)} or None,
+        names=names,
         rest=described.frames_at_rest,
         subset=described.subset,
         failed=failed,
     )
-    if not names or centers:
-        return found
-    lost = {} if failed is None else dict(failed)
-    if len(names) != len(found) + len(lost):
-        raise HistoryError(
-            f"{len(found) + len(lost)} test pieces were found, and {len(names)} names are given: {', '.join(names)}; "
-            "give as many names, or the centres of those that have them"
-        )
-    given = {f"D{k}": name for k, name in enumerate(names, 1)}
-    if failed is not None:
-        failed.clear()
-        failed.update({given[name]: reason for name, reason in lost.items()})
-    return [one.replace(name=given[one.name]) for one in found]
 
 
 def operator_of(specimen: Specimen | str, described: ExtractionOptions) -> str:

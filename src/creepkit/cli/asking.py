@@ -26,7 +26,7 @@ def put_questions(read: Callable[[], object], answer: Callable[[str], str] | Non
     each question is a line with the text that answers it, and the last of them an error.
     """
     asked, written = set[tuple[object, ...]](), dict[Path, None]()
-    while groups := {key: found for key, found in _by_content(_open_questions(read)).items() if key not in asked}:
+    while groups := {key: found for key, found in _open_questions(read).items() if key not in asked}:
         if answer is None:
             for questions in groups.values():
                 tell(questions[0].asked_of(_name_of(questions), len(questions)))
@@ -39,11 +39,18 @@ def put_questions(read: Callable[[], object], answer: Callable[[str], str] | Non
     return list(written)
 
 
-def _by_content(questions: Sequence[Question]) -> dict[tuple[object, ...], list[Question]]:
-    """The questions of each folder that say the same of several files."""
+def _open_questions(read: Callable[[], object]) -> dict[tuple[object, ...], list[Question]]:
+    """The questions that reading raises, those of a folder that say the same of several files together.
+
+    {} where it raises none, whatever else is wrong.
+    """
     groups: dict[tuple[object, ...], list[Question]] = {}
-    for one in questions:
-        groups.setdefault((one.path.parent, one.key, one.sentence, repr(one.choices)), []).append(one)
+    try:
+        read()
+    except CreepkitError as error:
+        for one in single_errors(error):
+            if isinstance(one, Question):
+                groups.setdefault((one.path.parent, one.key, one.sentence, repr(one.choices)), []).append(one)
     return groups
 
 
@@ -59,15 +66,6 @@ def _name_of(questions: Sequence[Question]) -> str:
 
 def _names_of(questions: Sequence[Question]) -> list[str]:
     return sorted({one.path.name for one in questions})
-
-
-def _open_questions(read: Callable[[], object]) -> list[Question]:
-    """The questions that reading raises; [] where it raises none, whatever else is wrong."""
-    try:
-        read()
-    except CreepkitError as error:
-        return [one for one in single_errors(error) if isinstance(one, Question)]
-    return []
 
 
 def _answer_to(questions: Sequence[Question], answer: Callable[[str], str]) -> str | None:

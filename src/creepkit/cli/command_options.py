@@ -14,17 +14,18 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import MISSING, dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import typer
 from typer.core import TyperCommand
 
-from creepkit.cli.generated_options import NOTHING, default_text, given_value, text_form
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, quoted
 from creepkit.files.writing import check_folder_target, check_target, overwriting
 from creepkit.options import Option, Options, options_of
 
@@ -156,3 +157,250 @@ class CheckedCommand(TyperCommand):
 
         parser.parse_args = parsed
         return parser
+
+
+# ---- text forms ------------------------------------------------------------------------------------------------------
+
+
+def parsed_number(text: str) -> float:
+    """The finite number that a text is; ValueError for digits of other scripts and 1_000, which Python would take."""
+    number = float(text)
+    if not text.isascii() or "_" in text or not math.isfinite(number):
+        raise ValueError(text)
+    return number
+
+
+def parsed_integer(text: str) -> int:
+    """The whole number that a text is; ValueError as parsed_number()."""
+    parsed_number(text)
+    return int(text)
+
+
+def pair(text: str, separator: str = "=") -> tuple[str, str]:
+    """Both sides of a separator, without spaces; ValueError where one of them is missing."""
+    name, found, value = (part.strip() for part in text.partition(separator))
+    if not (name and found and value):
+        raise ValueError(text)
+    return name, value
+
+
+@dataclass(frozen=True)
+class TextForm:
+    """How values of a type are written: a text, or several; parse : raises ValueError or an error of ours."""
+
+    metavar: str
+    parse: Callable[[Any], Any]
+    several: bool = False
+
+
+def _words(words: Sequence[str], text: str) -> str:
+    if text not in words:
+        raise ValueError(text)
+    return text
+
+
+NEXT_NAME = re.compile(r",(?=\s*\w[\w.-]*\s*=)")
+"""The comma before another NAME=VALUE."""
+
+
+def _by_name(parse: Callable[[str], Any], texts: Sequence[str], *, nested: bool = False) -> dict[str, Any]:
+    """{name: value} from texts NAME=VALUE or A=VALUE,B=VALUE; nested : {group: {name: value}} from GROUP.NAME=VALUE."""
+    values: dict[str, Any] = {}
+    for text in (part for whole in texts for part in NEXT_NAME.split(whole)):
+        name, value = pair(text)
+        group, dot, key = name.rpartition(".") if nested else ("", "", name)
+        if nested and not dot:
+            raise ValueError(text)
+        inner = values.setdefault(group, {}) if nested else values
+        if key in inner:
+            raise CreepkitError(f"{name} is given twice; keep one of them")
+        inner[key] = parse(value)
+    return values
+
+
+def _lists_by_name(parse: Callable[[str], Any], texts: Sequence[str]) -> dict[str, tuple[Any, ...]]:
+    """{name: values} from texts NAME=VALUE,...; a name that is given again has further values."""
+    values: dict[str, tuple[Any, ...]] = {}
+    for text in texts:
+        name, listed = pair(text)
+        values[name] = (*values.get(name, ()), *_listed(parse, listed))
+    return values
+
+
+def _listed(parse: Callable[[str], Any], text: str) -> tuple[Any, ...]:
+    return tuple(parse(part.strip()) for part in text.split(","))
+
+
+def _range(text: str) -> tuple[float, float]:
+    low, high = (parsed_number(end) for end in text.split(":"))
+    return low, high
+
+
+def _output_weights(words: Sequence[str], text: str) -> Any:
+    return text if text in words else _by_name(parsed_number, [text])
+
+
+def _is_mapping(hint: Any) -> bool:
+    origin = get_origin(hint)
+    return isinstance(origin, type) and issubclass(origin, Mapping)
+
+
+@functools.cache
+def text_form(hint: Any) -> TextForm:
+    """The text form of a type; TypeError for one that has none."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if hint in SPECIAL:
+        return SPECIAL[hint]
+    of_records = any(getattr(one, "__module__", "").startswith("creepkit.records") for one in (hint, *parts))
+    if of_records and hint in _forms_of_records():
+        return _forms_of_records()[hint]
+    if origin is Union or type(hint).__name__ == "UnionType":
+        others = tuple(one for one in parts if one is not type(None))
+        words = next((get_args(one) for one in others if get_origin(one) is Literal), None)
+        if words is not None and len(others) > 1:
+            return TextForm(f"{'|'.join(words)}|NAME=NUMBER,...", functools.partial(_output_weights, words))
+        return text_form(others[0])
+    if origin is Literal:
+        return TextForm("|".join(parts), functools.partial(_words, parts))
+    if origin is tuple and Ellipsis in parts and get_origin(parts[0]) is tuple:
+        item = text_form(parts[0])
+        return TextForm(item.metavar, lambda texts: tuple(item.parse(text) for text in texts), several=True)
+    if origin is tuple and Ellipsis in parts:
+        item = text_form(parts[0])
+        return TextForm(f"{item.metavar},...", functools.partial(_listed, item.parse))
+    if origin is tuple and parts == (float, float):
+        return TextForm("LOW:HIGH", _range)
+    if _is_mapping(hint):
+        inner = get_args(parts[1])
+        if get_origin(parts[1]) is not None and not _is_mapping(parts[1]) and inner != (float, float):
+            item = text_form(inner[0])
+            parse = functools.partial(_lists_by_name, item.parse)
+            return TextForm(f"NAME={item.metavar},...", parse, several=True)
+        item = text_form(inner[1] if _is_mapping(parts[1]) else parts[1])
+        nested = _is_mapping(parts[1])
+        metavar = f"{'GROUP.' if nested else ''}NAME={item.metavar}"
+        return TextForm(metavar, functools.partial(_by_name, item.parse, nested=nested), several=True)
+    raise TypeError(f"no option is made of {hint}; give its text form in SPECIAL")
+
+
+def _nuisances(texts: Sequence[str]) -> Any:
+    from creepkit.inverse.settings import default_nuisances
+
+    without = [kind.strip() for kind, _, value in (text.partition("=") for text in texts) if value.strip() == "none"]
+    return default_nuisances(*(_nuisance(t) for t in texts if t.partition("=")[2].strip() != "none"), without=without)
+
+
+NUISANCE_SYNTAX = "KIND[=MEAN[:SD]][@START][ for TESTS]"
+"""KIND=none leaves a default out; TESTS is test, alloy or all, or names with commas between them, which share one."""
+
+
+def _nuisance(text: str) -> Any:
+    """One nuisance, from text of NUISANCE_SYNTAX, such as "temperature step=0:30@8250 for all"."""
+    from creepkit.records import Nuisance
+
+    definition, _, whose = text.partition(" for ")
+    definition, _, start = definition.partition("@")
+    kind, _, numbers = definition.partition("=")
+    mean, _, sd = numbers.partition(":")
+    tests = tuple(name.strip() for name in whose.split(",") if name.strip())
+    scope: Any = tests[0] if tests in (("test",), ("alloy",), ("all",)) else "all" if tests else "test"
+    return Nuisance(
+        kind.strip(),
+        scope,
+        mean=parsed_number(mean or "0"),
+        sd=parsed_number(sd) if sd else None,
+        start=parsed_number(start or "0"),
+        tests=() if tests == (scope,) else tests,
+    )
+
+
+def steps(texts: Sequence[str]) -> tuple[tuple[float, float], ...]:
+    """(start in s, value) pairs from texts such as 100 and 3600:120."""
+    parts = [text.rpartition(":") for text in texts]
+    return tuple((parsed_number(start or "0"), parsed_number(value)) for start, _, value in parts)
+
+
+def _part(text: str) -> tuple[int, int]:
+    k, n = (parsed_integer(part) for part in pair(text, "/"))
+    if not 1 <= k <= n:
+        raise ValueError(text)
+    return k, n
+
+
+def _surrogate(name: str) -> Any:
+    import creepkit as ck
+
+    return ck.surrogate(name)
+
+
+SPECIAL: dict[Any, TextForm] = {
+    tuple[int, int]: TextForm("K/N", _part),
+    tuple[tuple[float, float], ...]: TextForm("[S:]NUMBER", steps, several=True),
+    Path: TextForm("PATH", Path),
+    int: TextForm("INTEGER", parsed_integer),
+    float: TextForm("NUMBER", parsed_number),
+    str: TextForm("TEXT", str),
+}
+"""Text forms of types that are not made of others."""
+
+
+@functools.cache
+def _forms_of_records() -> dict[Any, TextForm]:
+    """Those of records, which are imported for the commands that take them alone."""
+    from creepkit.records import Nuisance, Predictor
+
+    return {
+        Predictor: TextForm("NAME", _surrogate),
+        tuple[Nuisance, ...]: TextForm(NUISANCE_SYNTAX, _nuisances, several=True),
+    }
+
+
+def default_text(one: Option) -> str:
+    """The limits and the default, where a line can say it."""
+    limits = f"{one.limits.low:g} to {one.limits.high:g}" if one.limits and one.limits.high < 1e6 else ""
+    default = one.default
+    if default in (MISSING, None, inspect.Parameter.empty, {}, ()) or isinstance(default, bool):
+        text = ""
+    elif isinstance(default, int | float):
+        text = f"{(default - one.offset) / one.scale:g}"
+    elif isinstance(default, tuple):
+        text = ",".join(str(getattr(part, "kind", part)) for part in default)
+    else:
+        text = str(default)
+    parts = ([limits] if limits else []) + ([f"default: {text}"] if text else [])
+    return f" [{'; '.join(parts)}]" if parts else ""
+
+
+NOTHING = object()
+"""What `none` is of an option that may be None, and is not without it."""
+
+
+def _without_unit(one: Option, text: Any) -> Any:
+    """What was written, without the unit of the option behind its numbers, as in 1e4h."""
+    if not one.unit or not isinstance(text, str):
+        return text
+    return re.sub(rf"(?<=[\d.])\s?{re.escape(one.unit)}(?=,|:|$)", "", text)
+
+
+def given_value(one: Option, text: Any, error: type[CreepkitError]) -> Any:
+    """The value of what was written, in creepkit's unit; None where the option was not given.
+
+    Raises `error`, which names the option, for what is not understood or beyond its limits.
+    """
+    if text is None or text == [] or isinstance(text, bool):
+        return text if isinstance(text, bool) else None
+    if text == "none" and one.is_optional and one.default is not None:
+        return NOTHING
+    form, text = text_form(one.type), _without_unit(one, text)
+    shown = quoted(" ".join(text) if isinstance(text, list) else text)
+    try:
+        value = form.parse(text)
+    except ValueError as problem:
+        if isinstance(problem, CreepkitError):
+            raise error(f"{one.flag} {shown}: {problem}") from None
+        example = f", such as {one.example}" if one.example else ""
+        raise error(f"{one.flag} {shown} is not known; write {one.metavar or form.metavar}{example}") from None
+    except CreepkitError as problem:
+        raise error(f"{one.flag} {shown}: {problem}") from None
+    replace(one, name=one.flag, scale=1.0, offset=0.0).check(value, error)
+    return one.converted(value)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from creepkit.cli.command_options import OutputPath
+from creepkit.reports.blocks import aligned
 from creepkit.reports.terminal import ProgressBar, tell, tell_written
 
 if TYPE_CHECKING:
@@ -148,6 +149,5 @@ def _print_truth(folder: Path, fit: Identification) -> None:
 
 def _print_rows(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table without rules: one line a row."""
-    widths = [max(len(row[k]) for row in (columns, *rows)) for k in range(len(columns))]
-    for row in (columns, *rows):
-        tell("  " + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())
+    for line in aligned(columns, rows):
+        tell(f"  {line}")

@@ -40,7 +40,7 @@ def command(
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.ranking_document import read_fit_or_ranking
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-    from creepkit.reports.design import design_to_json, print_design
+    from creepkit.reports.design import design_to_json
 
     histories = ck.read_histories(tests)
     found = [read_fit_or_ranking(path) for path in fits]
@@ -62,7 +62,7 @@ def command(
     if as_json:
         print_json(design_to_json(result))
     else:
-        print_design(result)
+        tell(result)
     if plot is not None and result.tests:
         result.plot(plot)
         tell_written(plot, err=as_json)

@@ -38,7 +38,7 @@ def former_files(folder: Path) -> list[Path]:
     found = []
     for number, (name, sha256) in enumerate(files_of_ranking(folder / f"{RANKING_STEM}.json").items()):
         path = folder / name
-        if path.is_file() and not is_foreign(path) and sha256 not in (None, sha256_of(path, IDENTIFICATION.kind)):
+        if path.is_file() and not is_foreign(path) and sha256 != sha256_of(path, IDENTIFICATION.kind):
             continue  # something else of creepkit has written it since
         suffixes = LAW_SUFFIXES if number else (*LAW_SUFFIXES, *BEST_LAW_SUFFIXES)
         found += [path.with_suffix(suffix) for suffix in suffixes]

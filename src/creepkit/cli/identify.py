@@ -18,7 +18,6 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.limits import STRAIN
 from creepkit.options import Option
 from creepkit.records import Predictor
-from creepkit.reports.ranking import print_ranking, ranking_to_json
 from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell
 from creepkit.studies.candidates import by_select, ranked_candidates
 
@@ -79,6 +78,7 @@ def command(
     go to a folder.
     """
     import creepkit as ck
+    from creepkit.reports.ranking import print_ranking, ranking_to_json
     from creepkit.screening.screen import CANDIDATE_LAWS
 
     search = SearchOptions().changed(how)

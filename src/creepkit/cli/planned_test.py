@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from creepkit.api.options import PlannedTestOptions, elastic_of
-from creepkit.cli.command_options import CheckedCommand
-from creepkit.cli.generated_options import pair, steps
+from creepkit.cli.command_options import CheckedCommand, pair, steps
 from creepkit.cli.shared import DEFAULT_SPECIMEN
 from creepkit.errors import SolveError
 from creepkit.forecasts.planned_tests import (

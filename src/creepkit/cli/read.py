@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -125,23 +126,10 @@ def _readable_tests(
     try:
         return ck.read_histories(files, reader=reader, ignore=ignored), []
     except ck.errors.CreepkitError:
-        single = [one for path in files for one in (_files_in(path, reader) if path.is_dir() else [path])]
-        _, tests, unread = read_those_that_can_be(single, reader, ignored)
+        _, tests, unread = read_those_that_can_be(files, reader, ignored)
         if not tests or not unread:
             raise
         return tests, unread
-
-
-def _files_in(folder: Path, reader: str | None) -> list[Path]:
-    """The visible files of a folder that a reader accepts, or the folder where one takes it as a whole."""
-    from creepkit.records.plugin_calls import accepts_path
-    from creepkit.registry import default_registry
-
-    readers = [entry.value for name, entry in default_registry().readers().items() if reader in (None, name)]
-    if any(accepts_path(one, folder) for one in readers):
-        return [folder]
-    visible = sorted(one for one in folder.iterdir() if one.is_file() and one.name[0] != ".")
-    return [one for one in visible if any(accepts_path(each, one) for each in readers)]
 
 
 def _write(histories: list[History], folder: Path) -> list[Path]:
@@ -154,15 +142,13 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
 
     stems = [file_stem(history.name, "test", signs=r"\w.+-", gap="_") for history in histories]
     distinct = len({stem.casefold() for stem in stems}) == len(stems)
-    names = stems if distinct else [f"{number}_{stem}" for number, stem in enumerate(stems, 1)]
-    for history in histories:
-        history_text(history)  # an error of the last one must not leave the others written
+    paths = [folder / (f"{stem}.csv" if distinct else f"{k}_{stem}.csv") for k, stem in enumerate(stems, 1)]
     check_folder_target(folder, HistoryError)
-    paths = [folder / f"{name}.csv" for name in names]
-    for write in (False, True):
+    for write in (False, True):  # an error of the last one must not leave the others written
         for history, path in zip(histories, paths, strict=True):
             with made_from(_source_file(history.source)):  # whose names must not choose those of another measurement
                 check_folder_target(folder, HistoryError, (path.name,))
+                history_text(history)
                 if write:
                     make_folder(folder, HistoryError)
                     ck.write_history(history, path)
@@ -191,20 +177,17 @@ def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
         return [ck.read_record(path, reader) for path in files]
     if reader is not None or not all(path.is_file() for path in files):
         return []
-    special = [one for one in formats if one.required]
-    try:
+    with suppress(HistoryError):
         heads = [find_head(path) for path in files]
-        if not all(any(one.accepts(head.names) for one in special) for head in heads):
-            if not all(head.has_clock for head in heads):
-                return []
-            try:
-                ck.read_histories(files)
-                return []
-            except ck.errors.CreepkitError:
-                pass
-    except HistoryError:
-        return []
-    return [ck.read_record(path) for path in files]
+        if all(any(one.required and one.accepts(head.names) for one in formats) for head in heads):
+            return [ck.read_record(path) for path in files]
+        if not all(head.has_clock for head in heads):
+            return []
+        try:
+            ck.read_histories(files)
+        except ck.errors.CreepkitError:
+            return [ck.read_record(path) for path in files]
+    return []
 
 
 def _show_records(records: list[InstrumentRecord], to: Path | None, plot: Path | None, as_json: bool) -> None:

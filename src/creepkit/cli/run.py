@@ -41,8 +41,7 @@ def command(
     back to its study and data in a folder, which then runs.
     """
     from creepkit.errors import StudyError
-    from creepkit.studies.carried_study import study_of_report
-    from creepkit.studies.study import Study
+    from creepkit.studies.study import Study, study_of_report
 
     from_report = study.suffix.lower() in REPORT_SUFFIXES
     if from_report:

@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from creepkit.cli.command_options import OutputPath
-from creepkit.cli.generated_options import parsed_number
+from creepkit.cli.command_options import OutputPath, parsed_number
 from creepkit.cli.shared import Files, Json, Only, selected
 from creepkit.errors import FitError
 from creepkit.options import Option

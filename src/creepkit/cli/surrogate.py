@@ -57,8 +57,7 @@ def generate(
     """
     import creepkit as ck
     from creepkit.dataset.generation import resolve_design
-    from creepkit.reports.dataset import print_dataset
-    from creepkit.reports.sampling import print_acceptance
+    from creepkit.reports.dataset import print_acceptance, print_dataset
 
     chosen = ParallelExecution(**execution)
     changes: dict[str, Any] = {"domain": domain, **(conditions or {})}
@@ -169,7 +168,6 @@ def reduce(
     geometry: Annotated[
         dict[str, float] | None, Option(help="A length of the test piece, mm.", example="apex_thickness=0.45")
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Picture of its points to write."), OutputPath("picture")] = None,
 ) -> None:
     """Train the reduced-order model of a test piece, and say how far it errs.
 
@@ -178,18 +176,12 @@ def reduce(
     """
     import creepkit as ck
     from creepkit.records import outputs_of
-    from creepkit.reports.simulation import cubature_figure
 
     predictor = _trainable_model(ck.specimen(specimen), geometry or {})
     tell(predictor.train())
     units = {str(output): output.unit for output in outputs_of(predictor)}
     errors = ", ".join(f"{name} {value:.2g} {units.get(name, '')}".rstrip() for name, value in predictor.error.items())
     tell(f"error against its finite elements, one standard deviation over runs it was not trained on: {errors}")
-    if picture is not None:
-        if not hasattr(predictor, "cubature_model"):
-            raise SolveError(f"--picture: the reduced-order model of '{specimen}' has no points to draw; leave it out")
-        cubature_figure(predictor.cubature_model(), picture)
-        tell_written(picture, err=True)
 
 
 COMMANDS = {"generate": generate, "train": train, "sweep": sweep, "reduce": reduce}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.errors import FitError, HistoryError, quoted
+from creepkit.errors import FitError, HistoryError
 from creepkit.extraction.domes import Centers, find_domes, place_centers
 from creepkit.extraction.extraction import Extraction, FieldMap, PlateMotion
 from creepkit.extraction.frame_checks import FrameFlags, frames_at_rest, motion_reasons, residual_reasons
@@ -68,6 +68,7 @@ def extract_surfaces(
     *,
     operator: str | None = None,
     centers: Centers | None = None,
+    names: Sequence[str] = (),
     rest: slice | None = None,
     subset: float = 0.0,
     load: Floats | None = None,
@@ -77,6 +78,7 @@ def extract_surfaces(
 
     specimen : says how cameras see it. operator : text of the observation operator; None for the specimen's own.
     centers : {name: (x, y)} or [(x, y), ...], mm in the axes of the frames; None to find domes and fit their centres.
+    names : of those that are found, row by row; by default D1, D2 ....
     rest : slice of the frames that are at rest; None to find them. subset : mm, side of the square that the camera
     system averages over, whose smoothing is taken out; 0 leaves it in. load : (frames,) imposed, any unit.
     failed : takes {test piece: why nothing is extracted of it}; None: the first such is a HistoryError.
@@ -84,9 +86,16 @@ def extract_surfaces(
     _check(frames, subset)
     region = specimen.surface_region
     plate = reference_plate(frames)
-    plate, found = (
-        find_domes(frames, plate, region) if centers is None else place_centers(frames, plate, region, centers)
-    )
+    if centers is not None:
+        plate, found = place_centers(frames, plate, region, centers)
+    else:
+        plate, found = find_domes(frames, plate, region)
+        if names and len(names) != len(found):
+            raise HistoryError(
+                f"{len(found)} test pieces were found, and {len(names)} names are given: {', '.join(names)}; give as "
+                "many names, or the centres of those that have them"
+            )
+        found = dict(zip(names or found, found.values(), strict=True))
     problems: dict[str, str] = {}
     groups: dict[str, Ints] = {}
     for name, center in found.items():
@@ -128,8 +137,6 @@ class _Piece(NamedTuple):
 
 
 def _check(frames: Frames, subset: float) -> None:
-    if not isinstance(frames, Frames):
-        raise HistoryError(f"extract() takes frames, found {quoted(repr(frames))}; read them with ck.read_frames(path)")
     if len(frames) < 2:
         raise HistoryError(f"frames '{frames.name}': one frame is no test; extraction needs the reference and others")
     if not np.isfinite(frames.times).all() or (np.diff(frames.times) <= 0.0).any():
@@ -201,14 +208,10 @@ def _extract_one(
     noise = estimate_noise(seen, fields, np.where(good, signal, np.nan), shown, plate.spacing)
     # Points of overlapping subsets err together: the centre of independent ones is known less well by as much.
     inflation = np.sqrt(max(1.0, np.pi * noise.correlation_length**2 / plate.spacing**2))
-    motion = PlateMotion(
-        translations,
-        rotations,
-        _motion_errors(taken, fields.clamped_places, noise),
-        int(clamped.sum()),
-        *_presence(series, clamped, good),
-        _size(taken.clamped_heights),
-    )
+    held = series.valid[good][:, clamped]
+    counts = int(clamped.sum()), int(held.all(axis=0).sum()), int(np.median(held.sum(axis=1)))
+    errors = _motion_errors(taken, fields.clamped_places, noise)
+    motion = PlateMotion(translations, rotations, errors, *counts, _size(taken.clamped_heights))
     sd = np.sqrt(np.einsum("fii->fi", noise.covariance))
     return Extraction(
         name=piece.name,
@@ -347,22 +350,12 @@ def _positions(signal: Floats) -> Floats:
 
 def _motion_errors(taken: TakenOff, places: Floats, noise: NoiseEstimate) -> Floats:
     """(6,) standard errors of one frame's translations and rotations; those in the plane from independent patches."""
-    independent = np.sqrt(len(places) / max(1.0, np.pi * (0.5 * noise.patch) ** 2 / _cell(places)))
+    distance = np.hypot(*places.T)
+    cell = np.pi * (distance.max() ** 2 - distance.min() ** 2) / len(places)  # mm2 of plate for each point, about
+    independent = np.sqrt(len(places) / max(1.0, np.pi * (0.5 * noise.patch) ** 2 / cell))
     lever = np.sqrt((places**2).sum(axis=1).mean())
     in_plane = np.median(taken.motion.residual_sd, axis=0)[:2] / independent
     return np.array([*in_plane, *noise.plate_sd, float(np.hypot(*in_plane)) / np.sqrt(2.0) / lever])
-
-
-def _cell(places: Floats) -> float:
-    """mm2 of plate for each point, about."""
-    area = np.pi * (np.hypot(*places.T).max() ** 2 - np.hypot(*places.T).min() ** 2)
-    return float(area / len(places))
-
-
-def _presence(series: PointSeries, clamped: Bools, good: Bools) -> tuple[int, int]:
-    """How many clamped points every good frame holds, and how many one frame does, the median."""
-    valid = series.valid[good][:, clamped]
-    return int(valid.all(axis=0).sum()), int(np.median(valid.sum(axis=1)))
 
 
 def _maps(heights: Floats, seen: SurfaceObservation, surface: Ints, good: Bools, rest: Ints) -> tuple[FieldMap, ...]:

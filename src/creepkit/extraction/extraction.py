@@ -54,7 +54,7 @@ class FieldMap(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Extraction(Presentable, text="reports.extraction_text:extraction_text"):
+class Extraction(Presentable, text="reports.extraction:extraction_text"):
     """The measured outputs of one test piece, and how they came about.
 
     name : D1, D2 ... or as given. source : the frames. specimen, operator : what was observed, and how.
@@ -107,7 +107,7 @@ class Extraction(Presentable, text="reports.extraction_text:extraction_text"):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """A contact sheet: fields, residuals, points that were used, outputs with bands, rigid motion, residuals."""
-        return present("reports.extraction_plot:extraction_figure", self, path)
+        return present("reports.extraction:extraction_figure", self, path)
 
     def history_under(
         self, loading: Loading | float, temperature: float | Program, *, time_zero: float | None = None

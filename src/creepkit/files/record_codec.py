@@ -76,8 +76,8 @@ class RecordCodec:
 
     omitted : {class: fields} that are not stored; they take their defaults when a record is read. `object` stands for
         every class.
-    ranges : {class: {field: numbers that may stand there}}; by default those that are finite. Of a field that holds
-        several numbers it holds for each. values : {type: codec} of what is no record, such as a law.
+    ranges : {class: {field: numbers that may stand there}}, "*" for its other fields; by default those that are finite.
+        Of a field that holds several numbers it holds for each. values : {type: codec} of what is no record: a law.
     names : {name: type} of annotations that a module imports for type checkers alone. default_range : of fields that
         `ranges` does not name.
     """
@@ -91,7 +91,7 @@ class RecordCodec:
 
     def __post_init__(self) -> None:
         for record, names in (*self.omitted.items(), *self.ranges.items()):
-            if is_dataclass(record) and (unknown := set(names) - {f.name for f in fields(record)}):
+            if is_dataclass(record) and (unknown := set(names) - {"*", *(f.name for f in fields(record))}):
                 raise TypeError(f"{record.__name__} has no field {', '.join(sorted(unknown))}")
 
     def to_json(self, value: Any, place: str = "the record") -> Any:
@@ -232,8 +232,8 @@ class RecordCodec:
         return get_type_hints(record, localns=dict(self.names))
 
     def _range(self, record: type, name: str) -> NumberRange:
-        tables = (table for kind, table in self.ranges.items() if issubclass(record, kind) and name in table)
-        return next(tables, {name: self.default_range})[name]
+        tables = (table for kind, table in self.ranges.items() if issubclass(record, kind))
+        return next((table[key] for table in tables for key in (name, "*") if key in table), self.default_range)
 
 
 _MAX_DIMENSIONS = 8

@@ -77,7 +77,7 @@ class Forecast(Presentable, text="reports.forecast:forecast_text"):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Curves with bands, measured points over them, times on the axis, and what the bands are made of."""
-        return present("reports.forecast_plot:forecast_figure", self, path)
+        return present("reports.forecast:forecast_figure", self, path)
 
 
 @checked

@@ -77,30 +77,29 @@ def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
         start = stream.read(LONGEST_LINE)
         stream.seek(0)
         is_wide = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        if b"\0" in start and not is_wide:  # before a line without an end is read
+            raise _no_text(path, start[: start.index(b"\0")].count(b"\n") + 1, 0)
         if len(start) == LONGEST_LINE and not {*b"\r\n"} & {*start}:
             raise HistoryError(f"{path}:1: a line of more than {LONGEST_LINE} characters; save it as a table")
         encoding, errors = ("utf-16", "strict") if is_wide else ("utf-8-sig", "creepkit.western")
         text: io.TextIOBase = io.TextIOWrapper(stream, encoding, errors)
         if is_labview(start[:200].decode("latin-1")):
             text = io.StringIO(table_of_labview(text.read()) + "\n")
-        number = 1
+        first = 1
         try:
             while lines := text.readlines(PART_CHARACTERS):
-                first = number
-                refuse_unprintable(
-                    "".join(lines),
-                    lambda k: f"{path}:{first + ''.join(lines)[:k].count(chr(10))}",  # noqa: B023
-                )
-                for line in lines:
-                    if "\0" in line:
-                        raise HistoryError(f"{path}:{number}: byte 0x00 is not text; save the table as text in UTF-8")
-                    yield number, line
-                    number += 1
+                part = "".join(lines)
+                if "\0" in part:
+                    raise _no_text(path, first + part[: part.index("\0")].count("\n"), 0)
+                refuse_unprintable(part, lambda k: f"{path}:{first + part[:k].count(chr(10))}")  # noqa: B023
+                yield from enumerate(lines, first)
+                first += len(lines)
         except UnicodeDecodeError as error:
-            found = error.object[error.start]
-            raise HistoryError(
-                f"{path}: byte 0x{found:02x} behind line {number - 1} is no text; save the table as text in UTF-8"
-            ) from None
+            raise _no_text(path, first, error.object[error.start]) from None
+
+
+def _no_text(path: Path, line: int, byte: int) -> HistoryError:
+    return HistoryError(f"{path}:{line}: byte 0x{byte:02x} is not text; save the table as text in UTF-8")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Adequacy: whether a law explains the tests to their noise (see inverse.chi_square_test for how it is judged)."""
+"""Adequacy: whether a law explains the tests to their noise (see inverse.judging for how it is judged)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.known_noise import how_to_state_noise
-from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.inverse.single_values import ContradictingValues
 from creepkit.inverse.variance_components import SMALLEST_RATE_SCATTER
 from creepkit.records import output_unit
+from creepkit.records.units import time_text
 
 IMPLAUSIBLE_CHI_SQUARE = 0.05
 """Reduced chi-square below which the noise that was stated is questioned: 4.5 times what the frames show."""
@@ -64,6 +64,36 @@ class OutputAdequacy:
     def discrepancy_in_noises(self) -> float:
         """The discrepancy over the noise, each frame's over its own; 0 where there is no discrepancy."""
         return float(np.sqrt(max(self.chi_square - 1.0, 0.0))) if self.discrepancy > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class LargestDeviation:
+    """Where a law misses the tests most: the test and output of largest rms over noise, and the frames within it.
+
+    test, output : names. time : s, of the neighbouring frames of largest mean deviation, which is `deviation`,
+    predicted less measured, in the output's unit, and `noises`, in noises of one frame. rms : of the deviation over all
+    frames of the test, 0 where unknown. Offsets and the scatter of rates and rupture lives are taken out of all.
+    """
+
+    test: str
+    output: str
+    time: float
+    deviation: float
+    noises: float
+    rms: float = 0.0
+
+    def __str__(self) -> str:
+        unit = output_unit(self.output)
+        side = "above" if self.deviation > 0 else "below"
+        rms = f" (rms {_amount(self.rms, unit)})" if self.rms > 0 else ""
+        return (
+            f"{self.output} of '{self.test}'{rms} about {time_text(self.time)}, where it lies "
+            f"{_amount(abs(self.deviation), unit)} {side} what was measured"
+        )
+
+
+def _amount(value: float, unit: str) -> str:
+    return f"{value:.2g}{' ' + unit if unit else ''}"
 
 
 @dataclass(frozen=True)

@@ -66,10 +66,7 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 @dataclass(frozen=True, eq=False)
 class Identification(
-    RateStatements,
-    Presentable,
-    text="reports.answer:answer_text",
-    details="reports.identification_text:identification_text",
+    RateStatements, Presentable, text="reports.answer:answer_text", details="reports.identification:identification_text"
 ):
     """The result of identify().
 
@@ -159,7 +156,7 @@ class Identification(
 
     def comments(self, ranking: Any = None) -> list[str]:
         """What an exported law says of itself, a line each; ranking : that it is the best of, where there was one."""
-        return present("reports.identification_text:identification_comments", self, ranking)
+        return present("reports.identification:identification_comments", self, ranking)
 
     @property
     def coordinates(self) -> Coordinates:

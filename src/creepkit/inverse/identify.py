@@ -11,7 +11,6 @@ import numpy as np
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.bound_penalties import check_bounds
-from creepkit.inverse.chi_square_test import adequacy_with_remedies
 from creepkit.inverse.compared_tests import compared_tests, compares_rupture_times
 from creepkit.inverse.composite_predictor import (
     predict,
@@ -52,6 +51,7 @@ from creepkit.inverse.iterative_estimation import (
     starting_point,
     under_errors_of_tests,
 )
+from creepkit.inverse.judging import Judge
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
@@ -323,9 +323,8 @@ def _result(
     failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]
     failed |= (prediction.status[0] != Status.RUPTURED) & [test.misses_readings for test in tests]
     unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
-    adequacy = adequacy_with_remedies(
-        problem, judged, noise_model, working_estimator.predictor_errors, histories, unmodelled, rates.found
-    ).with_unpredicted(unpredicted)
+    judge = Judge(problem, noise_model, working_estimator.predictor_errors, histories)
+    adequacy = judge.adequacy_with_remedies(judged, unmodelled, rates.found).with_unpredicted(unpredicted)
     adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
     estimates = parameter_estimates(law, coordinates, u, law_covariance, quantile)
     return Identification(
@@ -370,7 +369,7 @@ def _result(
         search_trace=search_outcome.trace,
         linearised=best.linearised,
         problem=replace(
-            problem, covariance_factor=CovarianceFactor.of_residuals(best.residuals, noise_model), loss="linear"
+            problem, covariance_factor=CovarianceFactor.of_residuals(residuals, noise_model), loss="linear"
         ),
     )
 

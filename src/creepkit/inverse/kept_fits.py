@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -36,7 +35,7 @@ from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
 from creepkit.inverse.composite_predictor import predictors_for_law
 from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identification_document import identification_from_json, identification_to_json
+from creepkit.inverse.identification_document import identification_from_json, identification_to_json, with_shapes
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.records import Predictor
 
@@ -58,10 +57,8 @@ CODE_SUFFIXES = (".py", ".so", ".dll", ".dylib", ".js", ".css", ".html")
 @functools.cache
 def code_fingerprint() -> str:
     """Hash of the files of this package: a checkout that is being worked on changes under the same version."""
-    root = Path(__file__).parent.parent
-    files = (Path(folder) / name for folder, _, names in os.walk(root) for name in names)
-    digest = hashlib.sha256()
-    for path in sorted(file for file in files if file.suffix in CODE_SUFFIXES):
+    root, digest = Path(__file__).parent.parent, hashlib.sha256()
+    for path in sorted(file for file in root.rglob("*") if file.suffix in CODE_SUFFIXES):
         content = path.read_bytes()  # files of the package itself, not of a user
         digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode())
         digest.update(content)
@@ -86,8 +83,11 @@ def kept_from_json(data: Any, source: str) -> Identification:
     fit = identification_from_json(data["identification"], source)
     stored = data["linearised"]
     linearised = None if stored is None else PLAIN.from_json(LinearisedProblem, stored)
-    if linearised is not None and (wrong := _contradiction(linearised)):
-        raise RecordError(f"linearised: {wrong}")
+    if linearised is not None:
+        unknowns, residuals = (linearised.free.size,), linearised.residuals
+        shapes = {**dict.fromkeys(("precision", "prior_residual", "free"), unknowns), "step_bounds": (2, *unknowns)}
+        residuals = with_shapes(residuals, {"jacobian": (*residuals.values.shape, *unknowns)})
+        linearised = with_shapes(replace(linearised, residuals=residuals), shapes)
     changes = PLAIN.from_json(list[Floats], data["residual_changes"], "residual_changes")
     if len(changes) != len(fit.unmodelled):
         raise RecordError("residual_changes are not those of the unmodelled effects")
@@ -97,27 +97,6 @@ def kept_from_json(data: Any, source: str) -> Identification:
         for effect, change in zip(fit.unmodelled, changes, strict=True)
     )
     return replace(fit, linearised=linearised, unmodelled=unmodelled)
-
-
-def _contradiction(linearised: LinearisedProblem) -> str:
-    """What of a linearised problem no identification has written, in a clause; "" where nothing is."""
-    residuals, unknowns = linearised.residuals, linearised.precision.size
-    shapes = {
-        "precision": (linearised.precision, (unknowns,)),
-        "prior_residual": (linearised.prior_residual, (unknowns,)),
-        "free": (linearised.free, (unknowns,)),
-        "step_bounds": (linearised.step_bounds, (2, unknowns)),
-        "values": (residuals.values, residuals.values.shape[:2]),
-        "jacobian": (residuals.jacobian, (*residuals.values.shape, unknowns)),
-    }
-    for name, (array, shape) in shapes.items():
-        if array is not None and array.size and array.shape != shape:
-            return f"{name} has the shape {array.shape}, not {shape}"
-        if array is not None and np.isnan(array).any():
-            return f"{name} holds what is no number"
-    if (linearised.precision < 0).any():
-        return "precision holds what is below zero"
-    return ""
 
 
 KEPT_PARTS = ("identification", "linearised", "residual_changes")
@@ -190,18 +169,10 @@ def kept_where_asked(identify: Identify) -> Identify:
         finally:
             _FOLDER.reset(token)
         kept.made += 1
-        if _can_be_kept(fit):
-            kept.save(key, fit)
+        kept.save(key, fit)
         return fit
 
     return cast(Identify, run)
-
-
-def _can_be_kept(fit: Identification) -> bool:
-    """Whether a file gives it back: JSON holds no shape of empty arrays."""
-    linear = fit.linearised
-    arrays = () if linear is None else (linear.step_bounds, linear.residuals.values, linear.residuals.jacobian)
-    return all(array is None or array.size for array in arrays)
 
 
 def _key(kind: str, law: Any, histories: Any, predictor: Predictor, how: Mapping[str, Any]) -> str:

@@ -59,7 +59,7 @@ class CovarianceFactor:
 
     def whiten(self, values: Floats) -> Floats:
         """L^-1 v of values (tests, observations[, columns]), of the same shape; observations without data stay."""
-        whitened = self._whitened_by_tests(values)
+        whitened = self._transformed(values, inverse=False)[0]
         if self.common is None:
             return whitened
         left, squares = self._common_modes
@@ -83,15 +83,11 @@ class CovarianceFactor:
         own = self._transformed(np.zeros((*self.series.shape, 0)), inverse=False)[1]
         return own if self.common is None else own + float(np.log1p(self._common_modes[1]).sum())
 
-    def _whitened_by_tests(self, values: Floats) -> Floats:
-        """L_0^-1 v, each test by itself."""
-        return self._transformed(values, inverse=False)[0]
-
     @cached_property
     def _common_modes(self) -> tuple[Floats, Floats]:
         """U, (tests x observations, effects), and the squares of D, (effects,)."""
         assert self.common is not None
-        rows = self._whitened_by_tests(self.common).reshape(-1, self.common.shape[-1])
+        rows = self._transformed(self.common, inverse=False)[0].reshape(-1, self.common.shape[-1])
         left, values, _ = np.linalg.svd(rows, full_matrices=False)
         return left, values**2
 
@@ -161,13 +157,6 @@ class NoiseLikelihood:
         self._components[:] = components
         _check(function("creepkit_restricted_likelihood")(*self._arguments))
         return float(self._value[0]), self._gradient.copy()
-
-
-def log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
-    """Gaussian log-likelihood of the residuals under a noise model."""
-    factor = CovarianceFactor.of_residuals(residuals, noise_model)
-    whitened, count = factor.whiten(residuals.values), int(residuals.present.sum())
-    return float(-0.5 * ((whitened**2).sum() + factor.log_determinant + count * np.log(2 * np.pi)))
 
 
 def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ strain or displacement the stress is E (strain - creep strain): a modulus or a s
 first reading on, and is found as offsets of the tests.
 
 The same perturbations, as random effects in the covariance or as unknowns with priors, show what a law would explain
-with them (inverse.chi_square_test), and whether the choice of a law rests on their absence
+with them (inverse.judging), and whether the choice of a law rests on their absence
 (selection.perturbation_trials).
 """
 

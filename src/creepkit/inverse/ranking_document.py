@@ -6,14 +6,16 @@ It states the SHA-256 of each of these files: one that another run has written s
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.files.file_names import LAW_SIGNS, numbered_stems
-from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, read_json, write_json
+from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind, sha256_of
+from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json, load
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
@@ -32,6 +34,37 @@ RANKING = DocumentFormat(
 
 MOST_LAWS = 100
 """In a ranking's file."""
+
+
+@dataclass(frozen=True)
+class LawFile:
+    """A law of a ranking: the file of its identification, beside the ranking's, its weight, and SHA-256 of the file."""
+
+    file: str
+    weight: float
+    sha256: str
+
+
+@dataclass(frozen=True)
+class RankingFile:
+    """What a ranking's file holds: the laws, the best first."""
+
+    laws: tuple[LawFile, ...]
+
+    def __post_init__(self) -> None:
+        names, total = [law.file for law in self.laws], sum(law.weight for law in self.laws)
+        if not 0 < len(names) <= MOST_LAWS:
+            raise FitError(f"laws is no list of 1 to {MOST_LAWS} laws")
+        for name in names:
+            if Path(name).name != name or name in ("", ".", ".."):
+                raise FitError(f"a law's file is '{quoted(name, 60)}'; it is a name in the same folder")
+            if names.count(name) > 1:
+                raise FitError(f"{quoted(name, 60)} is among its laws twice; keep one of them")
+        if not 0 < total <= 1.0 + 1e-6:
+            raise FitError(f"the weights add up to {total:g}, which must be above 0 and at most 1")
+
+
+CODEC = RecordCodec(ranges={LawFile: {"weight": NumberRange(0.0, 1.0)}})
 
 
 def stems_of_laws(laws: Iterable[CreepLaw], stem: str) -> list[str]:
@@ -61,19 +94,24 @@ def ranking_to_document(weights: Mapping[str, float], digests: Mapping[str, str]
     """
     if len(weights) > MOST_LAWS:  # those of least weight say nothing
         weights = dict(sorted(weights.items(), key=lambda pair: -pair[1])[:MOST_LAWS])
-    laws = [{"file": name, "weight": weight, "sha256": digests[name]} for name, weight in weights.items()]
-    return {**RANKING.heading, "laws": laws}
+    laws = tuple(LawFile(name, weight, digests[name]) for name, weight in weights.items())
+    return {**RANKING.heading, **CODEC.to_json(RankingFile(laws))}
 
 
-def files_of_ranking(path: Path) -> dict[str, str | None]:
-    """{file of a law: its SHA-256, None where it is not stated}, the best first; {} where no ranking can be read."""
+def files_of_ranking(path: Path) -> dict[str, str]:
+    """{file of a law: its SHA-256}, the best first; {} where no ranking can be read."""
     try:
-        laws = check_heading(read_json(path, RANKING.kind), str(path), RANKING).get("laws")
+        return {law.file: law.sha256 for law in _ranking_file(read_json(path, RANKING.kind), path).laws}
     except FitError:
         return {}
-    entries = [one for one in laws if isinstance(one, dict)] if isinstance(laws, list) else []
-    names = [(entry.get("file"), entry.get("sha256")) for entry in entries]
-    return {name: sha256 for name, sha256 in names if isinstance(name, str) and Path(name).name == name}
+
+
+def _ranking_file(data: Any, path: Path) -> RankingFile:
+    content = check_heading(data, str(path), RANKING)
+    try:
+        return CODEC.from_json(RankingFile, content)
+    except RecordError as error:
+        raise FitError(f"{path}: {error}; {RANKING.kind.advice}") from None
 
 
 def read_fit_or_ranking(path: str | Path) -> Identification | ModelAverage:
@@ -81,53 +119,33 @@ def read_fit_or_ranking(path: str | Path) -> Identification | ModelAverage:
     data = read_json(Path(path), IDENTIFICATION.kind)
     if not (isinstance(data, dict) and data.get("format") == RANKING.name):
         return identification_from_json(data, str(path))
-    return _ranking_from_json(data, path)
+    return _ranking_from_json(data, Path(path))
 
 
 @checked
 def load_ranking(path: str | Path) -> ModelAverage:
     """Return the laws of a ranking.json with their weights, as forecasts take them; the files of laws lie beside it."""
-    return _ranking_from_json(read_json(Path(path), RANKING.kind), path)
+    return _ranking_from_json(read_json(Path(path), RANKING.kind), Path(path))
 
 
-def _ranking_from_json(data: Any, path: str | Path) -> ModelAverage:
-    content = check_heading(data, str(path), RANKING)
-    laws = content.get("laws")
-    problem = check_keys(content, ("laws",), "ranking")
-    if problem or not isinstance(laws, list) or not 0 < len(laws) <= MOST_LAWS:
-        raise FitError(f"{path}: {problem or f'laws is no list of 1 to {MOST_LAWS} laws'}; {RANKING.kind.advice}")
-    fits: list[Identification] = []
-    weights: list[float] = []
-    for entry in laws:
-        if not isinstance(entry, dict) or check_keys(entry, ("file", "weight", "sha256"), "laws"):
-            raise FitError(f"{path}: each of its laws is file, weight and sha256, found {quoted(repr(entry), 60)}")
-        name, weight = entry["file"], entry["weight"]
-        if not isinstance(name, str) or Path(name).name != name or name in ("", ".", "..", Path(path).name):
-            raise FitError(f"{path}: a law's file is {quoted(repr(name), 60)}; it is a name in the same folder")
-        if isinstance(weight, bool) or not isinstance(weight, int | float) or not 0 <= weight <= 1:
-            raise FitError(f"{path}: the weight of {name} is {quoted(repr(weight), 20)}; it is a number from 0 to 1")
-        if name in (known["file"] for known in laws[: len(fits)]):
-            raise FitError(f"{path}: {name} is among its laws twice; keep one of them")
-        fits.append(_fit_of_law(Path(path), name, entry["sha256"]))
-        weights.append(float(weight))
+def _ranking_from_json(data: Any, path: Path) -> ModelAverage:
+    laws = _ranking_file(data, path).laws
+    fits = tuple(_fit_of_law(path, law) for law in laws)
     if len({fit.provenance.get("data") for fit in fits}) > 1:
         raise FitError(f"{path}: its laws were not identified alike from the same tests; {RANKING.kind.advice}")
-    if sum(weights) > 1.0 + 1e-6:
-        raise FitError(f"{path}: the weights add up to {sum(weights):g}, more than 1; {RANKING.kind.advice}")
-    if not sum(weights) > 0:
-        raise FitError(f"{path}: no law has a weight above zero; {RANKING.kind.advice}")
-    return ModelAverage(tuple(fits), tuple(weights))
+    return ModelAverage(fits, tuple(law.weight for law in laws))
 
 
-def _fit_of_law(path: Path, name: str, sha256: Any) -> Identification:
-    """The identification in a file beside a ranking; sha256 : of the file, as the ranking states it."""
+def _fit_of_law(path: Path, law: LawFile) -> Identification:
+    """The identification in a file beside a ranking."""
+    file = path.parent / law.file
     try:
-        fit = load(path.parent / name)
+        fit = load(file)
     except FitError as error:
-        raise FitError(f"{path} names {name}: {error}") from None
-    if sha256_of(path.parent / name, IDENTIFICATION.kind) != sha256:
+        raise FitError(f"{path} names {law.file}: {error}") from None
+    if sha256_of(file, IDENTIFICATION.kind) != law.sha256:
         raise FitError(
-            f"{path}: {name} is not the file that this ranking was made with: it has been changed, or written by "
+            f"{path}: {law.file} is not the file that this ranking was made with: it has been changed, or written by "
             f"another run; {RANKING.remedy}"
         )
     return fit

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,6 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError, quoted
-from creepkit.readers.column_names import split_unit
 from creepkit.readers.condition_texts import with_weak_sources
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
@@ -38,7 +36,7 @@ from creepkit.readers.frames import UNUSED, TableFrames, column_means, column_qu
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.questions import Question
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
-from creepkit.readers.table import CellTable, NumberRows, SourceText, cells_of
+from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records import (
     UNKNOWN_DURATION,
@@ -79,15 +77,12 @@ def assemble_history(
     conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
-    table, marked = _without_readings_before_steps(table, vocabulary, conditions.terms)
-    if marked:
-        count = f"{len(marked)} reading{'s' * (len(marked) > 1)}"
-        conditions.record_assumption(
-            f"{count} left out that another one at the same time follows with other conditions"
-        )
     frames = as_plain_bar(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
+    if count := len(frames.marked):
+        what = f"{count} reading{'s' * (count > 1)} left out that another one at the same time follows"
+        conditions.record_assumption(f"{what} with other conditions")
     columns = table.location(table.columns_line)
-    loading = read_loading(conditions, frames, marked)
+    loading = read_loading(conditions, frames)
     is_named = conditions.states("specimen")
     specimen, outputs = _specimen_and_outputs(conditions, frames, loading.quantity, columns)
     if not is_named:
@@ -95,7 +90,7 @@ def assemble_history(
     strain_measure = conditions.take_choice(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
-    temperature = read_temperature(conditions, frames, marked)
+    temperature = read_temperature(conditions, frames)
     used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
     if "strain" in outputs:
         record = without_loading(
@@ -260,36 +255,6 @@ def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | N
 def _refuse_unknown_specimen(named: str, terms: Terms, location: str) -> None:
     if named and named not in terms.outputs and (near := get_close_matches(named, terms.outputs, 1, cutoff=0.8)):
         raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
-
-
-def _without_readings_before_steps(
-    table: CellTable, vocabulary: HeaderVocabulary, terms: Terms
-) -> tuple[CellTable, set[int]]:
-    """The table with the later of two rows of one time that differ in load, temperature or step; their lines.
-
-    A reading before a change of load and one after it state when it was; the mean of both would be neither.
-    """
-    kinds = terms.column_kinds
-    found = [split_unit(vocabulary.synonyms.get(name, name), kinds) for name in table.columns]
-    quantities = ["" if one is None else one[0] for one in found]
-    imposed = [k for k, q in enumerate(quantities) if q in {*terms.number_kinds, "temperature", "step"}]
-    if "time" not in quantities or not imposed:
-        return table, set()
-    clock, rows = quantities.index("time"), table.rows
-    if isinstance(rows, NumberRows):
-        same_time = np.diff(rows.numbers[:, clock]) == 0.0
-        changed = np.array([np.diff(rows.numbers[:, k]) != 0.0 for k in imposed]).any(axis=0)
-        before = np.flatnonzero(same_time & changed).tolist()
-    else:
-        imposed_cells = zip(cells_of(rows, clock), *(cells_of(rows, k) for k in imposed), strict=True)
-        pairs = enumerate(pairwise(imposed_cells))
-        before = [k for k, (one, next_) in pairs if one[0] == next_[0] and one != next_]
-    if not before:
-        return table, set()
-    dropped, lines = set(before), table.lines
-    return replace(table, rows=[row for k, row in enumerate(rows) if k not in dropped]), {
-        int(lines[k + 1]) for k in before
-    }
 
 
 def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Elastic | None) -> float | None:

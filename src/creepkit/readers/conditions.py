@@ -10,10 +10,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
+from creepkit.errors import CreepkitError, HistoryError, nearest
 from creepkit.readers.column_names import plain_name, split_unit, unit_suffix
 from creepkit.readers.ends_of_tests import (
     FIRM,
@@ -25,7 +26,7 @@ from creepkit.readers.ends_of_tests import (
     kind_of_column,
     marked_time,
 )
-from creepkit.readers.questions import Question
+from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.table import SourceText
 from creepkit.readers.vocabulary import CLOSE_SPELLING, SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms, is_misspelling
 from creepkit.records import Program
@@ -100,17 +101,10 @@ class StatedConditions:
         self._texts: dict[str, SourceText] = {}
         self._assumptions: list[str] = []
         self._locations: dict[str, str] = {}
-        unknown = {key: entry for key, entry in entries.items() if not self._classify(key, entry)}
-        refused = [
-            key
-            for key in unknown
-            if not (key.strip() and kind_of_column(key) in (*FIRM, "remark"))
-            and (not columns_as_labels or not key.strip() or self._misspelt(key))
-        ]
-        if refused:
-            raise _unknown_key(refused, unknown, self._misspelt(refused[0]) or self.terms.suggestion(refused[0]))
-        for key, entry in unknown.items():
-            _put_once(self.labels, key, entry.text, entry.location)
+        errors = list[HistoryError]()
+        for key, entry in entries.items():
+            collected(errors, partial(self._classify, key, entry, columns_as_labels))
+        raise_all(errors)
 
     def take_number(self, quantity: str) -> StatedNumber | None:
         """Take a number, if it was given."""
@@ -208,77 +202,87 @@ class StatedConditions:
         assumed = ", ".join(dict.fromkeys([*earlier, *new]))
         return {**self.labels, **({"assumed": assumed} if assumed else {})}
 
-    def _classify(self, key: str, entry: SourceText) -> bool:
-        """Put an entry where it belongs; False where nothing is known of its key."""
-        name = self._vocabulary.synonyms.get(key, key)
-        kept_as_label = name in self._vocabulary.labels or (name == "operator" and not _OBSERVATION.match(entry.text))
-        result = None if kept_as_label else split_unit(name, self._kinds)
+    def _classify(self, key: str, entry: SourceText, columns_as_labels: bool) -> None:
+        """Put an entry where it belongs."""
+        name, written = self._vocabulary.synonyms.get(key, key), entry.key or key
+        found = split_unit(name, self._kinds)
         word, _, rest = name.strip().partition(" ")
-        if kept_as_label:
-            _put_once(self.labels, name, entry.text, entry.location)
+        base, _, suffix = name.rpartition("_")
+        if name in self._vocabulary.labels or (name == "operator" and not _OBSERVATION.match(entry.text)):
+            self._put(self.labels, name, entry.text, entry)
         elif word.casefold() == "label" and rest.strip():
-            _put_once(self.labels, rest.strip(), entry.text, entry.location)
+            self._put(self.labels, rest.strip(), entry.text, entry)
         elif word.casefold() == "geometry" and rest.strip():
-            _put_once(self.geometry, *_specimen_dimension(rest.strip(), entry, self.terms), entry.location)
+            self._put(self.geometry, *_specimen_dimension(rest.strip(), entry, self.terms), entry)
         elif name == "ended":
-            _put_once(self._texts, "ended", replace(entry, text=self._end(entry.text)), entry.location)
-        elif result and result[0] == "rupture" and (mark := marked_time(entry.text, self.end_terms)).said != "":
-            self._put_marked(mark, result[1], entry, entry.key or key)
+            self._put(self._texts, "ended", replace(entry, text=self._end(entry.text)), entry)
+        elif found and found[0] == "rupture" and (mark := marked_time(entry.text, self.end_terms)).said != "":
+            self._put_marked(mark, found[1], entry, written)
         elif name == "specimen":
             self._name_specimen(entry)
         elif name == "control":
             self._put_control(entry)
         elif name in self._text_keys:
-            _put_once(self._texts, name, entry, entry.location)
-            self._locations[name] = entry.location
-        elif dimension := _dimension_with_unit(name, self.terms.dimensions):
-            written = entry.key or key
-            value = LENGTH.convert(entry.number(written), dimension[1], entry.location, written)
-            _put_once(self.geometry, dimension[0], value, entry.location)
-        elif result is None or (result[1] not in self._kinds[result[0]].units and self._is_misspelt_text(name)):
-            _refuse_misread_length(name, entry, self.terms)
-            return False
+            self._put(self._texts, name, entry, entry)
+        elif base in self.terms.dimensions and suffix in LENGTH.units:
+            value = LENGTH.convert(entry.number(written), suffix, entry.location, written)
+            self._put(self.geometry, self.terms.dimensions[base], value, entry)
+        elif found and (found[1] in self._kinds[found[0]].units or not self._is_misspelt_text(name)):
+            self._put_number(*found, written, entry)
         else:
-            number = self._stated_number(result, entry.key or key, entry)
-            _put_once(self._numbers, result[0], number, entry.location)
-            self._locations[result[0]] = entry.location
-        return True
+            _refuse_misread_length(name, entry, self.terms)
+            misspelt = self._misspelt(key) if key.strip() else ""
+            is_label = kind_of_column(key) in (*FIRM, "remark") or (columns_as_labels and not misspelt)
+            if not (key.strip() and is_label):
+                meant = misspelt or self.terms.suggestion(key)
+                advice = f"did you mean '{meant}'? A label is written" if meant else "a label is written"
+                what = f"unknown key '{written}'; {advice} 'label {written or 'NAME'}'"
+                raise HistoryError(f"{entry.location}: {what}")
+            self._put(self.labels, key, entry.text, entry)
+
+    def _put(self, target: dict[str, _T], key: str, value: _T, entry: SourceText) -> None:
+        if key in target:
+            raise HistoryError(f"{entry.location}: '{key}' is given twice (perhaps in two units); keep one of them")
+        target[key] = value
+        self._locations[key] = entry.location
+
+    def _put_number(self, quantity: str, suffix: str, written: str, entry: SourceText) -> None:
+        kind = self._kinds[quantity]
+        kind.unit(suffix, entry.location, written)
+        value = kind.convert(entry.number(written), suffix, entry.location, written)
+        self._put(self._numbers, quantity, StatedNumber(value, written, entry.location, suffix), entry)
 
     def _end(self, text: str) -> str:
         """A word for how the test ended as one of END_OF_TEST_TERMS, where it is understood."""
         said = self.end_terms.get(text.casefold()) or end_said_by(text)
         return {INTERRUPTED: STOPPED, UNCLEAR: text, "": text}.get(said, said)
 
-    def _put_marked(self, mark: MarkedTime, unit: str, entry: SourceText, key: str) -> None:
+    def _put_marked(self, mark: MarkedTime, unit: str, entry: SourceText, written: str) -> None:
         """Put a rupture time that is marked as a run-out, or a word in its place."""
         if mark.said == STOPPED or not mark.number:
-            _put_once(self._texts, "ended", replace(entry, text=self._end(mark.said)), entry.location)
+            self._put(self._texts, "ended", replace(entry, text=self._end(mark.said)), entry)
         if mark.number:
-            quantity = "end_time" if mark.said == STOPPED else "rupture"
             text = mark.number if mark.said != UNCLEAR else entry.text
-            number = self._stated_number((quantity, unit), key, replace(entry, text=text))
-            _put_once(self._numbers, quantity, number, entry.location)
-            self._locations[quantity] = entry.location
+            quantity = "end_time" if mark.said == STOPPED else "rupture"
+            self._put_number(quantity, unit, written, replace(entry, text=text))
 
     def _name_specimen(self, entry: SourceText) -> None:
         """A text that is no name, such as `Round bar, 6 mm`, is a label, unless it is a misspelt name."""
-        if SPECIMEN_NAME_PATTERN.fullmatch(entry.text) or entry.text.casefold() in self.terms.outputs:
-            _put_once(self._texts, "specimen", replace(entry, text=entry.text.casefold()), entry.location)
-            self._locations["specimen"] = entry.location
-            return
-        near = get_close_matches(entry.text.casefold(), self.terms.outputs, 1, cutoff=CLOSE_SPELLING)
-        if near:
+        name = entry.text.casefold()
+        if SPECIMEN_NAME_PATTERN.fullmatch(entry.text) or name in self.terms.outputs:
+            self._put(self._texts, "specimen", replace(entry, text=name), entry)
+        elif near := get_close_matches(name, self.terms.outputs, 1, cutoff=CLOSE_SPELLING):
             raise HistoryError(f"{entry.location}: there is no specimen '{entry.text}'; did you mean '{near[0]}'?")
-        _put_once(self.labels, "specimen", entry.text, entry.location)
+        else:
+            self._put(self.labels, "specimen", entry.text, entry)
 
     def _put_control(self, entry: SourceText) -> None:
         """What was held, in a laboratory's words: `constant load`, `strain hold 0.15 %`."""
         plain = entry.text.casefold()
         held = next((held for held, pattern in _HELD.items() if pattern.search(plain)), entry.text)
         if held != entry.text:
-            _put_once(self.labels, "control", entry.text, entry.location)
-        _put_once(self._texts, "control", replace(entry, text=held), entry.location)
-        self._locations["control"] = entry.location
+            self._put(self.labels, "control", entry.text, entry)
+        self._put(self._texts, "control", replace(entry, text=held), entry)
 
     def _misspelt(self, key: str) -> str:
         """The key, the laboratory's own included, of which an unknown one is a misspelling; "" for none."""
@@ -288,28 +292,6 @@ class StatedConditions:
     def _is_misspelt_text(self, name: str) -> bool:
         """Whether what begins like a number, such as `strain_mesure`, is a misspelt text."""
         return any(is_misspelling(plain_name(name), text) for text in self._text_keys)
-
-    def _stated_number(self, found: tuple[str, str], key: str, entry: SourceText) -> StatedNumber:
-        quantity, suffix = found
-        kind = self._kinds[quantity]
-        kind.unit(suffix, entry.location, key)
-        return StatedNumber(kind.convert(entry.number(key), suffix, entry.location, key), key, entry.location, suffix)
-
-
-def _unknown_key(refused: Sequence[str], unknown: Mapping[str, SourceText], suggestion: str) -> HistoryError:
-    """The error about unknown keys: what the first may have meant, and which others there are."""
-    key, others = unknown[refused[0]].key or refused[0], refused[1:]
-    advice = f"did you mean '{suggestion}'? A label is written" if suggestion else "a label is written"
-    places = [f"'{quoted(other)}' in line {unknown[other].location.rpartition(':')[2]}" for other in others[:5]]
-    also = f"; unknown too: {', '.join(places)}" if others else ""
-    also += f" and {len(others) - 5} more" if len(others) > 5 else ""
-    return HistoryError(f"{unknown[refused[0]].location}: unknown key '{key}'; {advice} 'label {key or 'NAME'}'{also}")
-
-
-def _dimension_with_unit(name: str, dimensions: Mapping[str, str]) -> tuple[str, str] | None:
-    """A length of a test piece and its unit, where a key is one, such as `apex_thickness_mm`."""
-    base, _, suffix = name.rpartition("_")
-    return (dimensions[base], suffix) if base in dimensions and suffix in LENGTH.units else None
 
 
 def _refuse_misread_length(name: str, entry: SourceText, terms: Terms) -> None:
@@ -334,12 +316,6 @@ def errors_located_at(location: str) -> Iterator[None]:
         raise
     except CreepkitError as error:
         raise HistoryError(f"{location}: {error}") from error
-
-
-def _put_once(target: dict[str, _T], key: str, value: _T, location: str) -> None:
-    if key in target:
-        raise HistoryError(f"{location}: '{key}' is given twice (perhaps in two units); keep one of them")
-    target[key] = value
 
 
 def _specimen_dimension(stem: str, entry: SourceText, terms: Terms) -> tuple[str, float]:

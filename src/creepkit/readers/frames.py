@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.readers.column_names import NameTable, split_unit, split_written_name
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column
-from creepkit.readers.questions import Question
+from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.table import CellTable, some_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records.quantities import QuantityKind
@@ -29,12 +30,15 @@ class TableFrames:
     values : {quantity: (frames,)} in MPa, mm, s, K; "time" is among them and increases strictly.
     lines : (frames,) the line of the file in which each frame stands.
     merged_count : number of frames that were merged into another one of the same time.
+    marked : lines of frames at which a load or temperature changed, which a reading at the same time before each says;
+    that was left out.
     """
 
     table: CellTable
     values: Mapping[str, Floats]
     lines: Ints
     merged_count: int = 0
+    marked: frozenset[int] = frozenset()
 
     @property
     def times(self) -> Floats:
@@ -53,27 +57,32 @@ def read_frames(
     kinds = terms.column_kinds
     averaged = (name for names in vocabulary.averaged_columns.values() for name in names)
     ignored = {*skipped_columns, *vocabulary.labels, *averaged}
-    values: dict[str, Floats] = {}
-    found: dict[str, str] = {}
-    for k, name in enumerate(table.columns):
+    values, found, errors = dict[str, Floats](), dict[str, str](), list[HistoryError]()
+
+    def read(k: int, name: str) -> None:
         written = table.as_written(k)
-        if ignored.isdisjoint((name, written)):
-            quantity, suffix = _parsed_column(table, k, vocabulary.synonyms.get(name, name), kinds)
-            if quantity in values:
-                raise column_question(
-                    table,
-                    f"'{found[quantity]}' and '{written}' both hold the {quantity}; which counts?",
-                    *({one: UNUSED} for one in (written, found[quantity])),
-                )
-            values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
-            if quantity == "used":
-                _check_marks(table, k, values[quantity])
-            found[quantity] = written
+        quantity, suffix = _parsed_column(table, k, vocabulary.synonyms.get(name, name), kinds)
+        if quantity in found:
+            raise column_question(
+                table,
+                f"'{found[quantity]}' and '{written}' both hold the {quantity}; which counts?",
+                *({one: UNUSED} for one in (written, found[quantity])),
+            )
+        found[quantity] = written
+        values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
+        if quantity == "used":
+            _check_marks(table, k, values[quantity])
+
+    for k, name in enumerate(table.columns):
+        if ignored.isdisjoint((name, table.as_written(k))):
+            collected(errors, partial(read, k, name))
+    raise_all(errors)
     if "time" not in values:
         place, names = table.location(table.columns_line), table.written or table.columns
         result = f"among {some_of(names)}" if names else "as every column is the same in all rows"
         raise HistoryError(f"{place}: missing column: no time {result}; name one time_s, time_min or time_h")
-    return _strictly_increasing(TableFrames(table, values, table.lines))
+    imposed = [values[name] for name in (*terms.number_kinds, "temperature", "step") if name in values]
+    return _strictly_increasing(_without_readings_before_steps(TableFrames(table, values, table.lines), imposed))
 
 
 def column_means(table: CellTable, vocabulary: HeaderVocabulary) -> dict[str, str]:
@@ -155,6 +164,18 @@ def _check_marks(table: CellTable, k: int, marks: Floats) -> None:
         )
 
 
+def _without_readings_before_steps(frames: TableFrames, imposed: Sequence[Floats]) -> TableFrames:
+    """The frames with the later of two of one time that differ in load, temperature or step.
+
+    A reading before a change of load and one after it state when it was; the mean of both would be neither.
+    """
+    changed = np.any([np.diff(column) != 0.0 for column in imposed], axis=0)
+    before = np.flatnonzero((np.diff(frames.times) == 0.0) & changed)
+    values = {name: np.delete(column, before) for name, column in frames.values.items()}
+    marked = frozenset(frames.lines[before + 1].tolist())
+    return TableFrames(frames.table, values, np.delete(frames.lines, before), marked=marked)
+
+
 def _strictly_increasing(frames: TableFrames) -> TableFrames:
     """Refuse a time that falls; merge frames of equal time into their mean.
 
@@ -171,4 +192,4 @@ def _strictly_increasing(frames: TableFrames) -> TableFrames:
     values = {name: np.add.reduceat(column, first) / counts for name, column in frames.values.items()}
     if first.size < 2:
         raise HistoryError(f"{frames.location(0)}: only one frame in time; at least two are needed to identify a law")
-    return TableFrames(frames.table, values, frames.lines[first], frames.times.size - first.size)
+    return TableFrames(frames.table, values, frames.lines[first], frames.times.size - first.size, frames.marked)

@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.condition_texts import sources_of_names
 from creepkit.readers.conditions import noise_correlation_text
 from creepkit.readers.cut_files import CutNumber
+from creepkit.readers.questions import collected, raise_all
 from creepkit.readers.table import CellTable
 from creepkit.readers.table_heads import is_frame, names_time
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
@@ -136,17 +138,19 @@ def histories_of_tests(found: Iterable[TabulatedTest], path: Path, vocabulary: H
     tests = list(found)
     sheets = {test.table.sheet for test in tests}
     names = [test.name or (test.table.sheet if len(sheets) > 1 else path.stem) for test in tests]
-    histories = []
+    errors, histories = list[HistoryError](), list[History]()
     for test, name in zip(tests, names, strict=True):
         table = test.table
         unique = f"{table.sheet}/{name}" if len(set(names)) < len(names) and table.sheet else name
         parts = [f"sheet {table.sheet}"] * bool(table.sheet) + [test.name] * bool(test.name)
         source = f"{path} ({', '.join(parts)})" if parts and len(tests) > 1 else str(path)
         table = replace(table, sources=(*table.sources, *sources_of_names(table, vocabulary)))
-        history = assemble_history(unique, test.entries, table, vocabulary, location=table.place, source=source)
-        if table.cut is not None and _holds_number(table, table.cut):
+        make = partial(assemble_history, unique, test.entries, table, vocabulary, location=table.place, source=source)
+        history = collected(errors, make)
+        if history is not None and table.cut is not None and _holds_number(table, table.cut):
             history = history.replace(labels={**history.labels, CUT_LABEL: str(table.cut)})
-        histories.append(history)
+        histories += [] if history is None else [history]
+    raise_all(errors)
     return histories
 
 

@@ -6,7 +6,7 @@ and recorded, or asked for.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Literal
 
@@ -53,22 +53,17 @@ LONGEST_RAMP, SUSTAINED, STRAIGHT = 0.1, 0.5, 0.1
 below; of its range by how much a strain that was imposed by its rate is off a straight line."""
 
 
-def read_temperature(
-    conditions: StatedConditions, frames: TableFrames, marked: Collection[int] = ()
-) -> float | Program:
-    """The temperature, K; marked : lines of frames at which a load or temperature changed."""
-    result = _stated_loading(conditions, frames, "temperature", marked)
+def read_temperature(conditions: StatedConditions, frames: TableFrames) -> float | Program:
+    """The temperature, K."""
+    result = _stated_loading(conditions, frames, "temperature")
     if result is None:
         advice = "write temperature_C or temperature_K, or a column of that name"
         raise conditions.missing_error("temperature", advice, "temperature_C")
     return Program.steps(result) if isinstance(result, tuple) else result
 
 
-def read_loading(conditions: StatedConditions, frames: TableFrames, marked: Collection[int] = ()) -> Loading:
-    """The loading: by components, by what has steps and programs alone, else by the first load that is stated.
-
-    marked : lines of frames at which a load or temperature changed.
-    """
+def read_loading(conditions: StatedConditions, frames: TableFrames) -> Loading:
+    """The loading: by components, by what has steps and programs alone, else by the first load that is stated."""
     terms, load_kinds = conditions.terms, conditions.terms.load_kinds
     quantities = (*load_kinds, *COMPONENT_LOADING_KINDS)
     with errors_located_at(
@@ -77,7 +72,7 @@ def read_loading(conditions: StatedConditions, frames: TableFrames, marked: Coll
         loading = _component_loading(conditions)
         likely = {load for one in conditions.terms.specimens_with(frames.values) for load in terms.loads.get(one, ())}
         for name in sorted(load_kinds, key=lambda name: (name in terms.number_kinds, name not in likely)):
-            loading = loading or _loading_by(name, conditions, frames, marked)
+            loading = loading or _loading_by(name, conditions, frames)
         if loading is not None and loading.quantity == "strain" and conditions.text_of("control") == "strain":
             conditions.take_text("control")
     if loading is None:
@@ -101,11 +96,9 @@ def _loading_advice(terms: Terms, loads: Sequence[str]) -> str:
     return f"write {'; or '.join(forms)}"
 
 
-def _loading_by(
-    quantity: str, conditions: StatedConditions, frames: TableFrames, marked: Collection[int]
-) -> Loading | None:
+def _loading_by(quantity: str, conditions: StatedConditions, frames: TableFrames) -> Loading | None:
     """The loading by one quantity, if it is stated or recorded."""
-    value: float | TimeValuePairs | Program | TwoLevels | None = _stated_loading(conditions, frames, quantity, marked)
+    value: float | TimeValuePairs | Program | TwoLevels | None = _stated_loading(conditions, frames, quantity)
     value = _step_change(conditions, quantity) if value is None else value
     return None if value is None else _loading_of(conditions, quantity, value, float(frames.times[-1]))
 
@@ -124,20 +117,26 @@ def _component_loading(conditions: StatedConditions) -> Loading | None:
     """The stresses and strains of a material point."""
     programs: dict[str, dict[str, Program]] = {"stress": {}, "strain": {}}
     for name, kind in COMPONENT_LOADING_KINDS.items():
-        result = _steps_or_program(conditions, name, kind)
-        if result is not None:
+        if (stated := _stated_form(conditions, name, kind)) is not None:
             quantity, _, component = name.partition("_")
-            programs[quantity][component] = Program.steps(result) if isinstance(result, tuple) else result
+            programs[quantity][component] = _as_program(stated)
     return PointLoading(**programs) if programs["stress"] or programs["strain"] else None
 
 
-def _steps_or_program(
-    conditions: StatedConditions, quantity: str, kind: QuantityKind
-) -> TimeValuePairs | Program | None:
-    """Steps or a program that stand in the head."""
+def _stated_form(
+    conditions: StatedConditions, quantity: str, kind: QuantityKind, number: StatedNumber | None = None
+) -> float | TimeValuePairs | Program | None:
+    """What stands in the head: a number, steps or a program."""
     steps, breakpoints = (conditions.take_pairs(f"{quantity}_{form}", kind) for form in ("steps", "program"))
-    if steps is not None and breakpoints is not None:
-        raise HistoryError(f"{conditions.location}: {quantity} has both steps and a program; keep one")
+    forms = [form for form in (number, steps, breakpoints) if form is not None]
+    if len(forms) > 1:
+        raise HistoryError(
+            f"{conditions.location}: the {quantity} is given {len(forms)} times over, as a number, {quantity}_steps "
+            f"or {quantity}_program; keep one"
+        )
+    if number is not None:
+        _check_bare_strain(conditions, quantity, kind, number)
+        return number.value
     return steps if breakpoints is None else Program(*np.array(breakpoints).T)
 
 
@@ -181,7 +180,7 @@ def _required_number(conditions: StatedConditions, name: str, companion: StatedN
 
 
 def _stated_loading(
-    conditions: StatedConditions, frames: TableFrames, quantity: str, marked: Collection[int]
+    conditions: StatedConditions, frames: TableFrames, quantity: str
 ) -> float | TimeValuePairs | Program | None:
     """The value given for a quantity: a number, steps as (time, value), or a Program.
 
@@ -189,20 +188,7 @@ def _stated_loading(
     """
     kind = TEMPERATURE if quantity == "temperature" else conditions.terms.load_kinds[quantity]
     column = _imposed_column(conditions, frames, quantity)
-    number = conditions.take_number(quantity)
-    steps = conditions.take_pairs(f"{quantity}_steps", kind)
-    breakpoints = conditions.take_pairs(f"{quantity}_program", kind)
-    forms = [form for form in (number, steps, breakpoints) if form is not None]
-    if len(forms) > 1:
-        raise HistoryError(
-            f"{conditions.location}: the {quantity} is given {len(forms)} times over, as a number, {quantity}_steps "
-            f"or {quantity}_program; keep one"
-        )
-    if number is not None:
-        _check_bare_strain(conditions, quantity, kind, number)
-    stated: float | TimeValuePairs | Program | None = number.value if number is not None else steps
-    if breakpoints is not None:
-        stated = Program(*np.array(breakpoints).T)
+    stated = _stated_form(conditions, quantity, kind, conditions.take_number(quantity))
     earlier = conditions.take_pairs(f"stated_{quantity}_program", kind)
     if earlier is not None:
         conditions.stated[quantity] = Program(*np.array(earlier).T)
@@ -213,7 +199,7 @@ def _stated_loading(
         stated = None if jump is None else _loading_of(conditions, quantity, jump, jump.time).program()
     if stated is not None:
         conditions.stated[quantity] = _as_program(stated)
-    return _recorded(conditions, frames, quantity, column, marked)
+    return _recorded(conditions, frames, quantity, column)
 
 
 def _agrees(program: Program, times: Floats, column: Floats) -> bool:
@@ -341,7 +327,7 @@ def _levels_of_steps(conditions: StatedConditions, frames: TableFrames, quantity
 
 
 def _recorded(
-    conditions: StatedConditions, frames: TableFrames, quantity: str, column: Floats, marked: Collection[int]
+    conditions: StatedConditions, frames: TableFrames, quantity: str, column: Floats
 ) -> float | TimeValuePairs | Program:
     """A column as a number, as steps where it holds nominal levels, else as the program of a record."""
     if np.ptp(column) == 0.0:
@@ -360,7 +346,7 @@ def _recorded(
     for before, frame, after in zip(bounds, bounds[1:-1], bounds[2:], strict=False):
         shorter = min(frames.times[frame - 1] - frames.times[before], frames.times[after - 1] - frames.times[frame])
         gap = frames.times[frame] - frames.times[frame - 1]
-        if gap > LARGEST_GAP * shorter and int(frames.lines[frame]) not in marked:
+        if gap > LARGEST_GAP * shorter and int(frames.lines[frame]) not in frames.marked:
             unit = "K" if is_temperature else next(iter(conditions.terms.load_kinds[quantity].units))
             first, second = (f"{column[k]:g} {unit}".rstrip() for k in (frame - 1, frame))
             early, late = (f"{frames.times[k]:g} s" for k in (frame - 1, frame))

@@ -60,7 +60,7 @@ def read_histories(
     read: dict[tuple[str, str], tuple[Path, History]] = {}
     errors = list[HistoryError]()
     for path in _existing_paths(paths):
-        for source in _readable_paths(path, readers):
+        for source in readable_paths(path, readers):
             found = collected(errors, partial(_histories_of, source, readers))
             for history in found or ():
                 _check_printable(history, source)
@@ -77,7 +77,7 @@ def _histories_of(source: Path, readers: Sequence[Reader]) -> list[History]:
 def answered_readers(path: Path, readers: Sequence[Reader]) -> Sequence[Reader]:
     """The readers with what the file of answers beside a path says of it."""
     answers = answers_of(path)
-    return [_with_vocabulary(one, answers.added_to) for one in readers] if answers else readers
+    return [_with_vocabulary(one, answers.added_to) for one in readers] if any(answers) else readers
 
 
 def _check_printable(history: History, path: Path) -> None:
@@ -131,7 +131,7 @@ def _existing_paths(paths: PathsLike) -> list[Path]:
     return list(results)
 
 
-def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
+def readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
     """The paths to read: the path itself, or the files in a folder that no reader accepts as a whole."""
     if path.is_file() or any(accepts_path(reader, path) for reader in readers):
         return [path]

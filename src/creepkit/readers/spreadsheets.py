@@ -57,8 +57,9 @@ _MOST_REMARKS = 20
 """Cells of a sheet of remarks that is kept as a label."""
 
 
-_DAY_ZERO, _FIRST_DATE = datetime(1899, 12, 31), datetime(1902, 1, 1)
-"""The day that a spreadsheet counts as 0, and the first on which a creep test may have been made."""
+_DAY_ZERO, _FIRST_DATE = datetime(1904, 1, 1), timedelta(days=731)
+"""One of the two days from which spreadsheets count; what is above so many days is a date, of 1902 or later, and what
+is below it an elapsed time."""
 
 
 def read_sheets(path: Path) -> list[CellTable]:
@@ -76,9 +77,11 @@ def read_sheets(path: Path) -> list[CellTable]:
                     f"{how_to_raise(size, most)}"
                 )
             book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
+            # Counted from 1904, days come out as they are in the file; from 1900, the 59th and the 60th are one.
+            first_day, book.epoch = book.epoch, _DAY_ZERO
             visible = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
             aside = [f"hidden sheet '{one.title}' not read" for one in book.worksheets if one not in visible]
-            tables = [_table(path, sheet, _notes_of(archive, sheet), aside) for sheet in visible]
+            tables = [_table(path, sheet, _notes_of(archive, sheet), aside, first_day) for sheet in visible]
     except (HistoryError, MemoryError):
         raise
     except Exception:  # of openpyxl and of what it calls, which let all kinds through where a file is damaged
@@ -151,10 +154,10 @@ def _notes_of(archive: zipfile.ZipFile, sheet: Any) -> _SheetNotes:
     return notes
 
 
-def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str]) -> CellTable | None:
+def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str], first_day: datetime) -> CellTable | None:
     """A sheet as a table, None where it is empty; comments fill the first cell, `# key:` may have its value beside it.
 
-    aside : what was left aside of the file.
+    aside : what was left aside of the file. first_day : from which its dates count.
     """
     table = CellTable(path, [], str(sheet.title), Dialect("\t"), assumptions=(*notes.remarks(sheet.title), *aside))
     if notes.uncomputed:
@@ -165,7 +168,7 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str]) -> 
     rows, comments, texts, known = list[TableRow](), list[TableRow](), set[str](), dict[str, str]()
     sheet.reset_dimensions()
     for number, row in enumerate(sheet.iter_rows(), 1):
-        cells = [_cell_text(cell, known) for cell in row]
+        cells = [_cell_text(cell, known, first_day) for cell in row]
         refuse_unprintable("".join(cells), partial(str.format, "{}, row {}", table.place, number))
         if any(cells):
             refuse_long_cells(table.location(number), cells)
@@ -207,7 +210,7 @@ def _entries(
 # ---- cells ---------------------------------------------------------------------------------------------------------
 
 
-def _cell_text(cell: Any, known: dict[str, str]) -> str:
+def _cell_text(cell: Any, known: dict[str, str], first_day: datetime) -> str:
     """A cell as text; a number shown in per cent as the number that is shown, with the sign.
 
     known : {text of a cell: without further blanks}, so that many cells with one text take the memory of one.
@@ -221,10 +224,10 @@ def _cell_text(cell: Any, known: dict[str, str]) -> str:
         return str(value).upper()
     if isinstance(value, (int, float)):
         return number_text(value, str(cell.number_format))
-    if isinstance(value, datetime) and value >= _FIRST_DATE:
-        return value.isoformat(" ")
-    if isinstance(value, datetime):  # an elapsed time above a day, shown as h:mm:ss
+    if isinstance(value, datetime):  # or an elapsed time above a day, shown as h:mm:ss
         value -= _DAY_ZERO
+        if value >= _FIRST_DATE:
+            return (first_day + value).isoformat(" ")
     return _clock_text(value) if isinstance(value, timedelta) else str(value)
 
 

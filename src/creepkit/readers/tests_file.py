@@ -17,12 +17,11 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.reading import FileKind, read_text
@@ -38,56 +37,51 @@ ANSWERS = FileKind("answers about tests", HistoryError, "correct or remove it", 
 _ENDS = (RUPTURED, STOPPED, LABEL)
 
 
-@dataclass(frozen=True)
-class Answers:
+class Answers(NamedTuple):
     """What tests.toml says of one file.
 
     stated : {condition: text and place}. columns : {name as written: what it is}. ended : {text: end}.
     """
 
-    stated: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    columns: Mapping[str, str] = field(default_factory=dict)
-    ended: Mapping[str, str] = field(default_factory=dict)
-
-    def __bool__(self) -> bool:
-        return bool(self.stated or self.columns or self.ended)
+    stated: dict[str, tuple[str, str]]
+    columns: dict[str, str]
+    ended: dict[str, str]
 
     def added_to(self, vocabulary: HeaderVocabulary) -> HeaderVocabulary:
         """The vocabulary of a reader with the answers."""
-        ignored = tuple(name for name, meaning in self.columns.items() if meaning == UNUSED)
-        labels = tuple(name for name, meaning in self.columns.items() if meaning == LABEL)
-        names = NameTable({**vocabulary.terms().columns.kinds, **NAMES.kinds})
-        meant = {name: what for name, what in self.columns.items() if what not in (UNUSED, LABEL)}
-        synonyms = {name: names.standard(_with_unit(what, name, names)) for name, what in meant.items()}
+        names = NameTable({**vocabulary.terms().column_kinds, **NAMES.kinds})
+        synonyms, kept = dict(vocabulary.synonyms), {LABEL: [*vocabulary.labels], UNUSED: [*vocabulary.ignored]}
+        for name, what in self.columns.items():
+            if what in kept:
+                kept[what].append(name)
+                continue
+            unit = split_written_name(name)[1]  # that it has as it is written counts where the answer has none
+            synonyms[name] = names.standard(f"{what} ({unit})" if what in names.kinds and unit else what)
         return replace(
             vocabulary,
-            synonyms={**vocabulary.synonyms, **synonyms},
-            labels=(*vocabulary.labels, *labels),
-            ignored=(*vocabulary.ignored, *ignored),
+            synonyms=synonyms,
+            labels=kept[LABEL],
+            ignored=kept[UNUSED],
             end_of_test_terms={**vocabulary.end_of_test_terms, **self.ended},
             stated={**vocabulary.stated, **self.stated},
         )
 
 
-def _with_unit(what: str, written: str, names: NameTable) -> str:
-    """What a column is, with the unit that it has as it is written, where the answer has none."""
-    unit = split_written_name(written)[1]
-    return f"{what} ({unit})" if what in names.kinds and unit else what
-
-
 def answers_of(path: Path) -> Answers:
     """What the file of answers beside a file, or in a folder, says of it; HistoryError for what is wrong in that."""
-    folder = path if path.is_dir() else path.parent
-    file = folder / ANSWERS_FILE
+    found, file = Answers({}, {}, {}), (path if path.is_dir() else path.parent) / ANSWERS_FILE
     if path.name == ANSWERS_FILE or not file.is_file():
-        return Answers()
-    found = Answers()
+        return found
     for pattern, table in read_answers(file).items():
         if path.name == pattern or fnmatchcase(path.name, pattern) or (path.is_dir() and pattern == "*"):
-            one = _answers_in(file, pattern, table)
-            found = Answers(
-                {**found.stated, **one.stated}, {**found.columns, **one.columns}, {**found.ended, **one.ended}
-            )
+            for key, value in table.items():
+                if key == "columns":
+                    found.columns.update(value)
+                elif key == "ended" and isinstance(value, dict):
+                    found.ended.update({text.casefold(): end for text, end in value.items()})
+                else:
+                    text = value if isinstance(value, str) else repr(value)
+                    found.stated[key] = (text, f'{file} ["{pattern}"]')
     return found
 
 
@@ -132,18 +126,6 @@ def _problem(key: str, value: Any, known: Terms) -> str:
     meant = near[0] if near else known.suggestion(key)
     allowed = "allowed are columns, ended, and conditions as in the head of a file, such as stress_MPa or specimen"
     return f"is no key; did you mean '{meant}'?" if meant else f"is no key; {allowed}"
-
-
-def _answers_in(file: Path, pattern: str, table: Mapping[str, Any]) -> Answers:
-    place, ended = f'{file} ["{pattern}"]', table.get("ended", {})
-    conditions = {key: value for key, value in table.items() if key not in ("columns", "ended")}
-    if isinstance(ended, str):
-        conditions["ended"] = ended
-    return Answers(
-        {key: (value if isinstance(value, str) else repr(value), place) for key, value in conditions.items()},
-        table.get("columns", {}),
-        {} if isinstance(ended, str) else {text.casefold(): end for text, end in ended.items()},
-    )
 
 
 def with_answer(text: str, name: str, key: str, value: str) -> str:

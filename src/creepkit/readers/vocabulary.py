@@ -249,32 +249,27 @@ class Terms:
         averaged = (name for names in self.vocabulary.averaged_columns.values() for name in names)
         return {*self.vocabulary.synonyms, *averaged}
 
-    @cached_property
-    def spellings(self) -> dict[str, str]:
-        """{name in small letters with underscores: key} of every key that a head may hold, units included."""
-        return {plain_name(key): key for key in self._keys(self.condition_kinds, self.dimensions)}
-
     def misspelt(self, name: str) -> str:
         """The key of which an unknown name is a misspelling, first of those of the file's own specimen; "" for none."""
         plain = plain_name(name)
-        for kinds, dimensions in self._vocabularies():
-            spellings = {plain_name(key): key for key in self._keys(kinds, dimensions)}
-            misspelt = [known for known in spellings if is_misspelling(plain, known)]
+        for keys in self._keys_by_name():
+            misspelt = [known for known in keys if is_misspelling(plain, known)]
             if misspelt:
-                return spellings[get_close_matches(plain, misspelt, 1, cutoff=0.0)[0]]
+                return keys[get_close_matches(plain, misspelt, 1, cutoff=0.0)[0]]
         words = {plain, plain.rpartition("_")[0]}
         names = (name for name in self.condition_kinds for word in words if is_misspelling(word, name.casefold()))
         return next(names, "")
 
     def suggestion(self, name: str) -> str:
         """The key that an unknown name may have meant, "" where it resembles none."""
-        keys = {plain_name(key): key for terms in self._vocabularies() for key in self._keys(*terms)}
+        keys = {plain: key for one in self._keys_by_name() for plain, key in one.items()}
         near = get_close_matches(plain_name(name), keys, 1, cutoff=CLOSE_SPELLING)
         return self.misspelt(name) or (keys[near[0]] if near else "")
 
-    def _vocabularies(self) -> list[tuple[Mapping[str, QuantityKind], Collection[str]]]:
-        """Kinds and lengths of the file's own specimen, then those of all."""
-        return [(self._own_kinds(), self.own_dimensions), (self.condition_kinds, self.dimensions)]
+    def _keys_by_name(self) -> list[dict[str, str]]:
+        """{name in small letters: key} of the file's own specimen, then of all."""
+        own = self.head_keys(self._own_kinds(), self.own_dimensions)
+        return [{plain_name(key): key for key in keys} for keys in (own, self.head_keys())]
 
     def _own_kinds(self) -> dict[str, QuantityKind]:
         """The kinds of numbers that mean something for the specimen that the file names; of all where it names none."""
@@ -286,13 +281,18 @@ class Terms:
             if re.sub("_[0-9]$", "", name) not in foreign and not (name.endswith("_sd") and name[:-3] not in outputs)
         }
 
-    def _keys(self, kinds: Mapping[str, QuantityKind], dimensions: Collection[str]) -> Iterator[str]:
-        """Keys of numbers with their units, of texts, of lengths and of labels, creepkit's own units first."""
-        for quantity, kind in kinds.items():
+    def head_keys(
+        self, kinds: Mapping[str, QuantityKind] | None = None, dimensions: Collection[str] | None = None
+    ) -> Iterator[str]:
+        """Keys of numbers with their units, of texts, of lengths and of labels, creepkit's own units first.
+
+        kinds, dimensions : those that are meant; all by default.
+        """
+        for quantity, kind in (self.condition_kinds if kinds is None else kinds).items():
             yield from (f"{quantity}_{unit}" if unit else quantity for unit in kind.units)
         yield from sorted(self.text_keys)
         yield from LABEL_KEYS
-        for dimension in dimensions:
+        for dimension in self.dimensions if dimensions is None else dimensions:
             yield from (f"{dimension}_{unit}" for unit in LENGTH.units)
 
     def specimens_with(self, columns: Collection[str]) -> list[str]:

@@ -269,8 +269,7 @@ class History:
     def followed_temperatures(self) -> Floats:
         """(levels,) K, those of the program up to the last used frame: later ones decide nothing that is compared."""
         program, end = self.temperature_program(), self.used_times[-1]
-        just_before = np.nextafter(end, 0.0)  # a step at the last frame did nothing to it
-        return np.append(program.values[program.times <= just_before], program.at(just_before))
+        return np.append(program.values[program.times < end], program.before(end))  # a step at it did nothing to it
 
     @property
     def condition(self) -> str:

@@ -119,10 +119,7 @@ class SupportsReducedOrderModel(Predictor, Protocol):
 
 @runtime_checkable
 class SupportsTraining(Predictor, Protocol):
-    """A reduced-order model that is trained before it predicts, as one of finite elements is.
-
-    Optional attribute, looked for by name: `cubature_model()`, the fem.ReducedOrderModel whose points can be drawn.
-    """
+    """A reduced-order model that is trained before it predicts, as one of finite elements is."""
 
     def train(self) -> str:
         """Train it, where that was not done before, and keep it; what it is, in a few words."""

@@ -33,10 +33,9 @@ def read_those_that_can_be(
     files: Iterable[Path], reader: str | None = None, ignore: Collection[str] = ()
 ) -> tuple[list[Path], list[History], list[CreepkitError]]:
     """The files that hold tests, these tests, and the error of each other file; each file is read by itself."""
-    read: list[Path] = []
-    tests: list[History] = []
-    errors: list[CreepkitError] = []
-    for file in files:
+    read, tests, errors = list[Path](), list[History](), list[CreepkitError]()
+    readers = [one.value for name, one in default_registry().readers().items() if reader in (None, name)]
+    for file in (one for path in files for one in reading.readable_paths(path, readers)):
         try:
             tests += read_histories([file], reader, ignore)
             read.append(file)

@@ -8,22 +8,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 
-from creepkit.inverse.adequacy import SHAPE_MISFIT
-from creepkit.inverse.identified_values import depends_on_history
+from creepkit.exporters.mathml import expression_mathml, law_equations
+from creepkit.inverse.adequacy import SHAPE_MISFIT, UNDETECTED_SCATTER
+from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.inverse.perturbation import combined_change_text
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
-from creepkit.language import temperature
+from creepkit.language import strain, temperature, time
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.minimum_rate_panel import PERCENT_PER_HOUR, compared_minimum_rates, exponents
-from creepkit.reports.stress_exponents import NumberText, interval_digits, plain_number, rate_and_exponent
+from creepkit.reports.blocks import Answer, Rich, as_text, number, plural, printable
+from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -31,10 +32,16 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.laplace_approximation import Estimate
+    from creepkit.language import CreepLaw
     from creepkit.quality.flags import DataQuality
+
 
 MOST_CAUTIONS = 3
 """On the first screen and in a terminal; the others stand in the details."""
+
+
+MOST_ASKED = 2
+"""Forecasts on the first screen."""
 
 
 MOST_NAMED = 4
@@ -61,17 +68,18 @@ class KeyFigure:
     unit: str = ""
     remark: str = ""
 
-    def text(self, number: NumberText) -> str:
+    @property
+    def text(self) -> str:
         """Value, interval and unit."""
         unit = f" {self.unit}" if self.unit else ""
         if math.isnan(self.low):
             return f"{self.value:#.2g}".rstrip(".") + unit
         digits = interval_digits(self.value, self.low, self.high)
-        value, low, high = (_written_out(v, digits, number) for v in (self.value, self.low, self.high))
+        value, low, high = (_written_out(v, digits) for v in (self.value, self.low, self.high))
         return f"{value}{unit} [{low}, {high}]"
 
 
-def _written_out(value: float, digits: int, number: NumberText) -> str:
+def _written_out(value: float, digits: int) -> str:
     """A number without a power of ten where it has a usual size, such as 2930 h."""
     if not 1e3 <= abs(value) < 1e5:
         return number(value, digits)
@@ -148,8 +156,7 @@ def _range(fit: Identification) -> str:
 
 def tests_text(fit: Identification) -> str:
     """How many tests, and under which conditions."""
-    count = len(fit.tests)
-    return f"{count} test{'' if count == 1 else 's'}, {_range(fit)}"
+    return f"{plural(len(fit.tests), 'test')}, {_range(fit)}"
 
 
 # ---- cautions --------------------------------------------------------------------------------------------------------
@@ -256,35 +263,48 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
     return "forecast (creepkit predict), or export the law to your code (creepkit export)"
 
 
-# ---- as text ---------------------------------------------------------------------------------------------------------
+# ---- the answer ------------------------------------------------------------------------------------------------------
 
-WIDTH = 100
-"""Characters of a line in a terminal."""
+
+def answer(
+    fit: Identification,
+    ranking: Ranking | None = None,
+    *,
+    asked: Sequence[KeyFigure] = (),
+    quality: DataQuality | None = None,
+    **page: Any,
+) -> Answer:
+    """Headline, equations, values, key figures, cautions and what to do next, of the best law of a ranking if given.
+
+    asked : what forecasts say. quality : of the data. page : picture and files.
+    """
+    symbols = symbols_of(fit.law)
+    remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
+    if ranking is not None and len(ranking.laws) > 1:
+        remarks.append(chosen_text(ranking))
+    if fit.sparsity is not None:
+        remarks.append(fit.sparsity.verdict)
+    return Answer(
+        fit.headline,
+        titled_law(fit.law),
+        equations(fit.law),
+        [(symbols[e.name], f"{e.value:.4g}", interval_ends(fit.law, e), unit_text(e.unit)) for e in fit.estimates],
+        [(one.name, one.where, one.text, one.remark) for one in [*asked[:MOST_ASKED], *key_figures(fit)]],
+        cautions(fit, ranking, quality)[:MOST_CAUTIONS],
+        next_step(fit, ranking),
+        remarks,
+        **page,
+    )
 
 
 def answer_text(fit: Identification) -> str:
-    """The answer of one law: headline, equations, values, key figures, cautions and what to do next."""
-    return _text(fit, None)
+    """The answer of one law."""
+    return as_text([answer(fit)])
 
 
 def ranking_answer_text(ranking: Ranking) -> str:
-    """The same of the best law of a ranking, behind the weights of all."""
-    return _text(ranking.best, ranking)
-
-
-def _text(fit: Identification, ranking: Ranking | None) -> str:
-    lines = wrap(fit.headline, WIDTH)
-    failed = {} if ranking is None else ranking.failed
-    lines += [line for law, why in failed.items() for line in _indented(f"left out: {law}: {why}", "    ")]
-    if ranking is not None and len(ranking.laws) > 1:
-        lines += _indented(chosen_text(ranking))
-    summands = " + ".join(expression_text(term) for term in fit.law.terms.values())
-    lines += [f"  rate = {summands}", *(f"  {equation}" for equation in state_equations(fit.law))]
-    lines += _indented("   ".join(_value(fit, e) for e in fit.estimates), "    ")
-    lines += _indented(fit.sparsity.verdict, "    ") if fit.sparsity is not None else []
-    lines += [line for one in key_figures(fit) for line in _indented(_figure_text(one), "    ")]
-    lines += [line for text in cautions(fit, ranking)[:MOST_CAUTIONS] for line in _indented(f"- {text}", "    ")]
-    return "\n".join([*lines, *_indented(f"next: {next_step(fit, ranking)}; more: .details()")])
+    """The same of the best law of a ranking, with the weights of all."""
+    return as_text([answer(ranking.best, ranking)])
 
 
 def chosen_text(ranking: Ranking) -> str:
@@ -295,22 +315,135 @@ def chosen_text(ranking: Ranking) -> str:
     return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}"
 
 
-def _value(fit: Identification, estimate: Estimate) -> str:
-    """One value with its interval on a line of its own piece: its blanks do not break."""
-    low, high = interval_ends(fit.law, estimate)
-    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    text = f"{estimate.name} = {estimate.value:.4g} [{low}, {high}]{unit}"
-    return text.replace(" ", "\u00a0")
+# ---- laws ------------------------------------------------------------------------------------------------------------
 
 
-def _figure_text(figure: KeyFigure) -> str:
-    remark = f", {figure.remark}" if figure.remark else ""
-    return f"{figure.name} at {figure.where}: {figure.text(plain_number)}{remark}"
+def titled_law(law: CreepLaw) -> Rich:
+    """The name of a law, by which commands and files know it; on pages behind its title."""
+    name = Markup("<code>{}</code>").format(printable(law.name, 120))
+    return Rich(law.name, Markup("{} ({})").format(printable(law.title, 160), name) if law.title else name)
 
 
-def _indented(text: str, hanging: str = "  ") -> list[str]:
-    """Lines of a text, the first indented by two."""
+def equations(law: CreepLaw) -> list[Rich]:
+    """The creep rate, and the rates of internal variables."""
+    rate = " + ".join(expression_text(term) for term in law.terms.values())
+    texts = [f"rate = {rate}", *state_equations(law)]
+    return [Rich(text, Markup(html)) for text, html in zip(texts, law_equations(law), strict=True)]
+
+
+def symbols_of(law: CreepLaw) -> dict[str, Rich]:
+    """{parameter: its symbol}."""
+    return {str(symbol): Rich(str(symbol), expression_mathml(symbol)) for symbol in law.params}
+
+
+def value_cells(law: CreepLaw, estimate: Estimate) -> tuple[str, str]:
+    """A value and the ends of its 95 % interval, as every table shows them."""
+    return f"{estimate.value:.5g}", " to ".join(interval_ends(law, estimate))
+
+
+def unit_text(unit: str) -> str:
+    """A unit as it stands behind a number: "" of pure numbers."""
+    return "" if unit == "1" else unit
+
+
+# ---- rate and stress exponent amid the tests -------------------------------------------------------------------------
+
+
+def rate_and_exponent(fit: Identification) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Creep rate, 1/s, and stress exponent amid the tests, (value, low, high) each: of bars at the reference strain.
+
+    Where the law's rate depends on stress and temperature alone, or no bar can be followed, those of the formula.
+    """
+    state = _state(fit)
+    if state is not None:
+        return state.rate, state.exponent
+    stress = fit.reference.stress
+    return tuple(map(float, fit.rate(stress, warn=False))), tuple(map(float, fit.local_exponent(stress, warn=False)))
+
+
+def _state(fit: Identification) -> StateAtStrain | None:
+    return state_at_strain(fit) if depends_on_history(fit.law) else None
+
+
+def held_quantities(fit: Identification) -> str:
+    """What the derivative of the law's formula to stress holds, in words."""
+    law = fit.law
+    held = [word for word, symbol in (("time", time), ("strain", strain)) if law.uses(symbol)]
+    held += ["initial internal variables"] if law.states else []
+    return f"{', '.join(held[:-1])} and {held[-1]}" if len(held) > 1 else "".join(held)
+
+
+def reference_sentences(fit: Identification) -> list[str]:
+    """Rate and exponent amid the tests, one sentence each, without full stops."""
+    r, state = fit.reference, _state(fit)
+    at = f"{number(r.stress)} MPa and {celsius_text(r.temperature, digits=0)}"
+    formula = _interval(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
+    held = held_quantities(fit)
+    if state is not None:
+        hours = tuple(v / SECONDS_PER_HOUR for v in state.time)
+        lines = [
+            f"amid the tests, under a constant true stress of {at}, a bar reaches a logarithmic creep strain of "
+            f"{number(r.strain, 2)} after {_interval(hours)} h, and creeps there at a rate of "
+            f"{_interval(state.rate)} 1/s (95 % intervals in brackets)",
+            "the stress exponent at constant strain, d ln rate / d ln stress of bars compared when each has this "
+            f"strain, is {_interval(state.exponent)}: the one to compare with exponents of measured creep rates",
+        ]
+        if held != "strain":
+            lines.append(
+                f"the derivative of the law's formula at constant {held} is {formula}, which no test at one strain "
+                "shows"
+            )
+        return lines
+    rate = _interval(tuple(map(float, fit.rate(r.stress, warn=False))))
+    if not held:
+        return [
+            f"amid the tests, at {at}, the creep rate is {rate} 1/s and the stress exponent, d ln rate / d ln stress, "
+            f"is {formula} (95 % intervals in brackets)"
+        ]
+    state_text = f"a strain of {number(r.strain, 2)} and {number(r.time / SECONDS_PER_HOUR, 3)} h"
+    # Of a law of stress, temperature and strain the derivative at constant strain is what bars at one strain show.
+    other = "" if held == "strain" else "; bars compared at one strain show another exponent where their times differ"
+    if fit.law.states:
+        other = "; bars compared at one strain show another exponent, as their internal variables differ there"
+    initial = " with internal variables as at the beginning" if fit.law.states else ""
     return [
-        line.replace("\u00a0", " ")
-        for line in wrap(text, WIDTH, initial_indent="  ", subsequent_indent=hanging, break_long_words=False)
+        f"at {at}, {state_text}{initial}, the law's formula has a creep rate of {rate} 1/s and, at constant {held}, "
+        f"the stress exponent d ln rate / d ln stress of {formula} (95 % intervals in brackets){other}"
     ]
+
+
+def _interval(values: tuple[float, ...]) -> str:
+    value, low, high = values
+    digits = interval_digits(value, low, high)
+    return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"
+
+
+FEWEST_DIGITS, MOST_DIGITS = 3, 7
+"""Of a value with its interval."""
+
+
+def interval_digits(value: float, low: float, high: float) -> int:
+    """Digits with which the ends of an interval differ from its value."""
+    distances = [abs(end - value) for end in (low, high) if math.isfinite(end) and end != value]
+    if not distances or value == 0.0 or not math.isfinite(value):
+        return FEWEST_DIGITS
+    return min(max(FEWEST_DIGITS, math.floor(math.log10(abs(value) / min(distances))) + 2), MOST_DIGITS)
+
+
+def constant_load_sentence(fit: Identification) -> str:
+    """Where the exponent comes from in tests whose true stress rises with strain; "" where none has a constant load."""
+    loads = [h for h in fit.histories if "strain" in h.outputs and getattr(h.loading, "control", "") == "load"]
+    if not loads:
+        return ""
+    growth = fit.ranges["strain"][1]
+    scatter = fit.noise_model.rate
+    beside = f"rates of single tests scatter by {100 * scatter:.2g} % (one standard deviation) beside it"
+    if 0 < scatter <= UNDETECTED_SCATTER:
+        beside = "no scatter of rates between tests was detected beside it"
+    if not scatter > 0:
+        beside = "the scatter of rates between tests is not known beside it"
+    return (
+        f"under a constant load the true stress rises with strain, here by up to {100 * growth:.2g} %, so that the "
+        "stress exponent comes from the curvature of single curves as well as from the comparison of tests: its "
+        f"interval holds only if the form of the law is right, and {beside}"
+    )

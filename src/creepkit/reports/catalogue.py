@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.terminal import print_json, print_table, tell
 
 if TYPE_CHECKING:
@@ -43,25 +44,9 @@ def _law_to_json(entry: Registered[CreepLaw]) -> dict[str, Any]:
         "provenance": str(entry.provenance),
         "fingerprint": law.fingerprint,
         "terms": {label: str(term) for label, term in law.terms.items()},
-        "parameters": {
-            name: {
-                "meaning": p.meaning,
-                "unit": p.unit,
-                "bounds": p.bounds,
-                "scale": p.scale,
-                "off": p.off,
-                "limits": None if p.limits is None else [x if abs(x) < float("inf") else None for x in p.limits],
-            }
-            for name, p in table
-        },
+        "parameters": {name: fields_to_json(p, "meaning unit bounds scale off limits") for name, p in table},
         "states": {
-            symbol.name: {
-                "meaning": s.meaning,
-                "unit": s.unit,
-                "rate": str(s.rate),
-                "initial": s.initial,
-                "limit": s.limit,
-            }
+            symbol.name: {**fields_to_json(s, "meaning unit initial limit"), "rate": str(s.rate)}
             for symbol, s in law.states.items()
         },
         "constraints": [str(relation) for relation in law.constraints],
@@ -129,28 +114,27 @@ def _specimen_to_json(entry: Registered[Specimen]) -> dict[str, Any]:
 def print_plugins(plugins: Sequence[Plugin], conflicts: Sequence[str], as_json: bool) -> None:
     """Print one row a plugin, what it offers and what is wrong with it."""
     if as_json:
-        print_json({"plugins": [_plugin_to_json(plugin) for plugin in plugins], "clashes": conflicts})
+        found = [
+            {
+                "name": plugin.provenance.name,
+                "from": plugin.provenance.origin,
+                "status": _status(plugin),
+                "problem": plugin.problem,
+                "offers": {word: list(things) for word, things in plugin.contributions.items()},
+                "commands": plugin.commands,
+            }
+            for plugin in plugins
+        ]
+        print_json({"plugins": found, "clashes": conflicts})
         return
-    rows = [(p.provenance.name, p.provenance.origin, _offers_text(p), _status(p)) for p in plugins]
+    rows = []
+    for one in plugins:
+        offers = [f"{kind} {name}" for kind, names in one.contributions.items() for name in names]
+        offered = ", ".join(offers + ["commands"] * one.commands)
+        rows.append((one.provenance.name, one.provenance.origin, offered, _status(one)))
     print_table(f"{len(rows)} plugins", ("plugin", "from", "offers", "status"), rows)
     for sentence in (*(plugin.problem for plugin in plugins if plugin.problem), *conflicts):
         tell(sentence)
-
-
-def _plugin_to_json(plugin: Plugin) -> dict[str, Any]:
-    return {
-        "name": plugin.provenance.name,
-        "from": plugin.provenance.origin,
-        "status": _status(plugin),
-        "problem": plugin.problem,
-        "offers": {word: list(things) for word, things in plugin.contributions.items()},
-        "commands": plugin.commands,
-    }
-
-
-def _offers_text(plugin: Plugin) -> str:
-    offers = [f"{kind} {name}" for kind, names in plugin.contributions.items() for name in names]
-    return ", ".join(offers + ["commands"] * plugin.commands)
 
 
 def _status(plugin: Plugin) -> str:

@@ -6,8 +6,10 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from creepkit.reports.json_values import finite
+
 if TYPE_CHECKING:
-    from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
+    from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.cross_validation import CrossValidation
     from creepkit.inverse.single_values import SingleValue
 
@@ -46,8 +48,7 @@ def _held_out_text(one: SingleValue) -> str:
 
 def confirmation_to_json(confirmation: Confirmation) -> dict[str, Any]:
     """The same as JSON-able data."""
-    values: dict[str, Any] = _json_value(asdict(confirmation))
-    return {"holds": confirmation.confirmed, "verdict": confirmation.verdict, **values}
+    return {"holds": confirmation.confirmed, "verdict": confirmation.verdict, **finite(asdict(confirmation))}
 
 
 CONFIRMATION_COLUMNS = ("test", "output", "chi-square", "of the fit", "rms", "apart, noise")
@@ -55,30 +56,20 @@ CONFIRMATION_COLUMNS = ("test", "output", "chi-square", "of the fit", "rms", "ap
 
 def confirmation_rows(confirmation: Confirmation) -> list[tuple[str, ...]]:
     """One row an output of a test."""
-    return [_confirmation_row(test.name, comparison) for test in confirmation.tests for comparison in test.outputs]
-
-
-def _confirmation_row(test: str, comparison: ConfirmedOutput) -> tuple[str, ...]:
-    fit_chi_square = "" if comparison.fit_errors is None else _number_text(comparison.fit_errors.chi_square)
-    rms = _number_text(math.sqrt(comparison.simulation_errors.mean_squared_error))
-    return (
-        test,
-        comparison.output,
-        _number_text(comparison.simulation_errors.chi_square),
-        fit_chi_square,
-        rms,
-        _number_text(comparison.rms_difference),
-    )
-
-
-def _number_text(number: float) -> str:
-    return "" if math.isnan(number) else f"{number:.3g}"
-
-
-def _json_value(value: Any) -> Any:
-    """The same with null for what JSON cannot hold."""
-    if isinstance(value, dict):
-        return {name: _json_value(item) for name, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_json_value(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return [
+        (
+            test.name,
+            one.output,
+            *(
+                "" if value is None or math.isnan(value) else f"{value:.3g}"
+                for value in (
+                    one.simulation_errors.chi_square,
+                    None if one.fit_errors is None else one.fit_errors.chi_square,
+                    math.sqrt(one.simulation_errors.mean_squared_error),
+                    one.rms_difference,
+                )
+            ),
+        )
+        for test in confirmation.tests
+        for one in test.outputs
+    ]

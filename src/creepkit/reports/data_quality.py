@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from creepkit.reports.json_values import fields_to_json
+
 if TYPE_CHECKING:
     from creepkit.quality.flags import DataQuality
 
@@ -20,23 +22,5 @@ def data_quality_text(quality: DataQuality) -> str:
 
 def data_quality_to_json(quality: DataQuality) -> dict[str, Any]:
     """The flags with all their numbers, for JSON: times in s, steps of temperature in K, jumps in the output's unit."""
-    return {
-        "tests": quality.tests,
-        "flags": [
-            {
-                "tests": list(flag.tests),
-                "kind": flag.kind,
-                "frames": list(flag.frames),
-                "reason": flag.reason,
-                "time": flag.time,
-                "earliest": flag.earliest,
-                "latest": flag.latest,
-                "rate_factors": dict(flag.rate_factors),
-                "factor_errors": dict(flag.factor_errors),
-                "temperature_steps": dict(flag.temperature_steps),
-                "jumps": dict(flag.jumps),
-                "proposal": flag.proposal,
-            }
-            for flag in quality.flags
-        ],
-    }
+    names = "tests kind frames reason time earliest latest rate_factors factor_errors temperature_steps jumps proposal"
+    return {"tests": quality.tests, "flags": [fields_to_json(flag, names) for flag in quality.flags]}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,8 +11,9 @@ from creepkit.arrays import Floats
 from creepkit.experiments.planned_design import ALIKE, kind_of_reason, precision_text
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.records import load_unit
-from creepkit.reports.figures import empty_figure, save_figure, wrapped
-from creepkit.reports.terminal import print_table, tell
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
+from creepkit.reports.figures import panels_of, save_figure, wrapped
+from creepkit.reports.json_values import fields_to_json
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,44 +22,79 @@ if TYPE_CHECKING:
 
     from creepkit.experiments.expectations import Expectation
     from creepkit.experiments.planned_design import Design, PlannedTest
+    from creepkit.reports.svg import PageFigures
 
 
 ROWS = 8
 """Tests in a table."""
 
 
-MACHINE_TIME = "machine time with setting up, h"
-"""The heading of a column."""
+def design_text(design: Design) -> str:
+    """The advice, the best tests in a table, and of the law the chi-squares of the first in every direction."""
+    return as_text(design_blocks(design))
 
 
-def _columns(design: Design) -> tuple[str, ...]:
+def design_blocks(design: Design, figures: PageFigures | None = None, of: str = "") -> list[Block]:
+    """The advice, the cheapest test, a table of the best ones, with `figures` the map, and what else is to be said."""
+    blocks: list[Block] = [Paragraph(design.sentence, "lead")]
+    if design.tests:
+        blocks += [Paragraph(cheapest_text(design)), _table(design)]
+        if figures is not None:
+            caption = (
+                "Expected information for an hour of machine time over first load and duration; the plan is marked. "
+            )
+            picture = figures.picture(
+                lambda: design_figure(design),
+                f"What further tests tell{of}",
+                "Map of the expected information for an hour of machine time over first load and duration, left of "
+                "constant loads, right of loads that change.",
+                f"{caption}{cells_text(design)}.",
+                shows_values=True,
+            )
+            blocks.append(picture)
+    blocks += _directions(design)
+    reasons: dict[str, list[str]] = {}
+    for description, reason in design.left_out:
+        reasons.setdefault(kind_of_reason(reason), []).append(description)
+    lines = [f"left out: {len(names)} that {reason} ({names[0]})" for reason, names in reasons.items()]
+    lines += ["stopped before the end: the best so far"] * design.interrupted
+    lines += design.notes if design.tests else ()
+    return [*blocks, Items(lines)] if lines else blocks
+
+
+def _table(design: Design) -> Table:
     last = {"law": "probability, decisive and right", "parameters": "standard deviations, before > after"}.get(
         design.goal, "sd after"
     )
-    return ("planned test", MACHINE_TIME, "nats", "nats / h", last)
+    rows = []
+    for test in design.tests[:ROWS]:
+        e = test.expectation
+        sds = [f"{name} {e.current_parameter_sd[name]:.3g} > {sd:.3g}" for name, sd in e.parameter_sd.items()]
+        cell = ", ".join(sds) if design.goal == "parameters" else precision_text(e.sd, design.unit)
+        cell = f"{e.probability:.2f}" if design.goal == "law" else cell
+        numbers = (f"{test.hours:.3g}", f"{e.information:.2g}", f"{test.information_per_hour:.2g}")
+        rows.append((test.description, *numbers, cell))
+    caption = (
+        f"the first of {plural(len(design.tests), 'planned test')} considered, {order_text(design)}; goal: "
+        f"{design.goal}. A nat of information divides the volume of what is likely by 2.7"
+    )
+    columns = ("planned test", "machine time with setting up, h", "nats", "nats / h", last)
+    return Table(caption, columns, rows, numeric=(1, 2, 3))
 
 
-def _cells(design: Design, test: PlannedTest) -> tuple[str, ...]:
-    e = test.expectation
-    if design.goal == "law":
-        last = f"{e.probability:.2f}"
-    elif design.goal == "parameters":
-        last = ", ".join(f"{name} {e.current_parameter_sd[name]:.3g} > {sd:.3g}" for name, sd in e.parameter_sd.items())
-    else:
-        last = precision_text(e.sd, design.unit)
-    return (test.description, f"{test.hours:.3g}", f"{e.information:.2g}", f"{test.information_per_hour:.2g}", last)
-
-
-def design_text(design: Design) -> str:
-    """The advice, the best tests in a table, and of the law the chi-squares of the first in every direction."""
-    lines = [design.sentence]
-    if design.tests:
-        rows = [_columns(design), *(_cells(design, test) for test in design.tests[:ROWS])]
-        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-        lines += ["", *("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)]
-        lines += ["", order_text(design), cheapest_text(design)]
-    lines += direction_lines(design)
-    return "\n".join(lines + _ending(design))
+def _directions(design: Design) -> list[Block]:
+    """The expected chi-squares of the plan, else of the first test, an item for each direction."""
+    first = design.plan[0] if design.plan else design.tests[0] if design.tests else None
+    expected = design.expected or (None if first is None else first.expectation)
+    if first is None or expected is None or not expected.chi_squares:
+        return []
+    items = [
+        f"if {each.reference_law} holds, the chi-square of {each.alternative_law} is expected {_by(each.expected)} "
+        f"than that of {each.reference_law} (now {_by(each.current)})"
+        for each in expected.chi_squares
+    ]
+    head = f"expected chi-squares with {'the plan' if len(design.plan) > 1 else first.description}:"
+    return [Paragraph(head), Items(items)]
 
 
 LARGE_SHARE = 0.5
@@ -99,50 +135,15 @@ def cheapest_text(design: Design) -> str:
     return f"the cheapest test that {does}: {cheapest.description} ({cheapest.machine_time})"
 
 
-def direction_lines(design: Design) -> list[str]:
-    """The expected chi-squares of the plan, else of the first test, a line for each direction."""
-    first = design.plan[0] if design.plan else design.tests[0] if design.tests else None
-    expected = design.expected or (None if first is None else first.expectation)
-    if first is None or expected is None or not expected.chi_squares:
-        return []
-    lines = ["", f"expected chi-squares with {'the plan' if len(design.plan) > 1 else first.description}:"]
-    for each in expected.chi_squares:
-        lines.append(
-            f"  if {each.reference_law} holds, the chi-square of {each.alternative_law} is expected "
-            f"{_by(each.expected)} than that of {each.reference_law} (now {_by(each.current)})"
-        )
-    return lines
-
-
 def _by(chi_square: float) -> str:
     size = f"{abs(chi_square):.3g}" if abs(chi_square) < 1000.0 else f"{abs(chi_square):.0f}"
     return f"{size} {'higher' if chi_square >= 0 else 'lower'}"
 
 
-def _ending(design: Design) -> list[str]:
-    reasons: dict[str, list[str]] = {}
-    for description, reason in design.left_out:
-        reasons.setdefault(kind_of_reason(reason), []).append(description)
-    lines = [f"left out: {len(names)} that {reason} ({names[0]})" for reason, names in reasons.items()]
-    if design.interrupted:
-        lines.append("stopped before the end: the best so far")
-    notes = design.notes if design.tests else ()
-    return ["", *lines, *notes] if lines or notes else []
-
-
-def print_design(design: Design) -> None:
-    """Print the table, the advice and what was left out, as wide as the terminal."""
-    if design.tests:
-        rows = [_cells(design, test) for test in design.tests[:ROWS]]
-        print_table(f"{len(design.tests)} planned tests, goal: {design.goal}", _columns(design), rows)
-    order = [order_text(design), cheapest_text(design)] if design.tests else []
-    tell("\n".join([design.sentence, *order, *direction_lines(design), *_ending(design)]))
-
-
 def design_to_json(design: Design) -> dict[str, object]:
     """Laws, advice, plan and every test considered, as JSON-able data."""
 
-    def row(test: PlannedTest) -> dict[str, object]:
+    def row(test: PlannedTest) -> dict[str, Any]:
         return {
             "description": test.description,
             "oven_hours": test.hours,
@@ -181,23 +182,18 @@ def design_to_json(design: Design) -> dict[str, object]:
     }
 
 
-def _expectation_to_json(e: Expectation) -> dict[str, object]:
-    known: dict[str, object] = {"information": float(e.information)}
-    for name in ("sd", "current_sd", "probability", "wrong"):
-        value = float(getattr(e, name))
-        if np.isfinite(value):
-            known[name] = value
+def _expectation_to_json(e: Expectation) -> dict[str, Any]:
+    numbers = {name: float(getattr(e, name)) for name in ("sd", "current_sd", "probability", "wrong")}
+    known: dict[str, Any] = {"information": float(e.information)}
+    known |= {name: value for name, value in numbers.items() if np.isfinite(value)}
     if e.parameter_sd:
-        known["parameter_sd"] = dict(e.parameter_sd)
-        known["current_parameter_sd"] = dict(e.current_parameter_sd)
+        known |= fields_to_json(e, "parameter_sd current_parameter_sd")
     if e.chi_squares:
         known["chi_squares"] = [
             {
                 "true": c.reference_law,
                 "alternative": c.alternative_law,
-                "current": c.current,
-                "expected": c.expected,
-                "refitted": c.refitted,
+                **fields_to_json(c, "current expected refitted"),
             }
             for c in e.chi_squares
         ]
@@ -216,8 +212,7 @@ def design_figure(design: Design, path: str | Path | None = None) -> Figure:
     the probability of a decisive and right verdict that tables give. The runs of the plan are marked. Of several
     specimens that of the best test is drawn.
     """
-    figure = empty_figure(10.5, 5.0)
-    axes = figure.subplots(1, 2, sharex=True, sharey=True)
+    figure, axes = panels_of(10.5, 5.0, 1, 2, sharex=True, sharey=True)
     drawn_tests = [test for test in design.tests if test.histories[0].specimen == design.best.histories[0].specimen]
     rates = [test.first_order_per_hour for test in drawn_tests] or [1.0]
     largest = max(*rates, 1e-9)

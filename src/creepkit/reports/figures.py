@@ -36,6 +36,12 @@ def empty_figure(width: float, height: float) -> Figure:
     return figure
 
 
+def panels_of(width: float, height: float, *shape: int, **options: Any) -> tuple[Figure, Any]:
+    """The same with panels: one, or rows and columns of them, as matplotlib's subplots() has them."""
+    figure = empty_figure(width, height)
+    return figure, figure.subplots(*shape, **options)
+
+
 def make_folder(folder: Path, error_type: type[CreepkitError] = FitError) -> None:
     """Make a folder for figures where there is none; an error of `error_type` where it cannot be made."""
     try:
@@ -106,8 +112,9 @@ def set_range(
 ) -> None:
     """Extend the range of an axis beyond low and high to round numbers, so that it has a label at either end.
 
-    most : labels at most. The range of a logarithmic axis is above zero.
+    most : labels at most. The range of a logarithmic axis is above zero. The panel gets a faint grid.
     """
+    axes.grid(alpha=0.25)
     axis = axes.xaxis if which == "x" else axes.yaxis
     if logarithmic:
         overhang = (high / low) ** OVERHANG

@@ -1,58 +1,91 @@
-"""Text of forecasts, as a whole, as rows of a table, and as JSON."""
+"""What a forecast says: by which laws, and of each test what it will show, how a measurement compares, and cautions."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.records import output_unit
+from creepkit.arrays import Floats
+from creepkit.errors import FitError
+from creepkit.inverse.frame_noise import usable_frames
+from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, hours_number
+from creepkit.reports.blocks import Block, Items, Paragraph, as_text
+from creepkit.reports.figures import empty_figure, save_figure, set_range, wrapped
+from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.load_programs import kind_of_test
+from creepkit.reports.prediction_bands import axis_label
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from creepkit.forecasts.forecast import Forecast
     from creepkit.forecasts.measured_test import ExplainedNuisance, TestScore
     from creepkit.forecasts.results import OutputForecast, TestForecast, TimeForecast
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit
+    from creepkit.reports.svg import PageFigures
+
 
 SHOWN_SHARE = 0.02
 """Of the variance: smaller parts of a band are not named."""
 
 
+LARGEST_LOG = 700.0
+
+
 def forecast_text(forecast: Forecast) -> str:
-    """What is forecast by which laws, then a paragraph for each test."""
+    """What is forecast by which laws, then each test."""
+    return as_text(forecast_blocks(forecast))
+
+
+def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: str = "") -> list[Block]:
+    """The laws and what bands hold, a list for each test, and with `figures` the curves. of : " of " its name."""
     names = ", ".join(name if len(forecast.laws) == 1 else f"{name} ({w:.2g})" for name, w in forecast.laws.items())
     names += f" ({forecast.left_out} more of too little weight)" if forecast.left_out else ""
-    lines = [f"by {names}: {100 * forecast.level:g} % bands and intervals of single tests, if {right_law(forecast)}"]
+    right = "the law is right" if len(forecast.laws) == 1 else "one of these laws is right, with these weights"
+    bands = f"{100 * forecast.level:g} % bands and intervals of single tests"
+    blocks: list[Block] = [Paragraph(f"by {names}: {bands}, if {right}")]
     if forecast.rejected:
-        lines.append("the tests contradict the law: bands and intervals are wider by what it misses of their rates")
+        blocks.append(
+            Paragraph("the tests contradict the law: bands and intervals are wider by what it misses of their rates")
+        )
+    if figures is not None and any(test.outputs for test in forecast.tests):
+        caption = (
+            f"Forecast with bands of {100 * forecast.level:g} % (drawn), and below it shares of the variance, which "
+        )
+        caption += "are of first order."
+        description = (
+            "Forecast curves over time with pointwise and simultaneous bands, and what the variance is made of."
+        )
+        blocks.append(figures.picture(lambda: forecast_figure(forecast), f"Forecasts{of}", description, caption))
     for test in forecast.tests:
-        lines += ["", *_test_lines(test)]
-    return "\n".join(lines)
+        blocks.append(Paragraph(f"{test.name}: {kind_of_test(test.history)}, {test.history.condition}:"))
+        blocks.append(Items([*_lines(test)]))
+    return blocks
 
 
-def right_law(forecast: Forecast) -> str:
-    """The condition under which bands hold what they say, behind "if"."""
-    return "the law is right" if len(forecast.laws) == 1 else "one of these laws is right, with these weights"
-
-
-def _test_lines(test: TestForecast) -> list[str]:
-    lines = [f"{test.name}: {kind_of_test(test.history)}, {test.history.condition}"]
-    lines += [f"  {_end_text(one)}" for one in test.outputs.values()]
-    lines += [f"  {_time_text(one, float(test.history.times[-1]))}" for one in test.times]
-    lines += [f"  {misfit_sentence(test.misfit)}"] if test.misfit is not None else []
-    lines += [f"  {test.caution}"] if test.caution else []
+def _lines(test: TestForecast) -> Iterator[str]:
+    """Outputs at the end, times, what the law misses, a measurement, what the band is made of, cautions."""
+    yield from map(_end_text, test.outputs.values())
+    yield from (_time_text(one, float(test.history.times[-1])) for one in test.times)
+    if test.misfit is not None:
+        yield misfit_sentence(test.misfit)
+    if test.caution:
+        yield test.caution
     if test.score is not None:
-        lines += [f"  {line}" for line in score_lines(test.score)]
+        yield from score_lines(test.score)
     leading = next(iter(test.outputs.values()), None)
-    if leading is not None:
-        parts = ", ".join(f"{part} {100 * share:.0f} %" for part, share in end_shares(leading).items())
-        lines.append(f"  shares of the variance at its end, to first order: {parts}")
-    lines += [f"  {test.extrapolation}"] if test.extrapolation else []
-    return [*lines, *(f"  note: {note}" for note in test.notes)]
+    if leading is not None and (shares := end_shares(leading)):
+        parts = ", ".join(f"{part} {100 * share:.0f} %" for part, share in shares.items())
+        yield f"shares of the variance at its end, to first order: {parts}"
+    if test.extrapolation:
+        yield test.extrapolation
+    yield from test.notes
 
 
 def misfit_sentence(misfit: LawMisfit) -> str:
@@ -71,33 +104,22 @@ def _end_text(one: OutputForecast) -> str:
     if not alive.size:
         return f"{one.output}: nothing is predicted"
     k = int(alive[-1])
+    high = f"{one.band.high[k]:.3g}" if math.isfinite(one.band.high[k]) else "ruptured"
     return (
         f"{one.output.replace('_', ' ')} at {hours_number(float(one.times[k]))} h: {one.value[k]:.3g}{unit} "
-        f"[{one.band.low[k]:.3g}, {_number(one.band.high[k])}]"
+        f"[{one.band.low[k]:.3g}, {high}]"
     )
 
 
 def _time_text(one: TimeForecast, end: float) -> str:
+    """When something comes; end : the last time of the test, s, before which it was asked for."""
     if not math.isfinite(one.low) and not math.isfinite(one.measured):
         return f"{one.event}: not within the test of {hours_number(end)} h (probability of it {one.chance:.2g})"
-    text = f"{one.event}: {_median_and_interval(one)} h"
+    text = f"{one.event}: median {hours_number(one.median)} [{hours_number(one.low)}, {hours_number(one.high)}] h"
     if math.isfinite(one.measured):
         where = {True: "inside", False: "outside", None: ""}[one.inside]
         return f"{text}, measured {'> ' if one.censored else ''}{hours_number(one.measured)} h, {where}"
-    return f"{text}; {_chance(one, end)}"
-
-
-def _median_and_interval(one: TimeForecast) -> str:
-    return f"median {hours_number(one.median)} [{hours_number(one.low)}, {hours_number(one.high)}]"
-
-
-def _chance(one: TimeForecast, end: float) -> str:
-    """The probability of what was asked: that it comes before the last time of the test, s."""
-    return f"before the end of the test at {hours_number(end)} h with probability {one.chance:.2g}"
-
-
-def _number(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "ruptured"
+    return f"{text}; before the end of the test at {hours_number(end)} h with probability {one.chance:.2g}"
 
 
 def score_lines(score: TestScore) -> list[str]:
@@ -117,9 +139,6 @@ def score_lines(score: TestScore) -> list[str]:
     ]
 
 
-LARGEST_LOG = 700.0
-
-
 def nuisance_text(one: ExplainedNuisance) -> str:
     """A nuisance and how far it lies from its prior mean."""
     if one.kind == "rate":
@@ -136,99 +155,259 @@ def end_shares(one: OutputForecast) -> dict[str, float]:
     return {part: share for part, share in sorted(shares.items(), key=lambda pair: -pair[1]) if share >= SHOWN_SHARE}
 
 
-FORECAST_COLUMNS = (
-    *("test", "kind of test and condition", "at the end", "times, h", "measured", "own nuisances explain"),
-    "extrapolated",
-)
-
-
-def forecast_rows(forecast: Forecast) -> list[tuple[str, ...]]:
-    """One row a test: its leading output at the end, times, and how a measurement compares."""
-    rows: list[tuple[str, ...]] = []
-    for test in forecast.tests:
-        leading = next(iter(test.outputs.values()), None)
-        times = "\n".join(
-            f"{t.event}: {_median_and_interval(t)}, {_chance(t, float(test.history.times[-1]))}" for t in test.times
-        )
-        measured = explained = ""
-        if test.score is not None:
-            inside = [f"{name} {100 * share:.0f} % inside" for name, share in test.score.inside.items()]
-            inside += [f"{t.event}: {hours_number(t.measured)}" for t in test.times if math.isfinite(t.measured)]
-            measured, explained = "\n".join(inside), f"{100 * test.score.explained:.0f} %"
-        end = "" if leading is None else _end_text(leading).replace(" at ", "\nat ", 1)
-        end += f"\n{test.caution}" if test.caution else ""
-        condition = f"{kind_of_test(test.history)}, {test.history.condition}"
-        beyond = [test.extrapolation] if test.extrapolation else []
-        beyond += [misfit_sentence(test.misfit)] if test.misfit is not None else []
-        rows.append((test.name, condition, end, times, measured, explained, "\n".join(beyond) or "no"))
-    return rows
-
-
 def forecast_to_json(forecast: Forecast) -> dict[str, Any]:
     """The forecast as JSON-able data: s and the units of the outputs; null for what is infinite or not known."""
     return {
-        "laws": dict(forecast.laws),
-        "level": forecast.level,
-        "rejected": forecast.rejected,
+        **fields_to_json(forecast, "laws level rejected"),
         "tests": [_test_to_json(test) for test in forecast.tests],
     }
 
 
 def _test_to_json(test: TestForecast) -> dict[str, Any]:
+    misfit, score = test.misfit, test.score
     return {
         "name": test.name,
         "condition": test.history.condition,
-        "outputs": {name: _output_to_json(one) for name, one in test.outputs.items()},
-        "times": [
-            {
-                "event": one.event,
-                **{key: _finite(getattr(one, key)) for key in ("value", "median", "low", "high", "chance", "measured")},
-                "censored": one.censored,
+        "outputs": {
+            name: {
+                "time": finite(one.times),
+                "value": finite(one.value),
+                **fields_to_json(one.band, "median low high lowest highest"),
+                "unit": output_unit(one.output),
+                "shares": finite(one.shares),
             }
-            for one in test.times
-        ],
-        "includes": dict(test.includes),
-        "extrapolation": test.extrapolation,
-        "misfit": None if test.misfit is None else _misfit_to_json(test.misfit),
-        "notes": list(test.notes),
-        "caution": test.caution,
-        "score": None if test.score is None else _score_to_json(test.score),
+            for name, one in test.outputs.items()
+        },
+        "times": [fields_to_json(one, "event value median low high chance measured censored") for one in test.times],
+        **fields_to_json(test, "includes extrapolation notes caution"),
+        "misfit": None
+        if misfit is None
+        else {
+            "factor": misfit.factor,
+            "nearest": {**fields_to_json(misfit, "stress temperature"), "factor": math.exp(misfit.log_factor)},
+        },
+        "score": None
+        if score is None
+        else {
+            **fields_to_json(score, "inside whole_inside freedom p_value departure_p_value log_score explained"),
+            **fields_to_json(score, "rms rms_explained"),
+            "nuisances": [fields_to_json(n, "kind value sd prior_mean prior_sd deviation") for n in score.nuisances],
+        },
     }
 
 
-def _misfit_to_json(misfit: LawMisfit) -> dict[str, Any]:
-    """The factor in the intervals, and that by which the law misses the tests nearest to the question."""
-    nearest = {"stress": misfit.stress, "temperature": misfit.temperature, "factor": math.exp(misfit.log_factor)}
-    return {"factor": misfit.factor, "nearest": nearest}
+# ---- figure ----------------------------------------------------------------------------------------------------------
 
 
-def _output_to_json(one: OutputForecast) -> dict[str, Any]:
-    curves: Mapping[str, Any] = {
-        "time": one.times,
-        "value": one.value,
-        **{key: getattr(one.band, key) for key in ("median", "low", "high", "lowest", "highest")},
-    }
-    return {
-        **{key: [_finite(float(v)) for v in values] for key, values in curves.items()},
-        "unit": output_unit(one.output),
-        "shares": {part: [_finite(float(v)) for v in values] for part, values in one.shares.items()},
-    }
+MOST_DRAWN = 12
+"""Tests in one figure."""
 
 
-def _score_to_json(score: TestScore) -> dict[str, Any]:
-    numbers = ("freedom", "p_value", "departure_p_value", "log_score", "explained")
-    return {
-        "inside": dict(score.inside),
-        "whole_inside": dict(score.whole_inside),
-        **{key: _finite(float(getattr(score, key))) for key in numbers},
-        "rms": {k: _finite(v) for k, v in score.rms.items()},
-        "rms_explained": {k: _finite(v) for k, v in score.rms_explained.items()},
-        "nuisances": [
-            {**{key: getattr(n, key) for key in ("kind", "value", "sd", "prior_mean", "prior_sd", "deviation")}}
-            for n in score.nuisances
-        ],
-    }
+COLUMNS = 4
+"""Tests side by side."""
 
 
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+PART_COLOURS = {
+    "parameters of the law": "#3b6fb6",
+    "choice of the law": "#7b5ea7",
+    "scatter between tests": "#e08214",
+    "scatter between heats": "#f5b13d",
+    "scatter between laboratories": "#fbd98c",
+    "offset": "#9aa4ad",
+    "noise": "#cfd5da",
+    "misfit of the law": "#b2182b",
+    "numerical error": "#555555",
+}
+"""Of the parts of a band; dimensions have those of DIMENSION_COLOURS in turn."""
+
+
+TIME_COLOUR, RUPTURE_COLOUR = "#c51b7d", "#b2182b"
+
+
+DIMENSION_COLOURS = ("#4d9221", "#7fbc41", "#b8e186", "#276419")
+
+
+NAMED_SHARE, UNNAMED = 0.02, "#000000"
+"""Share of the variance from which a part stands in the legend, and the colour of others."""
+
+
+BELOW_EDGE = 0.04
+"""Of the height of a panel: how far below its upper edge the interval of the rupture time is drawn."""
+
+
+LONGEST_AXIS = 5.0
+"""Of the time of a test: beyond, an interval goes on to the right of the axis, as an arrow says."""
+
+
+SHOWN_RATIO = 1e-3
+"""Of the largest strain: the lower end of a logarithmic axis."""
+
+
+def forecast_figure(forecast: Forecast, path: str | Path | None = None) -> Figure:
+    """Each test: its leading output with both bands, and below it what the band is made of over time.
+
+    A single test shows all of its outputs. Tests beyond the first dozen are not drawn.
+    """
+    tests = [t for t in forecast.tests if t.outputs][:MOST_DRAWN]
+    if not tests:
+        raise FitError("nothing is predicted of these tests, so there is nothing to draw")
+    columns = min(COLUMNS, len(tests))
+    rows = -(-len(tests) // columns)
+    shown = [[*t.outputs.values()] if len(tests) == 1 else [next(iter(t.outputs.values()))] for t in tests]
+    panels = max(len(one) for one in shown)
+    width, height = max(4.4 * columns, 6.6), rows * (3.1 * panels + 1.7) + 1.1
+    figure = empty_figure(width, height)
+    grid = figure.add_gridspec(rows, columns)
+    parts: dict[str, str] = {}
+    for k, (test, outputs) in enumerate(zip(tests, shown, strict=True)):
+        cell = grid[k // columns, k % columns].subgridspec(
+            len(outputs) + 1, 1, height_ratios=[*[2.0] * len(outputs), 1.0], hspace=0.08
+        )
+        panels_of_test = [figure.add_subplot(cell[j]) for j in range(len(outputs))]
+        for j, (axes, one) in enumerate(zip(panels_of_test, outputs, strict=True)):
+            _draw_curve(axes, test, one, first=j == 0)
+        _draw_shares(figure.add_subplot(cell[len(outputs)]), panels_of_test[0], outputs[0], parts)
+    events = {not t.output for test in tests for t in test.times if t.low <= 1.03 * SECONDS_PER_HOUR * _last(test)}
+    _legend(figure, parts, forecast.level, events, measured=any(t.score is not None for t in tests))
+    title = " or ".join(forecast.laws)
+    left_out = len(forecast.tests) - len(tests)
+    title += f" ({left_out} more tests are not drawn)" if left_out > 0 else ""
+    figure.suptitle(wrapped(f"forecast by {title}", width), fontsize=10)
+    return save_figure(figure, path)
+
+
+def _scaled(one: OutputForecast) -> float:
+    return 100.0 if is_logarithmic(one.output) else 1.0
+
+
+def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, *, first: bool) -> None:
+    """The curve, pointwise and simultaneous bands, the measured points, and intervals of times."""
+    factor, logarithmic = _scaled(one), is_logarithmic(one.output)
+    history, positive = test.history, one.times > 0
+    hours = one.times[positive] / SECONDS_PER_HOUR
+    curve = factor * one.value[positive]
+    low, high, lowest, highest = (
+        factor * v[positive] for v in (one.band.low, one.band.high, one.band.lowest, one.band.highest)
+    )
+    measured_hours, measured = _measured(test, one.output, factor)
+    finite = np.concatenate([v[np.isfinite(v)] for v in (curve, low, high, measured)])
+    finite = finite if finite.size else np.zeros(1)
+    top = float(finite.max(initial=1e-12))
+    bottom = (
+        max(SHOWN_RATIO * top, 1e-12) if logarithmic else float(min(finite.min(initial=0.0), 0.0 if top > 0 else top))
+    )
+    if not logarithmic and finite.size and finite.min() > 0.4 * top:
+        bottom = float(finite.min()) - 0.1 * (top - float(finite.min()))
+    ceiling = 1.3 * top if logarithmic else top + 0.05 * abs(top - bottom)
+
+    set_range(axes, "y", bottom, ceiling, logarithmic=logarithmic, most=6)
+    bottom, ceiling = axes.get_ylim()
+
+    def clipped(v: Floats) -> Floats:
+        return np.clip(v, bottom, ceiling)
+
+    axes.fill_between(hours, clipped(lowest), clipped(highest), color="#3b6fb6", alpha=0.15, lw=0)
+    axes.fill_between(hours, clipped(low), clipped(high), color="#3b6fb6", alpha=0.3, lw=0)
+    axes.plot(hours, curve, color="#1f3f73", lw=1.3)
+    if measured.size:
+        axes.plot(measured_hours, measured, ".", ms=3, color="black", alpha=0.6)
+    last = float(history.times[-1]) / SECONDS_PER_HOUR
+    start = float(hours[0]) if logarithmic else 0.0
+    end = _time_end(test, last)
+    set_range(axes, "x", start, end, logarithmic=logarithmic, most=6)
+    axes.set_xlim(0.95 * start if logarithmic else 0.0, 1.03 * end)
+    _draw_times(axes, test, one, bottom, ceiling)
+    axes.set_ylabel(axis_label(one.output), fontsize=8)
+    axes.tick_params(labelsize=7, labelbottom=False)
+    if first:
+        axes.set_title(wrapped(f"{test.name}: {history.condition}", 4.4, 11.0), fontsize=8)
+
+
+def _last(test: TestForecast) -> float:
+    """h, the end of the time axis."""
+    return _time_end(test, float(test.history.times[-1]) / SECONDS_PER_HOUR)
+
+
+def _time_end(test: TestForecast, last: float) -> float:
+    """h, the end of the time axis: that of the test, or of an interval that begins before it, up to LONGEST_AXIS."""
+    end = last
+    for time in sorted((t for t in test.times if np.isfinite(t.low)), key=lambda t: t.low):
+        if time.low / SECONDS_PER_HOUR < end:
+            end = max(end, min(time.high / SECONDS_PER_HOUR, LONGEST_AXIS * last))
+    return end
+
+
+def _measured(test: TestForecast, output: str, factor: float) -> tuple[Floats, Floats]:
+    history = test.history
+    if output not in history.outputs:
+        return np.zeros(0), np.zeros(0)
+    used = usable_frames(history, output) & (history.times > 0)
+    return history.times[used] / SECONDS_PER_HOUR, factor * history.outputs[output][used]
+
+
+def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, bottom: float, top: float) -> None:
+    """Intervals of times, the median marked: at the value that is reached, and of rupture at the upper edge."""
+    right = axes.get_xlim()[1]
+    for time in test.times:
+        is_rupture = not time.output
+        if not is_rupture and time.output != one.output:
+            continue
+        below = top * (bottom / top) ** BELOW_EDGE if is_logarithmic(one.output) else top - BELOW_EDGE * (top - bottom)
+        level = below if is_rupture else _scaled(one) * time.target
+        if not bottom <= level <= top or not time.low / SECONDS_PER_HOUR <= right:
+            continue
+        low, high = time.low / SECONDS_PER_HOUR, min(time.high / SECONDS_PER_HOUR, right)
+        colour = RUPTURE_COLOUR if is_rupture else TIME_COLOUR
+        axes.plot([low, high], [level, level], color=colour, lw=2.2, solid_capstyle="butt", zorder=4)
+        if time.high / SECONDS_PER_HOUR > right:
+            axes.plot([right], [level], ">", color=colour, ms=5, clip_on=False, zorder=5)
+        if np.isfinite(time.median) and time.median / SECONDS_PER_HOUR <= right:
+            axes.plot([time.median / SECONDS_PER_HOUR], [level], "|", color=colour, ms=9, mew=2, zorder=5)
+        if np.isfinite(time.measured) and not time.censored:
+            axes.plot([time.measured / SECONDS_PER_HOUR], [level], "x", color="black", ms=5, zorder=6)
+
+
+def _draw_shares(axes: Axes, above: Axes, one: OutputForecast, parts: dict[str, str]) -> None:
+    """Stacked shares of the variance over time, on the axis of the panel above."""
+    positive = (one.times > 0) & np.isfinite(one.value)
+    hours = one.times[positive] / SECONDS_PER_HOUR
+    for part, share in one.shares.items():
+        if part not in parts and np.nanmax(share[positive], initial=0.0) >= NAMED_SHARE:
+            taken = [c for c in parts.values() if c in DIMENSION_COLOURS]
+            parts[part] = PART_COLOURS.get(part) or DIMENSION_COLOURS[len(taken) % len(DIMENSION_COLOURS)]
+    if hours.size:
+        stacked = np.stack([100 * values[positive] for values in one.shares.values()])
+        axes.stackplot(hours, stacked, colors=[parts.get(part, UNNAMED) for part in one.shares], lw=0)
+        logarithmic = is_logarithmic(one.output)
+        upper = above.get_xlim()
+        axes.set_xscale("log" if logarithmic else "linear")
+        set_range(axes, "x", *upper, logarithmic=logarithmic, most=6)
+        axes.set_xlim(*upper)
+    axes.set(ylim=(0, 100), xlabel="time, h")
+    axes.set_ylabel("variance, %", fontsize=8)
+    axes.tick_params(labelsize=7)
+
+
+def _time_style(*, rupture: bool) -> dict[str, Any]:
+    """Of the interval of a time in the legend."""
+    return {"color": RUPTURE_COLOUR if rupture else TIME_COLOUR, "lw": 2.2, "marker": "|", "ms": 9, "mew": 2}
+
+
+def _legend(figure: Figure, parts: dict[str, str], level: float, ruptures: set[bool], *, measured: bool) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    per_cent = f"{100 * level:g} %"
+    handles = [
+        Line2D([], [], color="#1f3f73", lw=1.3, label="identified law"),
+        Patch(color="#3b6fb6", alpha=0.45, label=f"{per_cent} of measured values"),
+        Patch(color="#3b6fb6", alpha=0.15, label=f"{per_cent} of whole curves"),
+        *([Line2D([], [], color="black", marker=".", ls="", label="measured")] if measured else []),
+        *(
+            Line2D([], [], **_time_style(rupture=r), label=f"time to {word}: median, {per_cent}")
+            for r, word in ((False, "a value"), (True, "rupture"))
+            if r in ruptures
+        ),
+        *(Patch(color=colour, label=f"variance by {part}") for part, colour in parts.items()),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7)

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.readers.reading import TableSummary
-from creepkit.records import History, output_unit
+from creepkit.records import SECONDS_PER_HOUR, History, output_unit
+from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, save_figure
-from creepkit.reports.load_programs import SECONDS_PER_HOUR, program_text
+from creepkit.reports.json_values import fields_to_json
+from creepkit.reports.load_programs import program_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,9 +45,7 @@ def histories_text(histories: Sequence[History]) -> str:
     """A paragraph for one test; for several a row each, then what was assumed of all, and their labels."""
     if len(histories) < 2:
         return "\n".join(line for history in histories for line in _lines(history))
-    rows = [("test: specimen, conditions", "end", "frames", "outputs"), *map(_row, histories)]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    lines = ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+    lines = aligned(("test: specimen, conditions", "end", "frames", "outputs"), [*map(_row, histories)])
     measures = Counter(_strain_text(history) for history in histories if "strain" in history.outputs)
     lines += [f"{text} ({_count_text(count, len(histories))})" for text, count in measures.items()]
     return "\n".join([*lines, *filter(None, (assumptions_text(histories), _labels_text(histories)))])
@@ -151,16 +151,11 @@ def _end_text(history: History) -> str:
 def histories_to_json(histories: Sequence[History], tables: Sequence[TableSummary]) -> dict[str, Any]:
     """The tests without their frames, for JSON: times in s, temperatures in K, outputs in creepkit's units."""
     return {
-        "tables": [
-            {"place": t.place, "dialect": t.dialect, "test": t.test, "columns": dict(t.columns), "rows": t.rows}
-            for t in tables
-        ],
+        "tables": [fields_to_json(table, "place dialect test columns rows") for table in tables],
         "tests": [
             {
-                "name": history.name,
-                "source": history.source,
-                "specimen": history.specimen,
-                "alloy": history.alloy,
+                **fields_to_json(history, "name source specimen alloy strain_measure includes_elastic"),
+                **fields_to_json(history, "minimum_rate rupture_time unruptured geometry labels"),
                 "condition": program_text(history),
                 "frames": int(history.times.size),
                 "used_frames": int(np.asarray(history.used).sum()),
@@ -173,13 +168,6 @@ def histories_to_json(histories: Sequence[History], tables: Sequence[TableSummar
                     }
                     for name, values in history.outputs.items()
                 },
-                "strain_measure": history.strain_measure,
-                "includes_elastic": history.includes_elastic,
-                "minimum_rate": history.minimum_rate,
-                "rupture_time": history.rupture_time,
-                "unruptured": history.unruptured,
-                "geometry": dict(history.geometry),
-                "labels": dict(history.labels),
             }
             for history in histories
         ],

@@ -6,10 +6,14 @@ import hashlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from creepkit.files.file_names import LAW_SIGNS, numbered_stems
+from creepkit.reports.blocks import printable
 from creepkit.reports.contents import ExportedFile
 
 if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
 
 
@@ -42,3 +46,21 @@ def identified_files(rankings: Mapping[str, Ranking]) -> list[ExportedFile]:
         name, text = next(names), json_text(ranking_to_document(weights, digests))
         files.append(ExportedFile(name, "ranking, with the identifications in the same folder", text))
     return files
+
+
+def covariance_file(fit: Identification) -> ExportedFile:
+    """The covariance of the estimates as a table: in ln of parameters of logarithmic scale, else in their units."""
+    correlation = fit.correlation()
+    covariance = correlation.matrix * np.outer(correlation.sd, correlation.sd)
+    units = ["1" if p.scale == "log" else p.unit for p in fit.law.table.values()]
+    values = [p.to_internal(fit.values[name]) for name, p in fit.law.table.items()]
+    lines = [
+        f"# covariance of the estimates of law {printable(fit.law.name, 160)}; ln A: of the natural logarithm of A, in",
+        "# its unit; given the law, in the Gaussian approximation at the optimum",
+        ",".join(["parameter", "unit", "estimate", *correlation.names]),
+    ]
+    for name, unit, value, row in zip(correlation.names, units, values, covariance, strict=True):
+        lines.append(",".join([name, unit, f"{value:.12g}", *(f"{v:.12g}" for v in row)]))
+    return ExportedFile(
+        "covariance.csv", f"covariance of the estimates, {fit.law.title or fit.law.name}", "\n".join(lines) + "\n"
+    )

@@ -10,7 +10,8 @@ import numpy as np
 
 from creepkit.instruments.clock_alignment import UNIX_TIME
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
-from creepkit.reports.figures import empty_figure, save_figure
+from creepkit.reports.figures import panels_of, save_figure
+from creepkit.reports.json_values import fields_to_json
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from creepkit.records import Channel, ClockAlignment, InstrumentRecord
 
 UNITS = {"pressure": "MPa", "temperature": "C", "length": "mm", "force": "N"}
-MOST_DRAWN = 4000
-"""Points of a line; of a longer record the least and largest readings of equal spans are drawn."""
 
 
 def record_text(record: InstrumentRecord) -> str:
@@ -45,26 +44,20 @@ def record_to_json(record: InstrumentRecord) -> dict[str, Any]:
     """What record_text says, as data; values in MPa, K, mm, N or as written."""
     channels = [
         {
-            "name": channel.name,
-            "quantity": channel.quantity,
-            "reference": channel.reference,
-            "written_unit": channel.written_unit,
-            "missing": channel.missing,
+            **fields_to_json(channel, "name quantity reference written_unit missing"),
             "least": None if channel.missing == channel.values.size else float(np.nanmin(channel.values)),
             "largest": None if channel.missing == channel.values.size else float(np.nanmax(channel.values)),
         }
         for channel in record.channels.values()
     ]
     return {
-        "name": record.name,
-        "source": record.source,
+        **fields_to_json(record, "name source notes"),
         "rows": int(record.times.size),
         "interval_s": record.interval,
         "duration_s": float(np.ptp(record.times)),
         "start_unix_s": record.start,
         "gaps_s": record.gaps.tolist(),
         "channels": channels,
-        "notes": list(record.notes),
     }
 
 
@@ -83,31 +76,21 @@ def _channel_text(channel: Channel) -> str:
 def record_figure(record: InstrumentRecord, path: str | Path | None = None) -> Figure:
     """Every channel over time, one panel for each quantity."""
     quantities = list(dict.fromkeys(channel.quantity for channel in record.channels.values()))
-    figure = empty_figure(7.0, 1.0 + 2.2 * max(len(quantities), 1))
-    panels = figure.subplots(max(len(quantities), 1), 1, sharex=True, squeeze=False)[:, 0]
+    figure, panels = panels_of(
+        7.0, 1.0 + 2.2 * max(len(quantities), 1), max(len(quantities), 1), 1, sharex=True, squeeze=False
+    )
+    panels = panels[:, 0]
     for axes, quantity in zip(panels, quantities, strict=False):
         shift = ZERO_CELSIUS if quantity == "temperature" else 0.0
         for name, channel in record.channels.items():
             if channel.quantity == quantity:
-                rows = _drawn_rows(channel.values)
-                axes.plot(record.times[rows], channel.values[rows] - shift, lw=0.8, label=name)
+                axes.plot(record.times, channel.values - shift, lw=0.8, label=name)
         unit = UNITS.get(quantity, "")
         axes.set_ylabel(f"{quantity}, {unit}" if unit else quantity)
         if sum(channel.quantity == quantity for channel in record.channels.values()) <= 6:
             axes.legend(fontsize=7)
     panels[-1].set_xlabel("time of the record, s")
     return save_figure(figure, path)
-
-
-def _drawn_rows(values: np.ndarray) -> np.ndarray:
-    """Rows of the least and largest reading in each of equal spans, in order; all rows of a short record."""
-    if values.size <= MOST_DRAWN:
-        return np.arange(values.size)
-    size = -(-values.size // (MOST_DRAWN // 2))
-    filled = np.pad(np.nan_to_num(values), (0, -values.size % size), mode="edge").reshape(-1, size)
-    first = np.arange(len(filled)) * size
-    rows = np.concatenate([first + filled.argmin(axis=1), first + filled.argmax(axis=1)])
-    return np.unique(np.minimum(rows, values.size - 1))
 
 
 def alignment_text(alignment: ClockAlignment) -> str:

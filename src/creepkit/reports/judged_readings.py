@@ -13,10 +13,11 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
-from creepkit.inverse.judged_residuals import JudgedResiduals, judged_residuals_of
+from creepkit.inverse.judging import JudgedResiduals, judged_residuals_of
 from creepkit.inverse.observation_vector import ObservationVector
 
 if TYPE_CHECKING:
+    from creepkit.inverse.goodness_of_fit import TestFit
     from creepkit.inverse.identification import Identification
 
 
@@ -105,6 +106,13 @@ def _judged_readings(fit: Identification) -> JudgedReadings | None:
     by_output = np.array([[offsets.get(name, 0.0) for name in observations.outputs] for offsets in known])
     offsets = np.take_along_axis(by_output, observations.output_index, axis=1)
     return JudgedReadings(judged, observations, offsets)
+
+
+def misfit_of(test: TestFit) -> float:
+    """Reduced chi-square of a test over the frames of all its outputs, against the noise of a frame."""
+    rows = [(one.errors.frames, one.errors.chi_square) for one in test.outputs if np.isfinite(one.errors.chi_square)]
+    frames = sum(count for count, _ in rows)
+    return sum(count * chi_square for count, chi_square in rows) / frames if frames else float("nan")
 
 
 def _position(observations: ObservationVector, output: str) -> int:

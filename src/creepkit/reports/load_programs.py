@@ -9,7 +9,6 @@ import numpy as np
 
 from creepkit.inverse.held_levels import holds, is_isothermal, last_data_time, temperature_holds
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE
-from creepkit.records import SECONDS_PER_HOUR as SECONDS_PER_HOUR
 from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program, load_unit
 from creepkit.records.units import time_text
 

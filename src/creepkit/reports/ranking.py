@@ -1,21 +1,45 @@
-"""Text of rankings of laws, as a whole and as rows of a table."""
+"""What a ranking of laws says: the laws with misfits and weights, what separates them, and the values of each."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import CreepkitError
+from creepkit.inverse.compared_tests import UNTESTABLE, rests_on_durations
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
+from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, chi_square_by_test
+from creepkit.records import is_logarithmic
+from creepkit.reports.answer import titled_law, unit_text, value_cells
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
+from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
+from creepkit.reports.figures import empty_figure, logarithmic_labels, power_of_ten, save_figure, shortened, wrapped
+from creepkit.reports.identification import rejected, scatter_of_rates, verdict_given_law
+from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
+from creepkit.reports.json_values import fields_to_json
+from creepkit.reports.judged_readings import judged_readings, misfit_of
+from creepkit.reports.load_programs import program_text
+from creepkit.reports.prediction_bands import FittedCurves, axis_label, curve_of_test, fitted_curves
 from creepkit.reports.terminal import print_table, tell, tell_written
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.discrimination import EquivalentLaws
-    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.selection.ranking import RankedLaw, Ranking
+    from creepkit.reports.svg import PageFigures
 
 
-_CRITERION_NAMES = {"bic": "BIC", "aicc": "AICc", "hold-out": "hold-out"}
+CRITERIA = {"bic": "BIC", "aicc": "AICc"}
+"""Abbreviations of the criteria by which laws are ranked."""
 
 
 CHI_SQUARE_NOTE = (
@@ -24,26 +48,119 @@ CHI_SQUARE_NOTE = (
 )
 
 
+LAW_REJECTED = "the law does not fit"
+"""What stands for what tests say of a parameter, where they reject the law."""
+
+
 def ranking_text(ranking: Ranking) -> str:
-    """How well the best law describes the tests, the verdict, then a line for each law."""
-    width = max(len(r.fit.law.name) for r in ranking.laws)
-    header = (
-        f"{'law':{width}}   weight  {_CRITERION_NAMES[ranking.criterion]} - best  chi-square  by the noise of the tests"
-    )
+    """How well the best law describes the tests, the verdict, then all laws."""
+    equivalent = [] if ranking.decisive else [str(pair) for pair in equivalents_among_remaining(ranking)]
+    head: list[Block] = [Paragraph(ranking.best.headline), Paragraph(ranking.verdict), Items(equivalent)]
+    return as_text([*head, *ranking_blocks(ranking), *credible_values(ranking)])
+
+
+def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str = "") -> list[Block]:
+    """The laws tried with misfits and weights, what separates them, and with `figures` the misfit of each law.
+
+    of : the material, " of CMSX-4".
+    """
+    blocks: list[Block] = [_table(ranking)]
+    blocks += [Paragraph(CHI_SQUARE_NOTE, "note")] if any(math.isfinite(one.chi_square) for one in ranking.laws) else []
+    separation = separating_test(ranking)
+    blocks += [Paragraph(text) for text in separation]
+    if ranking.challenges:
+        blocks += [Paragraph("what the tests allow beside the best law:"), Items([*map(str, ranking.challenges)])]
+    if ranking.failed:
+        blocks.append(Items([f"{name}: {reason}" for name, reason in ranking.failed.items()]))
+    if figures is not None and ranking.best.tests:
+        weights = ", ".join(f"{r.fit.law.name} {r.weight:.3f}" for r in ranking.laws)
+        description = (
+            f"{misfit_name(ranking)}: {plural(len(ranking.laws), 'law')} in {plural(len(ranking.best.tests), 'test')}, "
+            f"the weights of the laws, and the curves of the credible ones. {' '.join(separation)} Weights: {weights}."
+        )
+        caption = f"Where the laws differ: {misfit_name(ranking)}, and weights."
+        title = f"Misfit of each law in each test{of}"
+        blocks.append(figures.picture(lambda: ranking_figure(ranking), title, description, caption))
+    return blocks
+
+
+def _table(ranking: Ranking) -> Table:
     rows = [
-        f"{r.fit.law.name:{width}}   {r.weight:6.3f}  {r.excess:10.1f}  {r.chi_square:10.1f}  {explanation(r.fit)}"
-        for r in ranking.laws
+        (
+            titled_law(one.fit.law),
+            str(len(one.fit.law.params)),
+            *_misfit(one.fit),
+            number(one.excess, 3),
+            f"{one.weight:.3f}",
+            number(one.chi_square, 4),
+            explanation(one.fit),
+        )
+        for one in ranking.laws
     ]
-    failed = [f"{name}: {reason}" for name, reason in ranking.failed.items()]
-    equivalent = [] if ranking.decisive else [f"- {pair}" for pair in equivalents_among_remaining(ranking)]
-    return "\n".join(
-        [ranking.best.headline, ranking.verdict, *equivalent, "", header, *rows, *failed, "", CHI_SQUARE_NOTE]
+    columns = (
+        *("law", "parameters", _misfit_name(ranking.best), "test to test", f"{criterion_name(ranking)} - best"),
+        *("weight", "chi-square", "by the noise of the tests"),
     )
+    return Table("laws tried, the best first", columns, rows, numeric=(1, 2, 3, 4, 5, 6))
 
 
 def explanation(fit: Identification) -> str:
     """Whether the tests contradict a law at their noise, with the p-value, and what it leaves, in noises."""
     return "?" if fit.adequacy is None else fit.adequacy.verdict_text
+
+
+def criterion_name(ranking: Ranking) -> str:
+    """The abbreviation of the criterion by which laws are ranked."""
+    return CRITERIA.get(ranking.criterion, ranking.criterion)
+
+
+def _misfit_name(fit: Identification) -> str:
+    """What _misfit says first: of the first output, else of minimum rates, else of rupture times."""
+    if fit.errors:
+        output = next(iter(fit.errors))
+        return f"rms ln {output}" if is_logarithmic(output) else f"error of {output}"
+    return f"rms ln {'minimum rate' if any(m.minimum_rate for m in fit.tests) else 'rupture time'}"
+
+
+def _misfit(fit: Identification) -> tuple[str, str]:
+    """The misfit of the first output, or of tests without frames, and the scatter of rates between tests."""
+    if fit.errors:
+        output = next(iter(fit.errors))
+        return f"{fit.rms:.3f}" if is_logarithmic(output) else (
+            f"{fit.errors[output].relative_squared_error:.3g}"
+        ), scatter_of_rates(fit)
+    rates = [m.minimum_rate.ratio for m in fit.tests if m.minimum_rate is not None]
+    ratios = rates or [m.rupture.ratio for m in fit.tests if m.rupture is not None and not m.rupture.censored]
+    logarithms = [math.log(ratio) for ratio in ratios if 0.0 < ratio < math.inf]
+    rms = math.sqrt(sum(x * x for x in logarithms) / len(logarithms)) if logarithms else math.nan
+    return f"{rms:.3f}", scatter_of_rates(fit)
+
+
+def separating_test(ranking: Ranking) -> list[str]:
+    """The test that speaks most for the best law against the second, and by how much the second is worse in all."""
+    if len(ranking.laws) < 2 or ranking.criterion == "hold-out" or len(ranking.best.tests) < 2:
+        return []
+    fits, second = [one.fit for one in ranking.laws], ranking.laws[1]
+    if any(fit.linearised is None for fit in fits):
+        fits = fits[:2]  # others cost a prediction each
+    if any(fit.linearised is None and (not fit.histories or fit.predictor is None) for fit in fits):
+        return []
+    try:
+        chi_square = chi_square_by_test(fits)
+    except CreepkitError:
+        return []
+    differences = chi_square[1] - chi_square[0]
+    if not np.isfinite(differences).all():
+        return []
+    if min(float(differences.sum()), second.excess) < DISTINGUISHABLE_CHI_SQUARE:
+        return []
+    k, name = int(np.argmax(differences)), second.fit.law.name
+    share = 100 * float(differences[k]) / float(np.maximum(differences, 0.0).sum())
+    return [
+        f"what separates {name} from {fits[0].law.name} most is test {fits[0].tests[k].name} "
+        f"({fits[0].tests[k].condition}): {share:.0f} % of the chi-square that speaks against {name} is its own; "
+        f"{criterion_name(ranking)} of {name} is {number(second.excess, 3)} larger in all"
+    ]
 
 
 def equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
@@ -54,74 +171,50 @@ def equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
     return [pair for pair in ranking.equivalents() if {pair.first, pair.second} <= names]
 
 
-def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) -> None:
-    """Print the table of laws, the verdict, the best law and what was written."""
+def credible_values(ranking: Ranking | None) -> list[Block]:
+    """Values and intervals of every credible law, where the tests do not decide for one; each given its own law."""
+    if ranking is None or ranking.decisive or len(ranking.credible) < 2:
+        return []
     rows = [
         (
-            entry.fit.law.name,
-            str(len(entry.fit.law.params)),
-            *misfit_cells(entry.fit),
-            f"{entry.excess:.1f}",
-            f"{entry.weight:.3f}",
-            explanation(entry.fit),
+            titled_law(one.fit.law),
+            f"{one.weight:.3f}",
+            e.name,
+            *value_cells(one.fit.law, e),
+            unit_text(e.unit),
+            LAW_REJECTED if rejected(one.fit) else verdict_given_law(one.fit, e),
         )
-        for entry in ranking.laws
+        for one in ranking.credible
+        for e in one.fit.estimates
     ]
-    columns = ("law", "parameters", *misfit_columns(ranking.best), "BIC - best", "weight", "by the noise of the tests")
-    print_table(f"{test_count} tests", columns, rows)
+    columns = ("law", "weight", "parameter", "value", "95 % interval", "unit", "given this law")
+    caption = "values of every credible law, of weight above 0.05: each interval holds only if its law is right"
+    untested = [one.fit for one in ranking.credible if rests_on_durations(one.fit.law, one.fit.histories)]
+    said = [Paragraph(f"{', '.join(fit.law.name for fit in untested)}: {UNTESTABLE}", "note")] if untested else []
+    return [Table(caption, columns, rows, numeric=(1, 3, 4)), *said]
+
+
+# ---- commands --------------------------------------------------------------------------------------------------------
+
+
+def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) -> None:
+    """Print the table of laws, the answer, and what was written."""
+    table = _table(ranking)
+    print_table(f"{test_count} tests", table.columns, [[*map(str, row)] for row in table.rows])
     tell(f"{ranking}\n")
     for path in written:
         tell_written(path)
-
-
-def _is_logarithmic(output: str) -> bool:
-    from creepkit.records import is_logarithmic  # heavy, and the help of the command line needs none of it
-
-    return is_logarithmic(output)
-
-
-def misfit_columns(fit: Identification) -> tuple[str, ...]:
-    """Heads of the columns of misfit_cells."""
-    if not fit.errors:
-        return _single_value_misfit(fit)[0], "test to test"
-    output = next(iter(fit.errors))
-    return (f"rms ln {output}" if _is_logarithmic(output) else f"error of {output}", "test to test")
-
-
-def misfit_cells(fit: Identification) -> tuple[str, ...]:
-    """The misfit of the first output, and the scatter of rates between tests."""
-    from creepkit.reports.identification_text import scatter_of_rates  # heavy, as below
-
-    if not fit.errors:
-        return _single_value_misfit(fit)[1], scatter_of_rates(fit)
-    output = next(iter(fit.errors))
-    misfit = f"{fit.rms:.3f}" if _is_logarithmic(output) else f"{fit.errors[output].relative_squared_error:.3g}"
-    return misfit, scatter_of_rates(fit)
-
-
-def _single_value_misfit(fit: Identification) -> tuple[str, str]:
-    """Name and size of the misfit of tests without frames: of their minimum rates, else of their rupture times."""
-    rates = [m.minimum_rate.ratio for m in fit.tests if m.minimum_rate is not None]
-    ratios = rates or [m.rupture.ratio for m in fit.tests if m.rupture is not None and not m.rupture.censored]
-    logarithms = [math.log(ratio) for ratio in ratios if 0.0 < ratio < math.inf]
-    rms = math.sqrt(sum(x * x for x in logarithms) / len(logarithms)) if logarithms else math.nan
-    return f"rms ln {'minimum rate' if rates else 'rupture time'}", f"{rms:.3f}"
 
 
 def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]:
     """The same as JSON-able data."""
     return {
         "headline": ranking.best.headline,
-        "verdict": ranking.verdict,
-        "decisive": ranking.decisive,
-        "adequacy": ranking.adequacy,
-        "further": list(ranking.further),
-        "failed": dict(ranking.failed),
-        "challenges": None if ranking.challenges is None else list(ranking.challenges),
-        "laws": [
-            {**_fit_to_json(ranked.fit), "bic_excess": ranked.excess, "weight": ranked.weight}
-            for ranked in ranking.laws
-        ],
+        **{
+            name: getattr(ranking, name)
+            for name in ("verdict", "decisive", "adequacy", "further", "failed", "challenges")
+        },
+        "laws": [{**_fit_to_json(one.fit), "bic_excess": one.excess, "weight": one.weight} for one in ranking.laws],
         "files": [str(path) for path in written],
     }
 
@@ -129,15 +222,234 @@ def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]
 def _fit_to_json(fit: Identification) -> dict[str, Any]:
     return {
         "law": fit.law.name,
-        **{f"rms_ln_{name}": fit.rms for name in fit.errors if _is_logarithmic(name)},
-        "errors": dict(fit.errors),
-        "parameters": {
-            e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
-            for e in fit.estimates
-        },
-        "adequacy": fit.adequacy,
-        "numerical_error": fit.numerical_error,
-        "nuisances": list(fit.nuisances),
-        "noise_model": fit.noise_model,
+        **{f"rms_ln_{name}": fit.rms for name in fit.errors if is_logarithmic(name)},
+        "parameters": {e.name: fields_to_json(e, "value low high unit verdict") for e in fit.estimates},
+        **{name: getattr(fit, name) for name in ("errors", "adequacy", "numerical_error", "nuisances", "noise_model")},
         "notes": list(fit.notes),
     }
+
+
+# ---- figure ----------------------------------------------------------------------------------------------------------
+
+
+MOST_TESTS_DRAWN = 6
+"""Tests whose curves are drawn: those in which the credible laws differ most."""
+
+
+MOST_LAWS_DRAWN = 5
+"""Credible laws whose curves are drawn, the best first."""
+
+
+MOST_TEST_NAMES = 24
+"""Above this many tests the columns of the misfits are numbered by condition instead of named."""
+
+
+SHOWN_QUANTILE = 0.97
+"""Of the misfits: where the colours end. A test of hardly any noise has a misfit of any size."""
+
+
+MOST_NUMBERS = 14
+"""Up to this many tests each misfit is written in its cell."""
+
+
+PANEL_WIDTH = 3.0
+"""Inches of the title of one test's panel, as wide as its axes."""
+
+
+NOT_JUDGED = "this noise is not known well enough to judge the laws by it: compare them, not with 1"
+
+
+OWN_RATE_MISFIT = "reduced chi-square of each law in each test, its own rate and offset taken out (1: noise alone)"
+"""Of laws whose tests are at hand, judged as where it is said whether they explain them."""
+
+
+COMMON_RATE_MISFIT = "mean square misfit of each law in each test over noise², the law's rate for every test"
+"""Of identifications without their tests."""
+
+
+def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
+    """Draw the misfit of each law in each test, the weights, and the curves of the laws that tests do not tell apart.
+
+    The misfit is that of `misfits`; the title is the verdict.
+    """
+    credible = [r for r in ranking.laws if r.weight > CREDIBLE_WEIGHT][:MOST_LAWS_DRAWN]
+    with_tests = all(r.fit.histories and r.fit.predictor is not None for r in credible)
+    curves = [fitted_curves(r.fit) for r in credible] if with_tests and len(credible) > 1 else []
+    shown = _tests_to_draw([r.fit for r in credible], curves) if curves else []
+    columns = min(3, len(shown))
+    rows = -(-len(shown) // 3)
+    misfits_height = 2.0 + 0.42 * len(ranking.laws)
+    width = 12.5
+    figure = empty_figure(width, misfits_height + 3.0 * rows + 0.7)
+    heights = [misfits_height, 3.0 * rows] if shown else [misfits_height]
+    parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    _draw_misfits(parts[0], ranking)
+    if shown:
+        panels = list(parts[1].subplots(rows, columns, squeeze=False).flat)
+        for axes, test in zip(panels, shown, strict=False):
+            _draw_test(axes, credible, curves, test)
+        for axes in panels[len(shown) :]:
+            axes.set_visible(False)
+        _name_laws(parts[1], credible, every_test=len(shown) == len(ranking.best.tests))
+    title = ranking.verdict
+    figure.suptitle(wrapped(title, width), fontsize=10)
+    return save_figure(figure, path)
+
+
+# ---- misfits and weights ---------------------------------------------------------------------------------------------
+
+
+def misfit_name(ranking: Ranking) -> str:
+    """What `misfits` are of a ranking."""
+    return OWN_RATE_MISFIT if _all_judged(ranking) else COMMON_RATE_MISFIT
+
+
+def _all_judged(ranking: Ranking) -> bool:
+    return all(judged_readings(ranked.fit) is not None for ranked in ranking.laws)
+
+
+def misfits(ranking: Ranking) -> Floats:
+    """(laws, tests) misfit of each law in each test, in the order of the ranking and of its tests.
+
+    The reduced chi-square by which laws are judged, tests with their own rates, lives and offsets; where tests or
+    their noise are not known, that against the noise of a frame with the laws' own rates.
+    """
+    if _all_judged(ranking):
+        readings = [judged_readings(ranked.fit) for ranked in ranking.laws]
+        return np.array([[one.chi_square(k) for k in range(len(ranking.best.tests))] for one in readings if one])
+    return np.array([[misfit_of(test) for test in ranked.fit.tests] for ranked in ranking.laws])
+
+
+def _draw_misfits(part: Any, ranking: Ranking) -> None:
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import NullLocator
+
+    heat, bars = part.subplots(1, 2, width_ratios=(4.0, 1.0), sharey=True)
+    order = _columns(ranking.best)
+    values = misfits(ranking)[:, order]
+    finite = values[np.isfinite(values) & (values > 0)]
+    low, high = np.quantile(finite, (0.0, SHOWN_QUANTILE)) if finite.size else (1.0, 1.0)
+    labels = logarithmic_labels(min(float(low), 0.8), max(float(high), 2.0), 6)
+    image = heat.imshow(
+        np.where(values > 0, values, np.nan), norm=LogNorm(labels[0], labels[-1]), cmap="YlOrRd", aspect="auto"
+    )
+    heat.set_yticks(range(len(ranking.laws)), [_law_name(r) for r in ranking.laws], fontsize=8)
+    _label_tests(heat, ranking.best, order)
+    if len(order) <= MOST_NUMBERS:
+        middle = float(np.sqrt(labels[0] * labels[-1]))
+        for (row, column), value in np.ndenumerate(values):
+            colour = "white" if value > middle * (labels[-1] / middle) ** 0.4 else "black"
+            heat.text(column, row, _number(value), ha="center", va="center", fontsize=7.5, color=colour)
+    extend = "max" if (finite > labels[-1]).any() else "neither"
+    bar = part.colorbar(image, ax=heat, label="misfit / noise²", pad=0.01, aspect=12, extend=extend)
+    bar.set_ticks(list(labels), labels=[_number(v) for v in labels])
+    bar.ax.yaxis.set_minor_locator(NullLocator())
+    adequacy = ranking.best.adequacy
+    judged = adequacy is None or adequacy.outputs
+    title = wrapped(misfit_name(ranking), 6.5, 9.0)
+    heat.set_title(title if judged else f"{title}\n{NOT_JUDGED}", fontsize=9)
+    weights = [r.weight for r in ranking.laws]
+    bars.barh(range(len(weights)), weights, color=_law_colours(ranking), height=0.6)
+    for row, weight in enumerate(weights):
+        inside = weight > 0.7
+        place = (weight - 0.03, "right", "white") if inside else (weight + 0.03, "left", "black")
+        bars.text(place[0], row, f"{weight:.3f}", va="center", ha=place[1], color=place[2], fontsize=8)
+    bars.set(xlim=(0.0, 1.0), xticks=(0.0, 0.5, 1.0), xlabel="weight among the laws tried")
+    bars.xaxis.label.set_fontsize(9)
+    bars.tick_params(axis="y", labelleft=False)
+    bars.grid(axis="x", alpha=0.25)
+
+
+def _number(value: float) -> str:
+    """Two digits; large numbers as powers of ten."""
+    if not np.isfinite(value):
+        return "-"
+    return f"{value:.2g}" if value < 100 else f"{value:.0f}" if value < 9999.5 else power_of_ten(float(f"{value:.0e}"))
+
+
+def _law_name(ranked: RankedLaw) -> str:
+    return ranked.fit.law.name
+
+
+def _law_colours(ranking: Ranking) -> list[Any]:
+    """Those of the curves; grey for laws whose curves are not drawn."""
+    colours = distinct_colours(MOST_LAWS_DRAWN)
+    return [
+        colours[k] if r.weight > CREDIBLE_WEIGHT and k < MOST_LAWS_DRAWN else "0.6" for k, r in enumerate(ranking.laws)
+    ]
+
+
+def _columns(fit: Identification) -> list[int]:
+    """The tests from the coldest to the hottest, of one temperature (or without histories) P2 before P10."""
+    names = [_natural_order(test.name) for test in fit.tests]
+    celsius = np.round(temperatures_celsius(fit.histories)) if fit.histories else np.zeros(len(names))
+    return sorted(range(len(names)), key=lambda k: (float(celsius[k]), names[k]))
+
+
+def _natural_order(name: str) -> list[tuple[int, int, str]]:
+    """A key by which numbers within names count as numbers; other text goes before them where both begin alike."""
+    return [(1, int(part), "") if part.isdecimal() else (0, 0, part) for part in re.split(r"(\d+)", name) if part]
+
+
+def _label_tests(axes: Axes, fit: Identification, order: Sequence[int]) -> None:
+    """Names of the tests; of many, the temperature of each run of equal ones."""
+    if len(order) <= MOST_TEST_NAMES or not fit.histories:
+        step = -(-len(order) // MOST_TEST_NAMES)
+        names = [shortened(fit.tests[k].name) for k in order[::step]]
+        axes.set_xticks(range(0, len(order), step), names, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
+        return
+    celsius = np.round(temperatures_celsius(fit.histories))[list(order)]
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(celsius) > 0) + 1, [celsius.size]])
+    for edge in edges[1:-1]:
+        axes.axvline(edge - 0.5, color="black", lw=0.8)
+    centres = 0.5 * (edges[:-1] + edges[1:]) - 0.5
+    step = -(-centres.size // MOST_TEST_NAMES)
+    names = [f"{celsius[edge]:.0f}" for edge in edges[:-1:step]]
+    axes.set_xticks(list(centres[::step]), names, fontsize=8)
+    axes.set_xlabel(f"{len(order)} tests, by temperature, °C", fontsize=9)
+
+
+# ---- curves ----------------------------------------------------------------------------------------------------------
+
+
+def _tests_to_draw(fits: Sequence[Identification], curves: Sequence[FittedCurves]) -> list[int]:
+    """Positions of the tests in which the laws differ most, in noises; of one law, of its largest misfits."""
+    with_frames = [k for k, test in enumerate(fits[0].tests) if test.outputs]
+    if len(with_frames) <= MOST_TESTS_DRAWN:
+        return with_frames
+    scores = np.array([_separation(fits, curves, test) for test in with_frames])
+    chosen = np.argsort(-np.nan_to_num(scores), kind="stable")[:MOST_TESTS_DRAWN]
+    return [with_frames[k] for k in np.sort(chosen)]
+
+
+def _separation(fits: Sequence[Identification], curves: Sequence[FittedCurves], test: int) -> float:
+    """Root mean square distance of the laws' curves in a test, over the noise; of one law its own misfit."""
+    if len(fits) == 1:
+        return misfit_of(fits[0].tests[test])
+    output = fits[0].tests[test].outputs[0]
+    values = np.stack([c.of(test, output.output)[0] for c in curves])
+    distance = float(np.sqrt(np.nanmean((values - values[0])[1:] ** 2)))
+    return distance / output.noise if output.noise > 0 else distance
+
+
+def _draw_test(axes: Axes, laws: Sequence[RankedLaw], curves: Sequence[FittedCurves], test: int) -> None:
+    history, output = laws[0].fit.histories[test], laws[0].fit.tests[test].outputs[0].output
+    drawn = [curve_of_test(r.fit, c, test, output) for r, c in zip(laws, curves, strict=True)]
+    for k, (curve, colour) in enumerate(zip(drawn, distinct_colours(len(laws)), strict=True)):
+        draw_curve(axes, curve, colour, "-" if k == 0 else "--", dots="0.35" if k == 0 else None)
+    set_curve_ranges([axes], drawn, output)
+    axes.set(xlabel="time, h", ylabel=axis_label(output))
+    title = f"{shortened(history.name, 48)}: {shortened(program_text(history), 96)}"
+    axes.set_title(wrapped(title, PANEL_WIDTH), fontsize=8.5)
+
+
+def _name_laws(part: Any, laws: Sequence[RankedLaw], every_test: bool) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], color="0.35", marker=".", ls="none")]
+    labels = ["measured"]
+    for k, (ranked, colour) in enumerate(zip(laws, distinct_colours(len(laws)), strict=True)):
+        handles.append(Line2D([], [], color=colour, ls="-" if k == 0 else "--"))
+        labels.append(f"{_law_name(ranked)}, weight {ranked.weight:.3f}")
+    title = "credible laws with their 95 % bands" + ("" if every_test else "; the tests in which they differ most")
+    part.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, title=title, title_fontsize=8)

@@ -1,24 +1,31 @@
-"""Panels of creep rates against stress and of rupture times, measured beside identified, with 95 % intervals."""
+"""Panels of creep rates over stress and of rupture times, measured beside identified, with 95 % intervals."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.inverse.reference_conditions import reference_stresses
-from creepkit.records import ZERO_CELSIUS, Prediction
-from creepkit.reports.condition_colours import temperature_scale, tested_temperatures
-from creepkit.reports.figures import place_legend_right, set_range
-from creepkit.reports.load_programs import SECONDS_PER_HOUR
-from creepkit.reports.minimum_rate_panel import PERCENT_PER_HOUR, compared_minimum_rates, draw_minimum_rates
+from creepkit.arrays import Floats
+from creepkit.errors import CreepkitError
+from creepkit.inverse.identified_values import MinimumRate, minimum_rates_of
+from creepkit.inverse.minimum_rates import apparent_exponent
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_stresses
+from creepkit.language import strain, time
+from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, Prediction
+from creepkit.records.units import celsius_text
+from creepkit.reports.condition_colours import ColourScale, distinct_colours, temperature_scale, tested_temperatures
+from creepkit.reports.figures import panels_of, place_legend_right, set_range, shortened
 from creepkit.reports.prediction_bands import HoldRate, rates_of_tests
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from creepkit.inverse.identification import Identification
+    from creepkit.inverse.single_values import SingleValue
 
 
 MOST_TEMPERATURES = 6
@@ -77,7 +84,6 @@ def _draw_reference_rates(axes: Axes, fit: Identification, rates: Sequence[HoldR
     finite = [b for b in bounds if np.isfinite(b) and b > 0]
     set_range(axes, "y", max(min(finite), 1e-12 * max(finite)), max(finite), logarithmic=True)
     axes.set(xlabel="von Mises stress, MPa", ylabel="creep rate, %/h")
-    axes.grid(alpha=0.25)
     place_legend_right(axes, "95 % band:\nlaw")
     reference = fit.reference
     initial = "\ninternal variables as at the start, not those of a test" if fit.law.states else ""
@@ -92,6 +98,11 @@ def _drawn_temperatures(tested: Sequence[float]) -> list[float]:
     values = np.unique(np.round(tested, 0))
     wanted = np.linspace(values[0], values[-1], MOST_TEMPERATURES)
     return [float(v) for v in np.unique(values[np.abs(values[:, None] - wanted).argmin(axis=0)])]
+
+
+def rupture_rows(fit: Identification) -> list[SingleValue]:
+    """The rupture times of the tests whose end is known and was compared with the law."""
+    return [m.rupture for m in fit.tests if m.rupture is not None and m.rupture.used]
 
 
 def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> None:
@@ -120,8 +131,165 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
     if any(r.censored for r, _ in ruptures):
         axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped: broke\nlater, if at all")
     axes.set(xlabel="measured time to rupture, h", ylabel="identified time to rupture, h", ylim=tuple(limits))
-    axes.grid(alpha=0.25)
     place_legend_right(axes)
     axes.set_title(
         "time to rupture; bars: 95 % of a single test\n(if the law is right; with scatter between tests)", fontsize=9
     )
+
+
+# ---- minimum rates ---------------------------------------------------------------------------------------------------
+
+
+MOST_NAMED_TEMPERATURES = 6
+"""Temperatures that the legend names."""
+
+
+PERCENT_PER_HOUR = 100.0 * SECONDS_PER_HOUR
+"""Of 1/s."""
+
+
+DRAWN_FACTOR = 30.0
+"""Beyond the rates by which bands end at the axis."""
+
+
+def compared_minimum_rates(fit: Identification) -> list[MinimumRate]:
+    """Minimum rates to draw: of laws whose rate at a given strain and time is not what a test shows, else none.
+
+    These are laws with internal variables or of strain or time, laws that the tests reject, and laws of tests that
+    were followed to rupture. There are none where fewer than half of the tests show a minimum rate.
+    """
+    law, rejected = fit.law, getattr(fit.adequacy, "rejects", False)
+    changing = bool(law.states) or law.uses(strain) or law.uses(time)
+    if not (changing or rejected or any(m.rupture is not None for m in fit.tests)):
+        return []
+    try:
+        rates = minimum_rates_of(fit)
+    except CreepkitError:
+        return []
+    return rates if 2 * len(rates) >= len(fit.tests) else []
+
+
+def exponents(rates: Sequence[MinimumRate]) -> tuple[float, float]:
+    """The apparent stress exponents of measured and of predicted minimum rates; NaN of tests at one stress."""
+    stresses, temperatures = _column(rates, "stress"), _column(rates, "temperature")
+    measured, predicted = (
+        apparent_exponent(stresses, _column(rates, name), temperatures) for name in ("measured", "predicted")
+    )
+    return measured, predicted
+
+
+def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
+    """Both in words; "" where the stresses do not differ."""
+    measured, predicted = exponents(rates)
+    if not np.isfinite([measured, predicted]).all():
+        return ""
+    return f"apparent stress exponent: measured {measured:.2g}, by the law {predicted:.2g}"
+
+
+def draw_minimum_rates(axes: Axes, fit: Identification, rates: Sequence[MinimumRate]) -> None:
+    """Measured minimum rates as dots, those by the law for the same tests as a line with the 95 % band of one test."""
+    scale = temperature_scale(fit.histories)
+    rates = [_in_percent(rate) for rate in rates]
+    levels = _levels(rates)
+    for level in levels:
+        _draw_level(axes, [r for r in rates if _level(r) == level], scale, named=len(levels) <= MOST_NAMED_TEMPERATURES)
+    centre = _positive([v for r in rates for v in (r.measured, r.predicted)])
+    ends = _positive([v for r in rates for v in (r.low, r.high)])
+    ends = ends[(ends > centre.min() / DRAWN_FACTOR) & (ends < centre.max() * DRAWN_FACTOR)]
+    values = np.concatenate([centre, ends])
+    stresses = _column(rates, "stress")
+    set_range(axes, "x", 0.93 * float(stresses.min()), 1.07 * float(stresses.max()), logarithmic=True, most=6)
+    set_range(axes, "y", 0.8 * float(values.min()), 1.25 * float(values.max()), logarithmic=True)
+    axes.plot([], [], "o", ms=4, color="grey", mec="black", mew=0.4, label="measured")
+    axes.set(xlabel="stress, MPa", ylabel="minimum creep rate, %/h")
+    place_legend_right(axes, "line: by the law;\nband: 95 % of\na single test")
+    sentence = exponent_sentence(rates)
+    heading = "minimum creep rate of the tests"
+    axes.set_title(f"{heading}\n{sentence}" if sentence else heading, fontsize=9)
+
+
+def _in_percent(rate: MinimumRate) -> MinimumRate:
+    """The same in %/h."""
+    drawn = {name: PERCENT_PER_HOUR * getattr(rate, name) for name in ("measured", "predicted", "low", "high")}
+    return replace(rate, **drawn)
+
+
+def _draw_level(axes: Axes, rates: Sequence[MinimumRate], scale: ColourScale, *, named: bool) -> None:
+    """The tests of one temperature."""
+    colour = scale(float(np.mean(_column(rates, "temperature"))) - ZERO_CELSIUS)
+    known = sorted((r for r in rates if np.isfinite([r.predicted, r.low, r.high]).all()), key=lambda r: r.stress)
+    if known:
+        label = celsius_text(float(_column(known, "temperature").mean()), digits=0) if named else None
+        stresses, predicted = _column(known, "stress"), _column(known, "predicted")
+        low, high = _column(known, "low"), _column(known, "high")
+        if np.ptp(stresses) > 0:
+            axes.fill_between(stresses, low, high, color=colour, alpha=0.25, lw=0)
+            axes.plot(stresses, predicted, color=colour, lw=1.4, label=label)
+        else:
+            error = np.stack([predicted - low, high - predicted])
+            axes.errorbar(stresses, predicted, yerr=np.maximum(error, 0.0), fmt="_", color=colour, label=label)
+    axes.plot(
+        _column(rates, "stress"), _column(rates, "measured"), "o", ms=4, color=colour, mec="black", mew=0.4, zorder=3
+    )
+
+
+def _level(rate: MinimumRate) -> int:
+    return round(rate.temperature / ISOTHERMAL_RANGE)
+
+
+def _levels(rates: Sequence[MinimumRate]) -> list[int]:
+    return sorted({_level(r) for r in rates})
+
+
+def _column(rates: Sequence[MinimumRate], name: str) -> Floats:
+    return np.array([getattr(r, name) for r in rates], float)
+
+
+def _positive(values: Sequence[float]) -> Floats:
+    array = np.array(values, float)
+    return np.asarray(array[np.isfinite(array) & (array > 0)])
+
+
+# ---- the map of a plate ----------------------------------------------------------------------------------------------
+
+
+MOST_LAWS = 10
+"""Laws with a colour of their own."""
+
+
+WIDTH, ROW, LARGEST = 8.6, 0.17, 11.0
+"""Inches of the figure, of a material in it, and of its height at most."""
+
+
+def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
+    """Rates in %/h with 95 % intervals at the median stress of all; fits : (material, best law), in the order drawn."""
+    stress = float(np.median([fit.reference.stress for _, fit in fits]))
+    figure, axes = panels_of(WIDTH, min(1.4 + ROW * max(len(fits), 12), LARGEST))
+    laws = list(dict.fromkeys(fit.law.name for _, fit in fits))
+    colours = dict(zip(laws, distinct_colours(len(laws)), strict=True))
+    rates = np.array([[float(v) for v in fit.rate(stress, warn=False)] for _, fit in fits])
+    rates = PERCENT_PER_HOUR * rates
+    centre = rates[:, 0][np.isfinite(rates[:, 0]) & (rates[:, 0] > 0)]
+    named: set[str] = set()
+    for k, ((_, fit), (rate, low, high)) in enumerate(zip(fits, rates, strict=True)):
+        if not rate > 0:
+            continue
+        agrees = fit.adequacy is not None and fit.adequacy.explains
+        label = fit.law.name if fit.law.name not in named and len(named) < MOST_LAWS else None
+        named.add(fit.law.name)
+        colour = colours[fit.law.name]
+        ends = [[max(rate - max(low, rate / 1e3), 0.0)], [max(min(high, 1e3 * rate) - rate, 0.0)]]
+        axes.errorbar(
+            rate, k, xerr=ends, fmt="o", ms=4.5, lw=0.9, color=colour, mfc=colour if agrees else "white", label=label
+        )
+    if centre.size:
+        drawn = rates[:, 1:][
+            (rates[:, 1:] > centre.min() / DRAWN_FACTOR) & (rates[:, 1:] < centre.max() * DRAWN_FACTOR)
+        ]
+        every = np.concatenate([centre, drawn])
+        set_range(axes, "x", float(every.min()), float(every.max()), logarithmic=True)
+    axes.set_yticks(range(len(fits)), [shortened(name, 24) for name, _ in fits], fontsize=7 if len(fits) > 20 else 8)
+    axes.set_ylim(len(fits) - 0.5, -0.5)
+    axes.set(xlabel=f"creep rate at {stress:.3g} MPa, %/h")
+    place_legend_right(axes, "law; open:\ncontradicted\nby its tests")
+    return figure

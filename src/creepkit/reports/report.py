@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import platform
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -38,9 +36,10 @@ from creepkit.reports.contents import (
     ReportGroup,
     ReportProvenance,
     ReportSource,
+    versions_of,
 )
+from creepkit.reports.findings import findings_of
 from creepkit.reports.html import report_html
-from creepkit.reports.html.findings import findings_of
 from creepkit.reports.identified_files import identified_files
 from creepkit.rupture_assessment.assessment import RuptureAssessment
 from creepkit.screening.results import AlloyResult, ScreeningResult
@@ -58,6 +57,17 @@ Reported: TypeAlias = (
     | RuptureAssessment
     | Extraction
 )
+
+PARTS: dict[Any, str] = {
+    TemperatureStudy: "temperature",
+    TemperatureLaw: "temperature",
+    Forecast: "forecasts",
+    Design: "design",
+    RuptureAssessment: "rupture",
+    Extraction: "extractions",
+}
+"""{kind of result: the part of the contents where it stands by a title of its own}."""
+
 
 EXPORT_TARGETS = ("json", "python", "latex", "abaqus")
 """Of the best law of each material, to download."""
@@ -104,12 +114,15 @@ def report_contents(
         source = source.report_contents()
     if isinstance(source, ReportContents):
         return replace(source, title=title) if title else source
-    results = _Results()
-    for one in [*source] if isinstance(source, Iterable) and not hasattr(source, "__dataclass_fields__") else [source]:
-        results.add(one)
-    if not results.any:
+    several: Any = source if isinstance(source, Iterable) and not hasattr(source, "__dataclass_fields__") else [source]
+    results: list[Any] = [*several]
+    groups = _groups(results)
+    others: dict[str, Any] = {part: {} for part in PARTS.values()}
+    for one in results:
+        for part in {part for kind, part in PARTS.items() if isinstance(one, kind)}:
+            others[part][_title_of(one, others[part])] = one
+    if not (groups or any(others.values())):
         raise ReportError("there is nothing to report: give identifications, rankings, a plate or what follows them")
-    groups = results.groups()
     histories = [h for group in groups for h in group.histories]
     exports, notes = _exports(groups)
     return ReportContents(
@@ -117,79 +130,46 @@ def report_contents(
         groups=groups,
         quality=_quality(histories),
         exclusions=tuple(_exclusions(histories)),
-        temperature=results.temperature,
-        forecasts=results.forecasts,
-        design=results.design,
-        rupture=results.rupture,
-        extractions=results.extractions,
         exports=exports,
         provenance=_provenance(groups, histories),
         notes=notes,
+        **others,
     )
 
 
-@dataclass
-class _Results:
-    """Results sorted by what they are."""
-
-    ranked: list[ReportGroup] = field(default_factory=list)
-    fits: list[Identification] = field(default_factory=list)
-    temperature: dict[str, TemperatureStudy | TemperatureLaw] = field(default_factory=dict)
-    forecasts: dict[str, Forecast] = field(default_factory=dict)
-    design: dict[str, Design] = field(default_factory=dict)
-    rupture: dict[str, RuptureAssessment] = field(default_factory=dict)
-    extractions: dict[str, Extraction] = field(default_factory=dict)
-
-    @property
-    def any(self) -> bool:
-        """Whether there is one."""
-        return any(getattr(self, one.name) for one in fields(self))
-
-    def add(self, one: Any) -> None:
-        """Sort one result in; ReportError for anything else."""
-        if isinstance(one, Identification):
-            self.fits.append(one)
-        elif isinstance(one, ModelAverage):
-            self.fits += one.fits
+def _groups(results: Sequence[Any]) -> tuple[ReportGroup, ...]:
+    """Rankings and alloys, then identifications: those of the same tests as one ranking; ReportError for others."""
+    ranked: list[ReportGroup] = []
+    same_tests: dict[object, list[Identification]] = {}
+    for one in results:
+        if isinstance(one, Identification | ModelAverage):
+            for fit in one.fits if isinstance(one, ModelAverage) else (one,):
+                same_tests.setdefault(fit.provenance.get("data", id(fit)), []).append(fit)
         elif isinstance(one, Ranking):
-            self.ranked.append(ReportGroup(_material(one.best), one, one.best.histories))
+            ranked.append(ReportGroup(_material(one.best), one, one.best.histories))
         elif isinstance(one, AlloyResult):
-            self.ranked.append(ReportGroup(one.alloy, one, failure=one.failure))
+            ranked.append(ReportGroup(one.alloy, one, failure=one.failure))
         elif isinstance(one, ScreeningResult):
-            self.ranked += [ReportGroup(r.alloy, r, tuple(one.histories[r.alloy]), r.failure) for r in one.results]
-        elif isinstance(one, TemperatureStudy | TemperatureLaw):
-            _add_titled(self.temperature, getattr(getattr(one, "temperature_law", one), "law", None), one)
-        elif isinstance(one, Forecast):
-            _add_titled(self.forecasts, None, one)
-        elif isinstance(one, Design):
-            _add_titled(self.design, None, one)
-        elif isinstance(one, RuptureAssessment):
-            _add_titled(self.rupture, None, one)
-        elif isinstance(one, Extraction):
-            _add_titled(self.extractions, one, one)
-        else:
+            ranked += [ReportGroup(r.alloy, r, tuple(one.histories[r.alloy]), r.failure) for r in one.results]
+        elif not isinstance(one, tuple(PARTS)):
             raise ReportError(
                 f"a report takes identifications, rankings, plates, forecasts, designs, temperature laws, rupture "
                 f"assessments, extractions or a study, found {type(one).__name__}"
             )
-
-    def groups(self) -> tuple[ReportGroup, ...]:
-        """Rankings and alloys, then identifications: those of the same tests as one ranking."""
-        same_tests: dict[object, list[Identification]] = {}
-        for fit in self.fits:
-            same_tests.setdefault(fit.provenance.get("data", id(fit)), []).append(fit)
-        groups = [
-            ReportGroup(_material(fits[0]), fits[0] if len(fits) == 1 else rank(fits), fits[0].histories)
-            for fits in same_tests.values()
-        ]
-        return (*self.ranked, *groups)
+    fits = [
+        ReportGroup(_material(one[0]), one[0] if len(one) == 1 else rank(one), one[0].histories)
+        for one in same_tests.values()
+    ]
+    return (*ranked, *fits)
 
 
-def _add_titled(results: dict[str, Any], named: Any, one: Any) -> None:
-    title = str(getattr(named, "name", "") or "")
-    while title in results:
-        title = f"{title} ({len(results) + 1})" if title else f"No. {len(results) + 1}"
-    results[title] = one
+def _title_of(one: Any, others: Mapping[str, Any]) -> str:
+    """The name of a law with temperature, or of an extraction, told apart from those of others."""
+    law = getattr(getattr(one, "temperature_law", one), "law", None)
+    title = str(getattr(one if isinstance(one, Extraction) else law, "name", "") or "")
+    while title in others:
+        title = f"{title} ({len(others) + 1})" if title else f"No. {len(others) + 1}"
+    return title
 
 
 def _material(fit: Identification) -> str:
@@ -254,7 +234,7 @@ def _provenance(groups: Sequence[ReportGroup], histories: Sequence[History]) -> 
 
     found = [one for one in map(findings_of, groups) if one is not None]
     if not found:
-        return ReportProvenance(versions=_versions())
+        return ReportProvenance(versions=versions_of(PACKAGES))
     fit = found[0].fit
     stated = {k: v for k, v in fit.provenance.items() if k in ("specimen", "origin", "when")}
     if len(found) == 1:
@@ -262,7 +242,7 @@ def _provenance(groups: Sequence[ReportGroup], histories: Sequence[History]) -> 
     settings = {one.name: getattr(fit.settings, one.name) for one in fields(fit.settings) if one.name != "nuisances"}
     settings["nuisances"] = ", ".join(str(n.kind) for n in fit.settings.nuisances)
     return ReportProvenance(
-        versions=_versions(),
+        versions=versions_of(PACKAGES),
         seed=fit.settings.seed,
         settings={**{k: v for k, v in settings.items() if k != "seed"}, **stated},
         inputs=dict(_inputs(histories)),
@@ -298,16 +278,6 @@ def _commands(group: ReportGroup, histories: Sequence[History]) -> Iterator[str]
     yield "import creepkit as ck"
     yield f"tests = ck.read_histories({files if len(files) <= MOST_NAMED_FILES else 'FOLDER'})"
     yield f"ck.report(ck.{verb}({laws!r}, tests{changes}), 'report.html')"
-
-
-def _versions() -> dict[str, str]:
-    versions = {"python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            versions[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return versions
 
 
 def _inputs(histories: Sequence[History]) -> Iterator[tuple[str, str]]:

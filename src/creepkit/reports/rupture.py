@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.records.units import celsius_text
+from creepkit.arrays import Floats
+from creepkit.records.units import ZERO_CELSIUS, celsius_text
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
+from creepkit.reports.figures import empty_figure, save_figure, set_range, wrapped
+from creepkit.reports.json_values import fields_to_json
+from creepkit.rupture_assessment.checks import BAND_FACTOR
+from creepkit.rupture_assessment.fitting import conditions_of
 from creepkit.rupture_assessment.log_time_distributions import power_of_ten
+from creepkit.rupture_assessment.methods import METHODS, THERMAL, Conditions
+from creepkit.rupture_assessment.strength import LONGEST_EXTRAPOLATION, bound_curves, mixed
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from creepkit.reports.svg import PageFigures
     from creepkit.rupture_assessment.assessment import RuptureAssessment
     from creepkit.rupture_assessment.checks import AssessmentCheck
     from creepkit.rupture_assessment.rupture_fit import RuptureFit
-    from creepkit.rupture_assessment.strength import StrengthEstimate
+
 
 SHOWN_WEIGHT = 1e-3
 """Fits of less weight do not count in what is said of the scatter."""
@@ -31,43 +43,60 @@ CRITERIA = {"bic": "BIC", "aicc": "AICc"}
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
 
-def rupture_text(assessment: RuptureAssessment, *, strengths: bool = True) -> str:
-    """The verdict, then tables of methods, strengths (where wanted) and checks, and the notes."""
+def rupture_text(assessment: RuptureAssessment) -> str:
+    """The verdict, then methods, strengths and checks, and the notes."""
+    return as_text([*strength_blocks(assessment), *rupture_blocks(assessment)])
+
+
+def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
+    """The tests, the verdict, and the strengths of the average method in a table."""
     tests = assessment.tests
-    span = f"{_range(tests.stress)} MPa, {_range(tests.temperature - 273.15)} °C"
+    span = f"{_range(tests.stress)} MPa, {_range(tests.temperature - ZERO_CELSIUS)} °C"
     heats = "".join(f", {len(set(v))} {_plural(group)}" for group, v in tests.groups.items())
     head = (
         f"{len(tests)} rupture tests, {int(tests.censored.sum())} of them run-outs, {span}, up to "
         f"{10 ** float(tests.log_time.max()):.4g} h{heats}"
     )
-    best = assessment.best
-    lines = [
-        head,
-        assessment.verdict,
-        "",
-        *_aligned(
-            (
-                "method",
-                "weight",
-                f"{CRITERIA[assessment.settings.criterion]} - best",
-                "scatter of a test",
-                *(f"between {_plural(group)}" for group in tests.groups),
-            ),
-            _method_rows(assessment),
-        ),
-        *(f"{name}: not ranked, for {why}" for name, why in assessment.rejected.items()),
-        "",
-        *_constants(best),
-        *_effect_lines(best),
+    table, note = _strengths(assessment)
+    said = [Paragraph(note, "note")] if note else []
+    return [Paragraph(assessment.verdict, "lead"), Paragraph(head), table, *said]
+
+
+def rupture_blocks(assessment: RuptureAssessment, figures: PageFigures | None = None, of: str = "") -> list[Block]:
+    """Methods with their weights and constants, checks and notes, and with `figures` the isotherms."""
+    best, relation, groups = assessment.best, assessment.relation, assessment.tests.groups
+    columns = (
+        *("method", "weight", f"{CRITERIA[assessment.settings.criterion]} - best", "scatter of a test"),
+        *(f"between {_plural(group)}" for group in groups),
+    )
+    rows = [
+        (
+            one.fit.name,
+            f"{one.weight:.3f}",
+            f"{one.excess:.1f}",
+            f"factor {power_of_ten(one.fit.scale_corrected):.3g}",
+            *(f"factor {power_of_ten(scatter):.3g}" for scatter in one.fit.scatter_corrected.values()),
+        )
+        for one in assessment.ranked
     ]
-    if assessment.relation is not None:
-        lines += ["not ranked, for they use minimum rates:", *_constants(assessment.relation.times)]
-        lines += _constants(assessment.relation.rates)
-    lines += ["", *_strength_lines(assessment)] if strengths else []
-    lines += ["", f"checks of {best.name}:"]
-    lines += [f"- {check_text(check)}" for check in assessment.checks]
-    lines += [f"note: {note}" for note in assessment.notes]
-    return "\n".join(lines)
+    blocks: list[Block] = [Table("methods by their weights", columns, rows, numeric=(1, 2))]
+    if figures is not None:
+        picture = figures.picture(
+            lambda: rupture_figure(assessment),
+            f"Rupture assessment{of}",
+            "Isotherms of stress over rupture time with tests and bounds, the master curve, and predicted over "
+            f"measured times of {plural(len(assessment.tests), 'test')}.",
+            "Isotherms with tests and bounds; master curve; predicted against measured times. Broken lines lie beyond "
+            "the stresses tested.",
+        )
+        blocks.append(picture)
+    blocks += [Items([f"{name}: not ranked, for {why}" for name, why in assessment.rejected.items()])]
+    blocks += [_constants(best), *(Paragraph(line) for line in _effect_lines(best))]
+    if relation is not None:
+        blocks += [Paragraph("not ranked, for they use minimum rates:")]
+        blocks += [_constants(relation.times), _constants(relation.rates)]
+    blocks += [Paragraph(f"checks of {best.name}:"), Items(list(map(check_text, assessment.checks)))]
+    return [*blocks, Paragraph("notes:"), Items(assessment.notes)] if assessment.notes else blocks
 
 
 def check_text(check: AssessmentCheck) -> str:
@@ -85,33 +114,13 @@ def _range(values: Any) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(len(row[k]) for row in [heads, *rows]) for k in range(len(heads))]
-    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in [heads, *rows]]
-
-
-def _method_rows(assessment: RuptureAssessment) -> list[tuple[str, ...]]:
-    return [
-        (
-            one.fit.name,
-            f"{one.weight:.3f}",
-            f"{one.excess:.1f}",
-            f"factor {power_of_ten(one.fit.scale_corrected):.3g}",
-            *(f"factor {power_of_ten(scatter):.3g}" for scatter in one.fit.scatter_corrected.values()),
-        )
-        for one in assessment.ranked
-    ]
-
-
-def _constants(fit: RuptureFit) -> list[str]:
+def _constants(fit: RuptureFit) -> Table:
     from creepkit.rupture_assessment.methods import METHODS
 
     given = "".join(f", {name} = {value:.6g} given" for name, value in fit.fixed.items())
-    head = f"{fit.name}: {METHODS[fit.method].equation}{given}"
-    return [
-        head,
-        *(f"  {p.name} = {p.value:.5g} [{p.low:.5g}, {p.high:.5g}] {p.unit}".rstrip() for p in fit.parameters),
-    ]
+    rows = [(p.name, f"{p.value:.5g}", f"{p.low:.5g} to {p.high:.5g}", p.unit) for p in fit.parameters]
+    caption = f"{fit.name}: {METHODS[fit.method].equation}{given}"
+    return Table(caption, ("constant", "value", "95 % interval", "unit"), rows, numeric=(1, 2))
 
 
 def _effect_lines(fit: RuptureFit) -> list[str]:
@@ -123,18 +132,18 @@ def _effect_lines(fit: RuptureFit) -> list[str]:
         ordered = [f"{name} {10 ** effects[name]:.2f}" for name in sorted(effects, key=lambda name: effects[name])]
         if len(ordered) > 2 * SHOWN_EFFECTS:
             ordered = [*ordered[:SHOWN_EFFECTS], "...", *ordered[-SHOWN_EFFECTS:]]
-        lines.append(f"  times of {_plural(group)} over those of the average one: {', '.join(ordered)}")
+        lines.append(f"times of {_plural(group)} over those of the average one: {', '.join(ordered)}")
     return lines
 
 
-def strength_rows(assessment: RuptureAssessment) -> tuple[list[str], list[tuple[str, ...]], str]:
-    """Heads of columns, rows of the strengths of the average method, and what is said of a new heat, "" for nothing."""
+def _strengths(assessment: RuptureAssessment) -> tuple[Table, str]:
+    """The strengths of the average method, and what is said of a new heat, "" for nothing."""
     level = f"{100 * assessment.settings.level:g} %"
     shown = [one for one in assessment.strengths if one.method == "average"]
     if assessment.relation is not None:
         shown += [one for one in assessment.strengths if one.method == assessment.relation.times.method]
     scattering = [g for g in assessment.tests.groups if _largest_scatter(assessment, g) >= LEAST_SCATTER_SHOWN]
-    heads = ["strength, MPa", "temperature", "time, h", "value", f"{level} of the mean"]
+    heads = ["method", "temperature", "time, h", "value", f"{level} of the mean"]
     heads += [f"of a new {' and '.join(scattering)}"] if scattering else []
     rows = []
     for one in shown:
@@ -156,12 +165,9 @@ def strength_rows(assessment: RuptureAssessment) -> tuple[list[str], list[tuple[
     elif not scattering:
         groups = " and ".join(map(_plural, assessment.tests.groups))
         note = f"a new heat has the bounds of the mean: no scatter between {groups} is found"
-    return [*heads, "of one test", ""], rows, note
-
-
-def _strength_lines(assessment: RuptureAssessment) -> list[str]:
-    heads, rows, note = strength_rows(assessment)
-    return [*_aligned(heads, rows), *([note] if note else [])]
+    columns = [*heads, "of one test", "remarks"]
+    caption = "creep rupture strengths in MPa, with bounds in brackets"
+    return Table(caption, columns, rows, numeric=(2, 3)), note
 
 
 def _largest_scatter(assessment: RuptureAssessment, group: str) -> float:
@@ -192,8 +198,15 @@ def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
         "relation": None
         if assessment.relation is None
         else [_fit_to_json(assessment.relation.times), _fit_to_json(assessment.relation.rates)],
-        "strengths": [_strength_to_json(one) for one in assessment.strengths],
-        "checks": [{"name": c.name, "passed": c.passed, "found": c.found, "fault": c.fault} for c in assessment.checks],
+        "strengths": [
+            {
+                "strength": one.value,
+                **fields_to_json(one, "method hours temperature bounds_of_mean bounds_of_heat bounds_of_test"),
+                **fields_to_json(one, "extrapolation reason"),
+            }
+            for one in assessment.strengths
+        ],
+        "checks": [fields_to_json(one, "name passed found fault") for one in assessment.checks],
         "level": assessment.settings.level,
         "notes": list(assessment.notes),
         "provenance": dict(assessment.provenance),
@@ -202,27 +215,222 @@ def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
 
 def _fit_to_json(fit: RuptureFit) -> dict[str, Any]:
     return {
-        "method": fit.method,
-        "degree": fit.degree,
-        "parameters": {
-            p.name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit} for p in fit.parameters
-        },
-        "fixed": dict(fit.fixed),
+        **fields_to_json(fit, "method degree fixed log_likelihood"),
+        "parameters": {p.name: fields_to_json(p, "value low high unit") for p in fit.parameters},
         "scale_log10": fit.scale,
         "scatter_log10": dict(fit.scatter),
         "effects_log10": {group: dict(effects) for group, effects in fit.effects.items()},
-        "log_likelihood": fit.log_likelihood,
     }
 
 
-def _strength_to_json(one: StrengthEstimate) -> dict[str, Any]:
-    bounds = {of: list(getattr(one, of)) for of in ("bounds_of_mean", "bounds_of_heat", "bounds_of_test")}
-    return {
-        "method": one.method,
-        "hours": one.hours,
-        "temperature": one.temperature,
-        "strength": one.value,
-        **bounds,
-        "extrapolation": one.extrapolation,
-        "reason": one.reason,
-    }
+# ---- figure ----------------------------------------------------------------------------------------------------------
+
+
+MOST_ISOTHERMS = 8
+"""In one panel."""
+
+RUN_OUT = "$\\rightarrow$"
+"""Marker of tests that did not break."""
+
+POINTS = 181
+LONGEST_HOURS = 1e5
+"""Up to which isotherms are drawn at least."""
+
+
+def rupture_figure(assessment: RuptureAssessment, path: str | Path | None = None) -> Figure:
+    """Isotherms of the average of methods beside its best method's master curve and predicted times.
+
+    Broken lines are beyond the stresses tested, the shaded part of the time axis beyond three times the longest test.
+    """
+    figure = empty_figure(12.5, 6.2)
+    grid = figure.add_gridspec(2, 2, width_ratios=[1.7, 1.0])
+    isotherms, master, compared = (
+        figure.add_subplot(grid[:, 0]),
+        figure.add_subplot(grid[0, 1]),
+        figure.add_subplot(grid[1, 1]),
+    )
+    colours = _colours(assessment)
+    _draw_isotherms(isotherms, assessment, colours)
+    _draw_master_curve(master, assessment, colours)
+    _draw_predicted(compared, assessment, colours)
+    handles, labels = isotherms.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 6), fontsize=8)
+    figure.suptitle(wrapped(assessment.verdict, 12.5), fontsize=10)
+    return save_figure(figure, path)
+
+
+def _shown_isotherms(assessment: RuptureAssessment) -> tuple[float, ...]:
+    all_of_them = assessment.tests.isotherms
+    step = -(-len(all_of_them) // MOST_ISOTHERMS)
+    return all_of_them[::step]
+
+
+def _colours(assessment: RuptureAssessment) -> dict[float, Any]:
+    from matplotlib import colormaps
+
+    isotherms = assessment.tests.isotherms
+    return {T: colormaps["plasma"](0.78 * k / max(len(isotherms) - 1, 1)) for k, T in enumerate(isotherms)}
+
+
+def _colour_of(temperature: float, colours: dict[float, Any]) -> Any:
+    return colours[min(colours, key=lambda T: abs(T - temperature))]
+
+
+def _draw_isotherms(axes: Axes, assessment: RuptureAssessment, colours: dict[float, Any]) -> None:
+    tests = assessment.tests
+    longest = 10.0 ** float(tests.log_time.max())
+    end = max(3.0 * LONGEST_EXTRAPOLATION * longest, LONGEST_HOURS)
+    start = 10.0 ** float(tests.log_time.min()) / 2.0
+    low, high = 0.6 * float(tests.stress.min()), 1.3 * float(tests.stress.max())
+    for T in _shown_isotherms(assessment):
+        near = np.abs(tests.temperature - T) <= 5.0
+        _draw_isotherm(axes, assessment, T, (low, high), (start, end), colours[T])
+        for censored, marker in ((False, "o"), (True, RUN_OUT)):
+            chosen = near & (tests.censored == censored)
+            axes.plot(
+                10.0 ** tests.log_time[chosen],
+                tests.stress[chosen],
+                ls="",
+                marker=marker,
+                ms=9 if censored else 4,
+                color=colours[T],
+                mec="white" if not censored else colours[T],
+                mew=0.4,
+                zorder=5,
+            )
+    axes.axvspan(LONGEST_EXTRAPOLATION * longest, 2 * end, color="#d9d9d9", alpha=0.6, lw=0, zorder=0)
+    set_range(axes, "x", start, end, logarithmic=True)
+    set_range(axes, "y", low, high, logarithmic=True)
+    axes.set_xlim(start, end)
+    axes.set_ylim(low, high)
+    axes.set_xlabel("time to rupture, h")
+    axes.set_ylabel("stress, MPa")
+    per_cent = f"{100 * assessment.settings.level:g} %"
+    axes.plot([], [], "o", color="0.3", ms=4, label="test that broke")
+    axes.plot([], [], ls="", marker=RUN_OUT, color="0.3", ms=9, label="run-out")
+    axes.fill_between([], [], [], color="0.3", alpha=0.35, lw=0, label=f"{per_cent} of the mean")
+    axes.fill_between([], [], [], color="0.3", alpha=0.13, lw=0, label=f"{per_cent} of one test")
+    axes.plot([], [], "--", color="0.3", lw=1.2, label="beyond the stresses tested at this temperature")
+    axes.fill_between([], [], [], color="#d9d9d9", label="beyond 3 times the longest test")
+
+
+def _draw_isotherm(
+    axes: Axes,
+    assessment: RuptureAssessment,
+    temperature: float,
+    stresses: tuple[float, float],
+    hours: tuple[float, float],
+    colour: Any,
+) -> None:
+    tests, models = assessment.tests, assessment.models()
+    limit = float(assessment.tensile(np.array([temperature]))[0])
+    stress = np.geomspace(stresses[0], min(stresses[1], 0.99 * limit if np.isfinite(limit) else np.inf), POINTS)
+    at = _points(stress, temperature, limit)
+    if any(
+        METHODS[m.method].needs == "tensile_strength" for m, _ in models if hasattr(m, "method")
+    ) and not np.isfinite(limit):
+        return
+    curves = bound_curves(models, at, assessment.settings.level)
+    for of, alpha in (("test", 0.13), ("mean", 0.35)):
+        low, high = (np.clip(10.0**curve, *_wide(hours)) for (kind, _), curve in curves.items() if kind == of)
+        axes.fill_betweenx(stress, low, high, color=colour, alpha=alpha, lw=0)
+    times = 10.0 ** mixed(models, at, "mean").quantile(0.5)
+    near = np.abs(tests.temperature - temperature) <= 5.0
+    tested = (stress >= 0.99 * tests.stress[near].min()) & (stress <= 1.01 * tests.stress[near].max())
+    axes.plot(times, stress, "--", color=colour, lw=1.2)
+    axes.plot(np.where(tested, times, np.nan), stress, color=colour, lw=1.8)
+    shown = np.flatnonzero(tested & (times > hours[0]) & (times < 0.8 * hours[1]))
+    if shown.size:  # above the isotherm at the highest stress tested, where bands are narrow
+        axes.annotate(
+            celsius_text(temperature, digits=0),
+            (times[shown[-1]], stress[shown[-1]]),
+            xytext=(7, 3),
+            textcoords="offset points",
+            fontsize=8,
+            fontweight="bold",
+            color=colour,
+            bbox={"boxstyle": "square,pad=0.1", "color": "white", "alpha": 0.8, "lw": 0},
+            zorder=6,
+        )
+
+
+def _wide(hours: tuple[float, float]) -> tuple[float, float]:
+    return 1e-3 * hours[0], 1e3 * hours[1]
+
+
+def _points(stress: Floats, temperature: float, limit: float) -> Conditions:
+    shape = stress.shape
+    return Conditions(stress, np.full(shape, temperature), np.full(shape, limit), np.full(shape, np.nan))
+
+
+def _draw_master_curve(axes: Axes, assessment: RuptureAssessment, colours: dict[float, Any]) -> None:
+    """Stress over the time-temperature parameter of the best fit; of Wilshire's the normalised stress."""
+    fit, tests = assessment.best, assessment.tests
+    at = conditions_of(tests, assessment.tensile)
+    value, label = _parameter(assessment, at, tests.log_time)
+    normalised = fit.method == "wilshire"
+    stress = at.stress / at.tensile_strength if normalised else at.stress
+    for T in tests.isotherms:
+        near = np.abs(tests.temperature - T) <= 5.0
+        for censored, marker in ((False, "o"), (True, RUN_OUT)):
+            chosen = near & (tests.censored == censored)
+            axes.plot(value[chosen], stress[chosen], ls="", marker=marker, ms=8 if censored else 3.5, color=colours[T])
+    T = float(tests.temperature.mean())
+    limit = float(assessment.tensile(np.array([T]))[0])
+    grid = np.geomspace(tests.stress.min(), tests.stress.max(), POINTS)
+    if normalised:
+        grid = np.geomspace(stress.min(), stress.max(), POINTS) * limit
+    line, _ = _parameter(assessment, _points(grid, T, limit), fit.location(_points(grid, T, limit)))
+    axes.plot(line, grid / limit if normalised else grid, color="black", lw=1.2)
+    low, high = float(stress.min()), float(stress.max())
+    set_range(axes, "y", 0.95 * low, 1.05 * high, logarithmic=True, most=6)
+    axes.set_xlabel(label, fontsize=8)
+    axes.set_ylabel("stress / tensile strength" if normalised else "stress, MPa", fontsize=8)
+    axes.set_title(f"{fit.name}: master curve", fontsize=9)
+    axes.tick_params(labelsize=7)
+
+
+def _parameter(assessment: RuptureAssessment, at: Conditions, log_time: Floats) -> tuple[Floats, str]:
+    """The time-temperature parameter of conditions and log10 of times in hours, and what it is."""
+    fit = assessment.best
+    values = {p.name: p.value for p in fit.parameters} | dict(fit.fixed)
+    if fit.method == "larson-miller":
+        return at.temperature * (values["C"] + log_time) / 1000.0, f"T ({values['C']:.2f} + log t) / 1000, K, h"
+    if fit.method in ("orr-sherby-dorn", "wilshire"):
+        return log_time - values["Q"] / (
+            THERMAL * at.temperature
+        ), f"log t - {values['Q'] / 1000:.0f} kJ/mol / (R T ln 10), h"
+    if fit.method == "manson-haferd":
+        t_a, T_a = values["log10 t_a"], values["T_a"]
+        return (log_time - t_a) / (at.temperature - T_a), f"(log t - {t_a:.2f}) / (T - {T_a:.0f} K), h"
+    return log_time, "log t, h"
+
+
+def _draw_predicted(axes: Axes, assessment: RuptureAssessment, colours: dict[float, Any]) -> None:
+    fit, tests = assessment.best, assessment.tests
+    predicted = fit.location(conditions_of(tests, assessment.tensile))
+    for censored, marker in ((False, "o"), (True, RUN_OUT)):
+        for k in np.flatnonzero(tests.censored == censored):
+            colour = _colour_of(tests.temperature[k], colours)
+            axes.plot(
+                10.0 ** tests.log_time[k],
+                10.0 ** predicted[k],
+                ls="",
+                marker=marker,
+                ms=8 if censored else 3.5,
+                color=colour,
+            )
+    both = np.concatenate([tests.log_time, predicted])
+    low, high = 10.0 ** (both.min() - 0.25), 10.0 ** (both.max() + 0.25)
+    line = np.array([low, high])
+    axes.plot(line, line, color="black", lw=1.0)
+    for factor in (BAND_FACTOR, 1.0 / BAND_FACTOR):
+        axes.plot(line, factor * line, ":", color="black", lw=0.8)
+    for which in ("x", "y"):
+        set_range(axes, which, low, high, logarithmic=True, most=6)
+    axes.set_xlim(low, high)
+    axes.set_ylim(low, high)
+    axes.set_xlabel("measured, h (dotted: a factor of 2)", fontsize=8)
+    axes.set_ylabel("predicted, h", fontsize=8)
+    axes.set_title(f"{fit.name}: predicted against measured", fontsize=9)
+    axes.tick_params(labelsize=7)

@@ -12,7 +12,8 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, growing_output, output_named, specimen_of
-from creepkit.reports.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
+from creepkit.reports.blocks import aligned
+from creepkit.reports.figures import empty_figure, make_folder, panels_of, place_legend_below, save_figure, set_range
 from creepkit.reports.terminal import print_json, print_table, tell
 from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
 from creepkit.screening.results import AlloyResult, PredictedOutputs, mean_chi_square, mean_relative_squared_error
@@ -35,10 +36,7 @@ def table_rows(plate: ScreeningResult) -> list[tuple[str, ...]]:
 
 def screening_text(plate: ScreeningResult) -> str:
     """The table, the share of each law in each class, and what failed."""
-    rows = [TABLE_COLUMNS, *table_rows(plate)]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(TABLE_COLUMNS))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join([*lines, "", *summary_lines(plate)])
+    return "\n".join([*aligned(TABLE_COLUMNS, table_rows(plate)), "", *summary_lines(plate)])
 
 
 def summary_lines(plate: ScreeningResult) -> list[str]:
@@ -156,13 +154,11 @@ def _finish_misfit(axes: Axes, limits: tuple[float, float]) -> None:
     set_range(axes, "y", *limits, logarithmic=logarithmic, most=6)
     axes.plot(axes.get_xlim(), axes.get_xlim(), "k-", lw=0.7, alpha=0.6, scalex=False, scaley=False)
     axes.set(xlabel="law without sparsity", ylabel="reduced law")
-    axes.grid(alpha=0.25)
 
 
 def plot_law_fractions(plate: ScreeningResult) -> Figure:
     """Share of each law by class (Fig. 7c): full colour where decisive, hatched what is shared out between laws."""
-    figure = empty_figure(7.2, 4.4)
-    axes: Axes = figure.subplots()
+    figure, axes = panels_of(7.2, 4.4)
     classes = plate.by_class()
     bottom, positions = np.zeros(len(classes)), range(len(classes))
     for k, law in enumerate(sorted({w.fit.law.name for a in plate.identified for w in a.laws})):
@@ -198,8 +194,8 @@ def plot_histories(plate: ScreeningResult, results: list[AlloyResult]) -> Figure
         members = [a for a in results if plate.class_of(a.alloy) == name]
         if members and len(shown_results) < MAX_CLASSES:
             shown_results[name] = next((a for a in members if a.decisive), members[0])
-    figure = empty_figure(3.6 * max(len(shown_results), 2), 3.9)
-    panels = figure.subplots(1, len(shown_results), squeeze=False)[0]
+    figure, panels = panels_of(3.6 * max(len(shown_results), 2), 3.9, 1, len(shown_results), squeeze=False)
+    panels = panels[0]
     for axes, (name, result) in zip(panels, shown_results.items(), strict=True):
         test = plate.histories[result.alloy][0]
         _plot_series(axes, test, result.predicted[test.name])
@@ -219,7 +215,6 @@ def _plot_series(axes: Axes, test: History, predicted: PredictedOutputs) -> None
     set_range(axes, "y", 0.0, float(np.nanmax(drawn, initial=1e-9)))
     set_range(axes, "x", 0.0, float(test.times[-1]) / SECONDS_PER_HOUR, most=6)
     axes.set(xlabel="time, h")
-    axes.grid(alpha=0.25)
 
 
 def plot_screening(plate: ScreeningResult, folder: Path) -> list[Path]:
@@ -245,8 +240,9 @@ def _plot_parity(plate: ScreeningResult, results: list[AlloyResult]) -> Figure:
     """Identified against measured, of each series that is drawn, and their difference (Fig. 7a, of all alloys)."""
     pairs = {result.alloy: _pairs(plate, result) for result in results}
     titles = list(dict.fromkeys(title for series in pairs.values() for title in series))
-    figure = empty_figure(3.7 * max(len(titles), 2), 5.6)
-    panels = figure.subplots(2, len(titles), height_ratios=(2.2, 1.0), sharex="col", squeeze=False)
+    figure, panels = panels_of(
+        3.7 * max(len(titles), 2), 5.6, 2, len(titles), height_ratios=(2.2, 1.0), sharex="col", squeeze=False
+    )
     colours, labels = class_colours(plate), LegendLabels()
     quantity = _quantity_label(plate.histories[results[0].alloy])
     for k, ((upper, lower), title) in enumerate(zip(panels.T, titles, strict=True)):
@@ -287,8 +283,7 @@ def _finish_parity(upper: Axes, lower: Axes, title: str, errors: Any, axis_limit
     lower.axhline(0, color="black", lw=0.7, alpha=0.6)
     rms = f", rms {float(np.sqrt(np.mean(errors**2))):.2g}" if errors.size else ": not observed"
     upper.set_title(f"{title}{rms}", fontsize=10)
-    for axes in (upper, lower):
-        axes.grid(alpha=0.25)
+    lower.grid(alpha=0.25)
 
 
 def print_screening(plate: ScreeningResult, written: list[Path], as_json: bool) -> None:

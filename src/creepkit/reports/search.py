@@ -9,7 +9,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.sparsity.result import LEAST_CONTRIBUTION
-from creepkit.reports.figures import empty_figure, place_legend_below, save_figure, set_range
+from creepkit.reports.blocks import aligned
+from creepkit.reports.figures import panels_of, place_legend_below, save_figure, set_range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,8 +30,7 @@ MARKER_LIMIT = 60
 
 def search_figure(trace: SearchTrace, path: str | Path | None = None) -> Figure:
     """The lowest cost over iterations, and how the candidates spread."""
-    figure = empty_figure(7.0, 4.4)
-    axes = figure.subplots()
+    figure, axes = panels_of(7.0, 4.4)
     _draw_costs(axes, trace)
     _draw_evaluations(axes, trace)
     place_legend_below(figure, axes)
@@ -57,7 +57,6 @@ def _draw_costs(axes: Axes, trace: SearchTrace) -> None:
     set_range(axes, "y", 0.9 * float(drawn.min()), 1.1 * float(drawn.max()), logarithmic=True)
     axes.set_ylabel("cost (half of chi-square,\nbound penalties and penalty included)")
     axes.set_title(trace.search, fontsize=10)
-    axes.grid(alpha=0.25)
 
 
 def _draw_evaluations(axes: Axes, trace: SearchTrace) -> None:
@@ -72,24 +71,23 @@ def _draw_evaluations(axes: Axes, trace: SearchTrace) -> None:
 def sparsity_text(sparsity: Sparsity) -> str:
     """The verdict, and the contribution of every term without penalty, with it, and after the refit."""
     strength = "" if sparsity.strength is None else f" of strength {sparsity.strength:g}"
-    width = max(map(len, sparsity.contributions_without_penalty))
-    lines = [f"{sparsity.penalty}{strength}: {sparsity.verdict}", f"{'':{width}}  without  with  after"]
+    rows = []
     for term, contribution in sparsity.contributions_without_penalty.items():
-        refitted = sparsity.contributions_after_refit.get(term)
-        after = "dropped" if refitted is None else f"{refitted:.3f}"
-        lines.append(f"{term:{width}}  {contribution:.3f}  {sparsity.contributions_with_penalty[term]:.3f}  {after}")
+        after = sparsity.contributions_after_refit.get(term)
+        numbers = (contribution, sparsity.contributions_with_penalty[term])
+        rows.append((term, *(f"{one:.3f}" for one in numbers), "dropped" if after is None else f"{after:.3f}"))
+    lines = [f"{sparsity.penalty}{strength}: {sparsity.verdict}", *aligned(("", "without", "with", "after"), rows)]
     return "\n".join([*lines, f"(contributions; below {LEAST_CONTRIBUTION:g} a term is dropped)"])
 
 
 def penalty_path_text(path: PenaltyPath) -> str:
     """One row a strength: chi-square, BIC less the least, contributions and the terms that are kept."""
-    rows = [["strength", "chi-square", "BIC - least", *path.terms, "kept"]]
+    rows = []
     for k, strength in enumerate(path.strengths):
         numbers = [f"{strength:g}", f"{path.chi_square[k]:.1f}", f"{path.bic_excess[k]:.1f}"]
         rows.append([*numbers, *(f"{c:.3f}" for c in path.contributions[k]), ", ".join(path.kept_terms[k])])
-    rows[1 + path.chosen][-1] += "   <- chosen"
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+    rows[path.chosen][-1] += "   <- chosen"
+    return "\n".join(aligned(("strength", "chi-square", "BIC - least", *path.terms, "kept"), rows))
 
 
 SMALLEST_DRAWN_RISE = 0.1
@@ -98,8 +96,7 @@ SMALLEST_DRAWN_RISE = 0.1
 
 def penalty_path_figure(path: PenaltyPath, file: str | Path | None = None) -> Figure:
     """Contributions on the left axis, the rise of chi-square on the right one."""
-    figure = empty_figure(7.2, 4.4)
-    axes = figure.subplots()
+    figure, axes = panels_of(7.2, 4.4)
     positions = _strength_positions(path.strengths)
     for label, contribution in zip(path.terms, path.contributions.T, strict=True):
         axes.plot(positions, contribution, "o-", ms=4, lw=1.6, label=label)
@@ -107,7 +104,6 @@ def penalty_path_figure(path: PenaltyPath, file: str | Path | None = None) -> Fi
     axes.axhspan(0.0, 0.05, color="black", alpha=0.06, lw=0)
     axes.set(xscale="log", ylim=(0, 1.05), xlabel="strength of the penalty", ylabel="contribution of each term")
     _draw_ticks(axes, path, positions)
-    axes.grid(alpha=0.25)
     _draw_chi_square(axes, path, positions)
     place_legend_below(figure, axes, columns=4)
     axes.set_title(f"{path.penalty}: terms below 5 % (grey) are dropped", fontsize=10)

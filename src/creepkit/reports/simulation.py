@@ -1,4 +1,4 @@
-"""Text and plots of simulated tests: outputs over time, deformed section, points of a reduced-order model."""
+"""Text and plots of simulated tests: outputs over time, deformed section."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline, shape_functions
 from creepkit.records import Output, Status, output_named
-from creepkit.reports.figures import empty_figure, save_figure, set_range
+from creepkit.reports.figures import panels_of, save_figure, set_range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from creepkit.fem.reduced_order_model import ReducedOrderModel
     from creepkit.specimens.bulge.run import BulgeRun
     from creepkit.specimens.run import Run
 
@@ -50,8 +49,7 @@ def section_figure(run: BulgeRun, time: float | None, name: str, path: str | Pat
     field = run.field(name, time)
     body = run.test.model
     moved = body.nodes + run._at(run.simulation.displacements, time)
-    figure = empty_figure(9.0, 3.1)
-    axes = figure.subplots()
+    figure, axes = panels_of(9.0, 3.1)
     places, facets = _facets(moved[body.elements])
     values = _at_facets(field.values.reshape(-1, 4), body.elements)
     for side in (1.0, -1.0):
@@ -74,8 +72,14 @@ def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
     for name in run.outputs:
         output = output_named(name, run.specimen)
         groups.setdefault((output.quantity, output.grows), []).append(output)
-    figure = empty_figure(6.4, 3.0 + 1.2 * len(groups))
-    panels = figure.subplots(len(groups) + 1, 1, sharex=True, height_ratios=(2.0, *[1.0] * (len(groups) - 1), 0.8))
+    figure, panels = panels_of(
+        6.4,
+        3.0 + 1.2 * len(groups),
+        len(groups) + 1,
+        1,
+        sharex=True,
+        height_ratios=(2.0, *[1.0] * (len(groups) - 1), 0.8),
+    )
     hours = run.times / 3600.0
     for axes, group in zip(panels, groups.values(), strict=False):
         for k, output in enumerate(group):
@@ -99,7 +103,6 @@ def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
             (1.1 if axes is panels[-1] else 1.0) * float(values.max(initial=1e-9)),
             most=5,
         )
-        axes.grid(alpha=0.25)
     set_range(panels[-1], "x", 0.0, float(knots[-1]) / 3600.0)
     ended = f", ended at {_duration(run.end_time)}: {run.reason}" if run.reason else ""
     figure.suptitle(f"{run.name}{ended}", fontsize=10)
@@ -153,20 +156,3 @@ def _draw_outline(axes: Axes, nodes: Floats, elements: Ints, side: float, **styl
 
 def _duration(time: float) -> str:
     return f"{time / 3600:.4g} h" if time >= 3600 else f"{time:.4g} s"
-
-
-def cubature_figure(model: ReducedOrderModel, path: str | Path | None = None) -> Figure:
-    """The section at rest with the points where a reduced-order model evaluates the law; areas are weights."""
-    body, basis = model.model, model.basis
-    figure = empty_figure(9.0, 2.6)
-    axes = figure.subplots()
-    _draw_outline(axes, body.nodes, body.elements, 1.0, color=_GREY, linewidth=0.8)
-    places = np.einsum("pa,eai->epi", shape_functions(GAUSS_POINTS), body.nodes[body.elements]).reshape(-1, 2)
-    weights = basis.factors * body.weights.ravel()[basis.points]
-    axes.plot(*places.T, ".", markersize=1.0, color=_GREY)
-    axes.scatter(places[basis.points, 0], places[basis.points, 1], s=60.0 * weights / weights.max(), color="tab:blue")
-    axes.set_aspect("equal")
-    axes.set_xlabel("radius, mm")
-    axes.set_ylabel("height, mm")
-    axes.set_title(f"{len(basis.points)} of {len(places)} points, {len(basis.modes)} modes", fontsize=10)
-    return save_figure(figure, path)

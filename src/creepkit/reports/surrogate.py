@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from creepkit.errors import SurrogateError
 from creepkit.records import output_named
-from creepkit.reports.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
+from creepkit.reports.blocks import aligned
+from creepkit.reports.figures import empty_figure, make_folder, panels_of, place_legend_below, save_figure, set_range
 from creepkit.surrogates.evaluation import PredictionComparison, evaluate, worst_histories
 from creepkit.surrogates.parameter_gru import SurrogateMetadata
 
@@ -56,7 +57,6 @@ def training_curves(metadata: SurrogateMetadata, path: str | Path | None = None)
     for k in rate_drops:
         axes.axvline(k + 1, color="grey", lw=0.8, ls=":", label="rate falls" if k == rate_drops[0] else None)
     axes.set(xlabel="epoch", ylabel="loss", yscale="log", title=f"{metadata.law.name}, {metadata.specimen.name}")
-    axes.grid(alpha=0.25)
     losses = np.concatenate([curves_by_name[name] for name in ("loss", "validation", "rse")])
     losses = losses[np.isfinite(losses) & (losses > 0)]
     set_range(axes, "y", float(losses.min()), float(losses.max()), logarithmic=True)
@@ -66,8 +66,9 @@ def training_curves(metadata: SurrogateMetadata, path: str | Path | None = None)
 
 def parity_figure(comparison: PredictionComparison, times: Sequence[float], path: str | Path | None = None) -> Figure:
     """Predicted against true outputs at some times: a row each time, a column each output."""
-    figure = empty_figure(3.4 * len(comparison.outputs) + 0.4, 3.1 * len(times))
-    panels = figure.subplots(len(times), len(comparison.outputs), squeeze=False)
+    figure, panels = panels_of(
+        3.4 * len(comparison.outputs) + 0.4, 3.1 * len(times), len(times), len(comparison.outputs), squeeze=False
+    )
     for row, time in zip(panels, times, strict=True):
         true, predicted = comparison.at_time(time)
         for k, (axes, name) in enumerate(zip(row, comparison.outputs, strict=True)):
@@ -96,14 +97,13 @@ def _draw_parity(axes: Axes, true: Any, predicted: Any) -> None:
         slope = ((true - true.mean()) * predicted).sum() / spread
         r_squared = 1.0 - ((predicted - true) ** 2).sum() / spread
         axes.text(0.04, 0.96, f"slope {slope:.4f}\nR2 {r_squared:.4f}", va="top", fontsize=8, transform=axes.transAxes)
-    axes.grid(alpha=0.25)
 
 
 def worst_samples_figure(comparison: PredictionComparison, path: str | Path | None = None) -> Figure:
     """The samples with the largest errors of the first output, simulated and predicted over time."""
     rows = worst_histories(comparison, comparison.largest_errors())[:WORST_SHOWN]
-    figure = empty_figure(9.6, 5.6)
-    panels = figure.subplots(2, 3).ravel()
+    figure, grid = panels_of(9.6, 5.6, 2, 3)
+    panels = grid.ravel()
     for axes in panels[len(rows) :]:
         axes.axis("off")
     for axes, sample in zip(panels, rows, strict=False):
@@ -129,37 +129,20 @@ ERROR_HEADS = ("RSE (Eq. 4)", "MSE", "MAE", "R2", "largest error, median", "95 %
 
 def surrogate_text(surrogate: Surrogate) -> str:
     """Title, laws, errors on the validation rows for each output, and where it came from."""
-    metadata, metrics = surrogate.metadata, surrogate.metadata.metrics
+    metadata, metrics, source = surrogate.metadata, surrogate.metadata.metrics, surrogate.metadata.provenance
     lines = [surrogate.title, f"predicts law '{metadata.law.name}', and that less some of its terms"]
     if metrics:
-        rows = {
-            name: [_number_text(errors_of_output[c]) for c in ERROR_COLUMNS]
-            for name, errors_of_output in metrics["outputs"].items()
-        }
-        lines += _aligned_rows(("output", *ERROR_HEADS), rows)
+        rows = [(name, *(_number_text(one[c]) for c in ERROR_COLUMNS)) for name, one in metrics["outputs"].items()]
+        lines += aligned(("output", *ERROR_HEADS), rows, numeric=range(1, 1 + len(ERROR_HEADS)))
         lines.append(f"validation loss (Eq. 4, outputs together): {_number_text(metrics['loss'])}")
-    lines += _training_lines(metadata.provenance)
+    if "training_rows" in source:
+        counts = f"{source['training_rows']} samples for training, {source['validation_rows']} for validation"
+        lines.append(f"{counts}; best epoch {source['best_epoch']} of {source['epochs']}, seed {source['seed']}")
     return "\n".join([*lines, *(f"note: {note}" for note in metadata.notes)])
-
-
-def _training_lines(provenance: Mapping[str, Any]) -> list[str]:
-    if "training_rows" not in provenance:
-        return []
-    counts = f"{provenance['training_rows']} samples for training, {provenance['validation_rows']} for validation"
-    return [f"{counts}; best epoch {provenance['best_epoch']} of {provenance['epochs']}, seed {provenance['seed']}"]
 
 
 def _number_text(value: float | None) -> str:
     return "-" if value is None else f"{value:.4g}"
-
-
-def _aligned_rows(heads: tuple[str, ...], rows: Mapping[str, list[str]]) -> list[str]:
-    table_rows = [list(heads), *([name, *cells] for name, cells in rows.items())]
-    widths = [max(len(row[k]) for row in table_rows) for k in range(len(heads))]
-    return [
-        "  ".join(c.rjust(w) if k else c.ljust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True)))
-        for row in table_rows
-    ]
 
 
 def write_surrogate_figures(surrogate: Surrogate, data: Dataset, folder: Path, name: str) -> list[Path]:
@@ -200,13 +183,11 @@ def size_study_figure(results: Sequence[SizeStudyResult], path: str | Path | Non
     from matplotlib import colormaps
 
     ordered = sorted(results, key=lambda e: e.loss)
-    canvas = empty_figure(11.0, max(3.8, 0.28 * len(ordered) + 1.6))
-    left, right = canvas.subplots(1, 2, width_ratios=(1.15, 1.0))
+    canvas, (left, right) = panels_of(11.0, max(3.8, 0.28 * len(ordered) + 1.6), 1, 2, width_ratios=(1.15, 1.0))
     shades: list[Any] = [colormaps["viridis"](0.92 * k / max(len(ordered) - 1, 1)) for k in range(len(ordered))]
     for result, shade in reversed(list(zip(ordered, shades, strict=True))):
         left.plot(np.arange(1, len(result.losses) + 1), result.losses, lw=1.2, color=shade)
     left.set(xlabel="epoch", ylabel="loss of validation rows, Eq. (4)", yscale="log")
-    left.grid(alpha=0.25)
     positions = np.arange(len(ordered))
     for position, result, shade in zip(positions, ordered, shades, strict=True):
         right.plot([result.training, result.loss], [position, position], "-", lw=1.0, color="grey")
@@ -221,6 +202,5 @@ def size_study_figure(results: Sequence[SizeStudyResult], path: str | Path | Non
     set_range(right, "x", min(ends), max(ends), logarithmic=True, most=6)
     right.set_yticklabels([result_entry.label for result_entry in ordered], fontsize=8)
     right.invert_yaxis()
-    right.grid(alpha=0.25)
     place_legend_below(canvas, right)
     return save_figure(canvas, path, SurrogateError)

@@ -12,10 +12,12 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.discovery.regression import INFINITE_FREEDOM
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_ends, interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_quantile
 from creepkit.language import Param
-from creepkit.language.printing import expression_text
-from creepkit.reports.figures import empty_figure, place_legend_right, save_figure, set_range
+from creepkit.records.units import celsius_text
+from creepkit.reports.answer import equations, unit_text, value_cells
+from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, Verbatim, as_text
+from creepkit.reports.figures import panels_of, place_legend_right, save_figure, set_range
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from creepkit.discovery.elastic_moduli import ModulusEstimates
     from creepkit.discovery.regression import FormCombination
     from creepkit.discovery.temperature_law import TemperatureLaw
+    from creepkit.reports.svg import PageFigures
 
 
 MAX_PANELS_PER_ROW = 3
@@ -43,8 +46,7 @@ def plot_temperature_law(temperature_law: TemperatureLaw, path: str | Path | Non
     names = temperature_law.isothermal_law.names
     columns = min(MAX_PANELS_PER_ROW, len(names))
     rows = -(-len(names) // columns)
-    figure = empty_figure(5.2 * columns, 3.7 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False)
+    figure, panels = panels_of(5.2 * columns, 3.7 * rows, rows, columns, squeeze=False)
     for k, name in enumerate(names):
         _plot_parameter(panels.flat[k], temperature_law, coordinates, k)
         panels.flat[k].set_title(_panel_title(temperature_law, coordinates, k, name), fontsize=9)
@@ -107,7 +109,6 @@ def _plot_parameter(axes: Any, temperature_law: TemperatureLaw, coordinates: Coo
     set_range(axes, "y", lowest - margin, highest + margin)
     axes.set(xlabel="temperature, K")
     place_legend_right(axes, "form, weight", size=7)
-    axes.grid(alpha=0.25)
 
 
 def _with_margin(ends: tuple[float, float]) -> tuple[float, float]:
@@ -168,48 +169,42 @@ EQUIVALENCE_NOTE = {
 
 def temperature_law_text(temperature_law: TemperatureLaw) -> str:
     """The law, its numbers, the forms that remain for each parameter, and the combinations."""
-    low, high = temperature_law.temperature_range
-    count, data = temperature_law.isothermal_estimates.temperatures.size, temperature_law.criterion_data
-    adequacy = temperature_law.adequacy
-    verdict = [] if adequacy is None else [f"  the law {adequacy}"]
+    return as_text([Paragraph(temperature_law.law.title or temperature_law.law.name), *law_blocks(temperature_law)])
+
+
+def law_blocks(law: TemperatureLaw, figures: PageFigures | None = None, of: str = "") -> list[Block]:
+    """Verdict, equations, values, and with `figures` the parameters over temperature; forms and combinations."""
+    low, high = law.temperature_range
+    adequacy, count = law.adequacy, law.isothermal_estimates.temperatures.size
     rejected = adequacy is not None and adequacy.rejects
-    return "\n".join(
-        [
-            f"{temperature_law.law.title or temperature_law.law.name}",
-            *([*verdict, "  what follows are values of a law that does not fit the tests"] if rejected else []),
-            *(f"  {label}: {expression_text(term)}" for label, term in temperature_law.law.terms.items()),
-            "",
-            *_parameter_lines(temperature_law),
-            "",
-            f"  found from {count} temperatures, {low:.0f} to {high:.0f} K, and valid between "
-            f"them; T_ref = {temperature_law.T_ref:.2f} K",
-            f"  forms that remain, weighed by {CRITERION[data]} ({EQUIVALENCE_NOTE[data]}):",
-            *_form_lines(temperature_law.plausible_forms),
-            "",
-            *_combination_lines(temperature_law),
-            *_prior_lines(temperature_law),
-            *([] if rejected else verdict),
-            *(f"  note: {note}" for note in temperature_law.notes),
-        ]
-    )
-
-
-def _parameter_lines(temperature_law: TemperatureLaw) -> list[str]:
-    width, lines = max(len(e.name) for e in temperature_law.estimates), []
-    for e in temperature_law.estimates:
-        unit = "" if e.unit == "1" else f" {e.unit}"
-        note = "" if e.verdict == "determined" else f"   <- {e.verdict}"
-        ends = interval_ends(temperature_law.law, e)
-        lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{ends[0]}, {ends[1]}]{unit}{note}")
-    return lines
-
-
-def _form_lines(plausible_forms: Mapping[str, tuple[FormWeight, ...]]) -> list[str]:
-    width = max(len(name) for name in plausible_forms)
-    return [
-        f"    {name:{width}}  {', '.join(_form_text(form) for form in form_weights)}"
-        for name, form_weights in plausible_forms.items()
+    of_law = "; what follows are values and trends of a law that does not fit the tests" if rejected else ""
+    blocks: list[Block] = [] if adequacy is None else [Paragraph(f"the law {adequacy}{of_law}")]
+    blocks += [Formula(one) for one in equations(law.law)]
+    chosen = ", ".join(f"{parameter} {form}" for parameter, form in law.forms.items())
+    found = f"found from {count} temperatures, {celsius_text(low, high)}, and valid between them"
+    blocks.append(Paragraph(f"{found}: the parameters follow these forms best: {chosen}; T_ref = {law.T_ref:.2f} K"))
+    rows = [
+        (e.name, *value_cells(law.law, e), unit_text(e.unit), "the law does not fit" if rejected else e.verdict)
+        for e in law.estimates
     ]
+    columns = ("parameter", "value", "95 % interval", "unit", "by these tests")
+    blocks.append(Table("values of the temperature law", columns, rows, numeric=(1, 2)))
+    if figures is not None:
+        picture = figures.picture(
+            lambda: plot_temperature_law(law),
+            f"Parameters over temperature{of}",
+            f"Isothermal estimates with 95 % intervals at {count} temperatures from {celsius_text(low, high)}, and the "
+            f"curves of the forms that remain. Best forms: {chosen}.",
+            "Parameters at each temperature with 95 % intervals, and the forms that remain with their weights.",
+        )
+        blocks.append(picture)
+    data = law.criterion_data
+    forms = [(name, ", ".join(map(_form_text, weights))) for name, weights in law.plausible_forms.items()]
+    caption = f"forms that remain, weighed by {CRITERION[data]} ({EQUIVALENCE_NOTE[data]})"
+    blocks += [Table(caption, ("parameter", "forms with their weights"), forms), _combinations(law)]
+    odds = [(name, _odds_text(by_form)) for name, by_form in law.prior_odds.items() if len(by_form) > 1]
+    blocks += [Table("prior odds, the likeliest as 1", ("parameter", "odds"), odds)] if odds else []
+    return [*blocks, Items(law.notes)] if law.notes else blocks
 
 
 def _form_text(form: FormWeight) -> str:
@@ -218,28 +213,25 @@ def _form_text(form: FormWeight) -> str:
     return f"{form.name} {form.weight:.2f}"
 
 
-def _combination_lines(temperature_law: TemperatureLaw) -> list[str]:
+def _combinations(law: TemperatureLaw) -> Table:
     """The best combinations: forms, numbers, criterion less the best, weight."""
-    lines = ["  combination | numbers | criterion - best | weight"]
-    for candidate in temperature_law.candidates[:MAX_COMBINATIONS_LISTED]:
-        forms = ", ".join(f"{name}:{form}" for name, form in candidate.forms.items())
-        lines.append(
-            f"    {forms} | {len(candidate.values)} | {candidate.criterion_difference:.1f} | {candidate.weight:.3f}"
+    rows = [
+        (
+            ", ".join(f"{name}:{form}" for name, form in one.forms.items()),
+            str(len(one.values)),
+            f"{one.criterion_difference:.1f}",
+            f"{one.weight:.3f}",
         )
-    remaining = len(temperature_law.candidates) - MAX_COMBINATIONS_LISTED
-    return [*lines, f"    and {remaining} more"] if remaining > 0 else lines
+        for one in law.candidates[:MAX_COMBINATIONS_LISTED]
+    ]
+    more = len(law.candidates) - MAX_COMBINATIONS_LISTED
+    caption = f"combinations, the best first{f'; {more} more are not listed' if more > 0 else ''}"
+    return Table(caption, ("forms", "numbers", "criterion - best", "weight"), rows, numeric=(1, 2, 3))
 
 
-def _prior_lines(temperature_law: TemperatureLaw) -> list[str]:
-    """The prior: stated where it is not uniform."""
-    odds_lines = []
-    for name, odds_by_form in temperature_law.prior_odds.items():
-        if len(odds_by_form) > 1:
-            largest = max(odds_by_form.values())
-            odds_lines.append(
-                f"{name}: {', '.join(f'{form} {odds / largest:.2g}' for form, odds in odds_by_form.items())}"
-            )
-    return ["  prior odds, the likeliest as 1:", *(f"    {line}" for line in odds_lines)] if odds_lines else []
+def _odds_text(odds_by_form: Mapping[str, float]) -> str:
+    largest = max(odds_by_form.values())
+    return ", ".join(f"{form} {odds / largest:.2g}" for form, odds in odds_by_form.items())
 
 
 def temperature_study_text(study: TemperatureStudy) -> str:
@@ -247,6 +239,23 @@ def temperature_study_text(study: TemperatureStudy) -> str:
     parts = [study.moduli_fit, study.joint_fit, study.temperature_law]
     texts = [str(part) for part in parts if part is not None]
     return "\n\n".join([*texts, *(f"note: {note}" for note in study.notes)])
+
+
+def study_blocks(study: TemperatureStudy, figures: PageFigures, of: str = "") -> list[Block]:
+    """The temperature law, where there is one, the moduli, and the notes; that the joint fit is rejected, if it is."""
+    law, fit = study.temperature_law, study.joint_fit
+    blocks: list[Block] = []
+    if (
+        law is not None
+        and law.adequacy is None
+        and fit is not None
+        and fit.adequacy is not None
+        and fit.adequacy.rejects
+    ):
+        blocks.append(Paragraph(f"the law {fit.adequacy}; what follows are values and trends of that law alone"))
+    blocks += [] if law is None else law_blocks(law, figures, of)
+    blocks += [] if study.moduli_fit is None else [Verbatim("Young's modulus", str(study.moduli_fit))]
+    return [*blocks, Items(study.notes)] if study.notes else blocks
 
 
 def modulus_estimates_text(estimates: ModulusEstimates) -> str:
@@ -259,21 +268,18 @@ def modulus_estimates_text(estimates: ModulusEstimates) -> str:
 
 def temperature_law_to_json(temperature_law: TemperatureLaw, written: Sequence[Path]) -> dict[str, Any]:
     """The result and the files that were written, as JSON-able data."""
+    law = temperature_law
     return {
-        "law": temperature_law.law.name,
-        "judged_by": temperature_law.criterion_data,
-        "range_K": list(temperature_law.temperature_range),
-        "T_ref_K": temperature_law.T_ref,
-        "forms": temperature_law.forms,
-        "sets": {
-            name: [vars(form_weight) for form_weight in form_weights]
-            for name, form_weights in temperature_law.plausible_forms.items()
-        },
-        "parameters": {e.name: {k: v for k, v in vars(e).items() if k != "name"} for e in temperature_law.estimates},
+        "law": law.law.name,
+        "judged_by": law.criterion_data,
+        "range_K": list(law.temperature_range),
+        "T_ref_K": law.T_ref,
+        "forms": law.forms,
+        "sets": {name: [vars(one) for one in weights] for name, weights in law.plausible_forms.items()},
+        "parameters": {e.name: {k: v for k, v in vars(e).items() if k != "name"} for e in law.estimates},
         "candidates": [
-            {"forms": candidate.forms, "excess": candidate.criterion_difference, "weight": candidate.weight}
-            for candidate in temperature_law.candidates
+            {"forms": one.forms, "excess": one.criterion_difference, "weight": one.weight} for one in law.candidates
         ],
-        "notes": list(temperature_law.notes),
+        "notes": list(law.notes),
         "files": [str(path) for path in written],
     }

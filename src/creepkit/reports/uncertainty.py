@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.records.units import celsius_text
-from creepkit.reports.figures import empty_figure, place_legend_right, save_figure, set_range, wrapped
+from creepkit.reports.blocks import aligned
+from creepkit.reports.figures import empty_figure, panels_of, place_legend_right, save_figure, set_range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +44,7 @@ def _unit_text(unit: str) -> str:
 
 def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -> Figure:
     """The rise of chi-square over the quantity, its limit, and the parabola of Laplace's approximation."""
-    figure, axes = _figure_and_axes(6.0, 4.2)
+    figure, axes = panels_of(6.0, 4.2)
     low, high = profile.laplace
     positive = bool((profile.values > 0).all()) and low > 0
     logarithmic = positive and float(profile.values.max() / profile.values.min()) > LOGARITHMIC_RATIO
@@ -64,7 +65,6 @@ def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -
     if logarithmic:
         set_range(axes, "x", *axes.get_xlim(), logarithmic=True, most=6)
     place_legend_right(axes)
-    axes.grid(alpha=0.25)
     return save_figure(figure, path)
 
 
@@ -147,31 +147,8 @@ def _draw_pair(
 
 def correlation_text(correlation: Correlation) -> str:
     """The matrix with its names, four digits."""
-    widths = [max(len(name), 8) + 1 for name in correlation.names]
-    first_width = max(len(name) for name in correlation.names) + 1
-    heads = (f"{name:>{width}}" for name, width in zip(correlation.names, widths, strict=True))
-    lines = [" " * first_width + "".join(heads)]
-    for name, row in zip(correlation.names, correlation.matrix, strict=True):
-        cells = (f"{value:>{width}.4f}" for value, width in zip(row, widths, strict=True))
-        lines.append(f"{name:{first_width}}" + "".join(cells))
-    return "\n".join(lines)
-
-
-def correlation_figure(correlation: Correlation, path: str | Path | None = None) -> Figure:
-    """The matrix in colours from -1 to 1, with its numbers."""
-    count = len(correlation.names)
-    figure, axes = _figure_and_axes(2.0 + 0.8 * count, 1.6 + 0.8 * count)
-    image = axes.imshow(correlation.matrix, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
-    for row in range(count):
-        for column in range(count):
-            value = correlation.matrix[row, column]
-            colour = "white" if abs(value) > 0.6 else "black"
-            axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8, color=colour)
-    axes.set_xticks(range(count), correlation.names, rotation=45, ha="right")
-    axes.set_yticks(range(count), correlation.names)
-    axes.set_title(wrapped(correlation.title, 0.7 * float(figure.get_size_inches()[0])), fontsize=10)
-    figure.colorbar(image, ax=axes, shrink=0.8, label="correlation")
-    return save_figure(figure, path)
+    rows = [(name, *(f"{v:.4f}" for v in row)) for name, row in zip(correlation.names, correlation.matrix, strict=True)]
+    return "\n".join(aligned(("", *correlation.names), rows, numeric=range(1, 1 + len(rows))))
 
 
 def model_average_text(average: ModelAverage) -> str:
@@ -184,8 +161,3 @@ def model_average_text(average: ModelAverage) -> str:
         f"over the laws {names}: rate at {reference.stress:.4g} MPa, {celsius_text(reference.temperature)} {rate:.3g} "
         f"[{low:.3g}, {high:.3g}] 1/s, local stress exponent {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]"
     )
-
-
-def _figure_and_axes(width: float, height: float) -> tuple[Figure, Any]:
-    figure = empty_figure(width, height)
-    return figure, figure.subplots()

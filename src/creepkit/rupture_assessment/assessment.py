@@ -280,7 +280,7 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Isotherms with tests and bounds, the master curve, and predicted against measured times."""
-        return present("reports.rupture_plot:rupture_figure", self, path)
+        return present("reports.rupture:rupture_figure", self, path)
 
     def save(self, path: str | Path) -> Path:
         """Write the assessment to a JSON file."""

@@ -196,7 +196,7 @@ DEFAULT_DRAWS = 4096
 
 
 @dataclass(frozen=True, eq=False)
-class Acceptance(Presentable, text="reports.sampling:acceptance_text"):
+class Acceptance(Presentable, text="reports.dataset:acceptance_text"):
     """What is known of a design without simulating it.
 
     draws : rows of the design. criteria_met : {criterion before simulation: (rows,) whether it is met on its own}.
@@ -228,7 +228,7 @@ class Acceptance(Presentable, text="reports.sampling:acceptance_text"):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw the sampled rates, with the useful ones and criteria 1 and 2 marked; write them to `path` if given."""
-        return present("reports.sampling:acceptance_figure", self, path)
+        return present("reports.dataset:acceptance_figure", self, path)
 
 
 def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0) -> Acceptance:

@@ -39,8 +39,8 @@ from creepkit.registry.reading import frame_files
 from creepkit.reports.contents import Exclusion
 from creepkit.studies import arguments
 from creepkit.studies.alloy_table import AlloyTable, Dimple, read_alloy_table
+from creepkit.studies.execution import Results, Stage, Tick
 from creepkit.studies.inputs import InputFile
-from creepkit.studies.stage import Results, Stage, Tick
 from creepkit.studies.study_file import KeyPath, StudyFile
 from creepkit.studies.tables import CameraTable
 

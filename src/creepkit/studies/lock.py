@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-import platform
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ from creepkit.errors import StudyError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
+from creepkit.reports.contents import versions_of
 from creepkit.studies import arguments
 from creepkit.studies.execution import StageRecord
 from creepkit.studies.inputs import InputFile
@@ -61,17 +60,6 @@ class StudyLock:
     stages: Mapping[str, LockedStage]
 
 
-def versions_of() -> dict[str, str]:
-    """Versions of Python and of the packages that compute."""
-    found = {"python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
-
-
 def lock_of(
     file: StudyFile, files: Sequence[InputFile], records: Sequence[StageRecord] = (), before: StudyLock | None = None
 ) -> StudyLock:
@@ -87,7 +75,7 @@ def lock_of(
     data = CODEC.to_json(
         {
             "study": hashlib.sha256(file.text.encode()).hexdigest(),
-            "versions": versions_of(),
+            "versions": versions_of(PACKAGES),
             "inputs": {one.name: one.sha256 for one in files},
             "declared": file.model.model_dump(),
             "settings": asdict(arguments.settings_of(file)),

@@ -21,11 +21,12 @@ from creepkit.reports.contents import (
     ReportGroup,
     ReportProvenance,
     StageFailure,
+    versions_of,
 )
 from creepkit.reports.identified_files import identified_files
 from creepkit.studies.execution import StageRecord
 from creepkit.studies.inputs import DATA_FILE, InputFile, StudyInputs, TestGroup
-from creepkit.studies.lock import versions_of
+from creepkit.studies.lock import PACKAGES
 from creepkit.studies.study_file import StudyFile
 from creepkit.studies.tables import ReportTable
 
@@ -198,7 +199,7 @@ class StudyResult:
             exports=(*self.exports, *carried),
             failures=self.failures,
             provenance=ReportProvenance(
-                versions=versions_of(),
+                versions=versions_of(PACKAGES),
                 seed=model.study.seed,
                 settings=model.model_dump(exclude_none=True),
                 inputs={one.name: one.sha256 for one in self.files},

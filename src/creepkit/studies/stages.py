@@ -26,10 +26,10 @@ from creepkit.records import ZERO_CELSIUS, History, Nuisance, known_specimens
 from creepkit.registry import default_registry
 from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
+from creepkit.studies.arguments import check_forecast, planned_test
 from creepkit.studies.candidates import by_select, ranked_candidates
+from creepkit.studies.execution import STAGE_KINDS, Results, Stage, StageKind, Tick, stage_name
 from creepkit.studies.inputs import StudyInputs, TestGroup
-from creepkit.studies.planned_tests import check_forecast, planned_test
-from creepkit.studies.stage import STAGE_KINDS, Results, Stage, StageKind, Tick, stage_name
 from creepkit.studies.study_file import KeyPath, StudyFile
 
 if TYPE_CHECKING:

@@ -11,18 +11,25 @@ from typing import TYPE_CHECKING
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import StudyError, nearest
-from creepkit.files.reading import sha256_of
-from creepkit.files.writing import check_target, write_text
-from creepkit.reports.attachments import problem_of_name, same_name
+from creepkit.files.reading import read_bytes, sha256_of
+from creepkit.files.writing import check_target, write_bytes, write_text
+from creepkit.reports.attachments import problem_of_name, read_attachments, same_name
 from creepkit.studies import arguments
+from creepkit.studies.arguments import check_forecast
 from creepkit.studies.cameras import StudyCamera, cameras_of, flagged_frames
-from creepkit.studies.execution import Execution, StageRecord, failure_text, running_alone
+from creepkit.studies.execution import (
+    STAGE_KINDS,
+    Execution,
+    Stage,
+    StageRecord,
+    failure_text,
+    needed_stages,
+    running_alone,
+)
 from creepkit.studies.inputs import DATA_FILE, InputFile, input_files, read_inputs
 from creepkit.studies.kept_results import ResultFolder, key_of
 from creepkit.studies.lock import changed_results, differences, lock_of, read_lock, write_lock
-from creepkit.studies.planned_tests import check_forecast
-from creepkit.studies.result import StudyResult
-from creepkit.studies.stage import STAGE_KINDS, Stage, needed_stages
+from creepkit.studies.result import CARRIED_FOLDER, StudyResult
 from creepkit.studies.stages import StageInputs, export_name, stages_of
 from creepkit.studies.study_file import KeyPath, StudyFile, read_study_file
 
@@ -252,3 +259,43 @@ class _Run:
                 state, sentence = "failed", failure_text(error)
         record = StageRecord("report", "report", "", state, key, sentence)  # type: ignore[arg-type]
         return replace(result, stages=(*result.stages, record), report=None if state == "failed" else path)
+
+
+# ---- back from a report ----------------------------------------------------------------------------------------------
+
+
+STUDY_NAME, LOCK_NAME, INPUTS = "study.toml", "study.lock", f"{CARRIED_FOLDER}/"
+
+
+def study_of_report(report: Path, folder: Path) -> Study:
+    """Write what a report carries to a folder, and read its study; files that are there already must be the same.
+
+    The lock of the report is written where none is there, so that a run says what differs from the report's.
+    """
+    files = read_attachments(report)
+    if STUDY_NAME not in files:
+        raise StudyError(f"{report}: carries no {STUDY_NAME}; give a report that 'creepkit run study.toml' wrote")
+    for name in files:
+        if name not in (STUDY_NAME, LOCK_NAME) and not name.startswith(INPUTS):
+            raise StudyError(
+                f"{report}: carries '{name}', and a report carries {STUDY_NAME}, {LOCK_NAME} and data below {INPUTS} "
+                "alone; use the report as creepkit wrote it"
+            )
+    for name, content in files.items():
+        path = folder / name
+        if path.exists() and name != LOCK_NAME and read_bytes(path, DATA_FILE) != content:
+            raise StudyError(f"{path}: is there already, and differs from what {report} carries; give --to FOLDER")
+        if not path.exists():
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                what = f"cannot be made ({error.strerror}); name another folder by --to"
+                raise StudyError(f"{path.parent}: {what}") from None
+            write_bytes(content, path, StudyError)
+    inputs = folder / CARRIED_FOLDER
+    if not inputs.is_dir():
+        raise StudyError(
+            f"{report}: carries hashes of its data alone; the study is in {folder / STUDY_NAME}: "
+            f"put the files that {folder / LOCK_NAME} names into {inputs}, and run the report again"
+        )
+    return Study.load(folder / STUDY_NAME, root=inputs)

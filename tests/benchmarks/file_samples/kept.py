@@ -27,12 +27,11 @@ from creepkit.reports.contents import Attachment
 from creepkit.rupture_assessment.assessment_document import load_rupture_assessment
 from creepkit.screening.files import read_result, write_result
 from creepkit.screening.results import AlloyResult, WeightedLaw
-from creepkit.studies.carried_study import study_of_report
-from creepkit.studies.execution import Execution
+from creepkit.studies.execution import Execution, Stage
 from creepkit.studies.kept_results import ResultFolder
 from creepkit.studies.lock import STUDY_LOCK, read_lock
-from creepkit.studies.stage import Stage
 from creepkit.studies.stages import numbers_of_ranking
+from creepkit.studies.study import study_of_report
 from creepkit.surrogates.surrogate import SURROGATE, load_surrogate
 from helpers.paths import ROOT
 

@@ -20,7 +20,7 @@ def typing(*answers):
 def test_questions_are_answered_one_after_another(tmp_path, capsys):
     (tmp_path / "a.csv").write_text(CURVE, encoding="utf-8")
     (tmp_path / "rates.csv").write_text(TABLE, encoding="utf-8")
-    answer, left = typing("1", "9", "", "unused")
+    answer, left = typing("1", "unused", "9", "")
     (file,) = put_questions(partial(ck.read_histories, tmp_path), answer)
     assert (file.name, left) == ("tests.toml", [])
     assert "'9' is none of these" in capsys.readouterr().out
@@ -51,8 +51,8 @@ def test_a_question_may_stay_open(tmp_path):
 def test_without_a_terminal_each_question_is_a_line(tmp_path, capsys):
     (tmp_path / "a.csv").write_text(CURVE, encoding="utf-8")
     (tmp_path / "rates.csv").write_text(TABLE, encoding="utf-8")
-    with pytest.raises(HistoryError, match=r"2 questions open; answer them in tests.toml"):
+    with pytest.raises(HistoryError, match=r"3 questions open; answer them in tests.toml"):
         put_questions(partial(ck.read_histories, tmp_path), None)
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 2
-    assert 'tests.toml beside it: ["rates.csv"] ended = {B = "stopped", A = "ruptured"}' in lines[1]
+    assert len(lines) == 3
+    assert 'tests.toml beside it: ["rates.csv"] ended = {B = "stopped", A = "ruptured"}' in lines[2]

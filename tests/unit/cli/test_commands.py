@@ -8,7 +8,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.cli.app import COMMANDS
-from creepkit.cli.generated_options import parsed_integer, parsed_number
+from creepkit.cli.command_options import parsed_integer, parsed_number
 from helpers.command_line import answers, creepkit, one_line
 
 FALLING = """

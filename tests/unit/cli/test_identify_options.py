@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from creepkit.cli.generated_options import given_value
+from creepkit.cli.command_options import given_value
 from creepkit.errors import FitError
 from creepkit.inverse.settings import IdentificationSettings, default_nuisances
 from creepkit.options import options_of

@@ -148,10 +148,6 @@ def test_an_infinite_temperature_coefficient_beyond_double_range_is_printed():
     assert rf"\times 10^{{{exponent}}}" in text
 
 
-def test_a_law_without_temperature_has_one_form():
-    assert r"\infty" not in text_of(COMBINED, COMBINED.center(), LatexExporter())
-
-
 @pytest.mark.parametrize(
     ("value", "shown"),
     [(4.5, "4.5"), (8.0, "8"), (0.0, "0"), (-0.475, "-0.475"), (1e-23, r"1 \times 10^{-23}"), (475000.0, "475000")],

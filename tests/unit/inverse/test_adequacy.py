@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, f
 
-from creepkit.inverse.chi_square_test import adequacy_of
 from creepkit.inverse.frame_noise import frame_noise
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
+from creepkit.inverse.judging import Judge
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, KnownNoise, chance_of_larger
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -42,7 +42,7 @@ def at_the_truth(tests):
 def judged(tests, problem, linear, values=None, **noise_model):
     if values is not None:
         linear = replace(linear, residuals=replace(linear.residuals, values=values))
-    return adequacy_of(problem, linear, white(**noise_model), {}, tests)
+    return Judge(problem, white(**noise_model), {}, tests).adequacy(linear)
 
 
 def white(**more):
@@ -197,7 +197,9 @@ def test_the_noise_that_was_estimated_from_the_misfit_does_not_count(stated):
     excused = NoiseModel(
         {name: OutputNoise(30 * sd, drift=1.0, misfit=1.0) for name, sd in NOISE.items()}, discrepancy=40.0
     )
-    same = adequacy_of(problem, replace(linear, residuals=replace(linear.residuals, values=values)), excused, {}, tests)
+    same = Judge(problem, excused, {}, tests).adequacy(
+        replace(linear, residuals=replace(linear.residuals, values=values))
+    )
     assert (same.chi_square, same.p_value) == (plain.chi_square, plain.p_value)
     assert same.correlation == pytest.approx(1.0 / 5.0)
     assert judged(tests, problem, linear, values, rate=0.2).explains
@@ -211,7 +213,7 @@ def test_a_stated_error_of_the_predictor_is_no_discrepancy(stated):
     values = white_draws(problem, linear, 1, 7)[0] + wrong * linear.residuals.offset_sensitivity
     assert not judged(tests, problem, linear, values).explains
     moved = replace(linear, residuals=replace(linear.residuals, values=values))
-    assert adequacy_of(problem, moved, white(), {"amplitude": 8e-3}, tests).explains
+    assert Judge(problem, white(), {"amplitude": 8e-3}, tests).adequacy(moved).explains
 
 
 def test_a_law_outside_the_truth_is_flagged_and_the_true_one_is_not():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.inverse.cross_validation import cross_validate, measured_time_to_strain, times_to_strain
+from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
 from creepkit.inverse.selection import rank
@@ -65,7 +65,7 @@ def test_one_stress_leaves_the_exponent_undetermined():
     verdicts = {e.name: e.verdict for e in fit.estimates}
     assert verdicts["n"] == "not determined"
     assert any("one stress" in note for note in fit.notes)
-    assert "not determined by these data" in fit.details()
+    assert "not determined" in fit.details()
     _, low, high = fit.rate(50.0, 1050.0)
     assert low < 1e-16 * 50**5.2 < high
     assert float(high / low) < 2
@@ -87,20 +87,11 @@ def test_refit_on_other_tests_starts_where_the_first_ended(fit, tests):
     assert (np.abs(again.u - fit.u) < 0.05 * np.sqrt(np.diag(fit.covariance))).all()
 
 
-def test_z_factor_of_planted_scatter():
-    """Rates that scatter with sd 0.2 in ln give Z = 10^(2.5 x 0.2/ln 10); 60 tests know it to 20 % of the exponent."""
-    tests = planted(LAW, TRUTH, CONDITIONS * 7, seed=8, rate=0.2)
-    found = times_to_strain(LAW, TRUTH, tests, Steady(), 0.01)
-    assert found.measured.size == 63
-    assert found.spread == pytest.approx(0.2 / np.log(10), rel=0.25)
-
-
 def test_leaving_conditions_out_predicts_each_once(fit, tests):
     folds = cross_validate(fit, tests, by="condition")
-    found = folds.times_to_strain(0.01)
-    assert sorted(found.names) == sorted(h.name for h in tests)
+    assert sorted(folds.errors) == sorted(h.name for h in tests)
     assert len(folds.folds) == 9
-    assert found.spread < 0.4
+    assert folds.pooled_error("strain") < 0.4
 
 
 def test_a_given_offset_prior_is_used(tests):
@@ -186,10 +177,3 @@ def test_every_seed_reaches_the_same_minimum(tests, fit):
         LAW, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20, seed=11)
     )
     assert (np.abs(other.u - fit.u) < 0.05 * np.sqrt(np.diag(fit.covariance))).all()
-
-
-def test_measured_time_interpolates(tests):
-    test = tests[0]
-    t = measured_time_to_strain(test, 0.01)
-    assert np.interp(t, test.times, test.outputs["strain"]) == pytest.approx(0.01, rel=1e-9)
-    assert measured_time_to_strain(test, 1.0) is None

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.inverse.chi_square_test import adequacy_of
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
+from creepkit.inverse.judging import Judge
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.observation_vector import thinned_history
@@ -75,7 +75,7 @@ def test_chi_square_is_judged_by_the_joint_covariance() -> None:
         tests = measured(0.9, 100 + seed)
         problem, noise = exactly_known(LeastSquaresProblem.from_histories(LAW, tests, TwoOutputs(), SETTINGS))
         u = problem.coordinates.u(LAW.to_internal({"A": 1e-15})[0])
-        found = adequacy_of(problem, linearised(problem, u, problem.residuals(u)), noise, {}, tests)
+        found = Judge(problem, noise, {}, tests).adequacy(linearised(problem, u, problem.residuals(u)))
         p_values.append(found.p_value)
         reduced.append(found.chi_square)
     assert np.mean(np.array(p_values) < 0.05) <= 0.15

@@ -1,5 +1,7 @@
 """Errors that tests usually have, in intervals: against identifications of tests that have them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,11 @@ import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import reduced_order_model_of
 from creepkit.inverse.identify import identify
+from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
+from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, common_errors
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import USUAL_ERRORS, IdentificationSettings
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
 from creepkit.language import Elastic, arrhenius
@@ -24,7 +29,7 @@ CONDITIONS = [(60.0, 1000.0), (70.0, 980.0), (80.0, 1000.0), (70.0, 1020.0), (65
 SETTINGS = IdentificationSettings(
     starts=1, sobol_points=8, weights="likelihood", nuisances=(Nuisance("offset"), Nuisance("rate"))
 )
-NORMAL = 1.959964
+NORMAL, R = 1.959964, 8.314462618
 
 
 def half_width(fit, quantity="rate"):
@@ -43,18 +48,26 @@ def moved(tests, kelvin, share):
     ]
 
 
-def shifts_of_rate(tests, fit):
+def campaign_of_six(rate=0.05):
+    return planted(AT_TEMPERATURES, VALUES, CONDITIONS, seed=4, rate=rate, noise=2e-5)
+
+
+def common(fit):
+    return {e.kind: e for e in fit.unmodelled if e.common}
+
+
+def shifts_of_rate(tests, fit, at=(70.0, 1000.0)):
     """Of ln rate by 3 K and by 1 % in all tests, by identifications."""
     return [
-        np.log(identify(AT_TEMPERATURES, moved(tests, *by), Steady(), settings=SETTINGS).rate(70.0, 1000.0)[0])
-        - np.log(fit.rate(70.0, 1000.0)[0])
+        np.log(identify(AT_TEMPERATURES, moved(tests, *by), Steady(), settings=SETTINGS).rate(*at)[0])
+        - np.log(fit.rate(*at)[0])
         for by in ((USUAL_ERRORS["temperature"], 0.0), (0.0, USUAL_ERRORS["load"]))
     ]
 
 
 def test_what_is_common_to_all_tests_adds_in_quadrature_and_no_number_of_tests_averages_it_out():
     """Six tests, and the same twice: what 3 K and 1 % in all of them do to the rate is that of identifications."""
-    tests = planted(AT_TEMPERATURES, VALUES, CONDITIONS, seed=4, rate=0.2, noise=2e-5)
+    tests = campaign_of_six(0.2)
     fit = identify(AT_TEMPERATURES, tests, Steady(), settings=SETTINGS)
     expected = np.hypot(half_width(fit.by_tests_alone), NORMAL * np.linalg.norm(shifts_of_rate(tests, fit)))
     assert fit.noise_model.rate > 0.13  # more than temperatures and loads off by so much would make
@@ -70,7 +83,7 @@ def test_a_single_test_is_off_once_and_its_exponent_is_not():
     law = NORTON.fix(n=4.0)
     (test,) = planted(law, {"A": 1e-15}, [(70.0, 1000.0)], seed=1, noise=1e-6)
     fit = identify(law, [test], Steady(), settings=SETTINGS)
-    by_temperature = USUAL_ERRORS["temperature"] * 400e3 / (8.314462618 * 1000.0**2)
+    by_temperature = USUAL_ERRORS["temperature"] * 400e3 / (R * 1000.0**2)
     added = NORMAL * np.hypot(by_temperature, 4.0 * USUAL_ERRORS["load"])
     assert half_width(fit) == pytest.approx(np.hypot(half_width(fit.by_tests_alone), added), rel=0.02)
     (a,) = fit.estimates
@@ -117,14 +130,51 @@ def test_errors_that_are_none_are_refused(errors, message):
 
 def test_lives_hold_them_too():
     """A bar of a law of rupture: what 3 K in all tests do to the logarithm of its life, in the interval of the law."""
-    tests = planted(AT_TEMPERATURES, VALUES, CONDITIONS, seed=4, rate=0.05, noise=2e-5)
+    tests = campaign_of_six()
     fit = identify(AT_TEMPERATURES, tests, Steady(), settings=SETTINGS)
     (mean, with_errors), (_, alone) = (
         one.scatter_of_rates.joint(np.array([0.05])) for one in (fit, fit.by_tests_alone)
     )
+    reference = shifts_of_rate(tests, fit, (fit.reference.stress, fit.reference.temperature))
+    assert [common(fit)[kind].rate_change for kind in ("temperature", "load")] == pytest.approx(reference, rel=0.02)
     row = gradient(log_rate(fit.coordinates, 70.0, 1000.0), fit.u, np.ones(3))
     assert row @ (with_errors - alone) @ row == pytest.approx(np.sum(np.square(shifts_of_rate(tests, fit))), rel=0.02)
     assert mean.size == 3
+
+
+# ---- errors common to all tests ------------------------------------------------------------------------------------
+
+
+def test_a_law_without_temperature_takes_the_usual_energy_and_says_so():
+    tests = planted(
+        NORTON, {"A": 1e-15, "n": 4.0}, [(s, 1020.0) for s in (60.0, 70.0, 80.0)], seed=4, rate=0.05, noise=2e-5
+    )
+    effect = common(identify(NORTON, tests, Steady(), settings=SETTINGS))["temperature"]
+    expected = -USUAL_ACTIVATION_ENERGY / (R * 1020.0**2) * USUAL_ERRORS["temperature"]
+    assert effect.rate_change == pytest.approx(expected, rel=1e-3)
+    assert effect.sentence == (
+        "by -13 % with temperatures 3 K above those stated, in all 3 tests (4.7 % a kelvin, assumed, as the law has no "
+        "temperature)"
+    )
+
+
+def test_a_law_with_temperature_takes_its_own_energy():
+    fit = identify(AT_TEMPERATURES, campaign_of_six(), Steady(), settings=SETTINGS)
+    effect = common(fit)["temperature"]
+    assert effect.per_kelvin == pytest.approx(fit.values["Q"] / (R * fit.reference.temperature**2), rel=1e-3)
+    assert not effect.assumed
+    assert "assumed" not in effect.sentence
+
+
+def test_a_nuisance_parameter_of_all_tests_stands_for_the_temperature_and_one_of_each_test_does_not():
+    bar, tests = Uniaxial(), campaign_of_six()
+    for scope, expected in (("all", {"load"}), ("test", {"load", "temperature"})):
+        settings = replace(SETTINGS, nuisances=(Nuisance("rate"), Nuisance("temperature", scope, sd=3.0)))
+        problem = LeastSquaresProblem.from_histories(AT_TEMPERATURES, tests, bar, settings)
+        nuisances = problem.nuisance_parameters
+        x = np.concatenate([problem.coordinates.u(AT_TEMPERATURES.to_internal(VALUES)[0]), nuisances.mean])
+        linear = linearised(problem, x, problem.residuals(x))
+        assert {e.kind for e in common_errors(problem, x, linear)} == expected
 
 
 # ---- values under these errors ---------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from openpyxl import Workbook
 
 import creepkit as ck
 from creepkit.errors import HistoryError
@@ -92,3 +93,17 @@ def test_cells_of_a_spreadsheet(tmp_path: Path):
         (history,) = ck.read_histories(workbook(tmp_path / f"{name}.xlsx", {"S": rows}))
         expected = [7.0 * k for k in range(6)] if name != "days" else [0, *(24 + 7.0 * k for k in range(5))]
         np.testing.assert_allclose(history.times / 3600, expected, rtol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("first_day", [datetime(1899, 12, 30), datetime(1904, 1, 1)])
+def test_months_on_the_clock_of_a_spreadsheet(first_day: datetime, tmp_path: Path):
+    """As numbers of days shown as h:mm:ss: the 60th is the 29th of February 1900, which was none."""
+    book, days = Workbook(), [0, 0.25, 1, 30, 59, 59.5, 60, 60.5, 61, 100, 400]
+    book.epoch = first_day
+    book.active.append(["Time", "Strain (%)"])
+    for row, day in enumerate(days, 2):
+        book.active.append([day, 0.001 * day + 0.02])
+        book.active.cell(row, 1).number_format = "hh:mm:ss"
+    book.save(tmp_path / "long 60 MPa 850C.xlsx")
+    (history,) = ck.read_histories(tmp_path / "long 60 MPa 850C.xlsx")
+    np.testing.assert_allclose(history.times / 86400, days, rtol=1e-9)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from creepkit.reports.figures import empty_figure, logarithmic_labels, set_range
-from creepkit.reports.html.svg import kept_dots, svg_text
+from creepkit.reports.svg import kept_dots, svg_text
 
 RANGES = [(80.0, 125.0), (32.0, 175.0), (0.011, 1100.0), (3e-11, 3e-6), (1e-14, 1e2), (1.0, 1.0), (0.99, 1.01)]
 

@@ -7,9 +7,8 @@ from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
-from creepkit.reports.curve_of_test import curve_of_test
 from creepkit.reports.figures import LARGEST_PIXELS, RESOLUTION
-from creepkit.reports.prediction_bands import fitted_curves
+from creepkit.reports.prediction_bands import curve_of_test, fitted_curves
 from helpers.steady_rate_predictor import Steady, planted
 
 LAW = NORTON.times(arrhenius(T_ref=1073.15))

@@ -7,7 +7,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.reports.answer import key_figures
-from creepkit.reports.plate_figure import plate_figure
+from creepkit.reports.rate_panels import plate_figure
 from helpers.report_pages import ranking
 from helpers.steady_rate_predictor import Steady, planted
 

@@ -8,10 +8,10 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.ranking import ranking_from_scores
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
-from creepkit.reports.ranking_plot import MOST_TESTS_DRAWN, misfit_name, misfits
+from creepkit.reports.ranking import MOST_TESTS_DRAWN, misfit_name, misfits
 from helpers.steady_rate_predictor import Steady, planted
 
-QUICK = IdentificationSettings(starts=2, sobol_points=16, frames=20)
+QUICK = IdentificationSettings(starts=2, sobol_points=16, frames=20, weights="noise")
 
 
 @pytest.fixture(scope="module")

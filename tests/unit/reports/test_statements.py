@@ -20,10 +20,10 @@ from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
-from creepkit.reports.html.elements import number
-from creepkit.reports.html.groups import _separation
+from creepkit.reports.answer import interval_digits
+from creepkit.reports.blocks import number
 from creepkit.reports.judged_readings import judged_readings
-from creepkit.reports.stress_exponents import interval_digits
+from creepkit.reports.ranking import separating_test
 from helpers.steady_rate_predictor import Steady, planted
 
 SETTINGS = IdentificationSettings(starts=2, sobol_points=16, nuisances=())
@@ -45,15 +45,15 @@ def ranking(weights: str, *, wide: bool) -> Ranking:
 @pytest.mark.parametrize("weights", ["likelihood", "noise"])
 def test_what_separates_two_laws_is_stated_by_the_number_of_the_ranking(weights: str) -> None:
     found = ranking(weights, wide=True)
-    (text,) = _separation(found)
-    assert text.endswith(f"is {number(found.laws[1].excess, 3)} larger in all.")
+    (text,) = separating_test(found)
+    assert text.endswith(f"is {number(found.laws[1].excess, 3)} larger in all")
     share = float(re.findall(r"(\d+) % of the chi-square", text)[0])
     assert 25.0 <= share <= 100.0  # the largest of four
 
 
 @pytest.mark.parametrize("weights", ["likelihood", "noise"])
 def test_nothing_separates_laws_that_predict_the_same(weights: str) -> None:
-    assert _separation(ranking(weights, wide=False)) == []
+    assert separating_test(ranking(weights, wide=False)) == []
 
 
 def test_laws_of_equal_weights_are_compared_at_their_optima_under_the_common_covariance() -> None:

@@ -144,10 +144,6 @@ def test_tolerance_tightens_the_answer() -> None:
     assert errors[2] < 1e-7
 
 
-def test_no_histories_give_an_empty_prediction() -> None:
-    assert predicted().values.shape == (1, 0, 0, 1)
-
-
 def test_a_missing_value_is_named() -> None:
     with pytest.raises(LawError, match="needs a value for n"):
         ck.simulate(NORTON, Uniaxial(), {"A": 1e-13}, loading=constant_stress(100.0), times=TIMES)

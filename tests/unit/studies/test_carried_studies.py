@@ -14,7 +14,7 @@ import creepkit as ck
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.reports.attachments import embed
 from creepkit.reports.contents import Attachment
-from creepkit.studies.carried_study import study_of_report
+from creepkit.studies.study import study_of_report
 
 STUDY = """\
 [data]

@@ -9,9 +9,9 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import StudyError
-from creepkit.reports.html.methods import methods_text
-from creepkit.studies.carried_study import study_of_report
+from creepkit.reports.methods import methods_text
 from creepkit.studies.proposal import propose_study
+from creepkit.studies.study import study_of_report
 from creepkit.studies.study_file import parse_study
 from helpers.study_runs import ONE_FIT, STUDY, numbers, states
 

@@ -16,10 +16,10 @@ are therefore asked before an answer is called decisive:
 from __future__ import annotations
 
 import contextlib
-import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import partial
+from typing import Literal, TypeAlias
 
 import numpy as np
 import sympy
@@ -71,16 +71,47 @@ SAME_FUNCTION = 0.05
 
 def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     """The challenges of the first of some identifications, best first; the first law that is found ends the search."""
-    best, others = FittedLaw.at_least_chi_square(fits[0]), _addable(fits)
-    laws = itertools.chain((_sum_challenge(best, other) for other in others), (_threshold_challenge(best) for _ in "1"))
+    laws = (_challenge(*alteration) for alteration in _alterations(fits))
     first_law = next((challenge for challenge in laws if challenge is not None), None)
     return (*([first_law] if first_law is not None else []), *decisive_effects(fits))
 
 
-def _addable(fits: Sequence[Identification]) -> list[FittedLaw]:
-    """Those behind the first that have no summand of it: a sum that holds a law twice is never excluded."""
-    own = set(fits[0].law.name.split("+"))
-    return [FittedLaw.of(fit) for fit in fits[1:] if own.isdisjoint(fit.law.name.split("+"))]
+def altered_laws(fits: Sequence[Identification], limit: float = NOT_EXCLUDED) -> list[AlteredLaw]:
+    """Every alteration of the first of some identifications whose chi-square is higher by no more than a limit.
+
+    What cannot be fitted is left out.
+    """
+    results = []
+    for _, _, fitted in _alterations(fits):
+        with contextlib.suppress(CreepkitError):
+            found = fitted()
+            results += [found] if found is not None and found.excess <= limit else []
+    return results
+
+
+Kind: TypeAlias = Literal["sum", "threshold"]
+
+
+def _alterations(fits: Sequence[Identification]) -> Iterator[tuple[Kind, str, Callable[[], AlteredLaw | None]]]:
+    """What may be altered in the first law: kind, name, and what fits it.
+
+    No sum with a law that shares a summand: one that holds a law twice is never excluded.
+    """
+    best, summands = FittedLaw.at_least_chi_square(fits[0]), set(fits[0].law.name.split("+"))
+    for fit in fits[1:]:
+        if summands.isdisjoint(fit.law.name.split("+")):
+            yield "sum", f"a sum with {fit.law.name}", partial(sum_with_share, best, FittedLaw.of(fit))
+    yield "threshold", f"{best.law.name} above a threshold", partial(above_threshold, best)
+
+
+def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -> Challenge | None:
+    try:
+        found = fitted()
+    except CreepkitError:
+        return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
+    if found is None or found.excess > NOT_EXCLUDED:
+        return None
+    return Challenge(kind, found.problem.law.name, f"{found.description} {_comparison_text(found.excess)}")
 
 
 # ---- shares of other laws --------------------------------------------------------------------------------------------
@@ -166,50 +197,13 @@ class AlteredLaw:
     other : name of the law that has a share of a sum, else "". description : what it is, for people.
     """
 
-    kind: Literal["sum", "threshold"]
+    kind: Kind
     problem: LeastSquaresProblem
     x: Floats
     excess: float
     constraints: Floats
     other: str
     description: str
-
-    @property
-    def is_allowed(self) -> bool:
-        """Whether the tests do not exclude it."""
-        return self.excess <= NOT_EXCLUDED
-
-
-def compatible_sum(best: Identification, other: Identification) -> Challenge | None:
-    """The sum of the best law and another one that carries SHARE of the rate, if the tests do not exclude it."""
-    return _sum_challenge(FittedLaw.at_least_chi_square(best), FittedLaw.of(other))
-
-
-def _sum_challenge(best: FittedLaw, other: FittedLaw) -> Challenge | None:
-    try:
-        found = sum_with_share(best, other)
-    except CreepkitError:
-        return _unexamined("sum", f"a sum with {other.law.name}")
-    return _challenge_of(found)
-
-
-def compatible_threshold(best: Identification) -> Challenge | None:
-    """The best law above a threshold stress, if the tests do not exclude it."""
-    return _threshold_challenge(FittedLaw.at_least_chi_square(best))
-
-
-def _threshold_challenge(best: FittedLaw) -> Challenge | None:
-    try:
-        found = above_threshold(best)
-    except CreepkitError:
-        return _unexamined("threshold", f"{best.law.name} above a threshold")
-    return _challenge_of(found)
-
-
-def _challenge_of(found: AlteredLaw | None) -> Challenge | None:
-    if found is None or not found.is_allowed:
-        return None
-    return Challenge(found.kind, found.problem.law.name, f"{found.description} {_comparison_text(found.excess)}")
 
 
 def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
@@ -225,11 +219,10 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     x[own_rates] += np.log(1.0 - SHARE)
     x[further_rates] += np.log(SHARE) + start
     share = ShareResidual(own_rates, further_rates, float(np.log(SHARE / (1.0 - SHARE))))
-    least, x = _least_chi_square(best, problem, x, share=share)
+    excess, x = _least_excess(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
     description = f"its sum with {other.law.name}, tried with {100 * SHARE:.0f} % of the rate carried by it,"
-    excess = least - _chi_square(best.problem, best.x)
     return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.law.name, description)
 
 
@@ -245,33 +238,10 @@ def above_threshold(best: FittedLaw) -> AlteredLaw:
     problem = _of_law(best.problem, law)
     position = best.u.size
     x = np.concatenate([best.u, [threshold], best.x[position:]])
-    least, x = _least_chi_square(best, problem, x, fixed={position: threshold})
+    excess, x = _least_excess(best, problem, x, fixed={position: threshold})
     held = np.zeros((1, x.size))
     held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
-    description = f"{law.name} of {threshold:.3g} MPa"
-    excess = least - _chi_square(best.problem, best.x)
-    return AlteredLaw("threshold", problem, x, excess, held, "", description)
-
-
-def altered_laws(fits: Sequence[Identification], limit: float = NOT_EXCLUDED) -> list[AlteredLaw]:
-    """Every alteration of the first of some identifications whose chi-square is higher by no more than a limit.
-
-    What cannot be fitted is left out.
-    """
-    best, others = FittedLaw.at_least_chi_square(fits[0]), _addable(fits)
-    results = []
-    for other in (*others, None):
-        try:
-            found = above_threshold(best) if other is None else sum_with_share(best, other)
-        except CreepkitError:
-            continue
-        if found is not None and found.excess <= limit:
-            results.append(found)
-    return results
-
-
-def _unexamined(kind: Literal["sum", "threshold"], name: str) -> Challenge:
-    return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
+    return AlteredLaw("threshold", problem, x, excess, held, "", f"{law.name} of {threshold:.3g} MPa")
 
 
 def _comparison_text(excess: float) -> str:
@@ -321,7 +291,7 @@ def _of_law(single: LeastSquaresProblem, law: CreepLaw) -> LeastSquaresProblem:
     return problem.with_nuisances(single.nuisance_parameters).with_correction(single.correction)
 
 
-def _least_chi_square(
+def _least_excess(
     best: FittedLaw,
     problem: LeastSquaresProblem,
     x: Floats,
@@ -329,14 +299,17 @@ def _least_chi_square(
     share: ShareResidual | None = None,
     fixed: Mapping[int, float] | None = None,
 ) -> tuple[float, Floats]:
-    """The least chi-square from x (unknowns,), and where: by the reduced-order model, then by the predictor itself."""
+    """The least chi-square from x (unknowns,) above that of the best law, and where.
+
+    It is sought by the reduced-order model, then by the predictor itself.
+    """
     reduced = reduced_order_model_of(problem.predictor)
     if reduced is not None:
         difference = difference_of_predictors(best.problem, best.x, reduced)
         cheap = problem.with_predictor(reduced).with_correction(difference)
         x = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS).x
     x = problem.minimise(x, additional=share, fixed=fixed, tolerances=LAST_STEPS).x
-    return _chi_square(problem, x), x
+    return _chi_square(problem, x) - _chi_square(best.problem, best.x), x
 
 
 def _chi_square(problem: LeastSquaresProblem, x: Floats) -> float:

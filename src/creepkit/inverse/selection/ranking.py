@@ -156,7 +156,7 @@ class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="r
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Misfits and weights of the laws, and the curves of the credible ones; written to `path` when given."""
-        return present("reports.ranking_plot:ranking_figure", self, path)
+        return present("reports.ranking:ranking_figure", self, path)
 
 
 def verdict_of(ranking: Ranking) -> str:

@@ -83,14 +83,9 @@ class TermProblem:
         """The lowest of the minima from several starts (unknowns,), without penalty."""
         return min((self.minimise(x) for x in starts), key=lambda minimum: minimum.cost)
 
-    def bic(self, minimum: Minimum) -> float:
-        """BIC of a fit without penalty; its deviance is the chi-square, priors included."""
-        parameters = self.determined_parameter_count(minimum.x)
-        return 2.0 * minimum.cost + bic_penalty(parameters, self.problem.observations.count)
-
-    def determined_parameter_count(self, x: Floats) -> int:
-        """How many parameters of the law change anything that was measured, at x (unknowns,)."""
-        return determined_parameters(self.problem.residuals(x), self.parameter_count)
+    def cost(self, x: Floats, penalty: Penalty) -> float:
+        """Half the chi-square at x (unknowns,), penalty included."""
+        return 0.5 * self.problem.chi_square(x) + float(penalty.values(x[None])[0])
 
     # ---- other laws of the same sum --------------------------------------------------------------------------------
 
@@ -139,18 +134,17 @@ class TermProblem:
         shifted[rates] += log_total - self.log_total_rate(x)
         return self.problem.bounds.clip(shifted)
 
-    def with_fractions(self, x: Floats, fractions: Sequence[float] | Floats) -> Floats:
-        """x (unknowns,) with these fractions (terms,) of its rate, in the order of coordinates.term_rates."""
-        shifted, rates = np.array(x), list(self.problem.coordinates.term_rates)
-        shifted[rates] = self.log_total_rate(x) + np.log(fractions)
-        return self.problem.bounds.clip(shifted)
+    def fraction_permutations(self) -> list[Floats]:
+        """(unknowns,) each: the start with unequal fractions of its rate, each term leading once.
 
-    def fraction_permutations(self, x: Floats) -> list[Floats]:
-        """x (unknowns,) with unequal fractions, each term leading once: equal fractions are a stationary point."""
-        count = len(self.problem.coordinates.term_rates)
-        if count < 2:
-            return []
-        return [self.with_fractions(x, np.roll(unequal_fractions(count), k)) for k in range(count)]
+        Equal ones are a stationary point.
+        """
+        rates, permutations = list(self.problem.coordinates.term_rates), []
+        for k in range(len(rates) if len(rates) > 1 else 0):
+            x = np.array(self.start)
+            x[rates] = self.log_total_rate(x) + np.log(np.roll(unequal_fractions(len(rates)), k))
+            permutations.append(self.problem.bounds.clip(x))
+        return permutations
 
     def with_nuisances(self, u: Floats) -> Floats:
         """(unknowns,) x of conditioned coordinates u (parameters,), nuisance parameters as at the start."""
@@ -167,21 +161,21 @@ INITIAL_FRACTION = 0.05
 
 @dataclass(frozen=True, eq=False)
 class ReducedLaw:
-    """A law of some of the terms, and its fit without penalty.
-
-    kept_terms : its terms, in the order of the sum; exponents_off : its exponents that were switched off; bic : BIC.
-    """
+    """A law of some of the terms, and its fit without penalty; exponents_off : its exponents that were switched off."""
 
     problem: TermProblem
     minimum: Minimum
-    kept_terms: TermNames
-    exponents_off: tuple[str, ...]
-    bic: float
+    exponents_off: tuple[str, ...] = ()
 
     @property
     def law(self) -> CreepLaw:
         """The reduced law."""
         return self.problem.law
+
+    @property
+    def kept_terms(self) -> TermNames:
+        """Its terms, in the order of the sum."""
+        return tuple(self.law.terms)
 
     @property
     def x(self) -> Floats:
@@ -193,10 +187,15 @@ class ReducedLaw:
         """Sum of squared white residuals, priors included."""
         return 2.0 * self.minimum.cost
 
-    @property
+    @cached_property
     def parameter_count(self) -> int:
-        """Number of parameters of the law that were fitted."""
-        return self.problem.determined_parameter_count(self.x)
+        """Number of parameters of the law that change anything that was measured."""
+        return determined_parameters(self.problem.problem.residuals(self.x), self.problem.parameter_count)
+
+    @property
+    def bic(self) -> float:
+        """BIC; its deviance is the chi-square."""
+        return self.chi_square + bic_penalty(self.parameter_count, self.problem.problem.observations.count)
 
 
 class ReducedLaws:
@@ -211,7 +210,7 @@ class ReducedLaws:
         """The law of these terms."""
         terms = tuple(label for label in self.terms if label in names)
         if terms not in self._fitted_laws:
-            self._fitted_laws[terms] = with_exponents_off(self._fitted_problem(terms), terms)
+            self._fitted_laws[terms] = with_exponents_off(self._fitted_problem(terms))
         return self._fitted_laws[terms]
 
     def full(self, lower_bound: ReducedLaw | None = None) -> ReducedLaw:
@@ -222,7 +221,7 @@ class ReducedLaws:
         if starts:
             minima = [self.problem.lowest_minimum(starts), *([self._full.minimum] if self._full else [])]
             minimum = min(minima, key=lambda end: end.cost)
-            self._full = ReducedLaw(self.problem, minimum, self.terms, (), self.problem.bic(minimum))
+            self._full = ReducedLaw(self.problem, minimum)
         assert self._full is not None
         return self._full
 
@@ -281,10 +280,9 @@ def _start_in_larger_law(problem: TermProblem, reduced: ReducedLaw) -> Floats:
     return problem.problem.bounds.clip(x)
 
 
-def with_exponents_off(problem: TermProblem, terms: TermNames) -> ReducedLaw:
+def with_exponents_off(problem: TermProblem) -> ReducedLaw:
     """The law with as many exponents off as BIC allows, one after the other."""
-    minimum = problem.minimise(problem.start)
-    best = ReducedLaw(problem, minimum, terms, (), problem.bic(minimum))
+    best = ReducedLaw(problem, problem.minimise(problem.start))
     while True:
         simpler = [_without_exponent(best, best.law.names[k], off) for k, off in switchable_exponents(best.law)]
         lowest = min(simpler, key=lambda one: one.bic, default=best)
@@ -295,8 +293,7 @@ def with_exponents_off(problem: TermProblem, terms: TermNames) -> ReducedLaw:
 
 def _without_exponent(reduced: ReducedLaw, exponent: str, off: float) -> ReducedLaw:
     problem = replace(reduced.problem, start=reduced.x).with_law(reduced.law.fix(**{exponent: off}))
-    minimum = problem.minimise(problem.start)
-    return ReducedLaw(problem, minimum, reduced.kept_terms, (*reduced.exponents_off, exponent), problem.bic(minimum))
+    return ReducedLaw(problem, problem.minimise(problem.start), (*reduced.exponents_off, exponent))
 
 
 def terms_above(contributions: Mapping[str, float], threshold: float = LEAST_CONTRIBUTION) -> TermNames:

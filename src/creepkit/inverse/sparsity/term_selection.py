@@ -40,12 +40,12 @@ def penalised_starts(reductions: ReducedLaws) -> list[Floats]:
     """(unknowns,) each: the optimum without penalty, the same with each term leading, and each term's own optimum."""
     problem = reductions.problem
     single_term_optima = [problem.embedded(single.law, single.x) for single in reductions.single_terms()]
-    return [problem.start, *problem.fraction_permutations(problem.start), *single_term_optima]
+    return [problem.start, *problem.fraction_permutations(), *single_term_optima]
 
 
 def penalised_fit(problem: TermProblem, penalty: PenalisedTerms, starts: Sequence[Floats]) -> Minimum:
     """The lowest minimum of chi-square and penalty, from starts (unknowns,): first some steps, then to the end."""
-    costs = [0.5 * problem.problem.chi_square(x) + float(penalty.values(x[None])[0]) for x in starts]
+    costs = [problem.cost(x, penalty) for x in starts]
     order = sorted(range(len(starts)), key=lambda k: costs[k])[:CONTINUED_STARTS]
     preliminary = sorted((problem.minimise(starts[k], penalty, PRELIMINARY_STEPS) for k in order), key=lambda m: m.cost)
     completed = [m if m.converged else problem.minimise(m.x, penalty) for m in preliminary[:COMPLETED_STARTS]]
@@ -99,13 +99,9 @@ def _next_fit(
     reductions: ReducedLaws, penalised: PenalisedTerms, previous: Floats, corners: Sequence[Floats]
 ) -> Minimum:
     """The penalised fit from the last one, and from the corners that cost less there."""
-    problem = reductions.problem
-
-    def cost(x: Floats) -> float:
-        return 0.5 * problem.problem.chi_square(x) + float(penalised.values(x[None])[0])
-
-    previous_cost = cost(previous)
-    return penalised_fit(problem, penalised, [previous, *(x for x in corners if cost(x) < previous_cost)])
+    problem, limit = reductions.problem, reductions.problem.cost(previous, penalised)
+    lower = [x for x in corners if problem.cost(x, penalised) < limit]
+    return penalised_fit(problem, penalised, [previous, *lower])
 
 
 @dataclass(frozen=True, eq=False)

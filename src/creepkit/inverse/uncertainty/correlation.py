@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -19,11 +18,11 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED
-from creepkit.presentation import Presentable, present
+from creepkit.presentation import Presentable
 from creepkit.records.units import celsius_text
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 CoordinateSystem = Literal["author", "conditioned"]
@@ -59,10 +58,6 @@ class Correlation(Presentable, text="reports.uncertainty:correlation_text"):
             if name not in self.names:
                 raise FitError(f"there is no '{name}' in this correlation; it has {', '.join(self.names)}")
         return float(self.matrix[self.names.index(first), self.names.index(second)])
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """The matrix in colours with its numbers; written to `path` when given."""
-        return present("reports.uncertainty:correlation_figure", self, path)
 
 
 def correlation(fit: Identification, coordinates: CoordinateSystem = "author") -> Correlation:

@@ -28,7 +28,7 @@ from creepkit.arrays import Bools, Floats
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.rate_explanations import ENERGY_CHANGE, EXPONENT_CHANGE, FACTOR_SD
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
-from creepkit.inverse.uncertainty.rate_scatter import FLAT_BELOW, SMALLEST_EFFECT, USUAL_SD, RateScatter
+from creepkit.inverse.uncertainty.rate_scatter import FLAT_BELOW, SMALLEST_EFFECT, USUAL_SD, RateScatter, Solution
 from creepkit.language.symbols import GAS_CONSTANT
 
 USUAL_LOG_STRESS, USUAL_KELVIN = 0.9, 50.0
@@ -199,28 +199,10 @@ class LawMisfits:
         with_misfit, right = (np.einsum("k,kij->ij", share, np.array(one)) for one in (moments, without))
         return with_misfit, right
 
-    def _solved(self, sd: float, columns: Floats, prior_sd: Floats) -> tuple[float, Floats, Floats]:
-        """ln of the restricted likelihood, and mean and covariance of unknowns, effects of groups and coefficients.
-
-        sd : of ln rate between tests. columns : (tests, coefficients) effects on ln rates; prior_sd : (coefficients,).
-        """
-        scatter = self.scatter
-        own = (sd**2 + scatter.variance) / scatter.weight
-        Q, size = np.concatenate([scatter.joint_design, columns], axis=1), scatter.design.shape[1]
-        groups = [max(scatter.posterior.mean_square(level) ** 0.5, SMALLEST_EFFECT) for level, _ in scatter.groups]
-        prior = np.concatenate([groups, prior_sd])
-        precision = Q.T @ (Q / own[:, None])
-        precision[:size, :size] += scatter.precision
-        precision[size:, size:] += np.diag(prior**-2.0)
-        right = Q.T @ (scatter.log_factor / own)
-        right[:size] -= scatter.gradient
-        scale = np.sqrt(np.maximum(np.diag(precision), 1e-300))
-        scaled = precision / np.outer(scale, scale)
-        covariance = np.linalg.inv(scaled) / np.outer(scale, scale)
-        mean = covariance @ right
-        chi_square = float(scatter.log_factor**2 @ (1.0 / own) - right @ mean)
-        determinant = float(np.linalg.slogdet(scaled)[1] + 2.0 * np.log(scale).sum() + 2.0 * np.log(prior).sum())
-        return -0.5 * (chi_square + determinant + float(np.log(own).sum())), mean, covariance
+    def _solved(self, sd: float, columns: Floats, prior_sd: Floats) -> Solution:
+        """As RateScatter.solved(); sd : of ln rate between tests, beside what is likely of groups."""
+        groups = [self.scatter.posterior.mean_square(level) ** 0.5 for level in self.scatter.levels[:-1]]
+        return self.scatter.solved(np.array([*groups, sd]), columns, prior_sd)
 
     def _beside_the_others(self, tests: Bools) -> float:
         """ln of the rate of some tests (tests,) over what the others say of it, by the law."""

@@ -45,6 +45,9 @@ FLAT_BELOW = 1.0 / 3.0
 """Of what is usual: standard deviations that the prior hardly tells apart, since rates are not known that well."""
 
 
+Solution = tuple[float, Floats, Floats]
+
+
 LEVELS = ("laboratory", "heat", "test")
 """From the outermost to the innermost."""
 
@@ -156,10 +159,29 @@ class RateScatter:
 
     def restricted_log_likelihood(self, sd: Floats) -> float:
         """ln of the restricted likelihood of standard deviations sd (levels,), but for a constant."""
-        precision, right, own, log_prior = self._normal_equations(sd)
-        chi_square = float(self.log_factor**2 @ (1.0 / own) - right @ _scaled_solve(precision, right))
-        log_determinant = float(np.log(own).sum()) + log_prior + float(np.linalg.slogdet(precision)[1])
-        return -0.5 * (chi_square + log_determinant)
+        return self.solved(sd)[0]
+
+    def solved(self, sd: Floats, columns: Floats | None = None, prior_sd: Floats | None = None) -> Solution:
+        """ln of the restricted likelihood, mean and covariance of (dx, c) and of further effects on rates, given sd.
+
+        sd : (levels,). columns : (tests, effects) on ln rates. prior_sd : (effects,) their prior standard deviations.
+        """
+        own = (np.maximum(sd[-1], SMALLEST_EFFECT) ** 2 + self.variance) / self.weight
+        further = np.zeros((own.size, 0)) if columns is None else columns
+        Q, size = np.concatenate([self.joint_design, further], axis=1), self.design.shape[1]
+        of_group = np.array([sd[self.levels.index(level)] for level, _ in self.groups])
+        prior = np.append(np.maximum(of_group, SMALLEST_EFFECT), [] if prior_sd is None else prior_sd)
+        precision = Q.T @ (Q / own[:, None])
+        precision[:size, :size] += self.precision
+        precision[size:, size:] += np.diag(prior**-2.0)
+        right = Q.T @ (self.log_factor / own)
+        right[:size] -= self.gradient
+        scale = np.sqrt(np.maximum(np.diag(precision), 1e-300))
+        scaled = precision / np.outer(scale, scale)
+        mean = np.linalg.solve(scaled, right / scale) / scale
+        chi_square = float(self.log_factor**2 @ (1.0 / own) - right @ mean)
+        determinant = float(np.linalg.slogdet(scaled)[1] + 2.0 * (np.log(scale).sum() + np.log(prior).sum()))
+        return -0.5 * (chi_square + determinant + float(np.log(own).sum())), mean, scaled_inverse(precision)
 
     def joint(self, sd: Floats) -> tuple[Floats, Floats]:
         """Mean (unknowns + effects,) and covariance of (dx, c) about the estimate, given sd (levels,) of the effects.
@@ -167,8 +189,7 @@ class RateScatter:
         Where the estimate is not the optimum under this covariance (it is one of least squares), its distance from
         that counts as an error of the estimate: dx has the mean zero, and as covariance its second moment.
         """
-        precision, right, _, _ = self._normal_equations(sd)
-        optimum, covariance = _scaled_solve(precision, right), scaled_inverse(precision)
+        _, optimum, covariance = self.solved(sd)
         size = self.design.shape[1]
         shift, own = optimum[:size], covariance[:size, :size]
         gain = _scaled_solve(own, covariance[:size, size:]).T if size else np.zeros((len(self.groups), 0))
@@ -176,19 +197,6 @@ class RateScatter:
         mean = np.concatenate([np.zeros(size), optimum[size:] - gain @ shift])
         cross, effects = about @ gain.T, covariance[size:, size:] + gain @ np.outer(shift, shift) @ gain.T
         return mean, np.block([[about, cross], [cross.T, effects]])
-
-    def _normal_equations(self, sd: Floats) -> tuple[Floats, Floats, Floats, float]:
-        """Precision and right-hand side of (dx, c), D (tests,), and ln|S|."""
-        own = (np.maximum(sd[-1], SMALLEST_EFFECT) ** 2 + self.variance) / self.weight
-        Q, size = self.joint_design, self.design.shape[1]
-        precision = Q.T @ (Q / own[:, None])
-        precision[:size, :size] += self.precision
-        of_group = np.array([sd[self.levels.index(level)] for level, _ in self.groups])
-        effect_variance = np.maximum(of_group, SMALLEST_EFFECT) ** 2
-        precision[size:, size:] += np.diag(1.0 / effect_variance)
-        right = Q.T @ (self.log_factor / own)
-        right[:size] -= self.gradient
-        return precision, right, own, float(np.log(effect_variance).sum())
 
     @cached_property
     def mean_joint(self) -> tuple[Floats, Floats]:

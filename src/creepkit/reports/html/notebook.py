@@ -6,21 +6,21 @@ from collections.abc import Sequence
 from functools import singledispatch
 from itertools import count
 
-from markupsafe import Markup
-
-from creepkit.exporters.mathml import expression_mathml, law_equations
 from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.language import CreepLaw
 from creepkit.records import SECONDS_PER_HOUR, History
+from creepkit.reports.answer import equations, symbols_of, unit_text
+from creepkit.reports.blocks import Block, Formula, Paragraph, Table, Verbatim, number
 from creepkit.reports.contents import ReportGroup
-from creepkit.reports.html.elements import Block, Formula, Paragraph, Table, Verbatim, number
-from creepkit.reports.html.findings import answer_block, findings_of
-from creepkit.reports.html.groups import ranking_blocks
-from creepkit.reports.html.stage_sections import forecast_blocks
-from creepkit.reports.html.svg import PageFigures
+from creepkit.reports.findings import findings_of
+from creepkit.reports.forecast import forecast_blocks
+from creepkit.reports.html.page import block_shown, group_answer
 from creepkit.reports.html.templates import template
+from creepkit.reports.law_names import LawNames
+from creepkit.reports.ranking import ranking_blocks
+from creepkit.reports.svg import PageFigures
 
 STYLE = (
     ".creepkit .answer{display:grid;grid-template-columns:minmax(0,1.75fr) minmax(16rem,1fr);gap:0 2rem}"
@@ -36,7 +36,10 @@ _CELLS = count(1)
 def notebook_html(record: object) -> str:
     """A record as HTML for one cell; identifiers of its figures are those of no other cell."""
     block = template("blocks.html").module.block  # type: ignore[attr-defined]
-    return f'<div class="creepkit"><style>{STYLE}</style>{"".join(block(one) for one in _blocks(record))}</div>'
+    fits = [record] if isinstance(record, Identification) else []
+    fits = [one.fit for one in record.laws] if isinstance(record, Ranking) else fits
+    blocks = [block(block_shown(one, LawNames.of(fits))) for one in _blocks(record)]
+    return f'<div class="creepkit"><style>{STYLE}</style>{"".join(blocks)}</div>'
 
 
 def _figures() -> PageFigures:
@@ -49,38 +52,28 @@ def _blocks(record: object) -> Sequence[Block]:
     return [Verbatim(type(record).__name__, str(record))]
 
 
-@_blocks.register
-def _(fit: Identification) -> Sequence[Block]:
-    found = findings_of(ReportGroup("", fit))
-    return [] if found is None else [answer_block(found, _figures())]
-
-
-@_blocks.register
-def _(ranking: Ranking) -> Sequence[Block]:
-    found, figures = findings_of(ReportGroup("", ranking)), _figures()
-    return [] if found is None else [answer_block(found, figures), *ranking_blocks(found, figures, drawn=False)]
+@_blocks.register(Identification)
+@_blocks.register(Ranking)
+def _(result: Identification | Ranking) -> Sequence[Block]:
+    found = findings_of(ReportGroup("", result))
+    assert found is not None
+    return [group_answer(found, _figures()), *([] if found.ranking is None else ranking_blocks(found.ranking))]
 
 
 @_blocks.register
 def _(forecast: Forecast) -> Sequence[Block]:
-    return forecast_blocks("", forecast, _figures())
+    return forecast_blocks(forecast, _figures())
 
 
 @_blocks.register
 def _(law: CreepLaw) -> Sequence[Block]:
-    symbols = {str(symbol): symbol for symbol in law.params}
+    symbols = symbols_of(law)
     rows = [
-        (
-            Markup(expression_mathml(symbols[name])),
-            one.meaning,
-            f"{number(one.bounds[0])} to {number(one.bounds[1])}",
-            "" if one.unit == "1" else one.unit,
-        )
+        (symbols[name], one.meaning, f"{number(one.bounds[0])} to {number(one.bounds[1])}", unit_text(one.unit))
         for name, one in law.table.items()
     ]
-    table = Table("Stress as a ratio to 1 MPa, time to 1 s", ("parameter", "meaning", "bounds", "unit"), rows)
-    equations = [Formula(Markup(equation)) for equation in law_equations(law)]
-    return [Paragraph(law.title or law.name, "lead"), *equations, table]
+    table = Table("stress as a ratio to 1 MPa, time to 1 s", ("parameter", "meaning", "bounds", "unit"), rows)
+    return [Paragraph(law.title or law.name, "lead"), *map(Formula, equations(law)), table]
 
 
 @_blocks.register

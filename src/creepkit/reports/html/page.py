@@ -1,34 +1,71 @@
-"""report_html: the contents of a report as the text of one HTML page."""
+"""report_html: the contents of a report as the text of one HTML page; and blocks as they stand in it."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections import Counter
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
+from creepkit.discovery.temperature_law import TemperatureLaw
 from creepkit.inverse.perturbation import combined_change_text
-from creepkit.reports.answer import asked_figures
+from creepkit.reports.answer import (
+    KeyFigure,
+    answer,
+    asked_figures,
+    interval_digits,
+    rate_and_exponent,
+    tests_text,
+    titled_law,
+)
 from creepkit.reports.attachments import embed
-from creepkit.reports.html.closing import closing_sections, files_to_download
-from creepkit.reports.html.data_section import data_section
-from creepkit.reports.html.elements import Block, PageSection, Paragraph, Table, number, plural, printable
-from creepkit.reports.html.findings import GroupFindings, answer_block, findings_of, with_histories
-from creepkit.reports.html.groups import group_sections
-from creepkit.reports.html.law_names import LawNames, title_in_sentence
-from creepkit.reports.html.law_tables import law_title
-from creepkit.reports.html.stage_sections import stage_sections, strength_blocks
-from creepkit.reports.html.svg import PageFigures
+from creepkit.reports.blocks import (
+    Answer,
+    Block,
+    Cell,
+    Items,
+    PageSection,
+    Paragraph,
+    Picture,
+    Table,
+    Verbatim,
+    number,
+    plural,
+    printable,
+    printable_lines,
+    sentence,
+    typeset,
+)
+from creepkit.reports.design import design_blocks
+from creepkit.reports.extraction import extraction_figure, extraction_text
+from creepkit.reports.findings import GroupFindings, findings_of, with_histories
+from creepkit.reports.forecast import forecast_blocks
+from creepkit.reports.html.closing import MOST_FILES, closing_sections, data_section, files_to_download
 from creepkit.reports.html.templates import resource, template
-from creepkit.reports.identification_text import rejected
-from creepkit.reports.plate_figure import plate_figure
-from creepkit.reports.ranking import explanation
-from creepkit.reports.stress_exponents import interval_digits, rate_and_exponent
+from creepkit.reports.identification import (
+    blocks_of_tests,
+    noise_blocks,
+    rejected,
+    scatter_of_rates,
+    value_blocks,
+    worst_tests,
+)
+from creepkit.reports.identification_plot import summary_figure
+from creepkit.reports.instrument_records import alignment_text, imposed_text
+from creepkit.reports.law_names import LawNames
+from creepkit.reports.ranking import credible_values, explanation, ranking_blocks
+from creepkit.reports.rate_panels import plate_figure, rupture_rows
+from creepkit.reports.rupture import rupture_blocks, strength_blocks
+from creepkit.reports.svg import PageFigures
+from creepkit.reports.temperature_law import law_blocks, study_blocks
 
 if TYPE_CHECKING:
+    from creepkit.extraction.extraction import Extraction
+    from creepkit.forecasts.forecast import Forecast
+    from creepkit.instruments.imposed import Imposed
     from creepkit.reports.contents import ReportContents
 
 MOST_TEST_FIGURES = 160
@@ -47,27 +84,23 @@ def report_html(contents: ReportContents) -> str:
     contents = dataclasses.replace(contents, groups=tuple(map(with_histories, contents.groups)))
     figures = PageFigures()
     found = [one for one in map(findings_of, contents.groups) if one is not None]
+    names = LawNames.of(fit for one in found for fit in one.fits)
     sections = [
         _findings_section(contents, found, figures),
         *_group_sections(found, figures),
         data_section(contents, found),
-        *stage_sections(contents, figures, LawNames.of(fit for one in found for fit in one.fits)),
+        *_stage_sections(contents, figures, identified=bool(found)),
         *closing_sections(contents, found),
     ]
-    shown = [section for section in map(_without_empty, sections) if not section.empty]
+    shown = [section_shown(one, names) for one in sections]
     return template("page.html").render(
         title=printable(contents.title, 200) or "Report",
         summary=_summary(contents, found),
-        sections=shown,
+        sections=[one for one in shown if one.blocks or one.sections],
         style=Markup(resource("style.css")),
         attachments=Markup(embed(contents.attachments)),
         version=version("creepkit"),
     )
-
-
-def _without_empty(section: PageSection) -> PageSection:
-    inner = [one for one in map(_without_empty, section.sections) if not one.empty]
-    return dataclasses.replace(section, sections=inner)
 
 
 def _summary(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
@@ -81,6 +114,57 @@ def _summary(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
     return ", ".join(parts)
 
 
+# ---- blocks as they are shown ----------------------------------------------------------------------------------------
+
+
+_DEPENDENCE = re.compile(r" with [\w-]+ temperature dependence")
+"""Of titles in a headline, which the equation shows."""
+
+
+def section_shown(section: PageSection, names: LawNames) -> PageSection:
+    """A section with its blocks as they are shown, without empty ones below it."""
+    inner = [section_shown(one, names) for one in section.sections]
+    return dataclasses.replace(
+        section,
+        title=printable(section.title, 120),
+        blocks=[block_shown(one, names) for one in section.blocks if not isinstance(one, Items) or one.items],
+        sections=[one for one in inner if one.blocks or one.sections],
+        result=typeset(names.in_text(section.result)),
+    )
+
+
+def block_shown(block: Block, names: LawNames) -> Block:
+    """A block with capitals, full stops and printed numbers, laws in its sentences by their titles."""
+
+    def said(text: str) -> str:
+        return text if isinstance(text, Markup) else typeset(sentence(names.in_text(text)))
+
+    def cells(row: Sequence[Cell]) -> list[Any]:
+        return [typeset(printable(one)) if isinstance(one, str) else one for one in row]
+
+    if isinstance(block, Paragraph):
+        return dataclasses.replace(block, text=said(block.text))
+    if isinstance(block, Items):
+        return Items([said(one) for one in block.items])
+    if isinstance(block, Picture):
+        return dataclasses.replace(block, caption=typeset(block.caption))
+    if isinstance(block, Table):
+        table = block.filled
+        rows = [cells(row) for row in table.rows]
+        return Table(said(table.caption).removesuffix("."), cells(table.columns), rows, table.numeric)
+    if isinstance(block, Answer):
+        return dataclasses.replace(
+            block,
+            headline=_DEPENDENCE.sub("", said(block.headline)),
+            picture=None if block.picture is None else block_shown(block.picture, names),
+            values=[cells((one[0], one[1], one[3])) for one in block.values],
+            figures=[cells(one) for one in block.figures],
+            cautions=[said(one) for one in block.cautions],
+            next_step=said(block.next_step),
+        )
+    return block
+
+
 # ---- findings --------------------------------------------------------------------------------------------------------
 
 
@@ -88,54 +172,57 @@ def _findings_section(contents: ReportContents, found: Sequence[GroupFindings], 
     """The answer of one group; of several groups a map, and their answers in sections of their own."""
     missing = [printable(one.stage, 80) for one in contents.failures]
     missing += [f"identification of {printable(g.name, 80)}" for g in contents.groups if g.failure]
-    warning: list[Block] = []
+    blocks: list[Block] = []
     if missing:
         listed = ", ".join(missing[:12]) + (f" and {len(missing) - 12} more" if len(missing) > 12 else "")
         reasons = Markup(
             'This report is not complete. Failed: {}. The reasons stand under <a href="#missing">What is missing</a>.'
         )
-        warning.append(Paragraph(reasons.format(listed), "warning"))
+        blocks.append(Paragraph(reasons.format(listed), "warning"))
     if len(found) == 1:
-        questions = [figure for forecast in contents.forecasts.values() for figure in asked_figures(forecast)]
-        files = files_to_download(contents, found)
-        answer = answer_block(found[0], figures, asked=questions, quality=contents.quality, files=files)
-        return PageSection("findings", "Findings", [*warning, answer])
-    if not found:
-        asked = any(group.failure or group.result is not None for group in contents.groups)
-        alone = bool(contents.groups) and (asked or not contents.rupture)
-        law = [Paragraph("No law was identified.", "lead")] if alone else []
-        rupture = [
-            block
-            for name, assessment in contents.rupture.items()
-            for block in (
-                *([Paragraph(f"{printable(name, 120)}:")] if len(contents.rupture) > 1 else []),
-                *strength_blocks(assessment),
-            )
-        ]
-        return PageSection("findings", "Findings", [*warning, *law, *rupture])
-    lead, by_law = Paragraph(_overview(contents, found), "lead"), _by_law(found)
-    title = f"Creep rates of {plural(len(found), 'material')}"
-    caption = f"{title}, by law, with 95 % intervals; open marks: the tests contradict the law."
-    picture = figures.picture(
-        lambda: plate_figure([(one.name, one.fit) for one in by_law]),
-        title,
-        f"{title}; the table holds the numbers.",
-        caption,
-    )
-    return PageSection("findings", "Findings", [*warning, lead, picture])
+        asked = [figure for forecast in contents.forecasts.values() for figure in asked_figures(forecast)]
+        files = files_to_download(contents, found)[:MOST_FILES]
+        blocks.append(group_answer(found[0], figures, asked=asked, quality=contents.quality, files=files))
+    elif not found:
+        failed = any(group.failure or group.result is not None for group in contents.groups)
+        if contents.groups and (failed or not contents.rupture):
+            blocks.append(Paragraph("No law was identified.", "lead"))
+        for name, assessment in contents.rupture.items():
+            blocks += [Paragraph(f"{name}:")] if len(contents.rupture) > 1 else []
+            blocks += strength_blocks(assessment)
+    else:
+        title = f"Creep rates of {plural(len(found), 'material')}"
+        caption = f"{title}, by law, with 95 % intervals; open marks: the tests contradict the law."
+        drawn = [(one.name, one.fit) for one in _by_law(found)]
+        blocks.append(Paragraph(_overview(contents, found), "lead"))
+        blocks.append(
+            figures.picture(lambda: plate_figure(drawn), title, f"{title}; the table holds the numbers.", caption)
+        )
+    return PageSection("findings", "Findings", blocks)
+
+
+def group_answer(found: GroupFindings, figures: PageFigures, *, asked: Sequence[KeyFigure] = (), **page: Any) -> Answer:
+    """The first screen of one material. asked : what forecasts say; page : quality of its data, files to download."""
+    fit, picture = found.fit, None
+    if fit.histories and fit.predictor is not None:
+        rupture = ", and times to rupture, identified over measured" if rupture_rows(fit) else ""
+        title = f"The law over the tests{found.of}"
+        description = f"Curves of {plural(len(fit.tests), 'test')} over time, creep rate over stress{rupture}."
+        picture = figures.picture(lambda: summary_figure(fit), title, description, f"{title}: {tests_text(fit)}.")
+    return answer(fit, found.ranking, asked=asked, picture=picture, **page)
 
 
 def _by_law(found: Sequence[GroupFindings]) -> list[GroupFindings]:
     """Groups of one law together, the commonest law first, then by name."""
-    counts = Counter(one.fit.law.name for one in found)
-    return sorted(found, key=lambda one: (-counts[one.fit.law.name], one.fit.law.name, one.name))
+    laws = [one.fit.law.name for one in found]
+    return sorted(found, key=lambda one: (-laws.count(one.fit.law.name), one.fit.law.name, one.name))
 
 
 def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
     explained = sum(one.fit.adequacy is not None and one.fit.adequacy.explains for one in found)
-    laws = [title_in_sentence(one.fit.law) for one in found]
+    laws = [one.fit.law.name for one in found]
     counts = sorted({name: laws.count(name) for name in laws}.items(), key=lambda pair: (-pair[1], pair[0]))
-    named = ", ".join(f"{printable(name, 60)} in {count}" for name, count in counts[:8])
+    named = ", ".join(f"{name} in {count}" for name, count in counts[:8])
     compared = [one for one in found if one.decisive is not None]
     decisive = sum(one.decisive is True for one in compared)
     decided = f" The choice of the law is decisive in {decisive} of {len(compared)}." if compared else ""
@@ -145,38 +232,79 @@ def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
     )
 
 
+# ---- materials -------------------------------------------------------------------------------------------------------
+
+
+def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> Iterator[PageSection]:
+    """The sections of one material; of several a table of all, and one for each."""
+    drawn, most = len(found) <= MOST_RANKINGS_DRAWN, _figures_of_tests(found)
+    if len(found) == 1:
+        yield from _sections_of(found[0], figures, "", most, drawn=drawn)
+    elif found:
+        yield PageSection("materials", "Materials", [_table_of_groups(found)], result="rates and exponents, a table")
+        for k, one in enumerate(_by_law(found), start=1):
+            first = group_answer(one, figures)
+            inner = [*_sections_of(one, figures, f"m{k}-", most, drawn=drawn)]
+            yield PageSection(f"m{k}", one.name or f"Material {k}", [first], inner, first.headline)
+
+
+def _sections_of(
+    found: GroupFindings, figures: PageFigures, prefix: str, most: int, *, drawn: bool
+) -> Iterator[PageSection]:
+    """What was found of one material behind its answer; most : tests that are drawn, drawn : whether its ranking is."""
+    fit, ranking = found.fit, found.ranking
+    determined = sum(e.verdict == "determined" for e in fit.estimates)
+    said = f"{determined} of {plural(len(fit.estimates), 'value')} determined by these tests"
+    values = value_blocks(fit, found.verdict, found.equivalents)
+    values += [*credible_values(ranking), Items(found.remarks)]
+    yield PageSection(f"{prefix}values", "Values and verdict", values, result=said)
+    worst = worst_tests(fit)[:1]
+    far = f"; farthest from the law: {printable(fit.tests[worst[0]].name, 60)}" if len(fit.tests) > 1 and worst else ""
+    tests = blocks_of_tests(fit, figures, of=found.of, most=most)
+    yield PageSection(f"{prefix}tests", "Tests", tests, result=f"{tests_text(fit)}{far}")
+    if ranking is not None:
+        none = ", none of which explains the tests" if rejected(fit) else f": weight {found.weight:.2f}"
+        blocks = ranking_blocks(ranking, figures if drawn else None, found.of)
+        said = f"best of {plural(len(ranking.laws), 'law')}{none}"
+        yield PageSection(f"{prefix}ranking", "Laws compared", blocks, result=said)
+    scatter = f"rates of tests scatter by {scatter_of_rates(fit)}"
+    said = scatter if len(fit.tests) > 1 else "of the readings of one test"
+    yield PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", noise_blocks(fit), result=said)
+
+
+def _figures_of_tests(found: Sequence[GroupFindings]) -> int:
+    """How many tests of each group are drawn, so that the page has at most MOST_TEST_FIGURES of them."""
+    counts = sorted(len(one.fit.tests) for one in found)
+    left, most = MOST_TEST_FIGURES, 0
+    for k, count in enumerate(counts):
+        most = max(most, min(count, left // (len(counts) - k)))
+        left -= min(count, most)
+    return max(most, 1)
+
+
 def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
     rows = []
     for one in found:
-        fit, r = one.fit, one.fit.reference
+        fit = one.fit
         rate, exponent = (_with_interval(values) for values in rate_and_exponent(fit))
-        weight = "–" if one.ranking is None else f"{one.ranking.laws[0].weight:.2f}"
+        properties = (rate, combined_change_text(fit.unmodelled) or "–", exponent)
         rows.append(
             (
-                printable(one.name, 120),
-                law_title(fit.law),
-                weight,
+                one.name,
+                titled_law(fit.law),
+                "–" if one.ranking is None else f"{one.ranking.laws[0].weight:.2f}",
                 explanation(fit),
                 "–" if one.decisive is None else "yes" if one.decisive else "no",
-                number(r.stress, 3),
-                "–" if rejected(fit) else rate,
-                "–" if rejected(fit) else combined_change_text(fit.unmodelled) or "–",
-                "–" if rejected(fit) else exponent,
+                number(fit.reference.stress, 3),
+                *(("–", "–", "–") if rejected(fit) else properties),
             )
         )
     columns = (
-        "material",
-        "best law",
-        "weight",
-        "by the noise of the tests",
-        "decisive",
-        "at MPa",
-        "creep rate there, 1/s",
-        "rate: not in the interval",
-        "stress exponent",
+        *("material", "best law", "weight", "by the noise of the tests", "decisive", "at MPa"),
+        *("creep rate there, 1/s", "rate: not in the interval", "stress exponent"),
     )
     caption = (
-        "Materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests, of laws that fit "
+        "materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests, of laws that fit "
         "the tests. Not in the interval: by how much the rate would move with what no nuisance parameter models, such "
         "as errors of temperature and load common to all tests, each of the size that the findings state (root sum of "
         "squares). Decisive: one law has more than 95 % of the weight, the tests do not contradict it, and no other "
@@ -191,27 +319,85 @@ def _with_interval(values: tuple[float, ...]) -> str:
     return f"{number(value, digits)} ({number(low, digits)} to {number(high, digits)})"
 
 
-def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> list[PageSection]:
-    drawn = len(found) <= MOST_RANKINGS_DRAWN
-    most = _figures_of_tests(found)
-    if len(found) == 1:
-        return [*group_sections(found[0], figures, "", most_tests=most, ranking_drawn=drawn)]
-    if not found:
-        return []
-    sections = [PageSection("materials", "Materials", [_table_of_groups(found)], result="rates and exponents, a table")]
-    for k, one in enumerate(_by_law(found), start=1):
-        inner = group_sections(one, figures, f"m{k}-", most_tests=most, ranking_drawn=drawn)
-        title = printable(one.name, 120) or f"Material {k}"
-        answer = answer_block(one, figures)
-        sections.append(PageSection(f"m{k}", title, [answer], inner, answer.headline))
-    return sections
+# ---- other stages ----------------------------------------------------------------------------------------------------
 
 
-def _figures_of_tests(found: Sequence[GroupFindings]) -> int:
-    """How many tests of each group are drawn, so that the page has at most MOST_TEST_FIGURES of them."""
-    counts = sorted(len(one.fit.tests) for one in found)
-    left, most = MOST_TEST_FIGURES, 0
-    for k, count in enumerate(counts):
-        most = max(most, min(count, left // (len(counts) - k)))
-        left -= min(count, most)
-    return max(most, 1)
+def _stage_sections(contents: ReportContents, figures: PageFigures, *, identified: bool) -> Iterator[PageSection]:
+    """Extraction, records, temperature, rupture, forecasts and further tests, where there are such results.
+
+    Strengths stand among the findings where no law was identified, and are not repeated.
+    """
+
+    def temperature(one: Any, of: str) -> list[Block]:
+        return law_blocks(one, figures, of) if isinstance(one, TemperatureLaw) else study_blocks(one, figures, of)
+
+    def rupture(one: Any, of: str) -> list[Block]:
+        return [*(strength_blocks(one) if identified else []), *rupture_blocks(one, figures, of)]
+
+    stages: dict[str, tuple[str, Mapping[str, Any], Callable[[Any, str], list[Block]], Callable[[Any], str]]] = {
+        "extraction": (
+            "Extraction from camera frames",
+            contents.extractions,
+            lambda one, of: _extraction_blocks(one, figures, of),
+            lambda one: f"{', '.join(one.outputs)} of {plural(int(one.used.sum()), 'frame')}".replace("_", " "),
+        ),
+        "imposed": (
+            "Loads and temperatures from instrument records",
+            contents.imposed,
+            lambda one, of: _imposed_blocks(one),
+            lambda one: f"lag of the clocks {number(one.alignment.lag, 4)} s",
+        ),
+        "temperature": (
+            *("Trends with temperature", contents.temperature, temperature),
+            lambda one: "how the values change with temperature",
+        ),
+        "rupture": (
+            *("Rupture", contents.rupture, rupture),
+            lambda one: f"{plural(len(one.ranked), 'method')} compared",
+        ),
+        "forecasts": ("Forecasts", contents.forecasts, lambda one, of: forecast_blocks(one, figures, of), _asked_text),
+        "design": (
+            "Further tests",
+            contents.design,
+            lambda one, of: design_blocks(one, figures, of),
+            lambda one: f"{plural(len(one.tests), 'planned test')} compared",
+        ),
+    }
+    for identifier, (title, results, blocks_of, said) in stages.items():
+        blocks = [blocks_of(one, f" of {printable(name, 80)}" if name else "") for name, one in results.items()]
+        if len(results) == 1:
+            yield PageSection(identifier, title, blocks[0], result=said(*results.values()))
+        elif results:
+            inner = [
+                PageSection(f"{identifier}-{k}", name or "All tests", one)
+                for k, (name, one) in enumerate(zip(results, blocks, strict=True), start=1)
+            ]
+            yield PageSection(identifier, title, (), inner, result=f"{len(results)} results")
+
+
+def _asked_text(forecast: Forecast) -> str:
+    """What the first test of a forecast shows."""
+    figures = asked_figures(forecast)
+    more = f"; {len(forecast.tests) - 1} more" if len(forecast.tests) > 1 else ""
+    return f"{figures[0].name} {figures[0].text}, {figures[0].where}{more}" if figures else "nothing predicted"
+
+
+def _extraction_blocks(extraction: Extraction, figures: PageFigures, of: str) -> list[Block]:
+    outputs = ", ".join(output.replace("_", " ") for output in extraction.outputs)
+    picture = figures.picture(
+        lambda: extraction_figure(extraction),
+        f"Extraction{of}",
+        f"Maps of height of some frames, and over time {outputs}, rigid motion and residuals; "
+        f"{int(extraction.used.sum())} of {extraction.times.size} frames were used, "
+        f"{plural(len(extraction.flags), 'flag')}.",
+        f"Extraction{of}: maps of height, outputs with 95 % bands, rigid motion and residuals; flagged frames in red.",
+    )
+    return [picture, Verbatim("What was extracted, and how well", printable_lines(extraction_text(extraction)))]
+
+
+def _imposed_blocks(under: Imposed) -> list[Block]:
+    """The alignment of the clocks with its interval, and how well programs follow the record."""
+    return [
+        Verbatim("Alignment of the clocks", printable_lines(alignment_text(under.alignment))),
+        Verbatim("What was imposed", printable_lines(imposed_text(under))),
+    ]

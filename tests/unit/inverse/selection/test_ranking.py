@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
+from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
 from creepkit.inverse.identify import identify
-from creepkit.inverse.largest_deviation import LargestDeviation
 from creepkit.inverse.selection.perturbation_trials import Challenge
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores, verdict_of
 from creepkit.inverse.settings import IdentificationSettings
@@ -49,23 +48,18 @@ def test_decisive_is_a_law_that_was_asked_for_explains_has_the_weight_and_stands
     assert best.verdict == f"decisive: norton, of 3 laws tried; it {EXPLAINS}"
 
 
-@pytest.mark.parametrize(
-    "short",
-    [
-        ranking([0.95, 0.04, 0.01]),
-        ranking([0.97, 0.02, 0.01], [LEAVES, EXPLAINS, EXPLAINS]),
-        ranking([0.97, 0.02, 0.01], [UNKNOWN] * 3),
-        ranking([0.97, 0.02, 0.01], [None] * 3),
-        ranking([0.97, 0.02, 0.01], further=("norton",)),
-        ranking([0.97, 0.02, 0.01], challenges=None),
-        ranking([0.97, 0.02, 0.01], challenges=(DRIFT,)),
-        ranking([1.0]),
-    ],
-    ids=["weight", "adequacy", "no noise", "no adequacy", "not asked for", "unexamined", "challenge", "alone"],
-)
-def test_with_any_part_missing_it_is_not_decisive(short):
-    assert not short.decisive
-    assert not short.verdict.startswith("decisive")
+def test_with_any_part_missing_it_is_not_decisive():
+    short = {
+        "weight": ranking([0.95, 0.04, 0.01]),
+        "adequacy": ranking([0.97, 0.02, 0.01], [LEAVES, EXPLAINS, EXPLAINS]),
+        "no noise": ranking([0.97, 0.02, 0.01], [UNKNOWN] * 3),
+        "no adequacy": ranking([0.97, 0.02, 0.01], [None] * 3),
+        "not asked for": ranking([0.97, 0.02, 0.01], further=("norton",)),
+        "unexamined": ranking([0.97, 0.02, 0.01], challenges=None),
+        "challenge": ranking([0.97, 0.02, 0.01], challenges=(DRIFT,)),
+        "alone": ranking([1.0]),
+    }
+    assert [why for why, one in short.items() if one.decisive or one.verdict.startswith("decisive")] == []
 
 
 def test_singled_out_needs_adequacy_and_weight_but_no_challenge():
@@ -140,70 +134,56 @@ def test_an_export_of_a_ranking_carries_its_verdict():
     assert "decisive; weights" not in ck.export(found.best, "latex")
 
 
-def test_where_no_law_explains_the_best_is_named_with_what_it_leaves():
-    found = verdict_of(ranking([1.0, 0.0, 0.0], [LEAVES] * 3))
-    assert found == (
-        "not decisive: none of 3 laws tried explains the tests; the best, norton (weight 1.00 of the laws tried), "
-        f"{LEAVES}"
-    )
-    assert "leaves 4e-05 of strain (2 times its stated noise) unexplained" in found
-    assert "most in strain of 'bar 1' about 1.5 h, where it lies 4e-05 above what was measured" in found
-    two = verdict_of(ranking([0.6, 0.35, 0.05], [LEAVES] * 3))
-    assert "norton (weight 0.60 of the laws tried, not told apart from sinh), leaves" in two
-
-
-def test_an_effect_with_which_a_law_would_explain_is_named():
-    """Of the best law it stands in its adequacy; of another one it is said beside it."""
-    own = replace(LEAVES, remedies=("thickness",))
-    assert verdict_of(ranking([1.0, 0.0], [own, LEAVES])).endswith(
-        "it would explain them with thickness, which nobody modelled"
-    )
-    other = verdict_of(ranking([1.0, 0.0], [LEAVES, replace(LEAVES, remedies=("thickness", "temperature drift"))]))
-    assert "; with thickness or temperature drift, which nobody modelled, sinh would explain them)" in other
-
-
-def test_what_would_explain_them_is_said_before_what_the_best_law_leaves():
-    thinner = Challenge("unmodelled effect", "thickness", "with a thickness 4.8 % smaller sinh would explain them")
-    rejected = verdict_of(ranking([0.99, 0.01], [LEAVES, LEAVES], challenges=(thinner,)))
-    assert rejected.startswith(
-        "not decisive: none of 2 laws tried explains the tests as they are stated; with a thickness 4.8 % smaller sinh "
-        "would explain them; the best, norton (weight 0.99 of the laws tried), leaves"
-    )
-    together = verdict_of(ranking([0.5, 0.45, 0.05], challenges=(thinner,)))
-    assert together.startswith(
-        "not decisive: of 3 laws tried these tests cannot tell apart norton and sinh; with a thickness 4.8 % smaller "
-        "sinh would explain them; the best is norton: it"
-    )
-
-
-def test_a_law_that_nobody_asked_for_is_a_proposal():
-    found = verdict_of(ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton", "theta")))
-    assert found == (
+THINNER = Challenge("unmodelled effect", "thickness", "with a thickness 4.8 % smaller sinh would explain them")
+NONE = "not decisive: none of {} laws tried explains the tests"
+APART = "not decisive: of 3 laws tried these tests cannot tell apart norton and sinh"
+SENTENCES = [
+    (
+        ranking([1.0, 0.0, 0.0], [LEAVES] * 3),
+        f"{NONE.format(3)}; the best, norton (weight 1.00 of the laws tried), leaves 4e-05 of strain (2 times its "
+        "stated noise) unexplained",
+        "most in strain of 'bar 1' about 1.5 h, where it lies 4e-05 above what was measured",
+    ),
+    (
+        ranking([0.6, 0.35, 0.05], [LEAVES] * 3),
+        "norton (weight 0.60 of the laws tried, not told apart from sinh), leaves",
+    ),
+    # of the best law an effect stands in its adequacy; of another one it is said beside it
+    (
+        ranking([1.0, 0.0], [replace(LEAVES, remedies=("thickness",)), LEAVES]),
+        "it would explain them with thickness, which nobody modelled",
+    ),
+    (
+        ranking([1.0, 0.0], [LEAVES, replace(LEAVES, remedies=("thickness", "temperature drift"))]),
+        "; with thickness or temperature drift, which nobody modelled, sinh would explain them)",
+    ),
+    (
+        ranking([0.99, 0.01], [LEAVES, LEAVES], challenges=(THINNER,)),
+        f"{NONE.format(2)} as they are stated; {THINNER}; the best, norton (weight 0.99 of the laws tried), leaves",
+    ),
+    (ranking([0.5, 0.45, 0.05], challenges=(THINNER,)), f"{APART}; {THINNER}; the best is norton: it {EXPLAINS}"),
+    (ranking([0.5, 0.45, 0.05]), f"{APART}; the best is norton: it {EXPLAINS}"),
+    (
+        ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton", "theta")),
         "not decisive: the law asked for does not explain the tests; of 2 more that were tried, norton is not "
-        "contradicted by them (weight 0.99 of the laws tried): plan tests that can refute it"
-    )
-    two = verdict_of(ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton",)))
-    assert two.startswith("not decisive: none of the 2 laws asked for explains the tests; of 1 more")
-
-
-def test_laws_that_cannot_be_told_apart_are_named():
-    found = verdict_of(ranking([0.5, 0.45, 0.05]))
-    assert found == (
-        "not decisive: of 3 laws tried these tests cannot tell apart norton and sinh; the best is norton: "
-        f"it {EXPLAINS}"
-    )
-
-
-def test_what_the_tests_allow_beside_it_is_said():
-    found = verdict_of(ranking([0.99, 0.01], challenges=(SUM, DRIFT)))
-    assert found == (
+        "contradicted by them (weight 0.99 of the laws tried): plan tests that can refute it",
+    ),
+    (
+        ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton",)),
+        "not decisive: none of the 2 laws asked for explains the tests; of 1 more",
+    ),
+    (
+        ranking([0.99, 0.01], challenges=(SUM, DRIFT)),
         "not decisive: of 2 laws tried norton has nearly all the weight (weight 0.99 of the laws tried) and is not "
-        "contradicted by the tests; but norton+sinh with 30 % of the rate from sinh explains them as well; and a "
-        "temperature drift would leave it a weight of 0.52"
-    )
+        f"contradicted by the tests; but {SUM}; and {DRIFT}",
+    ),
+    (
+        ranking([0.99, 0.01], [UNKNOWN, UNKNOWN]),
+        "not decisive: of 2 laws tried norton is best (weight 0.99 of the laws tried); it cannot be judged: no noise",
+    ),
+]
 
 
-def test_without_known_noise_nothing_is_decided():
-    found = verdict_of(ranking([0.99, 0.01], [UNKNOWN, UNKNOWN]))
-    assert found.startswith("not decisive: of 2 laws tried norton is best (weight 0.99 of the laws tried); it cannot")
-    assert "cannot be judged: no noise is stated" in found
+def test_verdicts_name_the_best_law_what_it_leaves_and_what_else_the_tests_allow():
+    said = [(verdict_of(one), words) for one, *several in SENTENCES for words in several]
+    assert [(verdict, words) for verdict, words in said if words not in verdict] == []

@@ -6,7 +6,7 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from creepkit.reports.html.elements import printable_lines
+from creepkit.reports.blocks import printable_lines
 
 if TYPE_CHECKING:
     from jinja2 import Template

@@ -1,26 +1,39 @@
-"""What was done to identify laws, in sentences for a paper: each only where the records say that it was done."""
+"""Methods as text for a paper: what was done, from the records alone, with numbered citations."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from creepkit.inverse.adequacy import UNDETECTED_SCATTER
-from creepkit.inverse.noise_model import MINIMUM_TESTS
+from creepkit.inverse.adequacy import LARGEST_SCATTER
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
+from creepkit.inverse.judging import SIGNIFICANCE
+from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
 from creepkit.inverse.nuisance_parameters import nuisance_unit
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
 from creepkit.inverse.variance_components import NOISE_PRIOR_SD
 from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
 from creepkit.records import is_logarithmic, kind_and_start, output_unit
-from creepkit.reports.html.citations import References, listed
-from creepkit.reports.html.elements import number, plural, printable
-from creepkit.reports.html.methods_ranking import adequacy_sentences, ranking_sentences
-from creepkit.reports.html.methods_tests import MOST_NAMED, by_material, compared_tests, laws, loading, models
+from creepkit.reports.blocks import number, plural, printable, sentence, typeset
+from creepkit.reports.design import order_text
+from creepkit.reports.identification import rate_estimated, rate_scatter_sentence, scatter_text
+from creepkit.reports.methods_tests import (
+    CITATIONS,
+    MOST_NAMED,
+    References,
+    by_material,
+    compared_tests,
+    laws,
+    listed,
+    loading,
+    models,
+)
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.reports.contents import ReportContents
-    from creepkit.reports.html.findings import GroupFindings
+    from creepkit.reports.findings import GroupFindings
 
 
 def identification_methods(
@@ -124,10 +137,7 @@ def _search_name(fit: Identification, contents: ReportContents) -> str:
 def _weights(fit: Identification, references: References) -> list[str]:
     settings = fit.settings
     offsets = any(n.kind == "offset" for n in settings.nuisances)
-    estimated = [
-        *(["offsets of tests"] if offsets else []),
-        *(["the scatter of rates"] if _rate_estimated(fit) else []),
-    ]
+    estimated = [*(["offsets of tests"] if offsets else []), *(["the scatter of rates"] if rate_estimated(fit) else [])]
     parts = listed(["white noise", "autocorrelated noise", *estimated])
     noise = f"The {parts} were estimated by restricted maximum likelihood{references.cite('reml')}; 95 % intervals"
     freedom = f"Satterthwaite's degrees of freedom{references.cite('satterthwaite')}"
@@ -208,40 +218,12 @@ def _noise_priors(fit: Identification, *, numbers: bool) -> str:
     )
 
 
-def _rate_estimated(fit: Identification) -> bool:
-    """Whether the scatter of rates between tests was estimated from them."""
-    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
-    return bool(rates) and rates[0].sd is None and len(fit.tests) >= MINIMUM_TESTS
-
-
-def rate_scatter_sentence(fit: Identification) -> str:
-    """How much the creep rates of single tests scatter, and whether that was estimated, given, assumed or left out."""
-    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
-    if not rates:
-        return "No scatter of creep rates between tests was allowed: every test follows the law's own rate."
-    return _scatter_text(fit, f"{number(100 * fit.noise_model.rate, 3)} %", plural(len(fit.tests), "test"))
-
-
-def _scatter_text(fit: Identification, percent: str, tests: str) -> str:
-    """The sentence where scatter was allowed; percent : how much. tests : how many there are, where they show none."""
-    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
-    size = f"{percent} about the law (one standard deviation of their logarithm)"
-    if rates[0].sd is not None:
-        return f"The creep rates of single tests have a Gaussian prior: they scatter by {size}, as was given."
-    if _rate_estimated(fit):
-        if fit.noise_model.rate <= UNDETECTED_SCATTER:
-            return "No scatter of the creep rates of single tests about the law was detected."
-        return f"The creep rates of single tests scatter by {size}, as was estimated."
-    cannot = f"{tests} cannot show it"
-    return f"How the creep rates of single tests scatter is not known, for {cannot}: the intervals hold for these."
-
-
 def _scatter_over_materials(fits: Sequence[Identification]) -> list[str]:
     """The same of several materials, one sentence with the range for all of whom it is alike."""
     groups: dict[str, list[Identification]] = {}
     for fit in fits:
         if any(n.kind == "rate" and not n.is_simulated for n in fit.settings.nuisances):
-            groups.setdefault(_scatter_text(fit, "", ""), []).append(fit)
+            groups.setdefault(scatter_text(fit, "", ""), []).append(fit)
         else:
             groups.setdefault(rate_scatter_sentence(fit), [])
     sentences = []
@@ -253,7 +235,7 @@ def _scatter_over_materials(fits: Sequence[Identification]) -> list[str]:
         counts = sorted({len(fit.tests) for fit in alike})
         tests = plural(counts[0], "test") if len(counts) == 1 else f"{counts[0]} to {counts[-1]} tests"
         of = "" if len(groups) == 1 else f"Of {plural(len(alike), 'material')}: "
-        sentences.append(of + _scatter_text(alike[0], f"{low} %" if low == high else f"{low} to {high} %", tests))
+        sentences.append(of + scatter_text(alike[0], f"{low} %" if low == high else f"{low} to {high} %", tests))
     return sentences
 
 
@@ -282,3 +264,165 @@ def _penalty(found: GroupFindings) -> str:
         f"The terms of the sum {printable(sparse.law, 120)} were selected by the penalty {sparse.penalty}{strength} "
         f"and confirmed by BIC{dropped}."
     )
+
+
+# ---- comparison and adequacy -----------------------------------------------------------------------------------------
+
+
+CRITERIA = {
+    "bic": ("Bayesian information criterion", "K ln n"),
+    "aicc": ("corrected information criterion of Akaike", "2 K + 2 K (K + 1) / (n - K - 1)"),
+}
+"""{criterion: its name, and its penalty for K parameters and n readings}."""
+
+
+def ranking_sentences(found: GroupFindings, references: References, *, numbers: bool) -> list[str]:
+    """How the laws of a material were compared; numbers : whether n is stated, as of one material alone."""
+    ranking = found.ranking
+    if ranking is None:
+        return []
+    if ranking.criterion in CRITERIA:
+        name, penalty = CRITERIA[ranking.criterion]
+        n = f" (n = {number(ranking.independent_frames, 4)})" if numbers and _known(ranking.independent_frames) else ""
+        deviance = (
+            "chi-square, under the covariance of the law that fits the tests best, plus the logarithm of the "
+            "determinant that integrates nuisance parameters out"
+        )
+        criterion = (
+            f"{name}{references.cite(ranking.criterion)}: {deviance}, plus {penalty} for K parameters that the tests "
+            f"determine and n independent readings, as many as their autocorrelation leaves{n}"
+        )
+    else:
+        criterion = "error of tests that were held out"
+    return [
+        f"The laws were compared by the {criterion}.",
+        "The weight of a law is exp(-difference / 2) over the sum of all laws tried, and a law is credible with a "
+        f"weight above {CREDIBLE_WEIGHT:g}. A law is called decisive where its weight is above {DECISIVE_WEIGHT:g}, it "
+        "was among the laws asked for, it is not contradicted by the tests, and neither a share of another law nor an "
+        "effect that was not modelled changes that.",
+    ]
+
+
+def _known(value: float) -> bool:
+    return math.isfinite(value) and value > 0
+
+
+def adequacy_sentences(found: Sequence[GroupFindings], references: References) -> list[str]:
+    """How it was judged whether the tests contradict a law; none where it was not."""
+    judged = [one.fit.adequacy for one in found if one.fit.adequacy is not None]
+    if not judged:
+        return []
+    sources = {output.noise_source for one in judged for output in one.outputs}
+    estimated = (
+        " Noise that no test states is estimated from the third differences of neighbouring readings, with "
+        f"{FREEDOM_PER_FRAME:g} degrees of freedom for each of them; chi-square over its degrees of freedom then has "
+        "the F distribution for one test, and for several that of a scaled chi-square with the same mean and variance"
+        f"{references.cite('satterthwaite')}."
+        if "estimated" in sources
+        else ""
+    )
+    freedom = (
+        f" Here it has {number(judged[0].freedom, 4)} degrees of freedom."
+        if len(judged) == 1 and _known(judged[0].freedom)
+        else ""
+    )
+    several = " (the least of those of all outputs and of each one, times their number)"
+    scatter = number(math.exp(LARGEST_SCATTER), 2)
+    return [
+        "A law is not contradicted by the tests where its chi-square, against noise that was stated or estimated "
+        f"without the law, has a probability of at least {100 * SIGNIFICANCE:g} %"
+        f"{several if any(len(one.outputs) > 1 for one in judged) else ''}, the rates of tests scatter by less than a "
+        f"factor of {scatter}, and nothing else explains that scatter six times better: a stress exponent that "
+        "changes with stress, an activation energy that changes with temperature, one test, or two groups of tests. "
+        f"Degrees of freedom are the readings less the unknowns that they determine.{freedom}{estimated}"
+    ]
+
+
+# ---- other stages ----------------------------------------------------------------------------------------------------
+
+
+def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
+    """Paragraphs on identification, ranking and the other stages, then the references."""
+    references = References()
+    paragraphs = [
+        _source_of_data(contents, references),
+        *identification_methods(contents, found, references),
+        *_stages(contents, references),
+        _software(contents, found, references),
+    ]
+    text, cited = references.numbered(typeset("\n\n".join(" ".join(p) for p in paragraphs if p)))
+    numbered = "\n".join(f"[{k}] {citation}" for k, citation in enumerate(cited, start=1))
+    return f"{text}\n\n{numbered}".strip() + "\n"
+
+
+def _source_of_data(contents: ReportContents, references: References) -> list[str]:
+    """Where the data were published, if the study says so."""
+    if not contents.data_citations:
+        return []
+    return [f"The measured data are those of{references.cite(*contents.data_citations)}."]
+
+
+def _stages(contents: ReportContents, references: References) -> list[list[str]]:
+    paragraphs: list[list[str]] = []
+    if contents.exclusions:
+        tests = {one.test for one in contents.exclusions}
+        paragraphs.append(
+            [
+                f"Readings of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons that the "
+                "report lists."
+            ]
+        )
+    if contents.temperature:
+        paragraphs.append(
+            [
+                "Forms of temperature of the parameters were chosen by regression on isothermal estimates with their "
+                f"covariances{references.cite('pysindy')}, over all combinations of forms."
+            ]
+        )
+    for assessment in contents.rupture.values():
+        methods = dict.fromkeys(one.fit.method for one in assessment.ranked)
+        cited = [f"{name}{references.cite(name) if name in CITATIONS else ''}" for name in methods]
+        ruptures = assessment.tests
+        run_outs = int(ruptures.censored.sum())
+        scattering = [label for label, names in ruptures.groups.items() if len(set(names)) > 1]
+        how = [f"{plural(run_outs, 'run-out')} as censored times"] if run_outs else []
+        how += [f"{listed([_plural_of(label) for label in scattering])} as random effects"] if scattering else []
+        with_them = f", {listed(how)}," if how else ""
+        were = "was" if len(ruptures) == 1 else "were"
+        paragraphs.append([f"{plural(len(ruptures), 'rupture test')}{with_them} {were} assessed by {listed(cited)}."])
+    if contents.forecasts:
+        forecasts = contents.forecasts.values()
+        level, draws = next(iter(forecasts)).level, max(one.draws for one in forecasts)
+        drawn = f"; they come from {draws} draws in each test" if draws else ""
+        paragraphs.append(
+            [
+                f"Forecasts have bands of {100 * level:g} % that contain the uncertainty of the parameters and of the "
+                f"choice of the law, the scatter between tests, dimensions, noise and numerical error{drawn}."
+            ]
+        )
+    if contents.design:
+        by = order_text(next(iter(contents.design.values())))
+        information = f"Expected information of further tests was computed{references.cite('lindley')}"
+        paragraphs.append([f"{information}; they are listed {by}."])
+    return paragraphs
+
+
+def _plural_of(label: str) -> str:
+    """Several of what a label names: heats, laboratories."""
+    label = printable(label, 60)
+    return f"{label[:-1]}ies" if label.endswith("y") else f"{label}s"
+
+
+def _software(contents: ReportContents, found: Sequence[GroupFindings], references: References) -> list[str]:
+    versions = dict(contents.provenance.versions)
+    if not versions and found:
+        versions = {"creepkit": str(found[0].fit.provenance.get("creepkit", ""))}
+    named = listed(
+        [
+            f"{printable(name, 60)} {printable(version, 60)}{references.cite(name) if name == 'creepkit' else ''}"
+            for name, version in versions.items()
+            if version
+        ]
+    )
+    seed = "" if contents.provenance.seed is None else f", seed {contents.provenance.seed}"
+    return [sentence(f"The work was done with {named}{seed}")] if named else []

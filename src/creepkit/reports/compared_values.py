@@ -23,7 +23,7 @@ from creepkit.inverse.observation_vector import (
 )
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
 from creepkit.records import output_unit
-from creepkit.reports.html.elements import number, plural, printable
+from creepkit.reports.blocks import number, plural, printable
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification

@@ -17,8 +17,8 @@ from markupsafe import Markup
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
+from creepkit.reports.blocks import Paragraph, Picture, printable
 from creepkit.reports.figures import POWER_OF_TEN, save_figure
-from creepkit.reports.html.elements import Paragraph, Picture, printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,0 +1,268 @@
+"""What a result says, as blocks: paragraphs, lists, tables, figures, equations, files.
+
+Each kind of result makes its blocks once; a terminal, the page and a notebook render the same. Blocks hold plain text:
+numbers as programs write them (4.2e-05), laws by the names that commands know. The page writes powers of ten and the
+titles of laws (creepkit.reports.html.page).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from textwrap import wrap
+from typing import Any, ClassVar, TypeAlias
+
+from markupsafe import Markup
+
+LONGEST_TEXT = 4000
+"""Characters of a cell or paragraph; an error message may hold a name of any length."""
+
+
+WIDTH = 100
+"""Characters of a line of an answer in a terminal."""
+
+
+@dataclass(frozen=True)
+class Rich:
+    """A text that is set otherwise on a page, such as the symbol of a parameter. html : safe markup."""
+
+    text: str
+    html: str
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __html__(self) -> str:
+        """For templates."""
+        return self.html
+
+
+Cell: TypeAlias = str | Rich
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A paragraph. role : "", "lead" for what is to be read first, "note" for remarks, "warning"."""
+
+    kind: ClassVar[str] = "paragraph"
+    text: str
+    role: str = ""
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list of sentences."""
+
+    kind: ClassVar[str] = "items"
+    items: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a caption; the first cell of each row is its head. numeric : columns that stand right."""
+
+    kind: ClassVar[str] = "table"
+    caption: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    numeric: Sequence[int] = ()
+
+    @property
+    def filled(self) -> Table:
+        """The same without columns in which no cell says anything."""
+        kept = [k for k in range(len(self.columns)) if k == 0 or any(str(row[k]) not in ("", "–") for row in self.rows)]
+        rows = [[row[k] for k in kept] for row in self.rows]
+        numeric = [place for place, k in enumerate(kept) if k in self.numeric]
+        return Table(self.caption, [self.columns[k] for k in kept], rows, numeric)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure: <svg> with its own title and description, and what the caption says below it.
+
+    shows_values : whether its colours stand for values, so that they are the same on a dark page.
+    """
+
+    kind: ClassVar[str] = "picture"
+    svg: Markup
+    caption: str
+    shows_values: bool = False
+
+
+@dataclass(frozen=True)
+class Formula:
+    """An equation, with MathML for pages."""
+
+    kind: ClassVar[str] = "formula"
+    equation: Rich
+
+
+@dataclass(frozen=True)
+class Verbatim:
+    """Text with its line ends, to be copied: a program, commands, a paragraph for a paper."""
+
+    kind: ClassVar[str] = "verbatim"
+    caption: str
+    text: str
+    prose: bool = False
+
+
+@dataclass(frozen=True)
+class Downloads:
+    """Files within the page. files : (name, address, what it is) with the content in the address."""
+
+    kind: ClassVar[str] = "downloads"
+    files: Sequence[tuple[str, str, str]]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The first screen: headline, picture, and a card with the law, its key figures, cautions and files.
+
+    remarks : on the choice of the law. values : (symbol, value, ends of its interval, unit) of the parameters.
+    picture : a Picture, or the Paragraph that says why there is none.
+    figures : (name, where it holds, value with interval, remark).
+    """
+
+    kind: ClassVar[str] = "answer"
+    headline: str
+    law: Cell
+    equations: Sequence[Rich]
+    values: Sequence[Sequence[Any]]
+    figures: Sequence[Sequence[str]]
+    cautions: Sequence[str]
+    next_step: str
+    remarks: Sequence[str] = ()
+    picture: Any = None
+    files: Sequence[tuple[str, str, str]] = ()
+
+
+Block: TypeAlias = Answer | Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads
+
+
+@dataclass(frozen=True)
+class PageSection:
+    """A part of the page with its heading; identifier : letters, digits and hyphens, of its own in the page.
+
+    result : what it says, on the line of its heading, behind which it is folded; "" for a section that stands open.
+    """
+
+    identifier: str
+    title: str
+    blocks: Sequence[Block] = ()
+    sections: Sequence[PageSection] = field(default=())
+    result: str = ""
+
+
+# ---- numbers and words -----------------------------------------------------------------------------------------------
+
+
+def printable(text: object, longest: int = LONGEST_TEXT) -> str:
+    """A text on one line of bounded length, without characters that are invisible or turn the direction of writing."""
+    shown = "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in str(text))
+    return shown if len(shown) <= longest else f"{shown[: longest - 1]}…"
+
+
+def printable_lines(text: str) -> str:
+    """The same of a text of several lines, of any length."""
+    return "\n".join(printable(line, len(line) + 1).rstrip() for line in text.expandtabs(4).splitlines())
+
+
+def sentence(text: str) -> str:
+    """A text with a capital and a full stop; names stay as they are."""
+    text = printable(text).strip()
+    first = text[:1] if _NAME.match(text) else text[:1].upper()
+    return f"{first}{text[1:]}{'' if text.endswith(('.', '!', '?', ':', '…')) else '.'}"
+
+
+def plural(count: int, noun: str) -> str:
+    """A number of things in words: '1 test', '3 tests'."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number as programs write it, such as 4.2e-05; NaN as a dash."""
+    return "–" if math.isnan(value) else f"{value:.{digits}g}"
+
+
+_NAME = re.compile(r"(?![aA] )(?:[^\W\d_](?![^\W_]))|[\w-]*[_*0-9]\w*")
+"""The name of a parameter, a test or a law at the beginning of a sentence, which stays as it is written."""
+
+
+def typeset(text: str) -> str:
+    """The same with powers of ten, signs and infinity as they are printed: 4.2e-05 as 4.2 × 10⁻⁵, -3 with a minus."""
+    text = _POWER.sub(_with_power, text.replace(" +- ", " ± "))
+    return _INFINITE.sub("∞", _MINUS.sub("−", text))
+
+
+_POWER = re.compile(r"(?<![\w.+-])(-?\d+(?:\.\d+)?)e([+-]\d\d+)(?![\w.])", re.ASCII)
+"""A number as programs print it, such as 4.2e-05."""
+
+
+_MINUS, _INFINITE = re.compile(r"(?:^|(?<=[\[( ]))-(?=[\d∞]|inf\b)"), re.compile(r"(?:^|(?<=[\[( −]))inf\b")
+"""Before a number, and what programs print of one that has no end."""
+
+
+def _with_power(found: re.Match[str]) -> str:
+    power = str(int(found[2])).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"10{power}" if found[1] == "1" else f"{found[1]} × 10{power}"
+
+
+# ---- as text ---------------------------------------------------------------------------------------------------------
+
+
+def aligned(columns: Sequence[str], rows: Sequence[Sequence[Cell]], numeric: Sequence[int] = ()) -> list[str]:
+    """Lines of a table for a terminal, the first of which are its heads; numeric : columns that stand right."""
+    cells = [list(map(str, row)) for row in (columns, *rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return [
+        "  ".join(
+            cell.rjust(width) if k in numeric else cell.ljust(width)
+            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in cells
+    ]
+
+
+def as_text(blocks: Sequence[Block]) -> str:
+    """Blocks for a terminal: a line a paragraph, tables without rules; figures and files are for pages alone."""
+    return "\n".join(line for block in blocks for line in _lines(block))
+
+
+def _lines(block: Block) -> list[str]:
+    if isinstance(block, Answer):
+        return _answer_lines(block)
+    if isinstance(block, Paragraph):
+        return [f"warning: {block.text}" if block.role == "warning" else block.text]
+    if isinstance(block, Items):
+        return [f"- {item}" for item in block.items]
+    if isinstance(block, Table):
+        table = block.filled
+        lines = [f"  {line}" for line in aligned(table.columns, table.rows, table.numeric)]
+        return ["", *([f"{table.caption}:"] if table.caption else []), *lines, ""]
+    if isinstance(block, Formula):
+        return [f"  {block.equation}"]
+    if isinstance(block, Verbatim):
+        return ["", f"{block.caption}:", *block.text.splitlines()]
+    return []
+
+
+def _answer_lines(answer: Answer) -> list[str]:
+    """A dozen lines, none of which is longer than WIDTH."""
+    lines = wrap(answer.headline, WIDTH)
+    lines += [line for text in answer.remarks for line in _indented(text, "    ")]
+    lines += [f"  {equation}" for equation in answer.equations]
+    pieces = [f"{name} = {value} [{', '.join(ends)}] {unit}".strip() for name, value, ends, unit in answer.values]
+    lines += _indented("   ".join(piece.replace(" ", "\u00a0") for piece in pieces), "    ")
+    for name, where, value, remark in answer.figures:
+        lines += _indented(f"{name} at {where}: {value}{', ' if remark else ''}{remark}", "    ")
+    lines += [line for text in answer.cautions for line in _indented(f"- {text}", "    ")]
+    return [*lines, *_indented(f"next: {answer.next_step}; more: .details()")]
+
+
+def _indented(text: str, hanging: str = "  ") -> list[str]:
+    """Lines of a text, the first indented by two; blanks that do not break hold the pieces of a value together."""
+    lines = wrap(text, WIDTH, initial_indent="  ", subsequent_indent=hanging, break_long_words=False)
+    return [line.replace("\u00a0", " ") for line in lines]

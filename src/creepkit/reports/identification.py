@@ -1,0 +1,556 @@
+"""What an identification says beyond its answer: values and verdict, tests, noise and nuisance parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from statistics import median
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER
+from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration_known, rests_on_durations
+from creepkit.inverse.noise_model import MINIMUM_TESTS
+from creepkit.inverse.nuisance_parameters import nuisance_unit
+from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
+from creepkit.inverse.perturbation import NOT_INCLUDED
+from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
+from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
+from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
+from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, kind_and_start, output_unit
+from creepkit.records.units import celsius_text
+from creepkit.reports.answer import (
+    MOST_CAUTIONS,
+    cautions,
+    chosen_text,
+    constant_load_sentence,
+    equations,
+    reference_sentences,
+    symbols_of,
+    unit_text,
+    value_cells,
+)
+from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, as_text, number, plural
+from creepkit.reports.compared_values import compared_values
+from creepkit.reports.identification_plot import residual_caption, small_multiples
+from creepkit.reports.judged_readings import LAW_RATE_MEANING, OWN_RATE_CHI_SQUARE, judged_readings, misfit_of
+from creepkit.reports.rate_panels import rupture_rows
+
+if TYPE_CHECKING:
+    from creepkit.inverse.goodness_of_fit import TestFit
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.nuisance_parameters import NuisanceEstimate
+    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.settings import IdentificationSettings
+    from creepkit.inverse.single_values import SingleValue
+    from creepkit.inverse.uncertainty.laplace_approximation import Estimate
+    from creepkit.reports.svg import PageFigures
+
+MOST_NAMED = 12
+"""Tests, or temperatures, that are named in a sentence."""
+
+
+MOST_LISTED = 40
+"""Tests without curves in their table: with more, those whose values lie farthest from the law."""
+
+
+MOST_CORRELATED = 12
+"""Parameters up to which their correlations are a table."""
+
+
+REJECTED = (
+    "this law does not fit the tests: its values only bring it as near to them as it comes, and what the tests "
+    "determine, the creep rate and the stress exponent amid them are not derived from it"
+)
+
+
+def identification_text(fit: Identification) -> str:
+    """Everything: the law, its values with 95 % intervals, the verdict, the tests, noise and nuisance parameters."""
+    head: list[Block] = [Paragraph(fit.law.title or fit.law.name), Paragraph(fit.headline)]
+    formulas = [Formula(one) for one in equations(fit.law)]
+    return as_text([*head, *formulas, *value_blocks(fit), *blocks_of_tests(fit, None), *noise_blocks(fit)])
+
+
+def rejected(fit: Identification) -> bool:
+    """Whether the tests reject the law, so that what it says of them, rates and exponents, is not theirs."""
+    return fit.adequacy is not None and fit.adequacy.rejects
+
+
+# ---- values and verdict ----------------------------------------------------------------------------------------------
+
+
+def value_blocks(fit: Identification, verdict: str = "", equivalents: Sequence[str] = ()) -> list[Block]:
+    """The values with intervals, what these rest on, what is not determined, and the verdict by the noise.
+
+    verdict : of a comparison of laws, with pairs that cannot be told apart, a sentence each.
+    """
+    blocks: list[Block] = [_values(fit)]
+    blocks += [Paragraph(verdict), Items(equivalents)] if verdict else []
+    if fit.adequacy is not None and str(fit.adequacy) not in verdict:
+        blocks.append(Paragraph(f"the law {fit.adequacy}"))
+    if rejected(fit):
+        blocks.append(Paragraph(REJECTED))
+    else:
+        blocks += [Paragraph(text) for text in reference_sentences(fit)]
+        blocks += [Paragraph(text) for text in _assumed_duration(fit)]
+    blocks += [Paragraph(text) for text in (*_left_out(fit), *interval_basis(fit))]
+    blocks += [] if fit.sparsity is None else [Paragraph(fit.sparsity.verdict)]
+    if not rejected(fit) and (undetermined := fit.undetermined()):
+        blocks += [Paragraph("what these tests do not determine, or poorly, given this law:"), Items(undetermined)]
+    unmodelled = [effect.sentence for effect in fit.unmodelled if not effect.included]
+    if unmodelled:
+        blocks += [
+            Paragraph("the intervals do not include what would move the rate amid the tests:"),
+            Items(unmodelled),
+        ]
+    notes = [note for note in fit.notes if not (unmodelled and note.startswith(NOT_INCLUDED))]  # said above
+    return [*blocks, Paragraph("remarks:"), Items(notes)] if notes else blocks
+
+
+def _values(fit: Identification) -> Table:
+    """Values with intervals; of a law that the tests reject only which of them these would not determine."""
+    table, symbols = fit.law.table, symbols_of(fit.law)
+    rows = [
+        (
+            symbols[e.name],
+            table[e.name].meaning,
+            *value_cells(fit.law, e),
+            unit_text(e.unit),
+            "–" if rejected(fit) and e.verdict == "determined" else verdict_given_law(fit, e),
+        )
+        for e in fit.estimates
+    ]
+    held = ", if the law held" if rejected(fit) else ""
+    last = f"by these tests{held or ', given this law'}"
+    columns = ("parameter", "meaning", "value", f"95 % interval{held}", "unit", last)
+    caption = "values for stress in MPa as a ratio to 1 MPa, and time in s as a ratio to 1 s"
+    return Table(f"{'a law that does not fit the tests: ' * bool(held)}{caption}", columns, rows, numeric=(2, 3))
+
+
+def verdict_given_law(fit: Identification, estimate: Estimate) -> str:
+    """What tests say of a parameter given its law; of a law that they do not test, that they do not."""
+    untested = rests_on_durations(fit.law, fit.histories)
+    return f"{estimate.verdict}, but not testable" if untested else estimate.verdict
+
+
+def _assumed_duration(fit: Identification) -> list[str]:
+    """What is said of the reference point where it rests on tests whose duration is not known."""
+    unknown = sum(not duration_known(history) for history in fit.histories)
+    if not unknown:
+        return []
+    return [
+        f"the strain and the time of this point are assumed: of {plural(unknown, 'test')} only a minimum creep rate is "
+        f"known, not the duration, and each is taken to last until a strain of {100 * STRAIN_OF_UNKNOWN_DURATION:g} % "
+        "at that rate"
+    ]
+
+
+def _left_out(fit: Identification) -> list[str]:
+    """Between which the stress exponent lies where one test is left out; none of fewer tests than four."""
+    if not fit.left_out:
+        return []
+    low, high = min(fit.left_out, key=lambda one: one.exponent), max(fit.left_out, key=lambda one: one.exponent)
+    far = max(fit.left_out, key=lambda one: abs(one.log_factor) / one.sd)
+    factor, sd = math.exp(far.log_factor), far.sd
+    return [
+        f"leaving one test out: stress exponent {low.exponent:.3g} (without '{low.test}') to {high.exponent:.3g} "
+        f"(without '{high.test}'); farthest from the others: '{far.test}', {factor:.3g} times their rate "
+        f"[{factor * math.exp(-1.96 * sd):.3g}, {factor * math.exp(1.96 * sd):.3g}]"
+    ]
+
+
+# ---- what intervals rest on ------------------------------------------------------------------------------------------
+
+
+def interval_basis(fit: Identification) -> list[str]:
+    """What intervals rest on: errors of the tests, the weights of the readings, and the form of the law.
+
+    That they hold only with the form of the law is not said of a law that the tests reject: none of its values does.
+    """
+    conditional = "" if rejected(fit) else constant_load_sentence(fit)
+    return [_usual_errors(fit), _weights(fit.settings), *([conditional] if conditional else [])]
+
+
+def _usual_errors(fit: Identification) -> str:
+    """Which errors of tests the intervals include, of which size, and how wide they are without."""
+    included = {one.kind: one.amount for one in fit.unmodelled if one.included}
+    if not included:
+        return "the intervals take the temperatures, loads and dimensions of the tests as exactly known"
+    errors = ", ".join(f"{kind} {amount}" for kind, amount in included.items())
+    begin = f"the intervals include errors of the tests that nobody measured (one standard deviation: {errors})"
+    if rejected(fit) or not fit.estimates:
+        return begin
+    stress = fit.reference.stress
+    with_errors, without = (
+        float(one.rate(stress, warn=False)[2] / one.rate(stress, warn=False)[0]) for one in (fit, fit.by_tests_alone)
+    )
+    return (
+        f"{begin}: the rate amid the tests is known to a factor of {with_errors:.3g}, and if all of these were exact "
+        f'(usual_errors="none") to {without:.3g}'
+    )
+
+
+def _weights(settings: IdentificationSettings) -> str:
+    if settings.weights == "likelihood":
+        return (
+            'the intervals rest on the likelihood (weights "likelihood"): readings count by their estimated noise, so '
+            "that the shape of every curve counts beside the comparison of tests; readings of equal weight "
+            '(weights "noise") give other values and, as a rule, wider intervals'
+        )
+    if settings.weights == "noise":
+        return (
+            'the intervals rest on readings of equal weight (weights "noise") and all the scatter that was estimated, '
+            'with what the law cannot follow; the likelihood (weights "likelihood", the default) gives other values '
+            "and, as a rule, narrower intervals"
+        )
+    weights = settings.weights if isinstance(settings.weights, str) else f"{dict(settings.weights)}"
+    return (
+        f"the intervals rest on weights of the outputs ({weights}), whose relative squared errors are summed, and the "
+        "scatter that was estimated"
+    )
+
+
+# ---- tests -----------------------------------------------------------------------------------------------------------
+
+
+def blocks_of_tests(fit: Identification, figures: PageFigures | None, *, of: str = "", most: int = 0) -> list[Block]:
+    """Tables of the tests and, with `figures`, small multiples of those of largest misfit, at most so many.
+
+    of : the material, " of CMSX-4".
+    """
+    blocks = [*_single_value_blocks(fit), _table_of_tests(fit)]
+    blocks += [Paragraph(text, "note") for text in (*_sums(fit), *_without_misfit(fit))]
+    worst = worst_tests(fit)[:most]
+    if figures is not None and fit.histories and fit.predictor is not None and worst:
+        which = "" if len(worst) == len(fit.tests) else f"; the {len(worst)} of {len(fit.tests)} of largest misfit"
+        title = f"Tests one by one{of}"
+        caption = f"{title}: measured, by the law, and {residual_caption(fit)}{which}."
+        description = f"Curves and residuals of {plural(len(worst), 'test')}; the table of tests holds the numbers."
+        blocks.append(figures.picture(lambda: small_multiples(fit, sorted(worst)), title, description, caption))
+    return blocks
+
+
+def worst_tests(fit: Identification) -> list[int]:
+    """Positions of tests with frames, the largest misfit first."""
+    readings = judged_readings(fit)
+    misfits = [misfit_of(test) if readings is None else readings.chi_square(k) for k, test in enumerate(fit.tests)]
+    return sorted((k for k, t in enumerate(fit.tests) if t.outputs), key=lambda k: -np.nan_to_num(misfits[k]))
+
+
+def _table_of_tests(fit: Identification) -> Table:
+    rows = []
+    compared, readings, ruptures = compared_values(fit), judged_readings(fit), bool(rupture_rows(fit))
+    for k, test in enumerate(fit.tests):
+        first = test.outputs[0] if test.outputs else None
+        unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
+        rows.append(
+            (
+                test.name,
+                test.condition,
+                "not known" if compared is None else str(compared.by_test.get(test.name, 0)),
+                "–" if readings is None else number(readings.chi_square(k), 3),
+                "–" if readings is None else number(readings.misfit_of_common_rate(k), 3),
+                "–" if first is None else number(first.errors.relative_squared_error, 2),
+                "–" if first is None else f"{number(first.offset, 2)}{unit}",
+                number(test.rate_factor, 3),
+                number(test.weight, 2),
+                *((_end_cells(test.rupture if test.rupture and test.rupture.used else None)[:2]) if ruptures else ()),
+            )
+        )
+    columns = [
+        *("test", "condition", "values", "χ², own rate", "misfit, law's rate", "squared error", "offset"),
+        *("rate × law", "weight", *(("lasted, h", "by the law, h") if ruptures else ())),
+    ]
+    caption = (
+        f"{OWN_RATE_CHI_SQUARE}. Beside it the {LAW_RATE_MEANING}. Relative squared error and offset of the first "
+        "output with the law's rate; a dash: no value is predicted at some readings, as after a rupture. Weight in the "
+        "fit: 1 as any other, less for one far from the others"
+    )
+    if ruptures:
+        caption += f". Lives: > marks tests that were stopped; 95 % intervals of a single test{_if_the_law_holds(fit)}"
+    return Table(caption, columns, rows, numeric=tuple(range(2, len(columns))))
+
+
+def _sums(fit: Identification) -> list[str]:
+    """Over all tests: the misfit of logarithmic strains, minimum rates and rupture times, predicted over measured."""
+    lines, name = [], logarithmic_output(fit)
+    if name:
+        tests = [m for m in fit.tests if m.outputs and m.outputs[0].output == name]
+        label = "rms distance in ln strain and ln time" if rupture_rows(fit) else "rms of ln strain"
+        lines.append(f"{plural(len(tests), 'test')}, {sum(m.frames for m in tests)} readings: {label} {fit.rms:.3g}")
+    rates = [m.minimum_rate for m in fit.tests if m.minimum_rate is not None]
+    if rates:
+        lines.append(f"minimum rates of {plural(len(rates), 'test')} without frames: {_spread(fit, rates)}")
+    ruptures = rupture_rows(fit)
+    broken, censored = [r for r in ruptures if not r.censored], [r for r in ruptures if r.censored]
+    if ruptures:
+        line = f"rupture: {len(broken)} of {plural(len(fit.tests), 'test')} broke"
+        line += f"; time {_spread(fit, broken)}" if broken else ""
+        unexpected = sum(r.predicted < r.measured for r in censored)
+        stopped = f"; {len(censored)} stopped before, of which {unexpected or 'none'} should have broken"
+        lines.append(line + (stopped if censored else ""))
+    unused = [m.rupture for m in fit.tests if m.rupture is not None and not m.rupture.used]
+    ratios = [end.ratio for end in unused if not end.censored and math.isfinite(end.ratio)]
+    if unused:
+        found = f": time predicted over measured {_ratios(ratios)}" if ratios else ""
+        lines.append(f"ends of {plural(len(unused), 'test')} were not used{found}")
+    return lines
+
+
+def _spread(fit: Identification, values: Sequence[SingleValue]) -> str:
+    """Predicted over measured, and how many lie within their intervals."""
+    known = [one.ratio for one in values if math.isfinite(one.ratio)]
+    inside = sum(one.low <= one.measured <= one.high for one in values)
+    return (
+        f"predicted over measured {_ratios(known) if known else 'not predicted'}; {inside} within the 95 % interval of "
+        f"a single test{_if_the_law_holds(fit)}"
+    )
+
+
+def _ratios(ratios: Sequence[float]) -> str:
+    return f"{min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}"
+
+
+def _if_the_law_holds(fit: Identification) -> str:
+    """The condition of intervals of single tests."""
+    contradicted = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
+    return ", which they do not have: the tests contradict the law" if contradicted else ", if the law holds"
+
+
+def _without_misfit(fit: Identification) -> list[str]:
+    """Why chi-square of tests is a dash in their table, a sentence for each reason."""
+    readings = judged_readings(fit)
+    if readings is None:
+        if not fit.histories or fit.predictor is None:
+            return ["χ² is not known: the tests were not given with this identification"]
+        return ["χ² is not known: nor is the noise of a reading, well enough to judge by"]
+    others = [t.name for k, t in enumerate(fit.tests) if t.outputs and not readings.mask(k).any()]
+    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
+    named = f"{', '.join(others[:MOST_NAMED])}{more}"
+    return [f"χ² is a dash where the noise of a reading is not known: {named}"] if others else []
+
+
+def logarithmic_output(fit: Identification) -> str:
+    """The output of a fit that is compared by its logarithm, such as the strain of bars; "" where there is none."""
+    return next((name for name in fit.noise_model.outputs if is_logarithmic(name)), "")
+
+
+# ---- tests without curves --------------------------------------------------------------------------------------------
+
+
+def _single_value_blocks(fit: Identification) -> list[Block]:
+    """A table of the tests without curves, and a warning first where their values contradict one another by the law."""
+    tests = [test for test in fit.tests if not test.outputs and (test.minimum_rate or test.rupture)]
+    if not tests:
+        return []
+    contradicting = None if fit.adequacy is None else fit.adequacy.contradicting
+    farthest = sorted(tests, key=_distance, reverse=True)[:MOST_LISTED]
+    listed = [test for test in tests if any(test is one for one in farthest)]
+    rates, ends = any(t.minimum_rate for t in listed), any(t.rupture for t in listed)
+    rows = [
+        (
+            *(test.name, test.condition),
+            *(_rate_cells(test.minimum_rate) if rates else ()),
+            *(_end_cells(test.rupture) if ends else ()),
+        )
+        for test in listed
+    ]
+    columns = ["test", "condition"]
+    columns += ["minimum rate, 1/s", "by the law", "law / measured"] if rates else []
+    columns += ["lasted, h", "by the law, h", "law / measured"] if ends else []
+    caption = "tests without curves, measured and predicted by the law alone; > marks tests that were stopped before"
+    if any(t.rupture and not t.rupture.used for t in listed):
+        caption += "; the law was identified without their ends"
+    if len(listed) < len(tests):
+        caption += f"; the {len(listed)} of {len(tests)} that lie farthest from the law"
+    table = Table(caption, columns, rows, numeric=tuple(range(2, len(columns))))
+    return [*([] if contradicting is None else [Paragraph(str(contradicting), "warning")]), table]
+
+
+def _rate_cells(rate: SingleValue | None) -> tuple[str, str, str]:
+    if rate is None:
+        return ("", "", "")
+    predicted = f"{number(rate.predicted, 3)} [{number(rate.low, 3)}, {number(rate.high, 3)}]"
+    return number(rate.measured, 3), predicted if math.isfinite(rate.predicted) else "none", _ratio(rate.ratio)
+
+
+def _end_cells(end: SingleValue | None) -> tuple[str, str, str]:
+    if end is None:
+        return ("", "", "")
+    lasted = f"{'> ' if end.censored else ''}{number(end.measured / SECONDS_PER_HOUR)}"
+    low, predicted, high = (number(v / SECONDS_PER_HOUR) for v in (end.low, end.predicted, end.high))
+    by_law = f"{predicted} [{low}, {high}]" if math.isfinite(end.predicted) else "never"
+    return lasted, by_law, "" if end.censored else _ratio(end.ratio)
+
+
+def _ratio(ratio: float) -> str:
+    return number(ratio, 3) if math.isfinite(ratio) else "–"
+
+
+def _distance(test: TestFit) -> float:
+    """The largest |ln| of predicted over measured of a test."""
+    values = [test.minimum_rate] if test.minimum_rate else []
+    values += [test.rupture] if test.rupture and test.rupture.used and not test.rupture.censored else []
+    ratios = [one.ratio for one in values]
+    return max((abs(math.log(r)) if math.isfinite(r) and r > 0 else math.inf for r in ratios), default=0.0)
+
+
+# ---- noise and nuisance parameters -----------------------------------------------------------------------------------
+
+
+def noise_blocks(fit: Identification) -> list[Block]:
+    """Noise, scatter and misfits as they were estimated, explicit nuisance parameters, and correlations."""
+    rows = []
+    for name, one in fit.noise_model.outputs.items():
+        error = fit.errors.get(name) if name != RUPTURE_OUTPUT and not is_logarithmic(name) else None
+        rms = "–" if error is None else f"{error.mean_squared_error**0.5:.3g} ({100 * error.relative_rms_error:.2g} %)"
+        squared = "–" if error is None else number(error.relative_squared_error, 3)
+        sizes = (_judged_noise(fit, name), number(one.noise, 2), number(one.offset, 2))
+        rows.append((name.replace("_", " "), output_unit(name) or "1", *sizes, rms, squared))
+    blocks: list[Block] = [Paragraph(rate_scatter_sentence(fit))]
+    if name := logarithmic_output(fit):
+        part = fit.noise_model[name]
+        share = math.hypot(RELATIVE_DISCREPANCY_UNIT * fit.noise_model.discrepancy, part.drift, part.misfit)
+        blocks.append(Paragraph(f"what the law cannot follow of a curve is {100 * share:.1f} % of strain"))
+    if rows:
+        columns = ("output", "unit", "of a reading", "in the fit", "offset of a test", "rms misfit", "squared error")
+        caption = (
+            "noise as it was estimated, one standard deviation: of a reading from what its test states or its "
+            "neighbouring readings show, by which the law is judged; one for all in the weights of the fit; and what "
+            "the law leaves of all readings, with the relative squared error"
+        )
+        blocks.append(Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6)))
+    nuisances = [
+        (
+            n.key,
+            n.owner or "all",
+            f"{number(n.value)} +- {number(n.sd, 2)}",
+            f"{number(n.prior_mean)} +- {number(n.prior_sd, 2)}",
+            _nuisance_unit(n, fit),
+            number((n.value - n.prior_mean) / n.prior_sd, 2) if n.prior_sd > 0 else "–",
+        )
+        for n in fit.nuisances
+    ]
+    if nuisances:
+        heads = ("nuisance parameter", "of", "estimate", "prior", "unit", "deviation over sd of the prior")
+        blocks.append(Table("nuisance parameters estimated beside the law", heads, nuisances, numeric=(2, 3, 5)))
+    for nuisance in fit.settings.nuisances:
+        known = (
+            n.prior_sd for n in fit.nuisances if n.key == nuisance.key and n.owner in (nuisance.tests or [n.owner])
+        )
+        if nuisance.sd is None and (sd := next(known, None)) is not None:
+            unit = nuisance_unit(kind_and_start(nuisance.key)[0])
+            blocks.append(Paragraph(f"{nuisance.key}: spread estimated as {sd:.3g} {unit}".rstrip()))
+    return [*blocks, *_correlations(fit)]
+
+
+def scatter_of_rates(fit: Identification) -> str:
+    """One standard deviation of ln rate between tests, in per cent; whether an estimate of it found none."""
+    rate = fit.noise_model.rate
+    return "none detected" if 0.0 < rate <= UNDETECTED_SCATTER else f"{100 * rate:.2g} %"
+
+
+def rate_estimated(fit: Identification) -> bool:
+    """Whether the scatter of rates between tests was estimated from them."""
+    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
+    return bool(rates) and rates[0].sd is None and len(fit.tests) >= MINIMUM_TESTS
+
+
+def rate_scatter_sentence(fit: Identification) -> str:
+    """How much the creep rates of single tests scatter, and whether that was estimated, given, assumed or left out."""
+    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
+    if not rates:
+        return "No scatter of creep rates between tests was allowed: every test follows the law's own rate."
+    return scatter_text(fit, f"{number(100 * fit.noise_model.rate, 3)} %", plural(len(fit.tests), "test"))
+
+
+def scatter_text(fit: Identification, percent: str, tests: str) -> str:
+    """The sentence where scatter was allowed; percent : how much. tests : how many there are, where they show none."""
+    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
+    size = f"{percent} about the law (one standard deviation of their logarithm)"
+    if rates[0].sd is not None:
+        return f"The creep rates of single tests have a Gaussian prior: they scatter by {size}, as was given."
+    if rate_estimated(fit):
+        if fit.noise_model.rate <= UNDETECTED_SCATTER:
+            return "No scatter of the creep rates of single tests about the law was detected."
+        return f"The creep rates of single tests scatter by {size}, as was estimated."
+    cannot = f"{tests} cannot show it"
+    return f"How the creep rates of single tests scatter is not known, for {cannot}: the intervals hold for these."
+
+
+def _judged_noise(fit: Identification, output: str) -> str:
+    """The noise of a reading by which the law is judged; its ends where readings differ."""
+    readings = judged_readings(fit)
+    ends = None if readings is None else readings.noise(output=output)
+    if ends is None:
+        return "–"
+    low, high = (number(end, 2) for end in ends)
+    return low if low == high else f"{low} to {high}"
+
+
+def _nuisance_unit(nuisance: NuisanceEstimate, fit: Identification) -> str:
+    """In words of the table: 1 of pure numbers; of an offset that of the outputs where these have one in common."""
+    units = {output_unit(name) or "1" for name in fit.noise_model.outputs}
+    return nuisance_unit(nuisance.kind) or (units.pop() if nuisance.kind == "offset" and len(units) == 1 else "1")
+
+
+def _correlations(fit: Identification) -> list[Block]:
+    """Correlations of the estimated parameters, given the law; that strongly correlated values go together."""
+    correlation = fit.correlation()
+    names, matrix = correlation.names, correlation.matrix
+    if len(names) < 2:
+        return []
+    if len(names) > MOST_CORRELATED:
+        return [Paragraph(f"the correlations of {len(names)} parameters are in the file of the identification")]
+    rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, matrix, strict=True)]
+    caption = f"correlations of the estimates of {fit.law.name}; ln where the logarithm is estimated"
+    table = Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))
+    size = np.abs(np.triu(matrix, 1))
+    if not size.max() > STRONG_CORRELATION:
+        return [table]
+    k, j = np.unravel_index(int(size.argmax()), size.shape)
+    together = (
+        f"{names[k]} and {names[j]} have a correlation of {number(float(matrix[k, j]), 4)}: their values hold together "
+        "only. Rounding one of them, or taking it from elsewhere, changes the creep rate by far more than its "
+        "interval; carry all digits, and take uncertainties of rates from the covariance, which is among the files"
+    )
+    return [table, Paragraph(together, "warning")]
+
+
+# ---- comments of exports ---------------------------------------------------------------------------------------------
+
+
+def identification_comments(fit: Identification, ranking: Ranking | None = None) -> list[str]:
+    """What an exported law says of itself, a line each: how well it describes its tests, intervals, range, cautions.
+
+    ranking : the comparison of laws that it is the best of, where there was one. All else is in the identification.
+    """
+    origin = f"identified with creepkit {fit.provenance.get('creepkit', '')} from {plural(len(fit.tests), 'test')}"
+    chosen = f"; {chosen_text(ranking)}" if ranking is not None and len(ranking.laws) > 1 else ""
+    intervals = [f"{e.name} {' to '.join(interval_ends(fit.law, e))}" for e in fit.estimates]
+    held = " (if the law held, which the tests reject)" if rejected(fit) else ""
+    lines = [fit.headline, f"{origin}{chosen}", f"95 % intervals{held}: {', '.join(intervals)}"]
+    lines += [*_range_lines(fit), *cautions(fit, ranking)[:MOST_CAUTIONS]]
+    return [line.replace("°C", "C") for line in lines]  # sources in Fortran hold ASCII alone
+
+
+def _range_lines(fit: Identification) -> list[str]:
+    """The range of the tests, and at which temperatures not all of its stresses were tested."""
+    units = {"stress": " MPa", "time": " s"}
+    covered = {name: f"{low:.4g} to {high:.4g}{units.get(name, '')}" for name, (low, high) in fit.ranges.items()}
+    if "temperature" in covered:
+        covered["temperature"] = celsius_text(*fit.ranges["temperature"])
+    lines = [f"range of the tests: {', '.join(f'{name} {text}' for name, text in covered.items())}"]
+    at_temperatures = stresses_at_temperatures(fit)
+    low, high = fit.ranges["stress"]
+    tolerance = 1.0 + SAME_STRESS
+    if any(s[0] > low * tolerance or s[1] * tolerance < high for _, s in at_temperatures):
+        named = "; ".join(
+            f"{celsius_text(T, digits=0)} {s[0]:.4g}{f' to {s[1]:.4g}' if s[1] > s[0] * tolerance else ''} MPa"
+            for T, s in at_temperatures[:MOST_NAMED]
+        )
+        more = len(at_temperatures) - MOST_NAMED
+        others = f"; and {more} more temperatures" if more > 0 else ""
+        lines.append(f"not every combination of stress and temperature in this range was tested: at {named}{others}")
+    return lines

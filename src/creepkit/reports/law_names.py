@@ -1,0 +1,180 @@
+"""Laws by their titles in sentences, and their equations for a paper, set and as text to copy."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import sympy
+
+from creepkit.exporters.latex import equations_in_latex
+from creepkit.exporters.law_description import comment_lines
+from creepkit.exporters.mathml import expression_mathml
+from creepkit.language import CreepLaw, mean_stress, principal_stress, strain, stress, temperature, time
+from creepkit.language.printing import expression_text, state_equations
+from creepkit.language.symbols import GAS_CONSTANT
+from creepkit.reports.answer import equations
+from creepkit.reports.blocks import Block, Formula, Paragraph, Rich, Table, Verbatim, number, printable, printable_lines
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+    from creepkit.language import CreepLaw
+
+
+LONGEST_TITLE = 160
+"""Characters of a title within a sentence."""
+
+
+COMMON_WORD = re.compile(
+    r"(a|combined|creep|double|exponential|generali[sz]ed|hyperbolic|linear|logarithmic|modified|power|primary|secondary"
+    r"|steady|strain|sum|tertiary|the|threshold|time)\b",
+    re.IGNORECASE,
+)
+"""At the beginning of a title, small within a sentence; other words may be names of people."""
+
+
+SENTENCE_WORD = re.compile(
+    r"a|above|alone|and|another|asked|at|be|best|but|by|carries|contradicted|decisive|does|each|effect|explains?|first|for|from|has|in|its?"
+    r"|laws?|least|more|most|nearly|noise|none|not|of|only|or|rates?|second|share|stress|sum|tests?|that|the|them|these"
+    r"|threshold|time|to|tried|was|weight|were|whether|which|with|would"
+)
+"""Words of findings, which stay words where a law is called by one of them."""
+
+
+def title_in_sentence(law: CreepLaw) -> str:
+    """The title of a law within a sentence: without abbreviations in brackets, and what follows a colon.
+
+    The name of a law that has no title.
+    """
+    parts = re.sub(r"\s*\([A-Z]{2,4}\)", "", printable(law.title, LONGEST_TITLE)).split(" + ")
+    parts = [part.partition(": ")[0] for part in parts]
+    return " + ".join(map(_small, parts)) if law.title else printable(law.name, LONGEST_TITLE)
+
+
+def _small(title: str) -> str:
+    return f"{title[:1].lower()}{title[1:]}" if COMMON_WORD.match(title) else title
+
+
+DEPENDENCE = re.compile(r" with [\w -]+ temperature dependence$")
+"""At the end of a title of a law with temperature."""
+
+
+def _without_shared_dependence(titles: Mapping[str, str]) -> dict[str, str]:
+    """{name: title}, short where every title ends with the same dependence on temperature, which tells none apart."""
+    endings = {match[0] if (match := DEPENDENCE.search(title)) else "" for title in titles.values()}
+    if len(endings) != 1 or len(titles) < 2:
+        return dict(titles)
+    (ending,) = endings
+    return {name: title.removesuffix(ending) for name, title in titles.items()}
+
+
+class LawNames:
+    """Names of laws in a text, replaced by titles."""
+
+    def __init__(self, laws: Iterable[CreepLaw]) -> None:
+        titles = _without_shared_dependence({law.name: title_in_sentence(law) for law in laws})
+        shared = Counter(titles.values())
+        self.titles = {
+            name: title if shared[title] == 1 else f"{title} ({name})"  # which of them is meant, its name says
+            for name, title in titles.items()
+            if not SENTENCE_WORD.fullmatch(name) and title != name
+        }
+        longest_first = sorted(self.titles, key=len, reverse=True)
+        self._pattern = re.compile(rf"(?<![\w*+-])(?:{'|'.join(map(re.escape, longest_first))})(?![\w*+(-])")
+
+    @classmethod
+    def of(cls, fits: Iterable[Identification]) -> LawNames:
+        """Those of all laws that were fitted."""
+        return cls({fit.law.name: fit.law for fit in fits}.values())
+
+    def in_text(self, text: str) -> str:
+        """The text with titles in place of names; longer words that begin or end with a name stay as they are."""
+        return self._pattern.sub(lambda name: self.titles[name[0]], text) if self.titles else text
+
+
+# ---- equations -------------------------------------------------------------------------------------------------------
+
+
+VARIABLES = (
+    (stress, "von Mises stress, as its ratio to 1 MPa", "MPa"),
+    (strain, "equivalent creep strain; its dotted form is the creep rate, 1/s", ""),
+    (time, "time since the first loading, as its ratio to 1 s", "s"),
+    (temperature, "temperature", "K"),
+    (principal_stress, "largest principal stress", "MPa"),
+    (mean_stress, "mean stress", "MPa"),
+)
+"""(symbol, meaning, unit) of what laws depend on."""
+
+
+MOST_EQUATIONS = 20
+"""Laws whose equations are set."""
+
+
+def definition_blocks(laws: Iterable[CreepLaw]) -> list[Block]:
+    """Equations, symbols and texts to copy of laws, numbered in their order."""
+    shown = [*laws][:MOST_EQUATIONS]
+    if not shown:
+        return []
+    blocks: list[Block] = [Paragraph("The equations of the laws in it:")]
+    for k, law in enumerate(shown, start=1):
+        blocks.append(Paragraph(f"Eq. ({k}): {title_in_sentence(law)}"))
+        blocks += map(Formula, equations(law))
+        blocks.append(_symbols(k, law))
+    if any("=" in law.title for law in shown):
+        blocks.append(Paragraph("A title that ends with a parameter and a value says that it was fixed there.", "note"))
+    blocks.append(_variables(shown))
+    latex = [
+        line
+        for k, law in enumerate(shown, start=1)
+        for line in (*comment_lines([f"Eq. ({k}): {title_in_sentence(law)}"], "%"), *equations_in_latex(law))
+    ]
+    plain = [f"Eq. ({k}): {text}" for k, law in enumerate(shown, start=1) for text in _plain(law)]
+    return [
+        *blocks,
+        Verbatim("The same equations in LaTeX", printable_lines("\n".join(latex))),
+        Verbatim("The same equations as plain text", printable_lines("\n".join(plain))),
+    ]
+
+
+def _symbols(k: int, law: CreepLaw) -> Table:
+    """The parameters and internal variables of a law."""
+    rows = [
+        (
+            _symbol(symbol),
+            law.table[str(symbol)].meaning,
+            "1" if param.unit == "1" else param.unit,
+            f"{number(param.bounds[0], 3)} to {number(param.bounds[1], 3)}",
+        )
+        for symbol, param in law.params.items()
+    ]
+    for symbol, state in law.states.items():
+        end = "" if state.limit is None else f"; the material ruptures where it reaches {state.limit:.10g}"
+        meaning = f"internal variable, {state.initial:g} before loading{end}"
+        rows.append((_symbol(symbol), meaning, "1", "–"))
+    columns = ("symbol", "meaning", "unit", "bounds of the search")
+    return Table(f"Symbols of Eq. ({k})", columns, rows)
+
+
+def _symbol(symbol: sympy.Symbol) -> Rich:
+    return Rich(str(symbol), expression_mathml(symbol))
+
+
+def _variables(laws: Sequence[CreepLaw]) -> Table:
+    """What the laws depend on, with the gas constant where temperature is among it."""
+    used = [one for one in VARIABLES if one[0] is strain or any(law.uses(one[0]) for law in laws)]
+    rows = [(_symbol(symbol), meaning, unit or "1") for symbol, meaning, unit in used]
+    if any(law.uses(temperature) for law in laws):
+        gas = _symbol(sympy.Symbol("R"))
+        rows.append((gas, f"gas constant, {GAS_CONSTANT:g}", "J/(mol K)"))
+    return Table("Symbols that these equations share", ("symbol", "meaning", "unit"), rows)
+
+
+def _plain(law: CreepLaw) -> list[str]:
+    """The equations of a law on lines of their own, in letters."""
+    rate = " + ".join(expression_text(term) for term in law.terms.values())
+    lines = [f"ε̇ = {rate}", *state_equations(law)]
+    for word, letter in (("stress", "σ"), ("strain", "ε"), ("time", "t"), ("temperature", "T")):
+        lines = [line.replace(word, letter) for line in lines]
+    return [printable(line.replace("**", "^"), 400) for line in lines]
