@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import takewhile
 from pathlib import Path
 
 from creepkit.errors import CreepkitError, HistoryError, printable
+from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.files.writing import write_text
+from creepkit.readers.assembly import questions_of_assumed
 from creepkit.readers.ends_of_tests import LABEL
 from creepkit.readers.frames import UNUSED
 from creepkit.readers.questions import ANSWERS_FILE, Question, single_errors, toml_value
 from creepkit.readers.tests_file import read_answers, with_answer
+from creepkit.records import History
 from creepkit.reports.terminal import tell
 
 LEAVE_OPEN = "?"
 """What is typed to leave a question open."""
 
 
-def put_questions(read: Callable[[], object], answer: Callable[[str], str] | None) -> list[Path]:
+def put_questions(read: Callable[[], Iterable[History]], answer: Callable[[str], str] | None) -> list[Path]:
     """Put the questions that reading raises until none is left, and return the files of answers that were written.
 
     read : reads the files, and raises what is open. answer : what was typed at a prompt; None without a terminal, where
@@ -39,18 +42,19 @@ def put_questions(read: Callable[[], object], answer: Callable[[str], str] | Non
     return list(written)
 
 
-def _open_questions(read: Callable[[], object]) -> dict[tuple[object, ...], list[Question]]:
-    """The questions that reading raises, those of a folder that say the same of several files together.
+def _open_questions(read: Callable[[], Iterable[History]]) -> dict[tuple[object, ...], list[Question]]:
+    """The questions that reading raises, or else of what it assumes, those of a folder that say the same together.
 
-    {} where it raises none, whatever else is wrong.
+    {} where there are none, whatever else is wrong.
     """
     groups: dict[tuple[object, ...], list[Question]] = {}
     try:
-        read()
+        found: Sequence[Exception] = [one for history in read() for one in questions_of_assumed(history)]
     except CreepkitError as error:
-        for one in single_errors(error):
-            if isinstance(one, Question):
-                groups.setdefault((one.path.parent, one.key, one.sentence, repr(one.choices)), []).append(one)
+        found = single_errors(error)
+    for one in found:
+        if isinstance(one, Question):
+            groups.setdefault((one.path.parent, one.key, one.sentence, repr(one.choices)), []).append(one)
     return groups
 
 
@@ -101,10 +105,8 @@ def _in_words(choice: str | float | dict[str, str]) -> str:
 
 
 def _number_or_text(typed: str) -> str | float:
-    try:
-        return float(typed.replace(",", "."))
-    except ValueError:
-        return typed
+    plain = typed.replace(",", ".")
+    return float(plain) if is_number(plain, Dialect()) else typed
 
 
 def _write(questions: Sequence[Question], value: str) -> Path:

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from creepkit.errors import CreepkitError
     from creepkit.records import History, InstrumentRecord
 
-DATA_SET_SUFFIXES = (".h5", ".hdf5")
-"""Endings of data sets of simulated tests."""
-
 
 def command(
     files: Annotated[
@@ -59,7 +56,7 @@ def command(
     from creepkit.reports import histories as report
     from creepkit.reports.data_quality import data_quality_to_json
 
-    if len(files) == 1 and files[0].suffix.lower() in DATA_SET_SUFFIXES and reader is None:
+    if len(files) == 1 and files[0].suffix.lower() in (".h5", ".hdf5") and reader is None:
         _describe_data_set(files[0], to, as_json)
         return
     records = _records(files, reader)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2, f
@@ -74,34 +75,17 @@ class KnownNoise:
         """The probability of a larger reduced chi-square by chance.
 
         mask : (tests, observations) the observations that it is of. share_of_freedom : degrees of freedom of each.
-        Each test has noise of its own. One test has the distribution of F; the sum over several is taken as the scaled
-        chi-square of the same mean and variance (Satterthwaite).
         """
-        groups = self._groups(share_of_freedom, mask)
-        total = sum(freedom for freedom, _ in groups)
-        if len(groups) == 1:
-            return chance_of_larger(reduced, total, groups[0][1])
-        mean, variance = self._moments(share_of_freedom, mask)
-        return float(chi2.sf(reduced * total * 2.0 * mean / variance, 2.0 * mean**2 / variance))
+        distribution, scale = self._distribution(share_of_freedom, mask)
+        return float(distribution.sf(reduced / scale))
 
     def critical(self, chance: float, share_of_freedom: float, mask: Bools) -> float:
         """The reduced chi-square that is exceeded with a probability `chance`: the inverse of chance_of_larger.
 
         mask : (tests, observations) which count.
         """
-        groups = self._groups(share_of_freedom, mask)
-        total = sum(freedom for freedom, _ in groups)
-        if len(groups) == 1:
-            nu = groups[0][1]
-            return float(chi2.isf(chance, total) / total if np.isinf(nu) else f.isf(chance, total, nu))
-        mean, variance = self._moments(share_of_freedom, mask)
-        return float(chi2.isf(chance, 2.0 * mean**2 / variance) * variance / (2.0 * mean * total))
-
-    def _moments(self, share_of_freedom: float, mask: Bools) -> tuple[float, float]:
-        """Mean and variance of chi-square, the sum over groups."""
-        groups = self._groups(share_of_freedom, mask)
-        mean = sum(freedom for freedom, _ in groups) * self.expected(share_of_freedom, mask)
-        return mean, sum(freedom**2 * _variance_of_f(freedom, nu) for freedom, nu in groups)
+        distribution, scale = self._distribution(share_of_freedom, mask)
+        return float(distribution.isf(chance) * scale)
 
     def expected(self, share_of_freedom: float, mask: Bools) -> float:
         """The mean reduced chi-square of a law that is right: one where noise is stated, that of F where estimated.
@@ -111,6 +95,20 @@ class KnownNoise:
         groups = self._groups(share_of_freedom, mask)
         means = sum(freedom * (1.0 if np.isinf(nu) else nu / (nu - 2.0)) for freedom, nu in groups)
         return means / max(sum(freedom for freedom, _ in groups), 1e-300)
+
+    def _distribution(self, share_of_freedom: float, mask: Bools) -> tuple[Any, float]:
+        """A distribution of scipy, and what the reduced chi-square of a right law is over a draw of it.
+
+        Each test has noise of its own. One test has the distribution of F; the sum over several is taken as the scaled
+        chi-square of the same mean and variance (Satterthwaite). mask : (tests, observations) which count.
+        """
+        groups = self._groups(share_of_freedom, mask)
+        total = sum(freedom for freedom, _ in groups)
+        if len(groups) == 1:
+            return _distribution_of_reduced(total, groups[0][1])
+        mean = total * self.expected(share_of_freedom, mask)
+        variance = sum(freedom**2 * _variance_of_f(freedom, nu) for freedom, nu in groups)
+        return chi2(2.0 * mean**2 / variance), variance / (2.0 * mean * total)
 
     def _groups(self, share_of_freedom: float, mask: Bools) -> list[tuple[float, float]]:
         """(degrees of freedom of chi-square, of its noise) of observations whose noise is one estimate."""
@@ -158,9 +156,13 @@ def chance_of_larger(reduced: float, freedom: float, noise_freedom: float) -> fl
     """Probability of a larger reduced chi-square by chance, the noise known to `noise_freedom` degrees of freedom."""
     if not (np.isfinite(reduced) and freedom > 0):
         return float("nan")
-    if np.isinf(noise_freedom):
-        return float(chi2.sf(reduced * freedom, freedom))
-    return float(f.sf(reduced, freedom, max(noise_freedom, 1.0)))
+    distribution, scale = _distribution_of_reduced(freedom, max(noise_freedom, 1.0))
+    return float(distribution.sf(reduced / scale))
+
+
+def _distribution_of_reduced(freedom: float, noise_freedom: float) -> tuple[Any, float]:
+    """A distribution of scipy, and a scale of it: chi-square over its degrees of freedom, or F."""
+    return (chi2(freedom), 1.0 / freedom) if np.isinf(noise_freedom) else (f(freedom, noise_freedom), 1.0)
 
 
 def how_to_state_noise(outputs: Sequence[str], few_frames: Sequence[tuple[str, int]] = ()) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +35,7 @@ from creepkit.readers.ends_of_tests import (
 )
 from creepkit.readers.frames import UNUSED, TableFrames, column_means, column_question, read_frames
 from creepkit.readers.imposed import read_loading, read_temperature
-from creepkit.readers.questions import Question
+from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
@@ -82,7 +83,12 @@ def assemble_history(
         what = f"{count} reading{'s' * (count > 1)} left out that another one at the same time follows"
         conditions.record_assumption(f"{what} with other conditions")
     columns = table.location(table.columns_line)
-    loading = read_loading(conditions, frames)
+    errors = list[HistoryError]()
+    loading = collected(errors, partial(read_loading, conditions, frames))
+    temperature = collected(errors, partial(read_temperature, conditions, frames))
+    raise_all(errors)
+    assert loading is not None
+    assert temperature is not None
     is_named = conditions.states("specimen")
     specimen, outputs = _specimen_and_outputs(conditions, frames, loading.quantity, columns)
     if not is_named:
@@ -90,7 +96,6 @@ def assemble_history(
     strain_measure = conditions.take_choice(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
-    temperature = read_temperature(conditions, frames)
     used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
     if "strain" in outputs:
         record = without_loading(
@@ -100,6 +105,7 @@ def assemble_history(
     else:
         elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
     outputs = without_steps(conditions, frames.times, outputs, used)
+    merged = {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
     rupture_time, unruptured = _end_of_test(conditions, frames, used, name)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
     history = History(
@@ -118,7 +124,7 @@ def assemble_history(
         **_stated_fields(conditions, name, elastic),
         noise_correlation=read_noise_correlation(conditions, outputs),
         # Last: entries that nothing has used by now are refused.
-        labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
+        labels={**conditions.all_labels(), **column_means(table, vocabulary), **merged},
     )
     _check_operator(history, columns)
     return history
@@ -265,20 +271,31 @@ def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Ela
     return float(loading.program().values[0]) / float(elastic.at(float(start)).E)
 
 
-def _merge_label(frames: TableFrames) -> dict[str, str]:
-    return {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
+def _lengths_by_default(specimen: str, geometry: Mapping[str, float]) -> dict[str, float]:
+    """{length of a test piece that is not stated: mm}."""
+    pieces = [one for one in dimensions_of(known_specimens().get(specimen)) if one.of_piece]
+    return {one.name: one.default for one in pieces if not {*one.names, one.name} & geometry.keys()}
+
+
+_BY_ITS_COLUMNS = "specimen {} by its columns with lengths by default: "
 
 
 def _record_unstated(conditions: StatedConditions, specimen: str) -> None:
     """Record, before all else that is assumed, a specimen that columns alone tell, and its lengths by default."""
-    lengths = [
-        f"{one.name} {one.default:g}"
-        for one in dimensions_of(known_specimens().get(specimen))
-        if one.of_piece and not {*one.names, one.name} & conditions.geometry.keys()
-    ]
-    if lengths:
-        what = f"specimen {specimen} by its columns with lengths by default: {'; '.join(lengths)} mm"
-        conditions.record_assumption(what, first=True)
+    if lengths := _lengths_by_default(specimen, conditions.geometry):
+        listed = "; ".join(f"{name} {length:g}" for name, length in lengths.items())
+        conditions.record_assumption(f"{_BY_ITS_COLUMNS.format(specimen)}{listed} mm", first=True)
+
+
+def questions_of_assumed(history: History) -> list[Question]:
+    """What may be asked of a test whose specimen and lengths nobody stated; what is assumed is the likely answer."""
+    if not history.labels.get("assumed", "").startswith(_BY_ITS_COLUMNS.format(history.specimen)):
+        return []
+    path, lengths = Path(history.source.partition(" (")[0]), _lengths_by_default(history.specimen, history.geometry)
+    what = f"no specimen is stated, and the columns are those of {history.specimen}; which is it?"
+    asked: list[tuple[str, str, str | float]] = [(what, "specimen", history.specimen)]
+    asked += [(f"{one} is not stated; how many mm is it?", f"{one}_mm", mm) for one, mm in lengths.items()]
+    return [Question(path, str(path), what, key, (likely,), is_free=True) for what, key, likely in asked]
 
 
 def _specimen_and_outputs(

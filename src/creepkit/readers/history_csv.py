@@ -72,7 +72,8 @@ class HistoryCsvReader:
     vocabulary: HeaderVocabulary = field(default_factory=HeaderVocabulary)
 
     def __post_init__(self) -> None:
-        if not all(isinstance(name, str) for name in _listed(self.columns)):
+        is_listed = isinstance(self.columns, Sequence) and not isinstance(self.columns, str)
+        if not is_listed or not all(isinstance(name, str) for name in self.columns):
             raise HistoryError(
                 f"reader '{self.name}': columns is a {type(self.columns).__name__}; give a tuple of names of columns "
                 "as its files write them, such as ('Time (h)', 'Strain (%)'), and vocabulary=HeaderVocabulary(...)"
@@ -119,11 +120,6 @@ def _errors_of_format(grid: CellTable) -> Iterator[None]:
             raise
         where = "names are those of its line X_Value, units those of Y_Unit_Label"
         raise HistoryError(f"{error} (a LabVIEW measurement: {where})") from None
-
-
-def _listed(columns: object) -> Sequence[object]:
-    """The columns of a declaration, [None] of what is no sequence of them."""
-    return columns if isinstance(columns, Sequence) and not isinstance(columns, str) else [None]
 
 
 TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv", ".lvm"), (".txt", ".dat", ".asc")

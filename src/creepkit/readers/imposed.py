@@ -87,12 +87,9 @@ def _loading_advice(terms: Terms, loads: Sequence[str]) -> str:
     """What to write, for each of these loads."""
     forms = []
     for name in (load for load in loads if load in terms.load_kinds):
-        unit = next(iter(terms.load_kinds[name].units))
-        forms.append(
-            f"{name}_{unit}, {name}_steps, or {name}_1_{unit}, {name}_2_{unit} and jump_time_h"
-            if unit
-            else f"{name}_steps"
-        )
+        unit, steps = next(iter(terms.load_kinds[name].units)), f"{name}_steps"
+        levels = f"{name}_1_{unit}, {name}_2_{unit} and jump_time_h"
+        forms.append(f"{name}_{unit}, {steps}, or {levels}" if unit else steps)
     return f"write {'; or '.join(forms)}"
 
 
@@ -162,21 +159,17 @@ def _control(conditions: StatedConditions, *, varies: bool) -> str:
 
 def _step_change(conditions: StatedConditions, quantity: str) -> TwoLevels | None:
     """First value, second value and time of the change, when all three are given."""
-    names = (f"{quantity}_1", f"{quantity}_2", "jump_time")
-    first = conditions.take_number(names[0])
+    first = conditions.take_number(f"{quantity}_1")
     if first is None:
         return None
-    second, time = (_required_number(conditions, name, first) for name in names[1:])
-    return TwoLevels(first.value, second.value, time.value)
-
-
-def _required_number(conditions: StatedConditions, name: str, companion: StatedNumber) -> StatedNumber:
-    result = conditions.take_number(name)
-    if result is None:
-        raise HistoryError(
-            f"{companion.location}: '{companion.key}' needs {name} beside it (with its unit), which is missing"
-        )
-    return result
+    values = [first.value]
+    for name in (f"{quantity}_2", "jump_time"):
+        number = conditions.take_number(name)
+        if number is None:
+            what = f"'{first.key}' needs {name} beside it (with its unit), which is missing"
+            raise HistoryError(f"{first.location}: {what}")
+        values.append(number.value)
+    return TwoLevels(*values)
 
 
 def _stated_loading(

@@ -211,11 +211,6 @@ class HeadOfTest:
             raise HistoryError(f"{place}: '{quoted(written, 60)}' was already given; keep one of them")
         self.entries[key] = SourceText(text, place, self.table.dialect.decimal, written)
 
-    def put_measured(self, measured: Sequence[tuple[str, str]], row: TableRow) -> None:
-        """Add values with units that stand above columns, as quantities and texts."""
-        for quantity, text in measured:
-            self.put(quantity, text, row)
-
     def add_title(self, text: str, row: TableRow) -> None:
         """Keep a title; what it states is a weak source, but for `key: value`."""
         key, colon, value = (part.strip() for part in text.partition(":"))
@@ -243,7 +238,8 @@ class HeadOfTest:
             if "=" in key and conditions_in_text(key, place, known):
                 self.add_title(key, row)
             elif measured := conditions_of_head(key, known):
-                self.put_measured(measured, row)
+                for quantity, text in measured:
+                    self.put(quantity, text, row)
             elif cells:
                 value, *cells = cells
                 if cells and is_number(value, self.table.dialect) and unit_suffix(cells[0]):
@@ -296,7 +292,8 @@ def heads_of_tests(
             if not is_measured:
                 _add_row(result, columns, row, filled, key, key_columns, is_only=len(tests) == 1)
             elif (k := _covering(filled, columns)) is not None:
-                result.put_measured(measured[k], row)
+                for quantity, text in measured[k]:
+                    result.put(quantity, text, row)
                 if k < columns[0] and k not in key_columns:
                     what = f"{filled[k]} in line {row.line} holds for the columns right of it"
                     result.assumptions.append(what)

@@ -278,9 +278,8 @@ class RowEnd:
     is_open: bool = False
 
 
-_SAYS_NO_END = (
-    *("name", "alloy", "control", "specimen", "label heat", "label laboratory", "label group", "label assumed"),
-)
+_OF_ORIGIN = ("heat", "laboratory", "group", "assumed")
+_SAYS_NO_END = ("name", "alloy", "control", "specimen", *(f"label {one}" for one in _OF_ORIGIN))
 
 
 def ends_of_rows(table: TestTable) -> list[RowEnd]:

@@ -56,3 +56,13 @@ def test_without_a_terminal_each_question_is_a_line(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 3
     assert 'tests.toml beside it: ["rates.csv"] ended = {B = "stopped", A = "ruptured"}' in lines[2]
+
+
+def test_a_specimen_and_lengths_that_nobody_stated_are_asked_for(tmp_path):
+    head = "# pressure_MPa: 8\n# temperature_C: 800\ntime_s,amplitude_mm\n"
+    (tmp_path / "d.csv").write_text(f"{head}60,0.08\n300,0.09\n900,0.1\n", encoding="utf-8")
+    answer, left = typing("", "0.48", "", "", "", "", "")
+    put_questions(partial(ck.read_histories, tmp_path), answer)
+    (test,) = ck.read_histories(tmp_path)
+    assert (test.specimen, test.geometry["apex_thickness"], test.geometry["cavity_radius"]) == ("bulge", 0.48, 7.5)
+    assert (left, "by default" in test.labels.get("assumed", "")) == ([], False)

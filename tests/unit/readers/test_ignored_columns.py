@@ -18,11 +18,11 @@ def read(text: str, path: Path, **options: object) -> list[History]:
     return ck.read_histories(path, **options)
 
 
-@pytest.mark.parametrize("key", ["ignore: load, kN; operator; Date", "Ignore: load, kN; OPERATOR; date"])
-def test_by_a_key_of_the_head(key: str, tmp_path: Path):
-    (history,) = read(f"# {key}\n{HEAD}{TABLE}", tmp_path / "x.csv")
-    np.testing.assert_allclose(history.outputs["strain"], [0, 0.00112, 0.002])
-    assert set(history.labels) == {"assumed"}
+def test_by_a_key_of_the_head(tmp_path: Path):
+    for key in ("ignore: load, kN; operator; Date", "Ignore: load, kN; OPERATOR; date"):
+        (history,) = read(f"# {key}\n{HEAD}{TABLE}", tmp_path / "x.csv")
+        np.testing.assert_allclose(history.outputs["strain"], [0, 0.00112, 0.002])
+        assert set(history.labels) == {"assumed"}
 
 
 def test_by_the_call_in_every_file_that_has_them(tmp_path: Path):

@@ -41,24 +41,21 @@ def names(*args: object, **kwargs: object) -> list[str]:
     return [history.name for history in read_histories(*args, **kwargs)]
 
 
-def test_file_folder_and_pattern(tests_in_folders):
-    assert names(tests_in_folders / "one" / "b.csv", READERS) == ["b"]
-    assert names(str(tests_in_folders / "one"), READERS) == ["a", "b"]
-    assert names(f"{tests_in_folders}/one/*.csv", READERS) == ["a", "b"]
-
-
-def test_order_is_the_order_given(tests_in_folders):
+def test_files_folders_and_patterns(tests_in_folders):
+    """In the order given, each once; equal names get their folder in front, and a bad file among good ones is named."""
     one = tests_in_folders / "one"
-    assert names([one / "b.csv", one / "a.csv"], READERS) == ["b", "a"]
-
-
-def test_reached_twice_is_kept_once(tests_in_folders):
-    one = tests_in_folders / "one"
-    assert names([one, one / "a.csv", f"{one}/*"], READERS) == ["a", "b"]
-
-
-def test_equal_names_get_their_folder_in_front(tests_in_folders):
-    assert names(f"{tests_in_folders}/*/*.csv", READERS) == ["one/a", "b", "two/a"]
+    for paths, found in (
+        (one / "b.csv", ["b"]),
+        (str(one), ["a", "b"]),
+        (f"{one}/*.csv", ["a", "b"]),
+        ([one / "b.csv", one / "a.csv"], ["b", "a"]),
+        ([one, one / "a.csv", f"{one}/*"], ["a", "b"]),
+        (f"{tests_in_folders}/*/*.csv", ["one/a", "b", "two/a"]),
+    ):
+        assert names(paths, READERS) == found, paths
+    (one / "c.csv").write_text("")
+    with pytest.raises(HistoryError, match=r"c.csv: the file is empty"):
+        read_histories(one, READERS)
 
 
 def test_indexed_folder_reached_by_a_pattern_over_its_files(tmp_path):
@@ -74,12 +71,6 @@ def test_general_reader_yields_to_another_one(tests_in_folders):
     assert names(tests_in_folders / "two", [*READERS, Always("lab")]) == ["lab a"]
 
 
-def test_bad_file_among_good_ones_is_named(tests_in_folders):
-    (tests_in_folders / "one" / "c.csv").write_text("")
-    with pytest.raises(HistoryError, match=r"c.csv: the file is empty"):
-        read_histories(tests_in_folders / "one", READERS)
-
-
 def planned(name: str, end: float = 1e6, strain: float = 0.4, stress: float = 25.0, temperature: object = 1173.15):
     return History(name, [0, end], {"strain": [0, strain]}, constant_stress(stress), temperature)
 
@@ -89,15 +80,7 @@ def test_test_published_twice_is_found():
     assert duplicate_tests(records) == [("a", "c"), ("a", "d"), ("c", "d")]
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        planned("b", end=1.001e6),
-        planned("b", strain=0.41),
-        planned("b", stress=26.0),
-        planned("b", temperature=1223.15),
-        planned("b", temperature=Program([0, 1], [1173.15, 1174])),
-    ],
-)
-def test_like_tests_are_no_duplicates(other):
-    assert duplicate_tests([planned("a"), other]) == []
+def test_like_tests_are_no_duplicates():
+    others = ({"end": 1.001e6}, {"strain": 0.41}, {"stress": 26.0}, {"temperature": 1223.15})
+    for other in (*others, {"temperature": Program([0, 1], [1173.15, 1174])}):
+        assert duplicate_tests([planned("a"), planned("b", **other)]) == [], other
