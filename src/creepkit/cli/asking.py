@@ -8,6 +8,7 @@ from itertools import takewhile
 from pathlib import Path
 
 from creepkit.errors import CreepkitError, HistoryError, printable
+from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import questions_of_assumed
 from creepkit.readers.ends_of_tests import LABEL
@@ -104,10 +105,8 @@ def _in_words(choice: str | float | dict[str, str]) -> str:
 
 
 def _number_or_text(typed: str) -> str | float:
-    try:
-        return float(typed.replace(",", "."))
-    except ValueError:
-        return typed
+    plain = typed.replace(",", ".")
+    return float(plain) if is_number(plain, Dialect()) else typed
 
 
 def _write(questions: Sequence[Question], value: str) -> Path:

@@ -14,7 +14,7 @@ import sympy
 from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, called_names, factor_text
 from creepkit.exporters.law_description import comment_lines, comment_safe, heading, printable_text
 from creepkit.hookspecs import hookimpl
-from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
+from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter, joined
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
 from creepkit.records import Exporter, LawWithValues
 
@@ -103,19 +103,11 @@ class CPrinter(KernelPrinter):
     """Print lowered expressions as C, which is C++ too; branches are taken lazily."""
 
     reserved_words = ()
+    choice = "({condition} ? {branch} : {otherwise})"
+    _print_And, _print_Or = joined("(", " && "), joined("(", " || ")
 
     def _print_Pow(self, e: Any, rational: bool = False, **_: Any) -> str:
         return re.sub(r"^power\(", "pow(", super()._print_Pow(e, rational))
-
-    def _print_And(self, e: Any) -> str:
-        return f"({' && '.join(self._print(a) for a in e.args)})"
-
-    def _print_Or(self, e: Any) -> str:
-        return f"({' || '.join(self._print(a) for a in e.args)})"
-
-    def _print_Piecewise(self, e: Any) -> str:
-        branches = [f"{self._print(condition)} ? {self._print(branch)} : " for branch, condition in e.args[:-1]]
-        return f"({''.join(branches)}{self._print(e.args[-1].expr)})"
 
 
 _PRINTER = CPrinter({"standard": "python3"})

@@ -40,12 +40,7 @@ class FortranPrinter(KernelPrinter):
     """Print lowered expressions as Fortran."""
 
     reserved_words = ()
-
-    def _print_Piecewise(self, e: Any) -> str:
-        text: str = self._print(e.args[-1].expr)
-        for branch, condition in reversed(e.args[:-1]):
-            text = f"merge({self._print(branch)}, {text}, {self._print(condition)})"
-        return text
+    choice = "merge({branch}, {otherwise}, {condition})"
 
     def _print_BooleanTrue(self, e: Any) -> str:
         return ".true."

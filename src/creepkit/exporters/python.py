@@ -21,7 +21,7 @@ from creepkit.exporters.law_code import Identifiers, factor_text
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
 from creepkit.exporters.unit_conversion import STRESSES
 from creepkit.hookspecs import hookimpl
-from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
+from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter, joined
 from creepkit.kernels.log_form import FLOOR, TIME_FLOOR, log_form
 from creepkit.language.symbols import POINT_VARIABLES, time
 from creepkit.records import Exporter, LawWithValues, Units
@@ -237,21 +237,9 @@ class PythonExporter:
 class _ScalarPrinter(KernelPrinter):
     """Kernel text for one number at a time: branches are taken lazily, maxima are Python's."""
 
-    def _print_Max(self, e: Any) -> str:
-        return f"max({', '.join(self._print(a) for a in e.args)})"
-
-    def _print_Min(self, e: Any) -> str:
-        return f"min({', '.join(self._print(a) for a in e.args)})"
-
-    def _print_And(self, e: Any) -> str:
-        return f"({' and '.join(self._print(a) for a in e.args)})"
-
-    def _print_Or(self, e: Any) -> str:
-        return f"({' or '.join(self._print(a) for a in e.args)})"
-
-    def _print_Piecewise(self, e: Any) -> str:
-        branches = [f"{self._print(branch)} if {self._print(condition)} else " for branch, condition in e.args[:-1]]
-        return f"({''.join(branches)}{self._print(e.args[-1].expr)})"
+    choice = "({branch} if {condition} else {otherwise})"
+    _print_Max, _print_Min = joined("max(", ", "), joined("min(", ", ")
+    _print_And, _print_Or = joined("(", " and "), joined("(", " or ")
 
 
 def _math_imports(names: set[str]) -> str:

@@ -148,18 +148,19 @@ TARGET_FUNCTIONS = (*sorted({*TARGET_FUNCTION_NAMES.values()}), *OPERATIONS)
 
 def _nested(name: str) -> Callable[[Any, Any], str]:
     """The method that prints an operation of any number of arguments as calls of a function of two."""
+    return lambda printer, e: reduce(lambda a, b: f"{name}({a}, {b})", map(printer._print, e.args))
 
-    def printed(self: Any, e: Any) -> str:
-        text: str = reduce(lambda first, second: f"{name}({first}, {second})", map(self._print, e.args))
-        return text
 
-    return printed
+def joined(head: str, sign: str) -> Callable[[Any, Any], str]:
+    """A printing method of arguments with a sign between them, from a head that opens a bracket on."""
+    return lambda printer, e: f"{head}{sign.join(map(printer._print, e.args))})"
 
 
 class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     """Print lowered expressions as calls of the target's functions."""
 
     reserved_words = (*PythonCodePrinter.reserved_words, *TARGET_FUNCTIONS)
+    choice = "choose({condition}, {branch}, {otherwise})"
 
     def _print_Function(self, e: Any) -> str:
         name = TARGET_FUNCTION_NAMES.get(type(e).__name__)
@@ -199,7 +200,7 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     def _print_Piecewise(self, e: Any) -> str:
         text: str = self._print(e.args[-1].expr)
         for branch, condition in reversed(e.args[:-1]):
-            text = f"choose({self._print(condition)}, {self._print(branch)}, {text})"
+            text = self.choice.format(condition=self._print(condition), branch=self._print(branch), otherwise=text)
         return text
 
 

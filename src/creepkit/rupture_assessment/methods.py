@@ -24,8 +24,9 @@ tests and the yield stress at each temperature.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -105,35 +106,34 @@ def _powers(x: Floats, degree: int) -> Floats:
     return np.asarray(x)[..., None] ** np.arange(degree + 1)
 
 
-def _coefficient_names(values: Floats) -> dict[str, float]:
+def _coefficient_names(values: Floats, *_: Any) -> dict[str, float]:
     return {f"a_{k}": float(v) for k, v in enumerate(values)}
+
+
+def _constant_first(name: str) -> Callable[..., dict[str, float]]:
+    """The parameters of a polynomial that stands after one constant, which may be fixed."""
+
+    def parameters(c: Floats, _k: float, _degree: int, fixed: Mapping[str, float], _: Centre) -> dict[str, float]:
+        return _coefficient_names(c) if name in fixed else {name: float(c[0]), **_coefficient_names(c[1:])}
+
+    return parameters
+
+
+def _with_constant(value: float | None, column: Floats, before: Sequence[Floats], after: Sequence[Floats]) -> Basis:
+    """Columns before and after that of a constant, which is estimated where no value is given."""
+    if value is not None:
+        return Basis(value * column, np.column_stack([*before, *after]))
+    return Basis(np.zeros(column.shape), np.column_stack([*before, column, *after]))
 
 
 def _larson_miller(at: Conditions, degree: int, fixed: Mapping[str, float], _: Centre) -> Basis:
     columns = _powers(np.log10(at.stress), degree) / at.temperature[:, None]
-    if "C" in fixed:
-        return Basis(np.full(at.stress.shape, -fixed["C"]), columns)
-    return Basis(np.zeros(at.stress.shape), np.column_stack([-np.ones(at.stress.shape), columns]))
-
-
-def _larson_miller_parameters(
-    c: Floats, _k: float, _degree: int, fixed: Mapping[str, float], _: Centre
-) -> dict[str, float]:
-    return _coefficient_names(c) if "C" in fixed else {"C": float(c[0]), **_coefficient_names(c[1:])}
+    return _with_constant(fixed.get("C"), -np.ones(at.stress.shape), (), (columns,))
 
 
 def _orr_sherby_dorn(at: Conditions, degree: int, fixed: Mapping[str, float], _: Centre) -> Basis:
     inverse = 1.0 / (THERMAL * at.temperature)
-    columns = _powers(np.log10(at.stress), degree)
-    if "Q" in fixed:
-        return Basis(fixed["Q"] * inverse, columns)
-    return Basis(np.zeros(at.stress.shape), np.column_stack([inverse, columns]))
-
-
-def _orr_sherby_dorn_parameters(
-    c: Floats, _k: float, _degree: int, fixed: Mapping[str, float], _: Centre
-) -> dict[str, float]:
-    return _coefficient_names(c) if "Q" in fixed else {"Q": float(c[0]), **_coefficient_names(c[1:])}
+    return _with_constant(fixed.get("Q"), inverse, (), (_powers(np.log10(at.stress), degree),))
 
 
 def _manson_haferd(at: Conditions, degree: int, _: Mapping[str, float], centre: Centre) -> Basis:
@@ -162,10 +162,7 @@ def _wilshire(at: Conditions, _degree: int, fixed: Mapping[str, float], _: Centr
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.log(-np.log(at.stress / at.tensile_strength)) / LN10
     inverse = 1.0 / (THERMAL * at.temperature)
-    columns = np.column_stack([ratio, -np.ones(at.stress.shape)])
-    if "Q" in fixed:
-        return Basis(fixed["Q"] * inverse, columns)
-    return Basis(np.zeros(at.stress.shape), np.column_stack([columns, inverse]))
+    return _with_constant(fixed.get("Q"), inverse, (ratio, -np.ones(at.stress.shape)), ())
 
 
 def _wilshire_parameters(c: Floats, _k: float, _degree: int, fixed: Mapping[str, float], _: Centre) -> dict[str, float]:
@@ -202,19 +199,13 @@ def _isothermal(at: Conditions, degree: int, _fixed: Mapping[str, float], _: Cen
     return Basis(np.zeros(at.stress.shape), _powers(np.log10(at.stress), degree))
 
 
-def _isothermal_parameters(
-    c: Floats, _k: float, _degree: int, _fixed: Mapping[str, float], _: Centre
-) -> dict[str, float]:
-    return _coefficient_names(c)
-
-
 ENERGY = {"Q": "J/mol"}
 
 LARSON_MILLER = RuptureMethod(
     "larson-miller",
     "log10 t = -C + (a_0 + a_1 x + ...) / T",
     _larson_miller,
-    _larson_miller_parameters,
+    _constant_first("C"),
     {"a": "K"},
     fixable=("C",),
 )
@@ -222,7 +213,7 @@ ORR_SHERBY_DORN = RuptureMethod(
     "orr-sherby-dorn",
     "log10 t = Q / (R T ln 10) + a_0 + a_1 x + ...",
     _orr_sherby_dorn,
-    _orr_sherby_dorn_parameters,
+    _constant_first("Q"),
     ENERGY,
     fixable=("Q",),
 )
@@ -264,7 +255,7 @@ MINIMUM_RATE = RuptureMethod(
 )
 """No method of rupture times: the rate law that predicts minimum rates for Monkman-Grant's."""
 ISOTHERMAL = RuptureMethod(
-    "isothermal", "log10 t = a_0 + a_1 x + ...", _isothermal, _isothermal_parameters, {}, thermal=False
+    "isothermal", "log10 t = a_0 + a_1 x + ...", _isothermal, _coefficient_names, {}, thermal=False
 )
 
 METHODS = {
