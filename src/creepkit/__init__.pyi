@@ -122,7 +122,7 @@ from .specimens.test_piece import dimension as dimension
 from .studies.result import StudyResult as StudyResult
 from .studies.study import Study as Study
 from .surrogates.parameter_gru import ParameterGru as ParameterGru
-from .surrogates.recipe import Training as Training
+from .surrogates.parameter_gru import Training as Training
 from .surrogates.surrogate import surrogate as surrogate
 from .surrogates.training import train as train
 from .testing import check_camera_format as check_camera_format

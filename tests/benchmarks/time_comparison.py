@@ -103,6 +103,7 @@ def held_out_times_to_strain(validated: CrossValidation, strain: float, full: Se
     by_name, parts = {h.name: h for h in full}, []
     for fold in validated.folds:
         tests, fit = [by_name.get(h.name, h) for h in fold.held_out], fold.fit
+        assert fit.predictor is not None
         parts.append(times_to_strain(fit.law, fit.values, tests, fit.predictor, strain, offsets=loading_strains(tests)))
     measured, predicted = (np.concatenate([getattr(one, n) for one in parts]) for n in ("measured", "predicted"))
     return TimeComparison(strain, tuple(name for one in parts for name in one.names), measured, predicted)

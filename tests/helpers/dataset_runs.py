@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from creepkit.dataset.dataset import COLUMNS
-from creepkit.dataset.generation import generate
-from creepkit.dataset.shards import GenerationJob
+from creepkit.dataset.generation import GenerationJob, generate
 from creepkit.jobs.worker_pools import ParallelExecution
 from creepkit.jobs.worker_process import run_task
 from helpers.planted_sampling import BAR, Planted

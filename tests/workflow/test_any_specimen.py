@@ -10,7 +10,7 @@ import pytest
 import creepkit as ck
 from creepkit.jobs.worker_pools import ParallelExecution
 from creepkit.records import Nuisance
-from creepkit.surrogates.recipe import Training
+from creepkit.surrogates.parameter_gru import Training
 from helpers.cantilever import Cantilever
 from helpers.command_line import creepkit
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from creepkit.dataset import shards
+from creepkit.dataset import generation
 from creepkit.errors import DatasetError
 from helpers.dataset_runs import ROWS, assert_same, left_behind, run, run_here, shards_of, whole_of
 from helpers.planted_sampling import Deadly, Planted, Strong, Visible, strain, stress_of
@@ -167,9 +167,9 @@ def test_ctrl_c_ends_the_workers(tmp_path):
 def test_two_generations_in_one_folder_do_not_do_the_work_twice(whole, tmp_path):
     to, parts = tmp_path / "a.h5", tmp_path / "a.h5.parts"
     parts.mkdir()
-    with shards.generating_alone(parts, None), pytest.raises(DatasetError, match="another process is making these"):
+    with generation.generating_alone(parts, None), pytest.raises(DatasetError, match="another process is making these"):
         run_here(to)
-    with shards.generating_alone(parts, (1, 2)):
+    with generation.generating_alone(parts, (1, 2)):
         assert_same(run_here(to), whole)
 
 

@@ -15,8 +15,7 @@ from creepkit.jobs.worker_pools import ParallelExecution
 from creepkit.limits import SAMPLES, SECONDS, THREADS
 from creepkit.options import Option
 from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell, tell_written
-from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru
-from creepkit.surrogates.recipe import Training
+from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru, Training
 
 if TYPE_CHECKING:
     from creepkit.records import SupportsTraining

@@ -192,11 +192,8 @@ def summary(data: Dataset) -> dict[str, Any]:
         "reasons": rejection_counts(data),
         "failures": dict(Counter(data.failures.values()).most_common(5)),
         "frames": data.grid.frames,
-        "times": {
-            "from": float(data.grid.values[0]),
-            "to": float(data.grid.values[-1]),
-            "relative": data.grid.relative,
-        },
+        "times": dict(zip(("from", "to"), data.grid.values[[0, -1]].tolist(), strict=True))
+        | {"relative": data.grid.relative},
         "ranges": dict(accepted_ranges(data)),
         "units": column_units(data),
         "provenance": dict(data.provenance),
@@ -220,21 +217,11 @@ def rejection_counts(data: Dataset) -> list[dict[str, Any]]:
 
 def accepted_ranges(data: Dataset) -> Iterator[tuple[str, dict[str, float]]]:
     """Least, middle and largest value of every parameter, condition and last output of the accepted samples."""
-    accepted = data.reasons == 0
-    if not accepted.any():
-        return
+    functions: dict[str, Any] = {"least": np.min, "median": np.median, "most": np.max}
     for name, column in summary_columns(data):
-        finite_values = column[accepted]
-        finite_values = finite_values[np.isfinite(finite_values)]
-        if finite_values.size:
-            yield (
-                name,
-                {
-                    "least": float(finite_values.min()),
-                    "median": float(np.median(finite_values)),
-                    "most": float(finite_values.max()),
-                },
-            )
+        values = column[(data.reasons == 0) & np.isfinite(column)]
+        if values.size:
+            yield name, {word: float(function(values)) for word, function in functions.items()}
 
 
 def summary_columns(data: Dataset) -> Iterator[tuple[str, Floats]]:

@@ -1,24 +1,42 @@
 """Generation of a data set: shards of a design are simulated until enough samples are accepted, then merged.
 
-Shards are taken in order and without gaps, so that the content of the file does not depend on the number of workers.
+A shard is a block of rows of the design, simulated once and kept in its own file; it is done when that file exists,
+belongs to this generation and is complete. Shards are taken in order and without gaps, so that the content of the data
+set does not depend on the number of workers.
 """
 
 from __future__ import annotations
 
+import hashlib
+import itertools
+import logging
+import time
+from collections.abc import Collection, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from functools import cached_property
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from creepkit import limits
+import h5py
+import numpy as np
+
+from creepkit import limits, registry
 from creepkit.checked_arguments import checked
-from creepkit.dataset import shards, storage
+from creepkit.dataset import storage
 from creepkit.dataset.dataset import Dataset, concatenate, first_difference
-from creepkit.dataset.shards import GenerationJob, ProgressRecord, ProgressReporter
+from creepkit.dataset.simulation import empty_dataset, simulate_rows
+from creepkit.dataset.storage import LAYOUT_VERSION
 from creepkit.errors import DatasetError
 from creepkit.files.hdf5_files import open_hdf5, write_hdf5
-from creepkit.files.json_documents import as_read_back
-from creepkit.files.writing import remove_temporary_files
-from creepkit.jobs.progress import ProgressCallback
+from creepkit.files.json_documents import as_read_back, canonical_json, json_text, read_json
+from creepkit.files.locking import locked
+from creepkit.files.reading import FileKind
+from creepkit.files.writing import remove_temporary_files, write_text
+from creepkit.jobs.progress import ProgressCallback, duration_text
 from creepkit.jobs.worker_pools import SHARD_ROWS, ParallelExecution, Workers
 from creepkit.jobs.worker_process import TaskResult
 from creepkit.language import CreepLaw
@@ -28,6 +46,280 @@ from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictor
 from creepkit.registry.specimen_documents import specimen_to_json
 from creepkit.sampling.domains import SamplingDomain, sampling_design
+
+if TYPE_CHECKING:
+    from creepkit.records import Specimen
+    from creepkit.sampling.domains import SamplingDomain
+
+GENERATION_NAME = "generation.json"
+
+
+GENERATION_FILE = FileKind(
+    "the settings of a data set", DatasetError, "it is damaged; remove it if the shards beside it are of this data set"
+)
+
+
+_log = logging.getLogger("creepkit.dataset")
+
+
+@dataclass(frozen=True)
+class GenerationJob:
+    """The simulations of a data set, divided into shards that are kept in a folder.
+
+    rows : of a shard. Worker processes are sent this record.
+    """
+
+    design: SamplingDomain
+    specimen: Specimen
+    seed: int
+    folder: Path
+    rows: int = SHARD_ROWS
+    task_name: ClassVar[str] = "shard"
+
+    def on_one_thread(self) -> GenerationJob:
+        """The generation with a specimen that simulates on one thread."""
+        if getattr(self.specimen, "threads", 1) == 1:
+            return self
+        return replace(self, specimen=self.specimen.replace(threads=1))  # type: ignore[attr-defined]
+
+    def run(self, number: int) -> TaskResult:
+        """Simulate a shard and write its file, unless it is done."""
+        accepted = self.accepted_count(number, quiet=True)
+        if accepted is None:
+            path = self.path(number)
+            remove_temporary_files(path)
+            samples = simulate_rows(self.design, self.header, self.seed, number * self.rows, self.rows)
+            with write_hdf5(path, DatasetError, storage.WRITE_ADVICE, internal=True) as file:
+                storage.write_header(file, samples)
+                storage.append_samples(file, samples)
+                file.attrs.update({"generation": self.fingerprint, "shard": number})
+            accepted = int((samples.reasons == 0).sum())
+        return TaskResult(number, "done", accepted)
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """Everything that decides what the shards hold."""
+        document = {
+            "design": self.design.document(),
+            "law": law_to_json(self.design.law),
+            "specimen": specimen_to_json(self.specimen),
+            "seed": self.seed,
+            "rows": self.rows,
+            "layout": LAYOUT_VERSION,
+            "creepkit": version("creepkit"),
+        }
+        return dict(as_read_back(document))
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Of the document."""
+        return hashlib.sha256(canonical_json(self.document)).hexdigest()[:24]
+
+    @cached_property
+    def header(self) -> Dataset:
+        """The data set, with no samples in it yet."""
+        provenance = {
+            "creepkit": version("creepkit"),
+            "numpy": np.__version__,
+            "h5py": h5py.__version__,
+            "law": self.design.law.name,
+            "law_fingerprint": self.design.law.fingerprint,
+            "origin": registry.default_registry().distributions_of(self.design.law),
+            "specimen": self.specimen.name,
+            "design": self.design.name,
+            "seed": self.seed,
+            "fingerprint": self.fingerprint,
+            "when": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
+        return empty_dataset(self.design, self.specimen, provenance)
+
+    def path(self, number: int) -> Path:
+        """The file of a shard."""
+        return self.folder / f"{number:05d}.h5"
+
+    def read(self, number: int) -> Dataset:
+        """The samples of a shard; DatasetError when it is not whole, or of another data set."""
+        path = self.path(number)
+        with open_hdf5(path, storage.DATASET_FILE) as file:
+            if file.attrs.get("generation") != self.fingerprint or file.attrs.get("shard") != number:
+                raise DatasetError(f"{path}: a shard of another data set")
+            return storage.read_samples(file, self.header)
+
+    def accepted_count(self, number: int, *, quiet: bool = False) -> int | None:
+        """How many samples of a shard were accepted; None when it has to be simulated, or again, which is logged."""
+        if not self.path(number).exists():
+            return None
+        try:
+            return int((self.read(number).reasons == 0).sum())
+        except DatasetError as error:
+            if not quiet:
+                _log.warning("%s; it is simulated again", error)
+            return None
+
+    def open_folder(self) -> None:
+        """Make the folder, or check that the one that is there belongs to this job."""
+        path = self.folder / GENERATION_NAME
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if not path.exists():
+                write_text(json_text(self.document), path, DatasetError, internal=True)
+        except OSError as error:
+            raise DatasetError(f"{self.folder}: no shards can be written there ({error.strerror})") from None
+        existing = read_json(path, GENERATION_FILE)
+        if existing != self.document:
+            difference = first_difference(existing, self.document, "")
+            raise DatasetError(
+                f"{self.folder}: holds shards of another data set (there and here {difference}); choose another name, "
+                "or remove the folder"
+            )
+
+
+def rows_of_folder(folder: Path) -> int | None:
+    """Samples of a shard in a folder that was begun; None where there is none, or none that says so."""
+    path = folder / GENERATION_NAME
+    document = read_json(path, GENERATION_FILE) if path.is_file() else None
+    rows = document.get("rows") if isinstance(document, dict) else None
+    return rows if isinstance(rows, int) and rows > 0 else None
+
+
+@contextmanager
+def generating_alone(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
+    """DatasetError where another process of this machine is making the same shards."""
+    name = "generating.lock" if part is None else f"generating_{part[0]}_of_{part[1]}.lock"
+    with locked(folder / name) as held:
+        if not held:
+            raise DatasetError(
+                f"{folder}: another process is making these shards; wait for it or end it, or divide the work (part)"
+            )
+        yield
+
+
+MOST_DRAWS_WITHOUT_ACCEPTED = 16384
+"""Draws after which a design is given up of which none was accepted."""
+
+
+@dataclass
+class ProgressRecord:
+    """The shards of a job that are done, and how many are wanted.
+
+    samples : accepted ones wanted; or draws : rows wanted, accepted or not. part : (k, n), only shards k-1, k-1+n ...,
+        and as many samples as make an n-th of all.
+    done : {shard: accepted samples} of this part.
+    """
+
+    job: GenerationJob
+    samples: int | None
+    draws: int | None
+    part: tuple[int, int] | None = None
+    done: dict[int, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, value in (("samples", self.samples), ("draws", self.draws)):
+            if value is not None:
+                limits.check_number(name, value, limits.SAMPLES, DatasetError)
+        if (self.samples is None) == (self.draws is None):
+            raise DatasetError("say either how many accepted samples are wanted (samples), or how many draws (draws)")
+        if self.part is not None and not 1 <= self.part[0] <= self.part[1]:
+            raise DatasetError(f"part {self.part[0]}/{self.part[1]} is none; allowed are 1/N to N/N")
+
+    def scan_finished(self) -> None:
+        """Find the shards that are done already."""
+        for path in sorted(self.job.folder.glob("[0-9]*.h5")):
+            if path.stem.isdigit() and (self.part is None or int(path.stem) % self.part[1] == self.part[0] - 1):
+                self.mark_done(int(path.stem), self.job.accepted_count(int(path.stem)))
+
+    def mark_done(self, number: int, accepted: int | None) -> None:
+        """A shard is done."""
+        if accepted is not None:
+            self.done[number] = accepted
+        drawn = len(self.done) * self.job.rows
+        if self.samples is not None and drawn >= MOST_DRAWS_WITHOUT_ACCEPTED and not self.accepted:
+            raise DatasetError(
+                f"none of the first {drawn} draws was accepted; see 'creepkit surrogate generate --dry-run', change "
+                "the design, or ask for draws instead of samples"
+            )
+
+    @property
+    def target(self) -> int:
+        """Value of `count` at which the job is done: accepted samples, or rows."""
+        if self.samples is None:
+            return self.job.rows * len(list(self._shard_numbers()))
+        return self.samples if self.part is None else -(-self.samples // self.part[1])
+
+    @property
+    def count(self) -> int:
+        """Accepted samples, or rows, of all shards that are done."""
+        return sum(self._contribution(number) for number in self.done)
+
+    @property
+    def acceptance_rate(self) -> float:
+        """Accepted samples per draw, so far; 1 before the first are known."""
+        return self.accepted / (len(self.done) * self.job.rows) if self.done else 1.0
+
+    @property
+    def accepted(self) -> int:
+        """Accepted samples so far."""
+        return sum(self.done.values())
+
+    def leading_run(self) -> list[int] | None:
+        """The shortest leading run of done shards that is enough; None while there is none."""
+        run = self._needed()
+        return run if all(number in self.done for number in run) else None
+
+    def next_shard(self, running: Collection[int]) -> int | None:
+        """The next shard to simulate; None when those done and running are expected to be enough."""
+        return next((n for n in self._needed(running) if n not in self.done and n not in running), None)
+
+    def _needed(self, running: Collection[int] = ()) -> list[int]:
+        """The first shards that are expected to be enough, up to the first that is neither done nor running."""
+        needed, expected = list[int](), 0.0
+        for number in self._shard_numbers():
+            if self.samples is not None and expected >= self.target:
+                break
+            needed.append(number)
+            if number not in self.done and number not in running:
+                break
+            expected += self._contribution(number) if number in self.done else self.acceptance_rate * self.job.rows
+        return needed
+
+    def _shard_numbers(self) -> Iterable[int]:
+        """The shards that may be needed, first ones first."""
+        first, step = (0, 1) if self.part is None else (self.part[0] - 1, self.part[1])
+        if self.draws is None:
+            return itertools.count(first, step)
+        return range(first, -(-self.draws // self.job.rows), step)
+
+    def _contribution(self, number: int) -> int:
+        return self.done[number] if self.draws is None else self.job.rows
+
+
+class ProgressReporter:
+    """Reports the progress of a job; rates count the work since the reporter was made."""
+
+    def __init__(self, record: ProgressRecord, progress: ProgressCallback | None) -> None:
+        self._record = record
+        self._progress = progress
+        self._start = time.monotonic()
+        self._initial_count = record.count
+        self._last_reported = -1
+
+    def report(self) -> None:
+        """Report the progress when it has changed."""
+        done = self._record.count
+        if self._progress is None or done == self._last_reported:
+            return
+        self._last_reported = done
+        task = "accepted samples" if self._record.draws is None else "draws"
+        self._progress(task, min(done, self._record.target), self._record.target, self._note(done))
+
+    def _note(self, done: int) -> str:
+        rate = (done - self._initial_count) / max(time.monotonic() - self._start, 1e-3)
+        accepted = f"{100 * self._record.acceptance_rate:.0f} % accepted" if self._record.done else ""
+        if rate <= 0:
+            return accepted
+        remaining = max(self._record.target - done, 0) / rate
+        return f"{rate:.3g}/s, {duration_text(remaining)} left, {accepted}"
+
 
 POLL_INTERVAL = 0.5
 """s between reports of the progress, where no shard ends earlier."""
@@ -64,14 +356,14 @@ def generate(
     if not path.name:
         raise DatasetError(f"'{to}' is no name of a file; name the HDF5 file to write, such as combined.h5")
     folder = path.with_name(f"{path.name}.parts")
-    rows = execution.shard_rows or shards.rows_of_folder(folder) or _shard_rows(samples or draws)
+    rows = execution.shard_rows or rows_of_folder(folder) or _shard_rows(samples or draws)
     limits.check_number("seed", seed, limits.SEED, DatasetError)
     job = GenerationJob(design_of_samples, specimen, int(seed), folder, rows)
     record = ProgressRecord(job, samples, draws, execution.part)
     if execution.part is None and is_complete(job, record, path):
         return storage.read_dataset(path)
     job.open_folder()
-    with shards.generating_alone(folder, execution.part):
+    with generating_alone(folder, execution.part):
         record.scan_finished()
         with execution.start(job) as workers:
             run_until_enough(record, workers, progress)

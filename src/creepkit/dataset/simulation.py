@@ -132,18 +132,15 @@ def _reasons_before(design: SamplingDomain, draws: Draws) -> Ints:
 def _unsimulated(header: Dataset, draws: Draws, reasons: Ints, first: int) -> Dataset:
     """Samples that are not simulated yet, with the reasons of those rejected before."""
     rows = len(draws)
-
-    def not_available(name: str) -> NDArray[np.float32]:
-        return np.full((rows, *getattr(header, name).shape[1:]), np.nan, dtype=np.float32)
-
+    empty = {name: (rows, *getattr(header, name).shape[1:]) for name in ("values", "hold_outputs")}
+    nothing: dict[str, Any] = {name: np.full(shape, np.nan, np.float32) for name, shape in empty.items()}
     return replace(
         header,
         parameters=np.array(draws.parameters),
         conditions=np.array(draws.conditions),
-        values=not_available("values"),
-        hold_outputs=not_available("hold_outputs"),
         status=np.full(rows, NOT_SIMULATED, dtype=np.int64),
         end_times=np.zeros(rows),
         reasons=reasons,
         index=np.arange(first, first + rows, dtype=np.int64),
+        **nothing,
     )

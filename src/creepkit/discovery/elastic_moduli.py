@@ -78,7 +78,7 @@ def moduli(
     chosen = replace(settings or IdentificationSettings(starts=4), nuisances=(modulus,))
     fit = identify(resolve_law(law), first_frames, predictor, settings=chosen)
     estimates = {n.owner: n for n in fit.nuisances if n.kind == "modulus"}
-    stated = np.array([_stated_modulus(h) for h in histories])
+    stated = np.array([float(h.elastic.at(h.mean_temperature).E) for h in histories if h.elastic is not None])
     values = stated * (1.0 + np.array([estimates[h.name].value for h in histories]))
     sd = stated * np.array([estimates[h.name].sd for h in histories])
     temperatures = np.array([h.mean_temperature for h in histories])
@@ -109,8 +109,3 @@ def fit_wachtman(temperatures: Floats, values: Floats, sd: Floats) -> tuple[floa
     T0 = float(np.exp(result.x[0]))
     E0, b = linear(T0)[0]
     return float(E0), float(b), T0
-
-
-def _stated_modulus(history: History) -> float:
-    assert history.elastic is not None
-    return float(history.elastic.at(history.mean_temperature).E)

@@ -6,6 +6,7 @@ on the parameter's own scale, less its value at T_ref, times a coefficient where
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -97,34 +98,19 @@ class _Traced:
         function = getattr(sympy, {"arctan": "atan"}.get(name, name))
         return lambda: _Traced(function(self.expression))
 
-    def __add__(self, other: Any) -> _Traced:
-        return _Traced(self.expression + _expression_of(other))
-
-    def __mul__(self, other: Any) -> _Traced:
-        return _Traced(self.expression * _expression_of(other))
-
-    def __pow__(self, other: Any) -> _Traced:
-        return _Traced(self.expression ** _expression_of(other))
-
-    def __rpow__(self, other: Any) -> _Traced:
-        return _Traced(_expression_of(other) ** self.expression)
-
     def __neg__(self) -> _Traced:
         return _Traced(-self.expression)
 
-    def __sub__(self, other: Any) -> _Traced:
-        return _Traced(self.expression - _expression_of(other))
 
-    def __rsub__(self, other: Any) -> _Traced:
-        return _Traced(_expression_of(other) - self.expression)
+def _trace(operation: Callable[[Any, Any], Any]) -> None:
+    """Give traced numbers an operator of Python, with a number on either side."""
+    name = operation.__name__
+    setattr(_Traced, f"__{name}__", lambda self, other: _Traced(operation(self.expression, _expression_of(other))))
+    setattr(_Traced, f"__r{name}__", lambda self, other: _Traced(operation(_expression_of(other), self.expression)))
 
-    def __truediv__(self, other: Any) -> _Traced:
-        return _Traced(self.expression / _expression_of(other))
 
-    def __rtruediv__(self, other: Any) -> _Traced:
-        return _Traced(_expression_of(other) / self.expression)
-
-    __radd__, __rmul__ = __add__, __mul__
+for _operation in (operator.add, operator.sub, operator.mul, operator.truediv, operator.pow):
+    _trace(_operation)
 
 
 def _expression_of(value: Any) -> sympy.Expr:

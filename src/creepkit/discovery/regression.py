@@ -73,13 +73,14 @@ class IsothermalEstimates:
         check_identifications(fits)
         order = np.argsort([fit.reference.temperature for fit in fits])
         ordered = [fits[int(k)] for k in order]
+        ends = {name: zip(*(fit.ranges[name] for fit in ordered), strict=True) for name in ordered[0].ranges}
         return cls(
             ordered[0].law,
             np.array([fit.reference.temperature for fit in ordered]),
             np.stack([fit.coordinates.theta(fit.u) for fit in ordered]),
             np.stack([_theta_covariance(fit) for fit in ordered]),
             _central_reference([fit.reference for fit in ordered]),
-            _joint_ranges([dict(fit.ranges) for fit in ordered]),
+            {name: (min(low), max(high)) for name, (low, high) in ends.items()},
             tuple(ordered),
         )
 
@@ -150,16 +151,15 @@ def isothermal_groups(temperatures: Sequence[float], tolerance: float = ISOTHERM
 
 
 def _theta_covariance(fit: Identification) -> Floats:
-    """(parameters, parameters) by the tests alone: what is off alike at every temperature tells no forms apart."""
+    """(parameters, parameters) by the tests alone: what is off alike at every temperature tells no forms apart.
+
+    An estimate at its bound, which says nothing but that, has the variance of its bounds beside.
+    """
     jacobian, covariance = fit.coordinates.jacobian(fit.u), fit.by_tests_alone.covariance
     variance_factor = (interval_quantile(fit.freedom) / interval_quantile(INFINITE_FREEDOM)) ** 2
-    return np.asarray(variance_factor * jacobian @ covariance @ jacobian.T + _bound_variance(fit))
-
-
-def _bound_variance(fit: Identification) -> Floats:
-    """(parameters, parameters) variance to add where an estimate lies at its bound, which says nothing but that."""
     at_bound = [lies_at_bound(fit.law.table[e.name], e) for e in fit.estimates]
-    return np.asarray(np.diag(np.where(at_bound, np.ptp(fit.law.internal_bounds, axis=0) ** 2 / 12.0, 0.0)))
+    of_bounds = np.where(at_bound, np.ptp(fit.law.internal_bounds, axis=0) ** 2 / 12.0, 0.0)
+    return np.asarray(variance_factor * jacobian @ covariance @ jacobian.T + np.diag(of_bounds))
 
 
 def _central_reference(references: Sequence[ReferencePoint]) -> ReferencePoint:
@@ -168,10 +168,6 @@ def _central_reference(references: Sequence[ReferencePoint]) -> ReferencePoint:
     )
     celsius = float(np.median([r.temperature for r in references])) - ZERO_CELSIUS
     return ReferencePoint(stress, strain, time, float(round(celsius / 10.0) * 10.0 + ZERO_CELSIUS))
-
-
-def _joint_ranges(ranges: Sequence[dict[str, tuple[float, float]]]) -> dict[str, tuple[float, float]]:
-    return {name: (min(r[name][0] for r in ranges), max(r[name][1] for r in ranges)) for name in ranges[0]}
 
 
 SOBOL_STARTS = 8

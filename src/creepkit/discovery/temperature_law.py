@@ -85,11 +85,6 @@ def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
     return {**TEMPERATURE_LAW.heading, **CODEC.to_json(content)}
 
 
-def write_temperature_law(temperature_law: TemperatureLaw, path: str | Path) -> Path:
-    """Write a file that is whole or absent."""
-    return write_json(temperature_law_to_json(temperature_law), Path(path), TEMPERATURE_LAW.kind)
-
-
 CODEC = RecordCodec(
     values={CreepLaw: LAW_CODEC, Identification: ValueCodec(identification_to_json, identification_from_json)}
 )
@@ -173,7 +168,7 @@ class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_
 
     def save(self, path: str | Path) -> Path:
         """Write the result as JSON (to a temporary name, then renamed)."""
-        return write_temperature_law(self, Path(path))
+        return write_json(temperature_law_to_json(self), Path(path), TEMPERATURE_LAW.kind)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Parameters against temperature, with intervals and the curves of the forms that remain."""

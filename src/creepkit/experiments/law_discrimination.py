@@ -111,18 +111,11 @@ class LawCriterion:
             decided = _shares(score) > DECISIVE_WEIGHT
             right += weight[a] * float((decided[a] & (more > NOT_EXCLUDED).all(axis=0)).mean())
             wrong += weight[a] * float(np.delete(decided, a, axis=0).any(axis=0).mean())
-            for b, other in enumerate(self.names):
-                if a != b:
-                    current = float(self.chi_squares[b] - self.chi_squares[a])
-                    expected = current + float(np.median(Q[b] - Q[a]))
-                    is_refitted = (_key(histories), a, b) in self.ratios
-                    chi_squares.append(ExpectedChiSquare(name, other, current, expected, is_refitted))
-            for k, expected_more in zip(own, more, strict=True):
-                altered, key = self.outcomes.laws[count + k].fit.law.name, (_key(histories), a, count + k)
-                expected = float(np.median(expected_more))
-                chi_squares.append(
-                    ExpectedChiSquare(name, altered, self.altered[k].excess, expected, key in self.ratios)
-                )
+            current = [*(self.chi_squares - self.chi_squares[a]).tolist(), *(one.excess for one in self.altered)]
+            for b in (b for b in self._compared(a) if b != a):
+                expected, other = current[b] + float(np.median(Q[b] - Q[a])), self.outcomes.laws[b].fit.law.name
+                refitted = (_key(histories), a, b) in self.ratios
+                chi_squares.append(ExpectedChiSquare(name, other, current[b], expected, refitted))
         chi_squares.sort(key=lambda each: -weight[self.names.index(each.reference_law)])
         return Expectation(max(information, 0.0), probability=right, wrong=wrong, chi_squares=tuple(chi_squares))
 
@@ -351,8 +344,8 @@ def _refit_in_full(
         searched = search_problem(broad, search_predictor_of(measured.predictor))
         minima = MultiStart().minima(searched).minima
         begun += [m.x for m in distinct(minima, searched.bounds, equal_predictions=EQUAL_REDUCED_ORDER_PREDICTIONS)]
-    outputs = {name: noise_model[name] for name in observations.outputs}
-    own = replace(noise_model, outputs=outputs)
+    own = replace(noise_model, outputs={name: noise_model[name] for name in observations.outputs})
+    weights = np.concatenate([[test.weight for test in law.fit.tests], np.ones(len(further))])
     found = []
     for u in begun:
         x = problem.bounds.clip(starting_point(nuisances, u, known))
@@ -361,13 +354,8 @@ def _refit_in_full(
             present=observations.present,
             offset_sensitivity=residuals_at_measured_values(observations).offset_sensitivity,
         )
-        residuals = residuals.with_test_weights(_test_weights(law, len(further)))
+        residuals = residuals.with_test_weights(weights)
         under = problem.with_covariance(CovarianceFactor.of_residuals(residuals, own))
         minimum = under.minimise(x, tolerances=REFIT_TOLERANCES)
         found.append((FittedLaw(under, minimum.x), 2.0 * float(minimum.cost)))
     return min(found, key=lambda pair: pair[1])
-
-
-def _test_weights(law: KnownLaw, further: int) -> Floats:
-    """(tests,) of the fit, and one for further tests."""
-    return np.concatenate([[test.weight for test in law.fit.tests], np.ones(further)])

@@ -22,7 +22,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.residuals import candidate_residuals, candidate_residuals_and_jacobian, residuals_of_prediction
-from creepkit.records import History, Predictor, Status, outputs_of_test
+from creepkit.records import History, Status, outputs_of_test
 
 CHUNK = 8
 """Planned tests that are predicted at once: between two chunks progress is reported, and a stop takes effect."""
@@ -233,11 +233,8 @@ def _predicted(law: KnownLaw, planned: Sequence[History], observations: Observat
     prediction = predict_with_sensitivities(
         problem.predictor, law.fit.law, coordinates.theta(u), planned, nuisances.predictor_values(e)
     )
-    coefficients = coordinates.coefficients
-    every_rate_has_one = len(coefficients) == len(law.fit.law.terms) + len(law.fit.law.states)
-    residuals = residuals_of_prediction(
-        observations, prediction, nuisances, coefficients if every_rate_has_one else None
-    )
+    coefficients = coordinates.coefficients if coordinates.every_rate_has_coefficient else None
+    residuals = residuals_of_prediction(observations, prediction, nuisances, coefficients)
     assert residuals.jacobian is not None
     internal, of_nuisances = np.split(residuals.jacobian, [size], axis=-1)
     jacobian = np.concatenate([internal @ coordinates.jacobian(u), of_nuisances], axis=-1)
@@ -249,20 +246,15 @@ def _predicted(law: KnownLaw, planned: Sequence[History], observations: Observat
     own = [k for k, n in enumerate(nuisances.nuisances) if n.scope == "test" and nuisances.owners[k] in names]
     sd = np.minimum(nuisances.sd, (nuisances.high - nuisances.low) / np.sqrt(12.0))
     effects = compact_effects(jacobian[..., [size + k for k in own]] * sd[own]) if own else None
-    leading_outputs = [
-        prediction.of(k)[:, prediction.outputs.index(_leading(problem.predictor, h, prediction.outputs))]
-        for k, h in enumerate(planned)
-    ]
+    leading = []
+    for k, history in enumerate(planned):
+        outputs = outputs_of_test(predictor_for(problem.predictor, history), history) or prediction.outputs
+        values = prediction.of(k)[:, prediction.outputs.index(outputs[0])]  # the first grows with creep
+        leading.append(values[np.isfinite(values)])
     return _Chunk(
         residuals=replace(residuals, jacobian=jacobian),
-        leading=[values[np.isfinite(values)] for values in leading_outputs],
+        leading=leading,
         ruptures=np.isin(prediction.status[0], ENDED),
         own_effects=effects,
         kept=kept,
     )
-
-
-def _leading(predictor: Predictor, history: History, predicted: Sequence[str]) -> str:
-    """The output of a test that grows with creep, the first of its predictor."""
-    own = outputs_of_test(predictor_for(predictor, history), history) or predicted
-    return own[0]

@@ -197,9 +197,8 @@ def uncertain_quantities(
     dimensions: dict[str, UncertainQuantity] = {}
     for nuisance in fit.settings.nuisances:
         kind = nuisance.kind
-        if not _has_tolerance(kind) or not supports_nuisance(own_predictor, kind):
-            continue
-        if not nuisance.applies_to(history.name):
+        has_tolerance = kind in TOLERANCE_KINDS or is_length_nuisance(kind)
+        if not (has_tolerance and supports_nuisance(own_predictor, kind) and nuisance.applies_to(history.name)):
             continue
         mean = prior_mean(nuisance, history, predictor)
         position = estimated.get((nuisance.key, owner_of(nuisance, history)))
@@ -209,7 +208,8 @@ def uncertain_quantities(
             dimensions[kind] = UncertainQuantity(kind, estimate.value, estimate.sd, low, high, fit.u.size + position)
         else:
             dimensions[kind] = UncertainQuantity(kind, mean, _spread_between_tests(fit, nuisance), low, high)
-    for given, relative in (*_stated_tolerances(own_predictor), *((kind, None) for kind in tolerances)):
+    stated = ((d.names[-1], d.tolerance) for d in dimensions_of(own_predictor) if d.tolerance > 0.0)  # relative ones
+    for given, relative in (*stated, *((kind, None) for kind in tolerances)):
         if not supports_nuisance(own_predictor, given) or (relative is not None and given in dimensions):
             continue
         known = dimensions.get(given)
@@ -226,15 +226,6 @@ def _spread_between_tests(fit: Identification, nuisance: Nuisance) -> float:
     if np.isfinite(prior_sd):
         return float(prior_sd)
     return float(np.sqrt(np.mean([(n.value - n.prior_mean) ** 2 for n in estimates]))) if estimates else 0.0
-
-
-def _stated_tolerances(predictor: Predictor) -> list[tuple[str, float]]:
-    """(kind, relative standard deviation) of dimensions as a specimen states them."""
-    return [(d.names[-1], d.tolerance) for d in dimensions_of(predictor) if d.tolerance > 0.0]
-
-
-def _has_tolerance(kind: str) -> bool:
-    return kind in TOLERANCE_KINDS or is_length_nuisance(kind)
 
 
 def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[History], predictor: Predictor) -> None:

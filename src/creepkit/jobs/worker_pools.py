@@ -16,7 +16,6 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any, TypeAlias
 
 from creepkit import limits
@@ -138,9 +137,7 @@ class ProcessWorkers:
     def __enter__(self) -> ProcessWorkers:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         self._ending = True
         self._threads.shutdown(wait=False, cancel_futures=True)
         for process in self._processes:

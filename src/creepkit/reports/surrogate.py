@@ -13,7 +13,7 @@ from creepkit.records import output_named
 from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, make_folder, panels_of, place_legend_below, save_figure, set_range
 from creepkit.surrogates.evaluation import PredictionComparison, evaluate, worst_histories
-from creepkit.surrogates.recipe import SurrogateMetadata
+from creepkit.surrogates.parameter_gru import SurrogateMetadata
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

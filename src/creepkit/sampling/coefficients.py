@@ -153,13 +153,9 @@ def damage_rate_scalings(law: CreepLaw) -> tuple[DamageRateScaling, ...]:
     """The internal variables of a law that have a limit, and a coefficient of their own."""
     scalings = []
     for state_index, (symbol, state) in enumerate(law.states.items()):
-        if state.limit is not None:
-            group = _rate_group(law, symbol, state)
-            scalings += (
-                []
-                if group is None
-                else [DamageRateScaling(group, state_index, state.initial, state.limit - state.initial)]
-            )
+        group = None if state.limit is None else _rate_group(law, symbol, state)
+        if group is not None and state.limit is not None:
+            scalings.append(DamageRateScaling(group, state_index, state.initial, state.limit - state.initial))
     return tuple(scalings)
 
 

@@ -170,19 +170,15 @@ class ConditionedDomain(SamplingDomain):
         coordinates at once, to the first place where they do not.
         """
         parameters = self._solved_parameters(unit_coordinates, ln_rates, points)
-        rejected_rows, step = np.arange(len(unit_coordinates)), additive_recurrence_step(unit_coordinates.shape[1])
+        rows, step = np.arange(len(unit_coordinates)), additive_recurrence_step(unit_coordinates.shape[1])
+        criteria = [c for c in self.criteria if isinstance(c, DrawCriterion)]
         for trial in range(1, MOST_TRIALS):
-            rejected_rows = rejected_rows[
-                ~self._meets_draw_criteria(
-                    Draws(parameters[rejected_rows], tests.conditions[rejected_rows], self.condition_names)
-                )
-            ]
-            if not rejected_rows.size:
+            draws = Draws(parameters[rows], tests.conditions[rows], self.condition_names)
+            rows = rows[~np.all([c.passes(self.law, draws) for c in criteria], axis=0)]
+            if not rows.size:
                 break
-            shifted = (unit_coordinates[rejected_rows] + trial * step) % 1.0
-            parameters[rejected_rows] = self._solved_parameters(
-                shifted, ln_rates[rejected_rows], points.rows(rejected_rows)
-            )
+            shifted = (unit_coordinates[rows] + trial * step) % 1.0
+            parameters[rows] = self._solved_parameters(shifted, ln_rates[rows], points.rows(rows))
         return parameters
 
     def _solved_parameters(self, unit_coordinates: Floats, ln_rates: Floats, points: RateEvaluationPoints) -> Floats:
@@ -193,10 +189,6 @@ class ConditionedDomain(SamplingDomain):
         )
         theta = solve_coefficients(groups, theta, ln_rates, points)
         return author_parameters(self.law, solve_damage_coefficients(self.law, theta, unit_coordinates, points))
-
-    def _meets_draw_criteria(self, draws: Draws) -> Bools:
-        met = [c.passes(self.law, draws) for c in self.criteria if isinstance(c, DrawCriterion)]
-        return np.asarray(np.all(met, axis=0))
 
 
 DEFAULT_DRAWS = 4096

@@ -6,7 +6,7 @@ Reference stresses, and the growth of the output for each unit of reference stra
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -177,7 +177,8 @@ class ReferenceStress:
         if self.scaling is not None:
             stress = self.scaling.stresses(first, second, self._lengths(draws, self.scaling), before_jump)
         else:
-            stress = np.where(before_jump, *(self._level_stresses(draws, k, end)[:, None] for k in (0, 1)))
+            levels = (self._of_tests(mean_reference_stress, "reference_stress", draws, k, end) for k in (0, 1))
+            stress = np.where(before_jump, *(stresses[:, None] for stresses in levels))
         return RateEvaluationPoints(stress, times, draws.condition(TEMPERATURE, ROOM_TEMPERATURE))
 
     def useful_rates(self, draws: Draws, end: float) -> tuple[Floats, Floats]:
@@ -189,8 +190,6 @@ class ReferenceStress:
         end_times = draws.condition(END, end)
         return np.log10(least_strain / end_times), np.log10(LARGEST_REFERENCE_STRAIN / end_times)
 
-    # ---- of all rows at once -----------------------------------------------------------------------------------------
-
     def _lengths(self, draws: Draws, scaling: LoadScaling) -> Floats:
         return draws.condition(scaling.length, scaling.nominal) if scaling.length else np.ones(len(draws))
 
@@ -199,33 +198,25 @@ class ReferenceStress:
     def _growth(self, draws: Draws, end: float) -> Floats:
         if self.scaling is not None:
             return self.scaling.growth(self._lengths(draws, self.scaling))
-        return np.array([self._test_growth(draws, row, end) for row in range(len(draws))])
+        return self._of_tests(lambda p, test: np.mean(p.growth_per_strain(test)), "growth_per_strain", draws, 0, end)
 
-    def _test_growth(self, draws: Draws, row: int, end: float) -> float:
-        piece, test = tested_piece(self.specimen, self._held_test(draws, row, 0, end), {})
-        return self._positive(float(np.mean(piece.growth_per_strain(test))), "growth_per_strain")
-
-    def _level_stresses(self, draws: Draws, level: int, end: float) -> Floats:
-        """(rows,) MPa, the reference stress while one of both levels is held."""
-        tests = (tested_piece(self.specimen, self._held_test(draws, row, level, end), {}) for row in range(len(draws)))
-        return np.array([self._positive(mean_reference_stress(*test), "reference_stress") for test in tests])
-
-    def _held_test(self, draws: Draws, row: int, level: int, end: float) -> History:
-        """The test of a row, with one of both levels held throughout."""
-        conditions = dict(zip(draws.condition_names, draws.conditions[row].tolist(), strict=True))
-        held = conditions[self.known.levels[level]]
-        for name in (*self.known.levels, self.known.jump):
-            conditions.pop(name, None)
-        held_test = {**conditions, self.known.levels[0]: held, END: conditions.get(END, end)}
-        return planned_test(self.specimen, held_test, TimeGrid(np.array([0.0, 1.0]), relative=True))
-
-    def _positive(self, value: float, method: str) -> float:
-        if not 0.0 < value < np.inf:
-            raise DatasetError(
-                f"specimen '{self.known.kind}': its {method}(history) gives {value:g} for a planned test; it must give "
-                "a finite number above zero, from what is planned alone"
-            )
-        return value
+    def _of_tests(
+        self, function: Callable[[Any, History], Any], method: str, draws: Draws, level: int, end: float
+    ) -> Floats:
+        """(rows,) what a method of the specimen says of the test of each row, with one of both levels held."""
+        grid, values = TimeGrid(np.array([0.0, 1.0]), relative=True), []
+        for row in draws.conditions.tolist():
+            conditions = dict(zip(draws.condition_names, row, strict=True))
+            held = {self.known.levels[0]: conditions[self.known.levels[level]], END: conditions.get(END, end)}
+            others = {n: v for n, v in conditions.items() if n not in (*self.known.levels, self.known.jump)}
+            test = planned_test(self.specimen, {**others, **held}, grid)
+            values.append(float(function(*tested_piece(self.specimen, test, {}))))
+            if not 0.0 < values[-1] < np.inf:
+                raise DatasetError(
+                    f"specimen '{self.known.kind}': its {method}(history) gives {values[-1]:g} for a planned test; it "
+                    "must give a finite number above zero, from what is planned alone"
+                )
+        return np.array(values)
 
 
 def reference_stress_of(specimen: Specimen) -> ReferenceStress:

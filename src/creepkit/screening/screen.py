@@ -67,7 +67,7 @@ def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
 
 def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
     laws = [with_arrhenius(law, alloy.tests) for law in job.laws]
-    through = _surrogate_for(job, laws)
+    through = job.surrogate if any(len(law.terms) > 1 for law in laws) else None  # others cost no more without it
     # A plate compares alloys by the same laws; what else might explain one of them is a question for select() itself.
     ranking = select(laws, alloy.tests, job.predictor, settings=job.settings, through=through, sums=False)
     best, notes = ranking.best, list(limitations(alloy, job.predictor))
@@ -89,11 +89,6 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
         predicted=_predict_tests(best, alloy.tests, predictor_for_law(predictor, best.law)),
         notes=(*notes, *best.notes),
     )
-
-
-def _surrogate_for(job: ScreeningJob, laws: Sequence[CreepLaw]) -> Predictor | None:
-    """The surrogate, where a law has several terms: those of one cost no more without it."""
-    return job.surrogate if any(len(law.terms) > 1 for law in laws) else None
 
 
 def _fit_dense_law(
@@ -124,12 +119,9 @@ def _confirm_best(job: ScreeningJob, best: Identification, alloy: Alloy, notes: 
 
 def _predict_tests(best: Identification, tests: Sequence[History], predictor: Predictor) -> dict[str, PredictedOutputs]:
     prediction = best.predict(tests, predictor)
+    columns = [*enumerate(prediction.outputs)]
     return {
-        test.name: {
-            name: prediction.of(k)[:, prediction.outputs.index(name)]
-            for name in prediction.outputs
-            if name in test.outputs
-        }
+        test.name: {name: prediction.of(k)[:, column] for column, name in columns if name in test.outputs}
         for k, test in enumerate(tests)
     }
 
@@ -182,15 +174,15 @@ class ScreeningJob:
 
     @cached_property
     def _settings_text(self) -> str:
-        return "\n".join(self._settings_lines())
-
-    def _settings_lines(self) -> Iterator[str]:
-        yield f"creepkit {version('creepkit')}"
-        for law in (*self.laws, *([self.dense_law] if self.dense_law is not None else [])):
-            yield f"{law.name} {law.fingerprint} {[(name, p.bounds, p.off) for name, p in law.table.items()]}"
-        for predictor in (self.predictor, self.surrogate):
-            yield "none" if predictor is None else predictor_fingerprint(predictor)
-        yield repr((self.settings, self.dense_law is None, self.penalty, self.confirm))
+        laws = (*self.laws, *([self.dense_law] if self.dense_law is not None else []))
+        predictors = (self.predictor, self.surrogate)
+        lines = [
+            f"creepkit {version('creepkit')}",
+            *(f"{law.name} {law.fingerprint} {[(n, p.bounds, p.off) for n, p in law.table.items()]}" for law in laws),
+            *("none" if one is None else predictor_fingerprint(one) for one in predictors),
+            repr((self.settings, self.dense_law is None, self.penalty, self.confirm)),
+        ]
+        return "\n".join(lines)
 
 
 CANDIDATE_LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")

@@ -21,7 +21,8 @@ from creepkit.errors import DatasetError
 from creepkit.files.json_documents import canonical_json
 from creepkit.files.record_codec import record_to_json
 from creepkit.registry.specimen_documents import specimen_to_json
-from creepkit.surrogates.recipe import SampleArrays, SurrogateMetadata, Training
+from creepkit.surrogates.network_evaluation import SampleArrays
+from creepkit.surrogates.parameter_gru import SurrogateMetadata, Training
 from creepkit.surrogates.surrogate import Surrogate
 
 if TYPE_CHECKING:

@@ -16,13 +16,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from creepkit.arrays import Floats
 from creepkit.errors import SurrogateError
+
+SampleArrays: TypeAlias = dict[str, NDArray[Any]]
+"""Arrays whose leading axis is the sample. Always there: "targets" (n, frames, outputs), physical, float32, zero where
+there is none; "mask" (n, frames), which frames are data. The rest is the recipe's own: the inputs of its network."""
+
+
+Weights: TypeAlias = Mapping[str, NDArray[Any]]
+"""{name: (...,)} weights and scales of a network, as they stand in its file."""
+
 
 RecurrentCell = Literal["gru", "lstm"]
 

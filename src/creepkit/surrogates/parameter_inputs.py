@@ -16,6 +16,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import DatasetError, SurrogateError
+from creepkit.jobs.progress import ProgressCallback
 from creepkit.kernels.log_form import log_form
 from creepkit.language import CreepLaw
 from creepkit.records import (
@@ -28,7 +29,6 @@ from creepkit.records import (
     dimensions_of,
 )
 from creepkit.sampling.conditions import MODULUS, TEMPERATURE
-from creepkit.surrogates.recipe import ProgressCallback
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset

@@ -10,8 +10,7 @@ from typing import TypeAlias
 import torch
 from torch import Tensor, nn
 
-from creepkit.surrogates.network_evaluation import RecurrentCell
-from creepkit.surrogates.recipe import SampleArrays, Weights
+from creepkit.surrogates.network_evaluation import RecurrentCell, SampleArrays, Weights
 
 SampleTensors: TypeAlias = dict[str, Tensor]
 """recipe.SampleArrays as tensors."""
@@ -42,10 +41,11 @@ class Standardisation(nn.Module):
     mean: Tensor
     deviation: Tensor
 
-    def __init__(self, mean: Tensor, deviation: Tensor) -> None:
+    def __init__(self, columns: int) -> None:
+        """A scale that changes nothing."""
         super().__init__()
-        self.register_buffer("mean", mean.double())
-        self.register_buffer("deviation", deviation.double())
+        self.register_buffer("mean", torch.zeros(columns).double())
+        self.register_buffer("deviation", torch.ones(columns).double())
 
     @classmethod
     def from_rows(cls, values: Tensor, mask: Tensor | None = None) -> Standardisation:
@@ -57,12 +57,9 @@ class Standardisation(nn.Module):
         mean = torch.nan_to_num(rows.nanmean(dim=0), nan=0.0)
         deviation = torch.nan_to_num((rows - mean).square().nanmean(dim=0).sqrt(), nan=0.0)
         constant = deviation <= CONSTANT_TOLERANCE * torch.nan_to_num(rows, nan=0.0).abs().amax(dim=0)
-        return cls(mean, torch.where(constant, 1.0, deviation))
-
-    @classmethod
-    def identity(cls, columns: int) -> Standardisation:
-        """A scale that changes nothing."""
-        return cls(torch.zeros(columns), torch.ones(columns))
+        scale = cls(rows.shape[-1])
+        scale.mean, scale.deviation = mean, torch.where(constant, 1.0, deviation)
+        return scale
 
     def forward(self, values: Tensor) -> Tensor:
         """The values (..., columns), standardised."""
@@ -116,11 +113,8 @@ class ParameterModule(nn.Module):
         kind = nn.GRU if cell == "gru" else nn.LSTM
         self.network = kind(constants + series + int(corrects_base), hidden, layers, batch_first=True)
         self.head = nn.Linear(hidden, outputs)
-        self.constants, self.series = (
-            Standardisation.identity(constants),
-            Standardisation.identity(series + int(corrects_base)),
-        )
-        self.targets = Standardisation.identity(outputs)
+        self.constants, self.series = Standardisation(constants), Standardisation(series + int(corrects_base))
+        self.targets = Standardisation(outputs)
         self.register_buffer("deviation", torch.ones(outputs, dtype=torch.float64))
         for name in ("spread", "floor", "most"):
             self.register_buffer(name, torch.ones((), dtype=torch.float64))
@@ -140,10 +134,8 @@ class ParameterModule(nn.Module):
         self.constants = Standardisation.from_rows(rows["constants"])
         self.series = Standardisation.from_rows(self._series(rows))
         encoded = self._encoded(rows)
-        self.targets, self.most = (
-            Standardisation.from_rows(encoded, mask),
-            encoded[mask][:, 0].max().double() + LARGEST_LOG_EXCESS,
-        )
+        self.targets = Standardisation.from_rows(encoded, mask)
+        self.most = encoded[mask][:, 0].max().double() + LARGEST_LOG_EXCESS
         return self
 
     def forward(self, batch: SampleTensors) -> Tensor:

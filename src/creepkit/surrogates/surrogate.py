@@ -41,7 +41,8 @@ from creepkit.records import (
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid, specimen_conditions
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
-from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.network_evaluation import SampleArrays, Weights
+from creepkit.surrogates.parameter_gru import ParameterGru, SurrogateMetadata
 from creepkit.surrogates.parameter_inputs import (
     LawInputs,
     LoadHistoryInputs,
@@ -50,7 +51,6 @@ from creepkit.surrogates.parameter_inputs import (
     hold_last_value,
     zero_coefficients,
 )
-from creepkit.surrogates.recipe import SampleArrays, SurrogateMetadata, Weights
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw

@@ -34,10 +34,9 @@ from creepkit.surrogates.evaluation import (
     trainable_samples,
     training_split,
 )
-from creepkit.surrogates.network_evaluation import RecurrentCell
-from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru
+from creepkit.surrogates.network_evaluation import RecurrentCell, SampleArrays, Weights
+from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru, ProgressCallback, Training
 from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors, sample_tensors, weights_of
-from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, Training, Weights
 from creepkit.surrogates.surrogate import CHECKPOINT, Surrogate, load_surrogate
 
 LEAST_LEARNING_RATE = 1e-8
@@ -162,10 +161,8 @@ class NetworkTraining:
 
     def _validation_squares(self) -> float:
         """Squared deviations of the validation rows from their mean at each time."""
-        targets, mask = (
-            self.samples["targets"][self.validation].double(),
-            self.samples["mask"][self.validation][..., None],
-        )
+        targets = self.samples["targets"][self.validation].double()
+        mask = self.samples["mask"][self.validation][..., None]
         mean = torch.where(mask, targets, 0.0).sum(dim=0) / mask.sum(dim=0).clamp(min=1)
         return max(float(torch.where(mask, (targets - mean) / self._scale, 0.0).square().sum()), 1e-300)
 

@@ -10,8 +10,7 @@ FOLDER = Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER.parents[1]))
 
 import creepkit as ck  # noqa: E402
-from creepkit.surrogates.parameter_gru import ParameterGru  # noqa: E402
-from creepkit.surrogates.recipe import Training  # noqa: E402
+from creepkit.surrogates.parameter_gru import ParameterGru, Training  # noqa: E402
 from creepkit.surrogates.training import train  # noqa: E402
 from helpers.planted_datasets import bars  # noqa: E402
 from helpers.planted_rupture import larson_miller, planted  # noqa: E402

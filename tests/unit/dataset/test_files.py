@@ -15,7 +15,7 @@ import creepkit
 import creepkit as ck
 from creepkit.dataset import storage
 from creepkit.dataset.dataset import COLUMNS
-from creepkit.dataset.shards import GenerationJob
+from creepkit.dataset.generation import GenerationJob
 from creepkit.dataset.simulation import rounded_outputs, simulate_rows
 from creepkit.errors import DatasetError
 from helpers.dataset_runs import assert_same

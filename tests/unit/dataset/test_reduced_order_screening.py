@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.dataset.shards import GenerationJob
+from creepkit.dataset.generation import GenerationJob
 from creepkit.dataset.simulation import empty_dataset, simulate_rows
 from creepkit.records import Status, SupportsReducedOrderModel
 from creepkit.sampling.criteria import BURST_TIME_FACTOR, SimulationOutcome, conditioned_criteria, paper_criteria

@@ -13,9 +13,8 @@ from torch import nn
 import creepkit as ck
 from creepkit.errors import SurrogateError
 from creepkit.surrogates.network_evaluation import FRAMES_IN_BLOCK, ParameterNetwork
-from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.parameter_gru import ParameterGru, Training
 from creepkit.surrogates.parameter_network import ParameterModule, weights_of
-from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.training import train
 from helpers import source_tree
 from helpers.planted_datasets import bars

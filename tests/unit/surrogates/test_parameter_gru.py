@@ -11,9 +11,8 @@ from creepkit.dataset.dataset import Dataset
 from creepkit.errors import SolveError, SurrogateError
 from creepkit.records import Program, RecordedLoading, Status
 from creepkit.sampling.conditions import TimeGrid
-from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.parameter_gru import ParameterGru, Training
 from creepkit.surrogates.parameter_network import sample_tensors
-from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.surrogate import Surrogate, load_surrogate
 from creepkit.surrogates.training import train
 from helpers.planted_datasets import HOURS, bars, data_set, dimples, measured

@@ -11,9 +11,8 @@ import torch
 from creepkit.dataset.dataset import Dataset
 from creepkit.errors import DatasetError, SurrogateError
 from creepkit.surrogates.evaluation import dataset_fingerprint, evaluate, training_split
-from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.parameter_gru import ParameterGru, Training
 from creepkit.surrogates.parameter_network import ParameterModule
-from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.training import epochs_since_best, train
 from helpers.mistakes import said_otherwise
 from helpers.planted_datasets import bars
