@@ -82,9 +82,8 @@ def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
         if len(start) == LONGEST_LINE and not {*b"\r\n"} & {*start}:
             raise HistoryError(f"{path}:1: a line of more than {LONGEST_LINE} characters; save it as a table")
         encoding, errors = ("utf-16", "strict") if is_wide else ("utf-8-sig", "creepkit.western")
-        text: io.TextIOBase = io.TextIOWrapper(stream, encoding, errors)
-        if is_labview(start[:200].decode("latin-1")):
-            text = io.StringIO(table_of_labview(text.read()) + "\n")
+        whole, has_heads = io.TextIOWrapper(stream, encoding, errors), is_labview(start[:200].decode("latin-1"))
+        text: io.TextIOBase = io.StringIO(table_of_labview(whole.read()) + "\n") if has_heads else whole
         first = 1
         try:
             while lines := text.readlines(PART_CHARACTERS):
