@@ -40,6 +40,10 @@ MOST_CAUTIONS = 3
 """On the first screen and in a terminal; the others stand in the details."""
 
 
+AT_BOUND = 1e-3
+"""Of the width of a search, from whose upper end on a value is held there."""
+
+
 MOST_ASKED = 2
 """Forecasts on the first screen."""
 
@@ -164,7 +168,23 @@ def tests_text(fit: Identification) -> str:
 
 def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQuality | None = None) -> list[str]:
     """What to mind, the most serious first, a sentence each without a full stop."""
-    return list(dict.fromkeys([*_contradictions(fit), *_choice(ranking), *_precision(fit), *_data(quality)]))
+    return list(
+        dict.fromkeys(
+            [*_held(fit, ranking), *_contradictions(fit), *_choice(ranking), *_precision(fit), *_data(quality)]
+        )
+    )
+
+
+def _held(fit: Identification, ranking: Ranking | None) -> Iterator[str]:
+    """A law that an upper bound of the search keeps from the tests: the one that is stated, or one that lost to it."""
+    others = [one.fit for one in ranking.laws] if ranking is not None else []
+    for one in (fit, *others):
+        for name, param in one.law.table.items():
+            low, high = param.bounds
+            if param.scale != "log" and one.values.get(name, low) >= high - AT_BOUND * (high - low):
+                wider = f"bounds = {{ {name} = [{low:g}, {2 * high:g}] }}"
+                yield f"{one.law.name} is held at {name} = {high:g}, where its search ends; write {wider}"
+                return
 
 
 def _contradictions(fit: Identification) -> Iterator[str]:
