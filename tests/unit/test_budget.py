@@ -17,8 +17,8 @@ BUDGET = {
     "api": 322,
     "app": 617,
     "cameras": 931,
-    "cli": 2345,
-    "core": 70,
+    "cli": 2355,
+    "core": 67,
     "dataset": 765,
     "discovery": 1442,
     "experiments": 1584,
@@ -27,7 +27,7 @@ BUDGET = {
     "fem": 1827,
     "files": 1419,
     "forecasts": 1412,
-    "instruments": 1283,
+    "instruments": 1282,
     "integration": 774,
     "inverse": 11465,
     "jobs": 251,
@@ -39,18 +39,18 @@ BUDGET = {
     "readers": 5487,
     "records": 1979,
     "registry": 615,
-    "reports": 7229,
-    "rupture_assessment": 1867,
+    "reports": 7259,
+    "rupture_assessment": 1869,
     "sampling": 1042,
     "screening": 683,
     "specimens": 3592,
-    "studies": 3055,
+    "studies": 3056,
     "surrogates": 1675,
     "testing": 1892,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34465
+TESTS = 34473
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -19,7 +19,7 @@ from creepkit.limits import STRAIN
 from creepkit.options import Option
 from creepkit.records import Predictor
 from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell
-from creepkit.studies.candidates import by_select, ranked_candidates
+from creepkit.studies.candidates import by_likelihood, ranked_candidates
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -103,8 +103,10 @@ def command(
     _tell_assumptions(histories)
     candidates = LawChanges().changed(changes).applied(candidates, histories)
     compared = search.sums is not None or ("by" in how and len(candidates) > 1)
-    if compared and not by_select(search):
-        raise FitError("--sums and --criterion compare laws by their likelihood: leave out --search and --penalty")
+    if compared and not by_likelihood(search, settings):
+        raise FitError(
+            "--sums and --criterion compare laws by their likelihood: leave out --weights, --search, --penalty, --loss"
+        )
     check_identified_folder(to, candidates)
     options_of_fits: dict[str, Any] = {"compared": compared, **({} if through is None else {"through": through})}
     with ProgressBar() as progress:

@@ -13,6 +13,10 @@ from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell
 if TYPE_CHECKING:
     from creepkit.studies.result import StudyResult
 
+MOST_FIGURES = 10
+"""Forecasts and strengths that are printed; all of them stand in the report."""
+
+
 REPORT_SUFFIXES = (".html", ".htm")
 
 
@@ -77,6 +81,13 @@ def print_result(result: StudyResult) -> None:
         tell(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
     for group, ranking in result.rankings.items():
         tell(f"{group}: {ranking.best.headline}" if len(result.rankings) > 1 else str(ranking))
+    if result.forecasts or result.rupture:
+        from creepkit.reports.answer import asked_figures, strength_figures
+
+        figures = [one for forecast in result.forecasts.values() for one in asked_figures(forecast)]
+        figures += [one for assessment in result.rupture.values() for one in strength_figures(assessment)]
+        for figure in figures[:MOST_FIGURES]:
+            tell(figure.line)
     if result.report is not None:
         tell(f"report: {result.report}")
 

@@ -58,7 +58,8 @@ class IdentificationSettings(Options, title="settings of an identification", err
         both estimated.
     weights : of the values; noise, intervals and ranking are by one likelihood, with white noise and autocorrelation of
         every output (see inverse.variance_components). "likelihood": the values too, under the usual errors. "noise":
-        least squares of frames of equal weight. {output: weight}: the sum of weight times relative squared error (see
+        least squares of frames of equal weight, which describe tests best where no law explains them; select() and
+        screen() compare laws by "likelihood". {output: weight}: the sum of weight times relative squared error (see
         inverse.goodness_of_fit); "equal" weights are Eq. (4) of the paper, "paper" its Eq. (S3) for measured
         histories, 0.99 on D_amp.
     test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its weight.
@@ -84,7 +85,7 @@ class IdentificationSettings(Options, title="settings of an identification", err
         example="thickness=0.4935:0.027",
     )
     weights: OutputWeights = option(
-        "likelihood", "Of outputs; equal: Eq. (4), paper: Eq. (S3).", example="amplitude=0.99,width=0.005"
+        "noise", "Of outputs; equal: Eq. (4), paper: Eq. (S3).", example="amplitude=0.99,width=0.005"
     )
     test_loss: Literal["gaussian", "student"] = option(
         "gaussian", "Of whole tests; with student one far from its replicates weighs less."
@@ -106,8 +107,8 @@ class IdentificationSettings(Options, title="settings of an identification", err
         super().__post_init__()
         if self.weights == "likelihood" and self.loss != "linear":
             raise FitError(
-                f"loss '{self.loss}' does not go with weights 'likelihood', the default, which judges values and noise "
-                "alike; give weights='noise' beside it, or set test_loss='student' against tests that are far off"
+                f"loss '{self.loss}' does not go with weights 'likelihood', which judges values, noise and laws; "
+                "leave one of them out, or set test_loss='student' against tests that are far off"
             )
         for nuisance in self.nuisances:
             _check_nuisance(nuisance)

@@ -34,10 +34,15 @@ if TYPE_CHECKING:
     from creepkit.inverse.uncertainty.laplace_approximation import Estimate
     from creepkit.language import CreepLaw
     from creepkit.quality.flags import DataQuality
+    from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 
 MOST_CAUTIONS = 3
 """On the first screen and in a terminal; the others stand in the details."""
+
+
+AT_BOUND = 1e-3
+"""Of the width of a search, from whose upper end on a value is held there."""
 
 
 MOST_ASKED = 2
@@ -69,10 +74,16 @@ class KeyFigure:
     remark: str = ""
 
     @property
+    def line(self) -> str:
+        """All of it in one line."""
+        remark = f" ({self.remark})" if self.remark else ""
+        return f"{self.name}, {self.where}: {self.text}{remark}"
+
+    @property
     def text(self) -> str:
         """Value, interval and unit."""
         unit = f" {self.unit}" if self.unit else ""
-        if math.isnan(self.low):
+        if math.isnan(self.low + self.high):
             return f"{self.value:#.2g}".rstrip(".") + unit
         digits = interval_digits(self.value, self.low, self.high)
         value, low, high = (_written_out(v, digits) for v in (self.value, self.low, self.high))
@@ -147,6 +158,19 @@ def _shown(test: TestForecast) -> KeyFigure | None:
     return None
 
 
+def strength_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
+    """The rupture strength at the longest time asked for, a figure a temperature, with the interval of its mean."""
+    found = [one for one in assessment.strengths if one.method == "average" and one.value is not None]
+    longest, figures = max((one.hours for one in found), default=0.0), list[KeyFigure]()
+    for one in found:
+        low, high = (math.nan if bound is None else bound for bound in one.bounds_of_mean)
+        if one.hours == longest and one.value is not None:
+            name, where = f"rupture strength at {longest:g} h", celsius_text(one.temperature, one.temperature, digits=0)
+            remark = "extrapolated beyond the tests" if one.extrapolation else ""
+            figures.append(KeyFigure(name, where, one.value, low, high, "MPa", remark))
+    return figures
+
+
 def _range(fit: Identification) -> str:
     """Stresses and temperatures of the tests."""
     low, high = fit.ranges["stress"]
@@ -164,7 +188,23 @@ def tests_text(fit: Identification) -> str:
 
 def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQuality | None = None) -> list[str]:
     """What to mind, the most serious first, a sentence each without a full stop."""
-    return list(dict.fromkeys([*_contradictions(fit), *_choice(ranking), *_precision(fit), *_data(quality)]))
+    return list(
+        dict.fromkeys(
+            [*_held(fit, ranking), *_contradictions(fit), *_choice(ranking), *_precision(fit), *_data(quality)]
+        )
+    )
+
+
+def _held(fit: Identification, ranking: Ranking | None) -> Iterator[str]:
+    """A law that an upper bound of the search keeps from the tests: the one that is stated, or one that lost to it."""
+    others = [one.fit for one in ranking.laws] if ranking is not None else []
+    for one in (fit, *others):
+        for name, param in one.law.table.items():
+            low, high = param.bounds
+            if param.scale != "log" and high > 0 and one.values.get(name, low) >= high - AT_BOUND * (high - low):
+                wider = f"bounds = {{ {name} = [{low:g}, {2 * high:g}] }}"
+                yield f"{one.law.name} is held at {name} = {high:g}, where its search ends; write {wider}"
+                return
 
 
 def _contradictions(fit: Identification) -> Iterator[str]:

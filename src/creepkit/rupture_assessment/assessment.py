@@ -145,6 +145,9 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
     notes: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        return f"<RuptureAssessment of {len(self.tests.names)} tests, best {self.best.method}>"
+
     @property
     def best(self) -> RuptureFit:
         """The fit of highest weight."""

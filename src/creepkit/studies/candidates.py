@@ -13,9 +13,13 @@ if TYPE_CHECKING:
     from creepkit.records import History
 
 
-def by_select(asked: SearchOptions) -> bool:
-    """Whether laws are compared as select() does: neither a search nor a penalty asks for something else."""
-    return asked.global_search is None and asked.penalty is None
+def by_likelihood(asked: SearchOptions, changes: Mapping[str, Any]) -> bool:
+    """Whether laws are compared by their likelihood: no search, penalty, weights or loss asks for something else.
+
+    changes : fields of the settings that are stated.
+    """
+    stated = changes.get("weights", "likelihood"), changes.get("loss", "linear")
+    return asked.global_search is None and asked.penalty is None and stated == ("likelihood", "linear")
 
 
 def ranked_candidates(
@@ -30,7 +34,7 @@ def ranked_candidates(
     settings: IdentificationSettings | None = None,
     **options: Any,
 ) -> Ranking:
-    """Several laws compared as by select(), where nothing asks for another way; else each as by identify(), and ranked.
+    """Several laws compared as by select(), where likelihood compares them; else each as by identify(), and ranked.
 
     changes : fields of the settings that are stated. compared : whether a single law is compared, with sums or others.
     options : further ones of both verbs, such as `through`.
@@ -38,7 +42,7 @@ def ranked_candidates(
     import creepkit as ck
     from creepkit.inverse.compared_tests import common_rupture_times
 
-    if by_select(asked) and (len(laws) > 1 or compared):
+    if by_likelihood(asked, changes) and (len(laws) > 1 or compared):
         return ck.select(
             laws, tests, using, sums=asked.sums, by=asked.by, settings=settings, progress=progress, **options, **changes
         )

@@ -27,7 +27,7 @@ from creepkit.registry import default_registry
 from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
 from creepkit.studies.arguments import check_forecast, planned_test
-from creepkit.studies.candidates import by_select, ranked_candidates
+from creepkit.studies.candidates import by_likelihood, ranked_candidates
 from creepkit.studies.execution import STAGE_KINDS, Results, Stage, StageKind, Tick, stage_name
 from creepkit.studies.inputs import StudyInputs, TestGroup
 from creepkit.studies.study_file import KeyPath, StudyFile
@@ -143,8 +143,8 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
     how = {} if selection is None else values_of_table(SearchOptions, selection)
     asked = SearchOptions().changed({**values_of_table(SearchOptions, part), **how})
     changes = values_of_table(IdentificationSettings, part) | {"nuisances": None}  # which the settings have
-    if selection is not None and not by_select(asked):
-        what = "compares laws by their likelihood: leave out search and penalty"
+    if selection is not None and not by_likelihood(asked, changes):
+        what = "compares laws by their likelihood: leave out weights, loss, search and penalty"
         raise study.file.error(("selection",), what)
 
     def make(results: Results, tick: Tick) -> Ranking:

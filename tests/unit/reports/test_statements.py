@@ -20,7 +20,7 @@ from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
-from creepkit.reports.answer import interval_digits
+from creepkit.reports.answer import cautions, interval_digits
 from creepkit.reports.blocks import number
 from creepkit.reports.judged_readings import judged_readings
 from creepkit.reports.ranking import separating_test
@@ -37,6 +37,17 @@ def ranking(weights: str, *, wide: bool) -> Ranking:
     tests = planted(HYPERBOLIC_SINE, values, [(s, 1000.0) for s in stresses], seed=2, noise=3e-4)
     settings = replace(SETTINGS, weights=weights)
     return rank([identify(law, tests, Steady(), settings=settings) for law in (NORTON, HYPERBOLIC_SINE)])
+
+
+def test_a_law_that_the_search_holds_says_so_first() -> None:
+    """An exponent of 9.5, of a search that ends at 8; one that goes on to 16 finds it and says nothing."""
+    tests = planted(NORTON, {"A": 1e-26, "n": 9.5}, [(s, 1000.0) for s in (60.0, 80.0, 120.0)], seed=2, noise=3e-4)
+    held = identify(NORTON, tests, Steady(), settings=SETTINGS)
+    assert cautions(held)[0] == "norton is held at n = 8, where its search ends; write bounds = { n = [1, 16] }"
+    wide = NORTON.with_bounds(A=(1e-40, 1e-5), n=(1.0, 16.0))
+    found = identify(wide, tests, Steady(), settings=SETTINGS)
+    assert found.values["n"] == pytest.approx(9.5, rel=0.02)
+    assert not any("held" in one for one in cautions(found))
 
 
 # ---- what separates two laws ----------------------------------------------------------------------------------------

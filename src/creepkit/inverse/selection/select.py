@@ -58,14 +58,14 @@ def select(
     by: Criterion = "bic",
     progress: IterationCallback | None = None,
 ) -> Ranking:
-    """Identify every candidate from the same histories, and rank them.
+    """Identify every candidate from the same histories by likelihood, and rank them.
 
     sums : also sums of two candidates: True, False, or None for sums of the best law where it does not explain the
         tests to their noise, and then richer registered laws, at most settings.further_laws of both together.
     by : "bic", "aicc", or "hold-out" (the last 30 % of each history predicted from a refit to the first 70 %).
     A law that cannot be identified is named in `failed`; FitError if none can.
     """
-    settings = settings or IdentificationSettings()
+    settings = replace(settings or IdentificationSettings(), weights="likelihood")
     if by not in CRITERIA:
         raise FitError(f"select(by={by!r}) is not known; allowed are {', '.join(CRITERIA)}")
     if not candidates:
