@@ -205,7 +205,7 @@ def parse_number(text: str, dialect: Dialect, location: str, name: str) -> float
     An exponent may be written E or D. NaN, infinities, digits in groups and whole numbers such as 0123 are no numbers.
     """
     is_written_well = _NUMBERS[dialect.decimal].fullmatch(text) and not _PADDED.match(text)
-    value = _number(text, dialect.decimal) if is_written_well else math.nan
+    value = float_of(text) if is_written_well else math.nan
     if not math.isfinite(value):
         raise HistoryError(f"{location}: '{name}' is {_why_no_number(text, dialect)}")
     return value
@@ -232,7 +232,7 @@ def parse_numbers(
         if cell in lost:
             continue
         if matches(cell) and not _PADDED.match(cell):
-            values[k] = _number(cell, dialect.decimal)
+            values[k] = float_of(cell)
         if not math.isfinite(values[k]):
             raise HistoryError(f"{locate(k)}: '{name}' is {_why_no_number(cell, dialect)}")
     return values
@@ -275,9 +275,9 @@ def is_number(text: str, dialect: Dialect) -> bool:
     return _NUMBERS[dialect.decimal].fullmatch(text) is not None
 
 
-def _number(text: str, decimal: str) -> float:
-    plain = text if decimal == "." else text.replace(",", ".")
-    return float(plain.replace("D", "E").replace("d", "e"))
+def float_of(text: str) -> float:
+    """The number of a text with either decimal sign, its exponent behind E or, as Fortran writes it, D."""
+    return float(text.replace(",", ".").replace("D", "E").replace("d", "e"))
 
 
 def _why_no_number(text: str, dialect: Dialect) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -24,12 +25,14 @@ from creepkit.readers.conditions import (
 from creepkit.readers.derived_records import as_plain_bar, modulus_of_ramp, without_loading, without_steps
 from creepkit.readers.ends_of_tests import (
     FIRM,
+    INTERRUPTED,
     LABEL,
     NO,
     RUPTURED,
     STOPPED,
     UNCLEAR,
     YES,
+    end_said_by,
     ends_in_column,
     kind_of_column,
 )
@@ -106,7 +109,7 @@ def assemble_history(
         elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
     outputs = without_steps(conditions, frames.times, outputs, used)
     merged = {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
-    rupture_time, unruptured = _end_of_test(conditions, frames, used, name)
+    rupture_time, unruptured = _end_of_test(conditions, frames, used, name, loading.quantity != "strain")
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
     history = History(
         times=frames.times,
@@ -218,10 +221,13 @@ _OF_OTHER_THINGS = ("assumed", "ended", "heat", "laboratory", "operator")
 """Labels that do not say how a test ended; `ended` is what creepkit's simulation says beside a time of rupture."""
 
 
-def _time_and_end(conditions: StatedConditions, path: Path, name: str) -> tuple[StatedNumber | None, str, bool]:
+def _time_and_end(
+    conditions: StatedConditions, path: Path, name: str, frames: TableFrames | None = None, asks: bool = False
+) -> tuple[StatedNumber | None, str, bool]:
     """The rupture time, how the test ended, by `ended`, an answer or a label, and whether the time is that of its end.
 
-    A label by which a test did not break makes its time that of its end. What may say so is asked about.
+    A label by which a test did not break makes its time that of its end. What may say so is asked about. The remark of
+    the last frame says how the test ended; those of earlier frames say nothing of it.
     """
     time, ended = conditions.take_number("rupture"), conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
     answer = conditions.end_terms.get(name.casefold(), "")
@@ -232,6 +238,16 @@ def _time_and_end(conditions: StatedConditions, path: Path, name: str) -> tuple[
         kind = kind_of_column(label)
         if label in _OF_OTHER_THINGS or (not kind and text.casefold() in YES | NO):
             continue
+        if frames is not None and (line := re.fullmatch(r"line (\d+)", label)):
+            lines, at = frames.table.lines, int(line[1])
+            if frames.lines[-1] <= at <= lines[-1]:
+                firm[label] = _end_by_last_remark(text, conditions, asks, path, frames)
+                continue
+            if lines[0] <= at < frames.lines[-1]:
+                if conditions.end_terms.get(text.casefold(), LABEL) != LABEL:
+                    what = f"remark '{quoted(text, 60)}' of line {at} is not of the last frame and says no end"
+                    conditions.record_assumption(what.replace(",", ";"))
+                continue
         (end,) = ends_in_column(label, [text], conditions.end_terms, False).ends
         firmness = firm if kind in FIRM else remarks
         (unclear if end == UNCLEAR else firmness)[label] = text if end == UNCLEAR else end
@@ -248,6 +264,16 @@ def _time_and_end(conditions: StatedConditions, path: Path, name: str) -> tuple[
         conditions.record_assumption(f"stopped before rupture by its label '{quoted(label)}'")
         return time, STOPPED, True
     return time, "".join(said), False
+
+
+def _end_by_last_remark(text: str, conditions: StatedConditions, asks: bool, path: Path, frames: TableFrames) -> str:
+    """What the remark of the last frame says: RUPTURED, STOPPED, or "" for nothing."""
+    said = conditions.end_terms.get(text.casefold()) or end_said_by(text)
+    if said == UNCLEAR and asks:
+        what = f"the remark '{quoted(text)}' of the last frame may speak of the end; did the test break then?"
+        choices = [{text: STOPPED}, {text: RUPTURED}, {text: LABEL}]
+        raise Question(path, frames.location(-1), what, "ended", choices)
+    return {INTERRUPTED: STOPPED, STOPPED: STOPPED, RUPTURED: RUPTURED}.get(said, "")
 
 
 def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | None]:
@@ -396,13 +422,14 @@ def _used_frames(conditions: StatedConditions, frames: TableFrames) -> Bools:
 
 
 def _end_of_test(
-    conditions: StatedConditions, frames: TableFrames, used: Bools, name: str
+    conditions: StatedConditions, frames: TableFrames, used: Bools, name: str, asks: bool
 ) -> tuple[float | None, bool]:
     """The rupture time, s, if the test ruptured, and whether it was stopped before; neither where nothing is said.
 
-    A test that is said to have ruptured, without a time, did so when its last frame was taken.
+    A test that is said to have ruptured, without a time, did so when its last frame was taken. asks : whether a remark
+    of that frame that is not clear is asked about.
     """
-    time, ended, is_end = _time_and_end(conditions, frames.table.path, name)
+    time, ended, is_end = _time_and_end(conditions, frames.table.path, name, frames, asks)
     if is_end:
         return None, True
     if time is not None and ended == "stopped":

@@ -212,7 +212,7 @@ class TestTableHead:
 _NUMBER_LIKE = re.compile(
     r"(?:[<>≥≤~≈(\[]|>=|ca\.? )*\s*[+-]?\d[\d.,'’\s]*(?:[eEdD][+-]?\d+)?\s*(?:[+*)\]†‡#→h]|->|\.\.\.|…)*"
 )
-_WITH_UNIT = re.compile(r"[<>≥]?\s*[\d.,]+(?:[eE][+-]?\d+)?\s*(\S{1,6})")
+_WITH_UNIT = re.compile(r"[<>≥]?\s*[\d.,]+(?:[eEdD][+-]?\d+)?\s*(\S{1,6})")
 _SEARCHED, _DEEPEST, _MOST_IN_COLUMNS = 60, 5, 30
 """Rows within which the tests must begin; rows of a head; and of a table whose tests stand in columns."""
 

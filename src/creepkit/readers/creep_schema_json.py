@@ -80,7 +80,7 @@ CREEP_EXTENSION, PLASTIC_EXTENSION, TOTAL_EXTENSION = EXTENSIONS = (
 """ISO 204: that since the end of loading; with the initial plastic extension; with the whole initial extension."""
 
 
-_NUMBER_AND_UNIT = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\D*)", re.ASCII)
+_NUMBER_AND_UNIT = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eEdD][+-]?\d+)?)\s*(\D*)", re.ASCII)
 
 
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import gc
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from functools import partial
 from glob import glob
 from pathlib import Path
 from typing import Any, cast
 
 from creepkit.errors import HistoryError, nearest, quoted
-from creepkit.files.delimited_text import refuse_unprintable
+from creepkit.files.delimited_text import decode_text, refuse_unprintable
+from creepkit.files.reading import read_bytes
 from creepkit.hookspecs import hookimpl
 from creepkit.readers.columns_of_tests import column_called
 from creepkit.readers.creep_schema_json import CREEP_SCHEMA
@@ -23,9 +25,9 @@ from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
 from creepkit.readers.table import CellTable
 from creepkit.readers.table_heads import names_time
 from creepkit.readers.table_layouts import tests_in
-from creepkit.readers.tests_file import answers_of
+from creepkit.readers.tests_file import answers_of, read_answers
 from creepkit.readers.tests_in_rows import TEST_TABLE
-from creepkit.readers.text_files import read_text_table
+from creepkit.readers.text_files import TABLE_FILE, read_text_table
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, Reader, accepts_path, histories_in
 
@@ -66,7 +68,34 @@ def read_histories(
                 _check_printable(history, source)
                 read.setdefault((history.source or str(source), history.name), (source, history))
     raise_all(errors)
-    return _with_unique_names(list(read.values()))
+    histories = _with_unique_names(list(read.values()))
+    said = {text.casefold() for one in histories for text in (one.name, *one.labels, *one.labels.values())}
+    for folder in {path if path.is_dir() else path.parent for path, _ in read.values()}:
+        raise_all(_ends_of_nothing(folder, said))
+    return histories
+
+
+def _ends_of_nothing(folder: Path, said: Collection[str]) -> Iterator[HistoryError]:
+    """Texts under `ended` in the answers of a folder that stand in none of its files; said : what tests say."""
+    file = folder / ANSWERS_FILE
+    for pattern, answers in read_answers(file).items() if file.is_file() else ():
+        ended = answers.get("ended")
+        keys = [text for text in (ended if isinstance(ended, dict) else ()) if text.removeprefix("()").strip()]
+        open_keys = [key for key in keys if not any(key.removeprefix("()").casefold() in one for one in said)]
+        files = [path for path in sorted(folder.glob("*")) if path.is_file() and fnmatchcase(path.name, pattern)]
+        texts = [" ".join(_text_of(path).casefold().split()) for path in (files if open_keys else ())]
+        for key in open_keys:
+            if texts and not any(" ".join(key.removeprefix("()").casefold().split()) in text for text in texts):
+                what = f"'{quoted(key)}' stands in no file of that name"
+                yield HistoryError(f'{file}: ["{quoted(pattern)}"] ended: {what}; correct or remove it')
+
+
+def _text_of(path: Path) -> str:
+    """The text of a file, its name and those of its sheets included."""
+    if not SPREADSHEET.accepts(path):
+        return f"{path.stem} {decode_text(read_bytes(path, TABLE_FILE), path)}"
+    sheets = read_sheets(path)
+    return " ".join([path.stem, *(text for one in sheets for row in one.rows for text in (one.sheet, *row.cells))])
 
 
 def _histories_of(source: Path, readers: Sequence[Reader]) -> list[History]:

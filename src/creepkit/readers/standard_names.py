@@ -47,7 +47,7 @@ STRAIN_UNITS: Mapping[str, str] = {"1": "1", "pct": "pct", "microstrain": "micro
 """Units that the key `strain_unit` may name, as a suffix or in any other spelling of it."""
 
 
-_VALUE_WITH_UNIT = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^\d\s.,;:+-][^;:]{0,10})", re.ASCII)
+_VALUE_WITH_UNIT = re.compile(r"([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([^\d\s.,;:+-][^;:]{0,10})", re.ASCII)
 
 
 def in_standard_names(

@@ -13,10 +13,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import is_missing, is_number
+from creepkit.files.delimited_text import float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.column_names import TEST_NAME_COLUMNS, split_written_name, unit_suffix, words_of
 from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
+from creepkit.readers.ends_of_tests import kind_of_column
 from creepkit.readers.frames import unknown_text
 from creepkit.readers.table import (
     CellTable,
@@ -55,24 +56,28 @@ def refuse_twice(entries: Mapping[str, SourceText], header: Mapping[str, SourceT
             raise HistoryError(f"{entry.location}: '{key}' was already given; keep one of them")
 
 
-_REMARKS = frozenset(
-    (
-        *("note", "notes", "remark", "remarks", "comment", "comments", "bemerkung", "bemerkungen", "kommentar"),
-        *("anmerkung", "anmerkungen", "remarque", "remarques", "commentaire", "commentaires", "observation"),
-    )
-)
-"""Names of columns of remarks, in small letters."""
+def without_remarks(table: CellTable, notes: dict[str, SourceText], labels: Collection[str] = ()) -> CellTable:
+    """The table without columns of remarks, whose texts are added to the notes by line.
 
-
-def without_remarks(table: CellTable, notes: dict[str, SourceText]) -> CellTable:
-    """The table without columns of remarks, whose texts are added to the notes by line."""
-    columns = [k for k, name in enumerate(table.columns) if words_of(name) in _REMARKS]
-    if not columns or isinstance(table.rows, NumberRows):
+    labels : columns of words that are remarks where their cells differ.
+    """
+    columns = [
+        k
+        for k, name in enumerate(table.columns if not isinstance(table.rows, NumberRows) else ())
+        if kind_of_column(name) == "remark" or (name in labels and _are_remarks(table, k))
+    ]
+    if not columns:
         return table
     for row in table.rows:
         if text := "; ".join(row.cells[k] for k in columns if row.cells[k]):
             notes[f"label line {row.line}"] = SourceText(text, table.location(row.line))
     return table.keeping([k for k in range(len(table.columns)) if k not in columns])
+
+
+def _are_remarks(table: CellTable, column: int) -> bool:
+    """Whether the cells of a column differ and are words."""
+    texts = set(cells_of(table.rows, column))
+    return len(texts) > 1 and not any(is_number(text, table.dialect) for text in texts)
 
 
 _DATES = frozenset(("date", "datum", "day", "jour", "heure"))
@@ -110,7 +115,7 @@ def with_groups(table: CellTable, known: Terms) -> CellTable:
     clock = [row.cells[time] for row in table.rows] if time is not None else [""]
     if not all(is_number(cell, table.dialect) for cell in clock):
         return table
-    times = [float(cell.replace(",", ".")) for cell in clock]
+    times = list(map(float_of, clock))
     starts = {0, *(k for k in range(1, len(times)) if times[k] < times[k - 1])}
     keys = [k for k, name in enumerate(table.columns) if words_of(name) in TEST_NAME_COLUMNS]
     stated = keys + [
@@ -154,7 +159,10 @@ def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Ter
 
     groups = grouped(table.rows, keys[0], check) if keys else {"": table.rows}
     tests = []
+    has_notes = len(groups) > 1 and any(key.startswith("label line ") for key in entries)
+    of_rows = {f"label line {row.line}" for row in table.rows} if has_notes else set()
     for name, rows in groups.items():
+        others = of_rows - {f"label line {row.line}" for row in rows if has_notes}
         stated = [k for k in foreign if k not in keys[:1] and _states_condition(table, k, rows, known)]
         own = _entries_of_columns(table, stated, rows[0], known)
         refuse_twice(own, entries, known)
@@ -165,7 +173,8 @@ def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Ter
         ]
         assumptions = (*table.assumptions, *map(unknown_text, empty))
         part = replace(table, columns=[table.columns[k] for k in kept], rows=cut, assumptions=assumptions)
-        tests.append(TabulatedTest(name, {**entries, **own}, part))
+        notes = {key: entry for key, entry in entries.items() if key not in others}
+        tests.append(TabulatedTest(name, {**notes, **own}, part))
     return tests
 
 
@@ -363,7 +372,7 @@ def _rows_beside_notes(
             what = f"'{quoted(number)}' stands in a column without a name"
             raise HistoryError(f"{table.location(row.line)}: {what}; name it or remove it")
         if foreign:
-            notes[f"label line {row.line}"] = SourceText("; ".join(foreign), table.location(row.line))
+            notes[f"label beside line {row.line}"] = SourceText("; ".join(foreign), table.location(row.line))
         yield TableRow(row.line, cells[:width])
 
 
@@ -383,7 +392,7 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
     table, footers = _without_remarks_around(headed.table, head.entries)
     table = without_clocks(named_columns(table), headed.known)
     table = replace(table.assuming(*head.assumptions, *footers), sources=tuple(head.sources))
-    table = with_groups(without_remarks(table, head.entries), headed.known)
+    table = with_groups(without_remarks(table, head.entries, headed.known.vocabulary.labels), headed.known)
     return rows_by_test(table, {**table.header, **head.entries}, headed.known)
 
 

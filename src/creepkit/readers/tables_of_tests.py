@@ -72,7 +72,7 @@ def plain_number(text: str, decimal: str) -> tuple[str, str]:
 
     text = _POWER.sub(lambda found: f"e{unicodedata.normalize('NFKC', found[1]).replace('−', '-')}", text)
     changed, count = _GROUPED.subn(plain, text)
-    if not count and decimal == "," and re.fullmatch(r"\D*\d*,\d+(?:[eE][+-]?\d+)?\D*", text):
+    if not count and decimal == "," and re.fullmatch(r"\D*\d*,\d+(?:[eEdD][+-]?\d+)?\D*", text):
         changed, count = text.replace(",", "."), 1
     return changed, "." if count else decimal
 
@@ -386,5 +386,5 @@ def _is_note(row: TableRow, dialect: Dialect) -> bool:
 def _unit_of_cells(cells: Sequence[str]) -> str:
     """The unit behind the numbers of a column, as in `600 °C`; "" where not all cells that hold something have it."""
     texts = [cell for cell in cells if not is_missing(cell)]
-    found = {unit_suffix(re.sub(r"^[<>≥]?\s*[\d.,]+(?:[eE][+-]?\d+)?\s*", "", text)) or "" for text in texts}
+    found = {unit_suffix(re.sub(r"^[<>≥]?\s*[\d.,]+(?:[eEdD][+-]?\d+)?\s*", "", text)) or "" for text in texts}
     return found.pop() if len(found) == 1 else ""

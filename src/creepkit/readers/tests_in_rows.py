@@ -19,7 +19,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import is_missing
+from creepkit.files.delimited_text import float_of, is_missing
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.column_names import split_written_name, words_of
 from creepkit.readers.columns_of_tests import (
@@ -300,7 +300,10 @@ def ends_of_rows(table: TestTable) -> list[RowEnd]:
         for k, column in enumerate(table.columns)
         if column.kind is None
         and column.quantity not in _SAYS_NO_END
-        and table.names[k] not in table.vocabulary.labels
+        and (
+            table.names[k] not in table.vocabulary.labels
+            or any(row.cells[k].casefold() in answers for row in table.rows)
+        )
         and (kinds[k] or not split_written_name(table.names[k])[1])  # one with a unit is a quantity
     ]
     decided = any(mark.said == STOPPED for mark in marks)
@@ -383,7 +386,7 @@ def _likely_unbroken(table: TestTable, column: int, texts: Sequence[str], time: 
     def rank(text: str) -> tuple[bool, float]:
         rows = [row for row in table.rows if row.cells[column].casefold() == text.casefold()]
         cells = [TIME_IN_CELL.fullmatch(row.cells[time]) for row in rows] if time is not None else []
-        times = [float(one["number"].replace(",", ".")) for one in cells if one and one["number"].count(".") < 2]
+        times = [float_of(one["number"]) for one in cells if one and one["number"].count(".") < 2]
         return len(times) > 1 and len(set(times)) == 1, sum(times) / max(len(times), 1)
 
     return max(texts, key=rank)

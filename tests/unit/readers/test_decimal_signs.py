@@ -54,3 +54,20 @@ def test_a_large_table_of_several_tests_keeps_its_decimal_commas(tmp_path: Path)
     first, second = HISTORY_CSV.read(path)
     np.testing.assert_allclose(first.times, 3600 * times)
     np.testing.assert_allclose(second.outputs["strain"] * 100, times / 2e3, atol=6e-5)
+
+
+def test_exponents_of_fortran_are_numbers(tmp_path: Path):
+    path, times = tmp_path / "dip.dat", [0.0, 20.0, 24.1251, 137.5]
+    for letter in "DdE":
+        rows = [f" {t:.5E}  6.00000E+01  {1e-4 + 1e-6 * t:.5E}".replace("E", letter) for t in times]
+        path.write_text(
+            "# temperature_K: 673\n# control: stress\ntime_s stress_MPa strain_1\n" + "\n".join(rows) + "\n"
+        )
+        (history,) = HISTORY_CSV.read(path)
+        np.testing.assert_array_equal(history.times, times)
+        np.testing.assert_allclose(history.outputs["strain"], 1e-4 + 1e-6 * np.array(times), atol=1e-9)
+        assert history.loading.steps == ((0.0, 60.0),)
+    path.write_text("test;T (C);stress (MPa);min rate (1/h)\nA;600;1.2D+02;1.0d-05\n")
+    (row,) = TEST_TABLE.read(path)
+    assert row.minimum_rate == pytest.approx(1e-5 / 3600)
+    assert row.loading.steps == ((0.0, 120.0),)

@@ -5,6 +5,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.readers.ends_of_tests import end_said_by
+from creepkit.readers.questions import Question
 
 SPELLINGS = [
     # column, cell of the test that did not break, cell of the tests that broke
@@ -139,3 +140,61 @@ def test_what_is_not_understood_is_asked_for(tmp_path, column, text):
 def test_what_sentences_say():
     found = {text: end_said_by(text) for texts in SENTENCES.values() for text in texts}
     assert found == {text: end for end, texts in SENTENCES.items() for text in texts}
+
+
+LAST_REMARKS = {
+    "rupture": "ruptured",
+    "gebrochen": "ruptured",
+    "arrêt volontaire, non rompu": "stopped",
+    "Versuch abgebrochen": "stopped",
+    "test stopped": "stopped",
+    "oil changed": "",
+    "break?": "asked",
+    "furnace failure": "asked",
+}
+"""{remark of the last frame: how the test ended}."""
+
+
+@pytest.mark.parametrize("name", ["Observations", "Bemerkung", "Vermerk"])
+def test_the_remark_of_the_last_frame_says_how_the_test_ended(tmp_path, name):
+    """Remarks of earlier frames say nothing of it; `Vermerk` is no known name, and answered to be a label."""
+    path, answers, wrong = tmp_path / "a.csv", tmp_path / "tests.toml", dict[str, str]()
+    head = f"# stress_MPa: 120\n# temperature_C: 600\ntest;Time (h);Strain (%);{name}\n"
+    other = "B;0;0;\nB;4;0.02;rupture of a fuse\nB;8;0.1;\n"
+    for remark, end in LAST_REMARKS.items():
+        label = f'["a.csv"]\ncolumns = {{{name} = "label"}}\n'
+        answers.write_text(label)
+        path.write_text(
+            f"{head}A;0;0;\nA;5;0.05;test stopped, oil changed\nA;10;0.1;{remark}\n{other}", encoding="utf-8"
+        )
+        said = ""
+        try:
+            first, second = ck.read_histories(path)
+        except Question as question:
+            said = "asked"
+            answers.write_text(label + question.entry(question.choices[1]))
+            first, second = ck.read_histories(path)
+            assert first.rupture_time == 36000.0
+        else:
+            said = "stopped" if first.unruptured else "ruptured" if first.rupture_time == 36000.0 else ""
+        assert (second.unruptured, second.rupture_time) == (False, None)
+        if said != end:
+            wrong[remark] = said
+    assert wrong == {}
+
+
+def test_an_answer_about_the_end_acts_or_is_refused(tmp_path):
+    path, answers = tmp_path / "a.csv", tmp_path / "tests.toml"
+    head = "# stress_MPa: 120\n# temperature_C: 600\nTime (h);Strain (%);Note\n0;0;\n5;0.05;X1\n10;0.1;"
+    path.write_text(f"{head}X7\n")
+    answers.write_text('["*.csv"]\nended = {X7 = "ruptured"}\n')
+    assert ck.read_histories(path)[0].rupture_time == 36000.0
+    answers.write_text('["*.csv"]\nended = {X1 = "ruptured"}\n')
+    (history,) = ck.read_histories(path)
+    assert history.rupture_time is None
+    assert "remark 'X1' of line 5 is not of the last frame" in history.labels["assumed"]
+    answers.write_text('["*.csv"]\nended = {X8 = "ruptured"}\n')
+    with pytest.raises(HistoryError, match="ended: 'X8' stands in no file"):
+        ck.read_histories(path)
+    (tmp_path / "b.csv").write_text(f"{head}x8\n")
+    assert ck.read_histories(path)[0].rupture_time is None  # it is about another file

@@ -87,7 +87,7 @@ def test_sheets_named_by_temperature(tmp_path: Path) -> None:
     np.testing.assert_allclose(tests[3].outputs["strain"], 1.3e-3 * np.array([0.1, 1.0, 2.0]))
     labels = tests[1].labels
     assert "temperature 575 °C from sheet '575°C' row 1" in labels["assumed"]
-    assert labels["line 9"] == "13.05. power failure 1 h"
+    assert labels["beside line 9"] == "13.05. power failure 1 h"
     assert labels["cell C5"] == "thermocouple 2 exchanged"
     assert labels["sheet notes"] == "heat 4711, normalised 1060 °C, tempered 770 °C"
     assert labels["operator"] == "day shift"
