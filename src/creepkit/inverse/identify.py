@@ -289,13 +289,14 @@ def _result(
         working_noise = with_single_value_weight(best.working_noise, problem.observations)
         covariance = covariance_of_values(linear, noise_model, working_noise)
     judged = at_own_rates(problem, linear, noise_model)
-    errors = best.errors if by_likelihood else errors_of_tests(problem, linear.x, judged, noise_model)
+    found_at = judged if by_likelihood else linear
+    errors = best.errors if by_likelihood else errors_of_tests(problem, linear.x, linear, noise_model)
     unmodelled = perturbations(
         problem, linear, noise_model, histories, None if errors is None else errors.perturbations, working_noise
     )
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     rates = RateExplanations(problem, linear.x, judged, noise_model)
-    of_errors, of_common = error_covariances(judged, noise_model, errors, working_noise)
+    of_errors, of_common = error_covariances(found_at, noise_model, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
     prediction = predict(
         problem.predictor,

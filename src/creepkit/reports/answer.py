@@ -195,10 +195,9 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
     )
 
 
-def _held(fit: Identification, ranking: Ranking | None) -> Iterator[str]:
-    """A law that an upper bound of the search keeps from the tests: the one that is stated, or one that lost to it."""
-    others = [one.fit for one in ranking.laws] if ranking is not None else []
-    for one in (fit, *others):
+def _held(fits: Sequence[Identification]) -> Iterator[str]:
+    """A law that an upper bound of the search keeps from the tests."""
+    for one in fits:
         for name, param in one.law.table.items():
             low, high = param.bounds
             if param.scale != "log" and high > 0 and one.values.get(name, low) >= high - AT_BOUND * (high - low):
