@@ -148,10 +148,9 @@ def test_three_specimens_are_identified_together() -> None:
     for name in ("A", "n"):
         assert width["all"][name] < 1.1 * min(width[group][name] for group in ("bar", "dimple", "beams"))
     assert width["all"]["A"] < 0.3 * width["beams"]["A"] < 0.3 * width["bar"]["A"]
-    text = fits["all"].details()
-    height, sd = map(float, re.search(r"height of all(?:, mm)?: (\S+) \+- (\S+)", text).groups())
-    assert abs(height - 2.012) < 4 * sd < 0.002, "the beams are 2.012 mm high"
-    assert "the law is not contradicted by the tests at their stated noise" in text
+    (height,) = (one for one in fits["all"].nuisances if (one.key, one.owner) == ("height", "all"))
+    assert abs(height.value - 2.012) < 4 * height.sd < 0.002, "the beams are 2.012 mm high"
+    assert not fits["all"].adequacy.rejects
 
 
 # ---- readers -------------------------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals, components_fixed_by_priors
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
@@ -133,8 +134,10 @@ def error_covariances(
     if errors is None:
         return np.zeros((size, size)), np.zeros((size, size))
     own, common = errors.own(linear.residuals), errors.common()
+    if working_noise is not None:
+        return _moved_by(linear, working_noise, own, common)
     without, with_common, with_all = (
-        covariance_of_values(replace(linear, residuals=residuals), noise_model, working_noise)
+        covariance_of_values(replace(linear, residuals=residuals), noise_model)
         for residuals in (
             linear.residuals,
             linear.residuals.with_effects(own[..., :0], common),
@@ -142,6 +145,19 @@ def error_covariances(
         )
     )
     return _excess(with_all, without), _excess(with_common, without)
+
+
+def _moved_by(
+    linear: LinearisedProblem, working_noise: NoiseModel, own: Floats, common: Floats
+) -> tuple[Floats, Floats]:
+    """As error_covariances(), of values that are not by likelihood: what errors of one standard deviation move x by."""
+    plain = replace(linear.residuals, random_effect_sensitivities=None, common_effects=None)
+    free = replace(linear, residuals=plain, free=np.ones_like(linear.free))
+    solution = free.solve(CovarianceFactor.of_residuals(plain, working_noise))
+    of_common = solution.covariance @ np.einsum("tfp,tfk->pk", solution.weighted_jacobian, common)
+    of_own = np.einsum("qp,tfp,tfk->qtk", solution.covariance, solution.weighted_jacobian, own, optimize=True)
+    all_common = of_common @ of_common.T
+    return all_common + np.einsum("qtk,rtk->qr", of_own, of_own), all_common
 
 
 def _excess(covariance: Floats, least: Floats) -> Floats:
