@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34551
+TESTS = 34550
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

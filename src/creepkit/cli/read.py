@@ -80,7 +80,7 @@ def command(
     framed = [history for history in found if history.outputs]
     quality = ck.check_data_quality(framed, activation_energy=activation_energy)
     remarked = tuple(remark_flags([history for history in found if not history.outputs]))
-    quality = replace(quality, flags=(*quality.flags, *remarked))
+    quality = replace(quality, flags=(*quality.flags, *remarked), tests=len(found if remarked else framed))
     if as_json:
         document = {**report.histories_to_json(found, tables), "quality": data_quality_to_json(quality)}
         print_json({**document, "not read": [str(error) for error in unread]} if unread else document)
