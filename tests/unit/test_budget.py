@@ -17,7 +17,7 @@ BUDGET = {
     "api": 322,
     "app": 617,
     "cameras": 931,
-    "cli": 2355,
+    "cli": 2364,
     "core": 67,
     "dataset": 765,
     "discovery": 1442,
@@ -35,8 +35,8 @@ BUDGET = {
     "language": 1506,
     "laws": 136,
     "modules": 781,
-    "quality": 1458,
-    "readers": 5487,
+    "quality": 1477,
+    "readers": 5517,
     "records": 1979,
     "registry": 615,
     "reports": 7258,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34473
+TESTS = 34550
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -51,6 +52,7 @@ def command(
     A record of an instrument is shown with its channels, units, gaps and clock.
     """
     import creepkit as ck
+    from creepkit.quality import remark_flags
     from creepkit.readers.questions import single_errors
     from creepkit.readers.reading import summarise_tables
     from creepkit.reports import histories as report
@@ -77,13 +79,20 @@ def command(
     tables = [table for path in sorted(general & sources) for table in summarise_tables(Path(path), ignored)]
     framed = [history for history in found if history.outputs]
     quality = ck.check_data_quality(framed, activation_energy=activation_energy)
+    remarked = tuple(remark_flags([history for history in found if not history.outputs]))
+    quality = replace(quality, flags=(*quality.flags, *remarked), tests=len(found if remarked else framed))
     if as_json:
         document = {**report.histories_to_json(found, tables), "quality": data_quality_to_json(quality)}
         print_json({**document, "not read": [str(error) for error in unread]} if unread else document)
     else:
         without = len(found) - len(framed)
         counted = f"{without} test{'' if without == 1 else 's'} without frames" if without else ""
-        parts = (report.tables_text(tables), report.histories_text(found), counted, str(quality) if framed else "")
+        parts = (
+            report.tables_text(tables),
+            report.histories_text(found),
+            counted,
+            str(quality) if framed or remarked else "",
+        )
         tell("\n".join(part for part in parts if part))
     if to is not None:
         for path in _write(found, to):

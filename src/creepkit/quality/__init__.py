@@ -10,6 +10,7 @@ idle time in which nothing crept.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import get_args
 
@@ -48,6 +49,7 @@ __all__ = [
     "check_rig",
     "copy_reason",
     "exclude_suspect_frames",
+    "remark_flags",
     "repeated_row_notes",
     "without_copies",
 ]
@@ -116,8 +118,29 @@ def _large_strains(histories: Sequence[History]) -> Iterator[QualityFlag]:
             yield QualityFlag((history.name,), "unit", (), reason)
 
 
+_EXCLUDED = re.compile(
+    r"(?:do not|don.?t|not to be|never) use|not usable|^\W*void\W*$|\b(?:test|result) (?:is )?(?:void|invalid)\b"
+    r"|\b(?:void|invalid) (?:test|result)|ungültig|nicht (?:verwenden|verwertbar|auswerten)|à (?:exclure|écarter)"
+    r"|ne pas utiliser|non valide|\bessai (?:nul|invalide)\b",
+    re.IGNORECASE,
+)
+"""What a laboratory writes of a test that does not count."""
+
+
+def remark_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
+    """Tests of which a remark says that they do not count."""
+    for history in histories:
+        for label, text in history.labels.items():
+            if label != "assumed" and _EXCLUDED.search(text):
+                line = f'[[exclude]] test = "{history.name}" reason = "its remark"'
+                advice = f"to leave it out write into study.toml, in three lines: {line}"
+                yield QualityFlag((history.name,), "remark", (), f"'{label}' says '{text}'", proposal=advice)
+                break
+
+
 TEST_RULES: tuple[Callable[[Sequence[History]], Iterable[QualityFlag]], ...] = (
     *(_cut_flags, _copy_flags, _replicate_flags, temperature_trend_outliers, modulus_trend_outliers, _large_strains),
+    remark_flags,
 )
 """What questions whole tests, each by itself or beside the others."""
 

@@ -31,6 +31,7 @@ FlagKind = Literal[
     "motion",
     "residual",
     "fit",
+    "remark",
 ]
 
 

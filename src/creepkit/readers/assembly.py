@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -82,6 +81,8 @@ def assemble_history(
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
     frames = as_plain_bar(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
+    for assumption in frames.table.assumptions[len(table.assumptions) :]:
+        conditions.record_assumption(assumption)
     if count := len(frames.marked):
         what = f"{count} reading{'s' * (count > 1)} left out that another one at the same time follows"
         conditions.record_assumption(f"{what} with other conditions")
@@ -233,47 +234,39 @@ def _time_and_end(
     answer = conditions.end_terms.get(name.casefold(), "")
     if ended or answer in END_OF_TEST_TERMS:
         return time, ended or answer, not ended and answer == STOPPED
-    firm, remarks, unclear = dict[str, str](), dict[str, str](), dict[str, str]()
+    firm, remarks, unclear, asked = dict[str, str](), dict[str, str](), dict[str, str](), ""
     for label, text in conditions.labels.items():
         kind = kind_of_column(label)
         if label in _OF_OTHER_THINGS or (not kind and text.casefold() in YES | NO):
             continue
-        if frames is not None and (line := re.fullmatch(r"line (\d+)", label)):
-            lines, at = frames.table.lines, int(line[1])
-            if frames.lines[-1] <= at <= lines[-1]:
-                firm[label] = _end_by_last_remark(text, conditions, asks, path, frames)
-                continue
-            if lines[0] <= at < frames.lines[-1]:
-                if conditions.end_terms.get(text.casefold(), LABEL) != LABEL:
-                    what = f"remark '{quoted(text, 60)}' of line {at} is not of the last frame and says no end"
-                    conditions.record_assumption(what.replace(",", ";"))
-                continue
-        (end,) = ends_in_column(label, [text], conditions.end_terms, False).ends
-        firmness = firm if kind in FIRM else remarks
+        at = frames.line_of(label) if frames is not None else None
+        if at == "earlier":
+            if conditions.end_terms.get(text.casefold(), LABEL) != LABEL:
+                what = f"remark '{quoted(text, 60)}' of {label} is not of the last frame and says no end"
+                conditions.record_assumption(what.replace(",", ";"))
+            continue
+        if at == "last":
+            end = conditions.end_terms.get(text.casefold()) or end_said_by(text)
+            end, asked = {INTERRUPTED: STOPPED, LABEL: ""}.get(end, end), label if asks and end == UNCLEAR else asked
+        else:
+            (end,) = ends_in_column(label, [text], conditions.end_terms, False).ends
+        firmness = firm if kind in FIRM or at == "last" else remarks
         (unclear if end == UNCLEAR else firmness)[label] = text if end == UNCLEAR else end
     said = {end for end in firm.values() if end} or {STOPPED}.intersection(remarks.values())
     label = next((name for name, end in (firm | remarks).items() if end in said), "")
     if len(said) > 1:
         raise HistoryError(f"{conditions.location}: labels say {' and '.join(sorted(said))}; state '# ended: ruptured'")
-    if time is not None and unclear and not said:
-        name, text = next(iter(unclear.items()))
-        what = f"'{quoted(name)}' says '{quoted(text)}', and '{time.key}' that the test broke; which holds?"
+    if (time is not None or asked) and unclear and not said:
+        name = asked or next(iter(unclear))
+        text = unclear[name]
+        other = f"and '{time.key}' that the test broke; which holds?" if time else "the last frame; did it break then?"
         choices = [{text: STOPPED}, {text: RUPTURED}, {text: LABEL}]
-        raise Question(path, time.location, what, "ended", choices)
+        place = time.location if time else conditions.location
+        raise Question(path, place, f"'{quoted(name)}' says '{quoted(text)}', {other}", "ended", choices)
     if said == {STOPPED}:
         conditions.record_assumption(f"stopped before rupture by its label '{quoted(label)}'")
         return time, STOPPED, True
     return time, "".join(said), False
-
-
-def _end_by_last_remark(text: str, conditions: StatedConditions, asks: bool, path: Path, frames: TableFrames) -> str:
-    """What the remark of the last frame says: RUPTURED, STOPPED, or "" for nothing."""
-    said = conditions.end_terms.get(text.casefold()) or end_said_by(text)
-    if said == UNCLEAR and asks:
-        what = f"the remark '{quoted(text)}' of the last frame may speak of the end; did the test break then?"
-        choices = [{text: STOPPED}, {text: RUPTURED}, {text: LABEL}]
-        raise Question(path, frames.location(-1), what, "ended", choices)
-    return {INTERRUPTED: STOPPED, STOPPED: STOPPED, RUPTURED: RUPTURED}.get(said, "")
 
 
 def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | None]:

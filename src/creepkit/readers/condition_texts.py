@@ -1,7 +1,7 @@
 """Conditions in what people write beside a table: `140 MPa` above a pair of columns, titles, names of sheets and files.
 
 What stands above the columns of a test holds for it. A title, the name of a sheet or that of a file is a weaker source:
-it fills in what nothing else states, and must agree with what does.
+it fills in what nothing else states, gives way to an answer of tests.toml, and must agree with all else.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.readers.column_names import split_unit, unit_suffix
+from creepkit.readers.questions import ANSWERS_FILE
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records.quantities import LENGTH
@@ -28,8 +29,10 @@ _RANGE = re.compile(r"(?<![^\W_])\d[\d.,]*\s*(?:to|bis|à|and|und|et|or|oder|-|�
 
 
 _OF_THE_MATERIAL = re.compile(
-    r"normali[sz]|temper(?:ed|ing)|anneal|\bag(?:e?ing|ed)\b|solution|quench|forg|\brolled|\bhip(?:ped)?\b|heat.?treat"
+    r"normali[sz]|temper(?:ed|ing)|anneal|(?<![^\W_])(?:ag(?:e?ing|ed)|cur(?:ed|ing))(?![^\W\d_])|solution|reflow|sinter"
+    r"|quench|forg|\brolled|\bhip(?:ped)?\b|heat.?treat"
     r"|geglüht|vergütet|angelassen|lösungs|ausgelagert|wärmebehand|abgeschreckt|gehärtet|trempe|trempé|revenu|recuit"
+    r"|(?<![^\W_])ht[ _:-]+\d|stress.?reliev|spannungsarm|gealtert|ausgehärtet"
     r"|vieilli|traitement|yield|strength|\buts\b|\brm\b|\brp|streckgrenze|festigkeit|melting|solidus|room temp",
     re.IGNORECASE,
 )
@@ -110,14 +113,19 @@ def with_weak_sources(
         suffix = unit_suffix(unit) or unit
         value = kind.convert(float(text), suffix, source.location, quantity)
         other = taken.get(quantity) or _stated(quantity, result, table, known)
+        where = source.location.removeprefix(str(table.path)).lstrip(":, ")
         if other is not None:
-            _check_agreement(quantity, value, source, *other)
+            if abs(value - other[0]) <= _tolerance(quantity, other[0]):
+                continue
+            if f"{ANSWERS_FILE} [" not in other[1]:
+                what = f"states a {quantity} of {quoted(source.text, 20)}, but {other[1]}"
+                raise HistoryError(f"{source.location}: {what}; correct one of them")
+            assumptions.append(f"{quantity} of {ANSWERS_FILE} and not {source.text} from {where}".replace(", ", " "))
             continue
         if _is_stated_otherwise(quantity, result, table, known):
             continue
         taken[quantity] = (value, f"{source.location} states {source.text}")
         result[f"{quantity}_{suffix}"] = SourceText(text, source.location, key=quantity)
-        where = source.location.removeprefix(str(table.path)).lstrip(":, ")
         assumptions.append(f"{quantity} {source.text} from {'line ' * where.isdigit()}{where}".replace(", ", " "))
     return result, assumptions
 
@@ -161,10 +169,3 @@ def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table
 
 def _tolerance(quantity: str, value: float) -> float:
     return TEMPERATURE_AGREEMENT if quantity == "temperature" else LOAD_AGREEMENT * abs(value)
-
-
-def _check_agreement(quantity: str, value: float, source: SourceText, other: float, said: str) -> None:
-    if abs(value - other) > _tolerance(quantity, other):
-        raise HistoryError(
-            f"{source.location}: states a {quantity} of {quoted(source.text, 20)}, but {said}; correct one of them"
-        )

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -49,6 +50,12 @@ class TableFrames:
         """Where a frame stands, 'file:line'."""
         return self.table.location(int(self.lines[frame]))
 
+    def line_of(self, label: str) -> Literal["", "earlier", "last"]:
+        """Of which frame a label such as `line 17` is a remark."""
+        line = int(label[5:]) if label.startswith("line ") and label[5:].isdecimal() else -1
+        last, lines = self.lines[-1], self.table.lines
+        return "last" if last <= line <= lines[-1] else "earlier" if lines[0] <= line < last else ""
+
 
 def read_frames(
     table: CellTable, vocabulary: HeaderVocabulary, terms: Terms, skipped_columns: Collection[str] = ()
@@ -58,6 +65,7 @@ def read_frames(
     averaged = (name for names in vocabulary.averaged_columns.values() for name in names)
     ignored = {*skipped_columns, *vocabulary.labels, *averaged}
     values, found, errors = dict[str, Floats](), dict[str, str](), list[HistoryError]()
+    notes = list[str]()
 
     def read(k: int, name: str) -> None:
         written = table.as_written(k)
@@ -70,6 +78,8 @@ def read_frames(
             )
         found[quantity] = written
         values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
+        if quantity == "stress" and (table.numbers(name) < 0.0).any() and not (table.numbers(name) > 0.0).any():
+            notes.append("magnitudes of negative stress and strain (compression)")
         if quantity == "used":
             _check_marks(table, k, values[quantity])
 
@@ -81,6 +91,9 @@ def read_frames(
         place, names = table.location(table.columns_line), table.written or table.columns
         result = f"among {some_of(names)}" if names else "as every column is the same in all rows"
         raise HistoryError(f"{place}: missing column: no time {result}; name one time_s, time_min or time_h")
+    if notes and "strain" in values and values["strain"].max() <= 0.0:
+        values["strain"] = -values["strain"]
+    table = table.assuming(*notes)
     imposed = [values[name] for name in (*terms.number_kinds, "temperature", "step") if name in values]
     return _strictly_increasing(_without_readings_before_steps(TableFrames(table, values, table.lines), imposed))
 
@@ -151,6 +164,7 @@ def _converted_column(table: CellTable, name: str, kind: QuantityKind, suffix: s
     k, numbers = table.column(name), table.numbers(name)
     written = table.as_written(k)
     if kind.low == 0.0 and kind.name in ("stress", "pressure") and numbers.size:  # a reading of none may be below it
+        numbers = -numbers if kind.name == "stress" and numbers.max() <= 0.0 else numbers
         numbers = np.where((numbers < 0.0) & (numbers >= -NOISE_OF_ZERO * numbers.max()), 0.0, numbers)
     return kind.convert_all(numbers, suffix, lambda row: table.location(int(table.lines[row]), k), written)
 

@@ -48,6 +48,10 @@ HELD_RANGE, OUTLIERS = 0.02, 0.02
 """Of its median: a quantity that is held varies by less, but for this fraction of its frames."""
 
 
+CONSTANT_RATE, LARGEST_MODULUS = 0.05, 1e6
+"""Of the median: a rate of strain between the first frame and any other that is as near is constant; MPa."""
+
+
 LONGEST_RAMP, SUSTAINED, STRAIGHT = 0.1, 0.5, 0.1
 """Of the duration of a test the ramp to what is held; of the largest stress what one that was imposed does not fall
 below; of its range by how much a strain that was imposed by its rate is off a straight line."""
@@ -251,6 +255,9 @@ def _imposed_of(conditions: StatedConditions, frames: TableFrames, first: str, s
     if len(stated) == 1:
         return stated[0]
     columns = {q: frames.values[q] for q in pair}
+    if pair == ["strain", "stress"] and _is_strained_at_constant_rate(frames.times, **columns):
+        conditions.record_assumption("strain imposed, for its rate is constant")
+        return "strain"
     held = [q for q, column in columns.items() if hold_begins(frames.times, column) is not None] or [
         q for q, column in columns.items() if _level_starts(column, LOAD_RECORD_TOLERANCE * float(np.ptp(column)))
     ]
@@ -300,6 +307,18 @@ def _grows_steadily(times: Floats, column: Floats) -> bool:
     """Whether a column is a straight line over time, but for STRAIGHT of its range."""
     line = np.polyval(np.polyfit(times, column, 1), times)
     return bool(np.ptp(column) > 0.0 and np.abs(column - line).max() <= STRAIGHT * np.ptp(column))
+
+
+def _is_strained_at_constant_rate(times: Floats, strain: Floats, stress: Floats) -> bool:
+    """Whether strain grows by one rate from the first frame on, while the stress rises from nothing.
+
+    Creep, even steady one, is slower at the lower stress of a ramp, whose elastic strain is not that of creep; where
+    the stress rises by more than any modulus times the strain, that is creep strain alone.
+    """
+    rates, level = (strain[1:] - strain[0]) / (times[1:] - times[0]), float(np.median(stress))
+    is_constant = np.abs(rates - np.median(rates)).max() <= CONSTANT_RATE * np.median(rates)
+    is_elastic = stress[1] - stress[0] <= LARGEST_MODULUS * (strain[1] - strain[0])
+    return bool(is_constant and is_elastic and stress[0] <= 0.05 * level and stress[1] < 0.97 * level)
 
 
 def _levels_of_steps(conditions: StatedConditions, frames: TableFrames, quantity: str) -> Floats | None:

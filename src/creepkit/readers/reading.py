@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from creepkit.errors import HistoryError, nearest, quoted
-from creepkit.files.delimited_text import decode_text, refuse_unprintable
+from creepkit.files.delimited_text import refuse_unprintable
 from creepkit.files.reading import read_bytes
 from creepkit.hookspecs import hookimpl
 from creepkit.readers.columns_of_tests import column_called
@@ -80,22 +80,25 @@ def _ends_of_nothing(folder: Path, said: Collection[str]) -> Iterator[HistoryErr
     file = folder / ANSWERS_FILE
     for pattern, answers in read_answers(file).items() if file.is_file() else ():
         ended = answers.get("ended")
-        keys = [text for text in (ended if isinstance(ended, dict) else ()) if text.removeprefix("()").strip()]
-        open_keys = [key for key in keys if not any(key.removeprefix("()").casefold() in one for one in said)]
-        files = [path for path in sorted(folder.glob("*")) if path.is_file() and fnmatchcase(path.name, pattern)]
-        texts = [" ".join(_text_of(path).casefold().split()) for path in (files if open_keys else ())]
-        for key in open_keys:
-            if texts and not any(" ".join(key.removeprefix("()").casefold().split()) in text for text in texts):
+        ended = ended if isinstance(ended, dict) else {}
+        keys = {key: " ".join(key.casefold().removeprefix("()").split()) for key in ended}
+        missing = [key for key, text in keys.items() if not any(text in one for one in said)]
+        files = [path for path in sorted(folder.glob("*")) if missing and fnmatchcase(path.name, pattern)]
+        texts = [_text_of(path) for path in files if path.is_file()]
+        for key in missing:
+            if texts and not any(keys[key] in text for text in texts):
                 what = f"'{quoted(key)}' stands in no file of that name"
                 yield HistoryError(f'{file}: ["{quoted(pattern)}"] ended: {what}; correct or remove it')
 
 
 def _text_of(path: Path) -> str:
-    """The text of a file, its name and those of its sheets included."""
-    if not SPREADSHEET.accepts(path):
-        return f"{path.stem} {decode_text(read_bytes(path, TABLE_FILE), path)}"
-    sheets = read_sheets(path)
-    return " ".join([path.stem, *(text for one in sheets for row in one.rows for text in (one.sheet, *row.cells))])
+    """The words of a file, its name and those of its sheets included, in small letters."""
+    if SPREADSHEET.accepts(path):
+        words = [text for one in read_sheets(path) for row in one.rows for text in (one.sheet, *row.cells)]
+    else:
+        content = read_bytes(path, TABLE_FILE)
+        words = [content.decode(one, "replace") for one in ("utf-8", "utf-16", "cp1252")]
+    return " ".join(" ".join([path.stem, *words]).casefold().split())
 
 
 def _histories_of(source: Path, readers: Sequence[Reader]) -> list[History]:

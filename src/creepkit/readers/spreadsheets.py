@@ -263,16 +263,21 @@ def number_text(value: float, number_format: str) -> str:
     return f"{text}%" if shown.strip() == "%" else text
 
 
+_COMMA = re.compile(r"(?P<number>[<>≥]?\s*[+-]?\d*,(?P<part>\d+)(?:[eEdD][+-]?\d+)?)(?P<unit>\s*[^\d\s,;][^,;]{0,11})?")
+"""A number with a comma and perhaps a unit, `0,10 %`."""
+
+
 def _with_points(rows: list[TableRow], texts: set[str], place: str) -> list[TableRow]:
-    """The rows with decimal points in numbers that were entered as text with a decimal comma."""
-    comma = Dialect("\t", ",")
-    numbers = [text for text in texts if is_number(text, comma)]
+    """The rows with decimal points in numbers that were entered as text with a decimal comma.
+
+    Cells that are numbers have no decimal sign, so texts decide; of three digits behind a comma those without a unit.
+    """
+    found = [match for text in texts if (match := _COMMA.fullmatch(text))]
+    numbers = [match["number"].lstrip("<>≥ ") for match in found if not match["unit"] or len(match["part"]) != 3]
     if not numbers or detect_dialect([f"{text}\t0" for text in numbers], place).decimal == ".":
         return rows
-    return [
-        TableRow(row.line, [c.replace(",", ".") if "," in c and is_number(c, comma) else c for c in row.cells])
-        for row in rows
-    ]
+    changed = {match[0]: match[0].replace(",", ".") for match in found}
+    return [TableRow(row.line, [changed.get(cell, cell) for cell in row.cells]) for row in rows]
 
 
 def _cells_below(rows: list[TableRow], merged: Sequence[tuple[int, int, int, int]]) -> frozenset[tuple[int, int]]:

@@ -79,7 +79,7 @@ def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[st
     stated: dict[str, SourceText] = {}
     for key, entry in entries.items():
         name = known.condition(key)
-        found = split_unit(name, known.conditions.kinds)
+        found = split_unit(known.vocabulary.synonyms.get(key, name), known.conditions.kinds)
         if found and (match := _VALUE_WITH_UNIT.fullmatch(entry.text)):
             suffix = unit_suffix(match[2])
             if suffix in known.conditions.kinds[found[0]].units and found[1] in ("", suffix):
@@ -199,7 +199,8 @@ _ELAPSED = re.compile(r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d{1,9})?)", re.ASCII
 _ELAPSED_NAME = re.compile(r"elapsed|test time|creep time|laufzeit|h:mm|\[h|hh:mm|h:m", re.IGNORECASE)
 
 
-_OF_DAY = ("time of day", "clock", "clock time", "uhrzeit")
+OF_DAY, ELAPSED = ("time of day", "clock", "clock time", "uhrzeit"), "elapsed time"
+"""Names of times of the day; and of a time that is none, as an answer says it."""
 
 
 def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: Terms) -> CellTable:
@@ -218,7 +219,7 @@ def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: T
     cells = list(cells_of(table.rows, clock))
     elapsed = [_ELAPSED.fullmatch(cell) for cell in cells]
     if elapsed[0]:
-        hours, assumption = _times_of(elapsed, table, clock)
+        hours, assumption = _times_of(elapsed, table, clock, known.vocabulary.synonyms)
     else:
         hours, assumption = _since_first_row(cells, table, order.text if order else "", zone.text if zone else "")
     written = table.as_written(clock)
@@ -245,7 +246,9 @@ def _with_times(table: CellTable, clock: int, times: Floats) -> Iterator[TableRo
         yield TableRow(row.line, changed)
 
 
-def _times_of(elapsed: Sequence[re.Match[str] | None], table: CellTable, clock: int) -> tuple[Floats, str]:
+def _times_of(
+    elapsed: Sequence[re.Match[str] | None], table: CellTable, clock: int, synonyms: Mapping[str, str]
+) -> tuple[Floats, str]:
     """(rows,) s of times h:mm:ss, elapsed or of the day, and what was assumed of them."""
     seconds, name = [], table.as_written(clock)
     for row, match in zip(table.rows, elapsed, strict=True):
@@ -256,18 +259,23 @@ def _times_of(elapsed: Sequence[re.Match[str] | None], table: CellTable, clock: 
             )
         seconds.append(3600.0 * int(match[1]) + 60.0 * int(match[2]) + float(match[3].replace(",", ".")))
     times = np.array(seconds)
-    if words_of(name) in _OF_DAY:
+    meant = synonyms.get(name, name)
+    if words_of(meant) in OF_DAY:
         later = np.concatenate([[0.0], np.cumsum(np.diff(times) < -0.5 * DAY)])
         times = times + DAY * later
         return times - times[0], f"time since the first row at {table.rows[0].cells[clock]}"
-    if _ELAPSED_NAME.search(name):
+    if _ELAPSED_NAME.search(meant):
         return times, ""
     if times[0] < 3600.0 or times.max() >= DAY:
         return times, f"times such as {table.rows[-1].cells[clock]} elapsed"
     place = table.location(table.columns_line, clock)
-    raise HistoryError(
-        f"{place}: '{name}' begins at {table.rows[0].cells[clock]}, which may be elapsed or of the day; name the "
-        "column 'Elapsed time (h:mm:ss)' or 'Time of day'"
+    raise Question(
+        table.path,
+        place,
+        f"'{name}' begins at {table.rows[0].cells[clock]}, which may be elapsed or of the day; name the column "
+        "'Elapsed time (h:mm:ss)' or 'Time of day'",
+        "columns",
+        [{name: words.replace(" ", "_")} for words in (OF_DAY[0], ELAPSED)],
     )
 
 

@@ -61,23 +61,17 @@ def without_remarks(table: CellTable, notes: dict[str, SourceText], labels: Coll
 
     labels : columns of words that are remarks where their cells differ.
     """
-    columns = [
-        k
-        for k, name in enumerate(table.columns if not isinstance(table.rows, NumberRows) else ())
-        if kind_of_column(name) == "remark" or (name in labels and _are_remarks(table, k))
-    ]
+    count = 0 if isinstance(table.rows, NumberRows) else len(table.columns)
+    cells = {k: set(cells_of(table.rows, k)) for k in range(count)}
+    words = [k for k, one in cells.items() if len(one) > 1 and not any(is_number(cell, table.dialect) for cell in one)]
+    columns = [k for k in cells if kind_of_column(table.columns[k]) == "remark"]
+    columns += [k for k in words if table.columns[k] in labels and k not in columns]
     if not columns:
         return table
     for row in table.rows:
         if text := "; ".join(row.cells[k] for k in columns if row.cells[k]):
             notes[f"label line {row.line}"] = SourceText(text, table.location(row.line))
     return table.keeping([k for k in range(len(table.columns)) if k not in columns])
-
-
-def _are_remarks(table: CellTable, column: int) -> bool:
-    """Whether the cells of a column differ and are words."""
-    texts = set(cells_of(table.rows, column))
-    return len(texts) > 1 and not any(is_number(text, table.dialect) for text in texts)
 
 
 _DATES = frozenset(("date", "datum", "day", "jour", "heure"))
@@ -159,10 +153,9 @@ def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Ter
 
     groups = grouped(table.rows, keys[0], check) if keys else {"": table.rows}
     tests = []
-    has_notes = len(groups) > 1 and any(key.startswith("label line ") for key in entries)
-    of_rows = {f"label line {row.line}" for row in table.rows} if has_notes else set()
+    of_rows = {f"label line {row.line}" for row in (table.rows if len(groups) > 1 else ())}
     for name, rows in groups.items():
-        others = of_rows - {f"label line {row.line}" for row in rows if has_notes}
+        others = of_rows - {f"label line {row.line}" for row in rows} if of_rows else of_rows
         stated = [k for k in foreign if k not in keys[:1] and _states_condition(table, k, rows, known)]
         own = _entries_of_columns(table, stated, rows[0], known)
         refuse_twice(own, entries, known)

@@ -25,11 +25,12 @@ from typing import Any, NamedTuple
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.reading import FileKind, read_text
-from creepkit.readers.column_names import NameTable, split_written_name
+from creepkit.readers.column_names import NameTable, split_written_name, words_of
 from creepkit.readers.columns_of_tests import NAMES
 from creepkit.readers.ends_of_tests import LABEL, RUPTURED, STOPPED
 from creepkit.readers.frames import UNUSED
 from creepkit.readers.questions import ANSWERS_FILE, raise_all
+from creepkit.readers.standard_names import ELAPSED, OF_DAY
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 
 ANSWERS = FileKind("answers about tests", HistoryError, "correct or remove it", maximum_bytes=1_000_000)
@@ -56,7 +57,8 @@ class Answers(NamedTuple):
                 kept[what].append(name)
                 continue
             unit = split_written_name(name)[1]  # that it has as it is written counts where the answer has none
-            synonyms[name] = names.standard(f"{what} ({unit})" if what in names.kinds and unit else what)
+            standard = names.standard(f"{what} ({unit})" if what in names.kinds and unit else what)
+            synonyms[name] = what if words_of(what) in (*OF_DAY, ELAPSED) else standard  # which kind of clock counts
         return replace(
             vocabulary,
             synonyms=synonyms,

@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.tests_in_rows import TEST_TABLE
+from helpers.workbooks import workbook
 
 FRAMES = "# temperature_C: 800\n# control: load\n{}\ntime_h;strain_pct\n0;0\n100;0,5\n900;0,9\n"
 
@@ -71,3 +73,14 @@ def test_exponents_of_fortran_are_numbers(tmp_path: Path):
     (row,) = TEST_TABLE.read(path)
     assert row.minimum_rate == pytest.approx(1e-5 / 3600)
     assert row.loading.steps == ((0.0, 120.0),)
+
+
+def test_texts_of_a_sheet_decide_about_their_decimal_sign(tmp_path: Path):
+    head = [["Prüftemperatur", "540,5 °C"], ["E-Modul", "172,25 GPa"], ["Gesamtdehnung", "0,10 %"], ["Los", "3,004 kg"]]
+    sheet = [*head, [], ["Zeit (h)", "Restspannung (MPa)"], [0, 170.5], [100.25, "151,5"], [1000, 128.5]]
+    (history,) = ck.read_histories(workbook(tmp_path / "r.xlsx", {"Schraube": sheet}))
+    assert history.temperature == pytest.approx(813.65)
+    assert history.loading.program().values.tolist() == pytest.approx([0.001])
+    assert history.elastic.at(history.temperature).E == pytest.approx(172250.0)
+    assert history.outputs["stress"].tolist() == [170.5, 151.5, 128.5]
+    np.testing.assert_allclose(history.times, [0.0, 360900.0, 3600000.0])

@@ -1,9 +1,11 @@
 """Tables with one row a test as laboratories write them: groups, heads, times to strains, marks of run-outs."""
 
+import numpy as np
 import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
+from creepkit.quality import remark_flags
 from creepkit.readers.questions import Question
 from helpers.workbooks import workbook
 
@@ -119,3 +121,38 @@ def test_a_title_an_encoding_and_decimal_commas(tmp_path):
     first, second = read(tmp_path, text, "cp1252")
     assert (first.name, first.minimum_rate) == ("K1", pytest.approx(1.5e-6 / HOUR))
     assert (second.unruptured, second.labels["Bemerkung"]) == (True, "läuft noch")
+
+
+def test_a_constant_rate_of_strain_is_recognised(tmp_path):
+    """Strain in proportion to time with a stress that rises is imposed; negative ones are magnitudes of compression."""
+    times = np.concatenate([np.arange(15) / 7, np.linspace(3, 70, 40)])
+    stress = np.minimum(40e3 * 1e-2 * times, 112.0 * (1 + 0.01 * np.sin(40 * times)))
+    for sign in (1, -1):
+        rows = [f"{t:.2f};{sign * 1e-2 * t:.4f};{sign * s:.2f}" for t, s in zip(times, stress, strict=True)]
+        head = "# temperature_C: 1000\n# strain_unit: 1\n# modulus_GPa: 40\ntime_s;True strain;stress_MPa\n"
+        (tmp_path / "c.csv").write_text(head + "\n".join(rows))
+        (one,) = ck.read_histories(tmp_path / "c.csv")
+        assert (one.specimen, one.loading.quantity) == ("relaxation", "strain")
+        np.testing.assert_allclose(one.loading.program().at(one.times), 1e-2 * times, atol=3e-3)
+        np.testing.assert_allclose(one.outputs["stress"], stress, atol=0.01)
+        assert "strain imposed, for its rate is constant" in one.labels["assumed"]
+        assert ("magnitudes of negative stress and strain" in one.labels["assumed"]) == (sign < 0)
+    creep = [f"{t:.2f};{1e-4 * t:.6f};{112.0 * (t > 0):.1f}" for t in times]
+    (tmp_path / "c.csv").write_text(head + "\n".join(creep))
+    assert ck.read_histories(tmp_path / "c.csv")[0].loading.quantity == "stress"
+
+
+def test_remarks_of_tests_that_do_not_count(tmp_path):
+    """Both with frames and without; pores and other voids are none."""
+    excluded = ("voided joint (x-ray) - do not use", "void", "invalid test", "ungültig", "nicht verwenden", "à exclure")
+    for remark in (*excluded, "void at the fracture surface", "failed in IMC", "used twice"):
+        (tmp_path / "t.csv").write_text(
+            f"test;T (C);stress_MPa;min rate (1/h);remarks\nA1;23;8;1e-6;\nA3;23;12;1e-5;{remark}\n"
+        )
+        tests = ck.read_histories(tmp_path / "t.csv")
+        flags = list(remark_flags(tests))
+        assert [flag.tests for flag in flags] == [("A3",)] * (remark in excluded), remark
+        assert all('[[exclude]] test = "A3"' in str(flag) for flag in flags)
+    framed = "# stress_MPa: 12\n# temperature_C: 600\n# label note: do not use\ntime_h;strain_pct\n0;0\n1;0.1\n2;0.15\n"
+    (tmp_path / "f.csv").write_text(framed)
+    assert [flag.kind for flag in ck.check_data_quality(ck.read_histories(tmp_path / "f.csv"))] == ["remark"]

@@ -116,3 +116,48 @@ def test_all_errors_of_a_table_come_at_once(tmp_path):
     lines = [str(one) for one in caught.value.errors]
     assert [next(k for k in "2345" if f"r.csv:{k}" in line) for line in lines] == ["3", "4", "2", "5"]
     assert "ignore" not in "".join(lines)
+
+
+def test_a_guess_gives_way_to_an_answer(tmp_path):
+    """Titles and names of files and sheets are guesses; a column or `# key: value` contradicts an answer."""
+    frames = "Time (h);Strain (%)\n0;0\n10;0.1\n"
+    written(
+        tmp_path, lot_245C__csv=f"joint A 300 C\nStress: 12 MPa\n{frames}", k__csv=f"# temperature_C: 245\n{frames}"
+    )
+    with pytest.raises(HistoryError, match="states a temperature of 245 C, but .* states 300 C; correct one of them"):
+        ck.read_histories(tmp_path / "lot_245C.csv")
+    written(tmp_path, tests__toml='["*.csv"]\ntemperature_C = 23\n')
+    (one,) = ck.read_histories(tmp_path / "lot_245C.csv")
+    assert (one.temperature, one.loading.steps) == (pytest.approx(296.15), ((0.0, 12.0),))
+    assert "temperature of tests.toml and not 300 C from 1" in one.labels["assumed"]
+    assert "temperature of tests.toml and not 245 C from name of the file" in one.labels["assumed"]
+    with pytest.raises(HistoryError, match="temperature_C is '23', and .*k.csv:1 says another one"):
+        ck.read_histories(tmp_path / "k.csv")
+
+
+TREATMENTS = (
+    *("lot A, reflow 245C", "aged 1000 h at 750 °C", "annealed 980 C", "heat treated 1050 °C", "solution 1180 °C"),
+    *("tempered 770 °C", "normalised 1060 °C", "cured 180 C", "HT 1050 °C", "geglüht 900 °C", "ausgelagert 750 °C"),
+    *("vieilli 700 °C", "recuit 900 °C", "ageing 750C", "sintered 1400 °C"),
+)
+
+
+def test_temperatures_of_treatments_are_none_of_tests(tmp_path):
+    for title in TREATMENTS:
+        written(tmp_path, a__csv=f"{title}\nStress (MPa);12\nTime (h);Strain (%)\n0;0\n10;0.1\n")
+        with pytest.raises(Question, match="no temperature"):
+            ck.read_histories(tmp_path)
+
+
+@pytest.mark.parametrize(("answer", "hours"), [("time_of_day", [0, 2, 6]), ("elapsed_time", [20, 22, 26])])
+def test_a_clock_that_is_asked_for_can_be_answered(tmp_path, answer, hours):
+    clock = ("20:00:00", "22:00:00", "02:00:00" if answer == "time_of_day" else "23:59:59")
+    rows = "".join(f"{time};0.{k}\n" for k, time in enumerate(clock))
+    written(tmp_path, a__csv=f"# stress_MPa: 12\n# temperature_C: 600\nTime;Strain (%)\n{rows}")
+    with pytest.raises(Question, match="may be elapsed or of the day") as caught:
+        ck.read_histories(tmp_path)
+    (line,) = [caught.value.entry(one) for one in caught.value.choices if answer in str(one)]
+    assert line == f'columns = {{Time = "{answer}"}}'
+    written(tmp_path, tests__toml=f'["a.csv"]\n{line}\n')
+    expected = hours if answer == "time_of_day" else [20, 22, 24 - 1 / 3600]
+    np.testing.assert_allclose(ck.read_histories(tmp_path)[0].times / 3600, expected)
