@@ -154,10 +154,13 @@ def _moved_by(
     plain = replace(linear.residuals, random_effect_sensitivities=None, common_effects=None)
     free = replace(linear, residuals=plain, free=np.ones_like(linear.free))
     solution = free.solve(CovarianceFactor.of_residuals(plain, working_noise))
-    of_common = solution.covariance @ np.einsum("tfp,tfk->pk", solution.weighted_jacobian, common)
-    of_own = np.einsum("qp,tfp,tfk->qtk", solution.covariance, solution.weighted_jacobian, own, optimize=True)
-    all_common = of_common @ of_common.T
-    return all_common + np.einsum("qtk,rtk->qr", of_own, of_own), all_common
+    size = linear.precision.size
+    found = []
+    for effects, sums in ((own, "tfp,tfk->ptk"), (common, "tfp,tfk->pk")):
+        pull = np.einsum(sums, solution.weighted_jacobian, effects) if effects.shape[-1] else np.zeros((size, 0))
+        moved = solution.covariance @ pull.reshape(size, -1)
+        found.append(moved @ moved.T)
+    return found[0] + found[1], found[1]
 
 
 def _excess(covariance: Floats, least: Floats) -> Floats:

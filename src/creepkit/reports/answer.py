@@ -188,11 +188,9 @@ def tests_text(fit: Identification) -> str:
 
 def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQuality | None = None) -> list[str]:
     """What to mind, the most serious first, a sentence each without a full stop."""
-    return list(
-        dict.fromkeys(
-            [*_held(fit, ranking), *_contradictions(fit), *_choice(ranking), *_precision(fit), *_data(quality)]
-        )
-    )
+    others = [one.fit for one in ranking.laws if one.fit is not fit] if ranking is not None else []
+    of_law = [*_held([fit]), *_contradictions(fit), *_choice(ranking), *_precision(fit)]
+    return list(dict.fromkeys([*of_law, *_held(others), *_data(quality)]))
 
 
 def _held(fits: Sequence[Identification]) -> Iterator[str]:
