@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1412,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 11479,
+    "inverse": 11489,
     "jobs": 251,
     "kernels": 1703,
     "language": 1506,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34550
+TESTS = 34548
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

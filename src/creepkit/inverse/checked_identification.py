@@ -52,7 +52,7 @@ def identify(
         A surrogate that does not know the class of the law is replaced by its specimen, and a note says so.
     settings : what is minimised, nuisance parameters, starts, seed, frames, robust losses, and whether suspect frames
         are left out. changes : single fields of it, see IdentificationSettings:
-        starts=4, nuisances=["offset", Nuisance("rate", sd=0.1)].
+        starts=4, nuisances=["offset", Nuisance("rate", sd=0.1)], weights="likelihood".
     """
     law, predictor = resolve_law(law), resolve_predictors(using, histories)
     settings = (settings or IdentificationSettings()).changed(changes, predictor)
@@ -79,7 +79,7 @@ def identify(
     return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 
-@takes_options(IdentificationSettings)
+@takes_options(IdentificationSettings, weights="likelihood")
 @checked
 def select(
     laws: Sequence[CreepLaw | str],
@@ -93,16 +93,21 @@ def select(
     progress: Callable[[str, int, int], None] | None = None,
     **changes: Any,
 ) -> Ranking:
-    """Identify several laws from the same histories, and rank them by how well they explain these.
+    """Identify several laws from the same histories by likelihood, and rank them by how well they explain these.
 
     laws : candidates; sums : also sums of two of them: True, False, or None, with which sums of the best law and then
         richer registered laws are tried where none explains the tests to their noise, at most `further_laws` of them.
     by : the criterion; the result is a set of laws with weights, and a verdict: "decisive" only where one law of those
         asked for explains the tests, has 95 % of the weight, and nothing that the tests allow stands against it.
-    using, through, settings, changes : as for identify().
+    using, through, settings, changes : as for identify(); weights are "likelihood".
     """
     predictor = resolve_predictors(using, histories)
     settings = (settings or IdentificationSettings()).changed(changes, predictor)
+    if changes.get("weights") not in (None, "likelihood"):
+        raise FitError(
+            f"select() compares laws by their likelihood, found weights={changes['weights']!r}; leave weights out, or "
+            "identify each law with them and rank() the results"
+        )
     histories, left_out = sound_tests(list(histories), settings)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     ranking = select_law(

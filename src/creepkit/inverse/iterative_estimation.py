@@ -220,7 +220,10 @@ def _round_result(
         nuisances = _with_prior_sd(nuisances, np.einsum("tfp,tfq->pq", whitened, whitened), minimum.x)
         problem = problem.with_nuisances(nuisances)
     linear = linearised(problem, minimum.x, residuals)
-    likelihood = restricted_log_likelihood(linear, working_noise)
+    # The optimum under weights is none of the noise model: that it is flat in the law's parameters says nothing for it.
+    by_likelihood = problem.settings.weights == "likelihood"
+    integrated = np.arange(minimum.x.size) >= (0 if by_likelihood else problem.parameter_count)
+    likelihood = restricted_log_likelihood(linear, working_noise, integrated)
     return EstimationResult(problem, minimum, residuals, working_noise, likelihood, linear, minimum.x)
 
 

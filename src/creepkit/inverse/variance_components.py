@@ -73,13 +73,19 @@ class LinearSolution:
     log_det: float
 
 
-def restricted_log_likelihood(linearised: LinearisedProblem, noise_model: NoiseModel) -> float:
-    """ln L but for a constant; ln|A| over all unknowns, so that it does not jump where one meets its bound."""
-    factor = CovarianceFactor.of_residuals(linearised.residuals, noise_model)
-    solution = linearised.solve(factor)
+def restricted_log_likelihood(
+    linearised: LinearisedProblem, noise_model: NoiseModel, integrated: Bools | None = None
+) -> float:
+    """ln L but for a constant; ln|A| over all unknowns, so that it does not jump where one meets its bound.
+
+    integrated : (unknowns,) those that are integrated out, where these are not all.
+    """
+    integrated = np.ones_like(linearised.free) if integrated is None else integrated
+    factor, free = CovarianceFactor.of_residuals(linearised.residuals, noise_model), linearised.free & integrated
+    solution = replace(linearised, free=free).solve(factor)
     unconstrained = solution
-    if not linearised.free.all():
-        unconstrained = replace(linearised, free=np.ones_like(linearised.free)).solve(factor)
+    if (free != integrated).any():
+        unconstrained = replace(linearised, free=integrated).solve(factor)
     priors = float(np.log(linearised.precision[linearised.precision > 0]).sum())
     return -0.5 * (factor.log_determinant + unconstrained.log_det - priors + solution.chi_square)
 

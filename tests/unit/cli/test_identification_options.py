@@ -85,12 +85,10 @@ def test_a_law_of_the_command_line_has_its_changes_in_its_files(tmp_path: Path) 
     assert 3 <= law["parameters"]["n_2"]["value"] <= 6
 
 
-def test_select_ranks_values_by_other_weights_too() -> None:
+def test_weights_that_select_does_not_take_are_an_error() -> None:
     tests = ck.read_histories(ck.example_data("planted creep curves"))
-    laws = [ck.law(name).times(ck.arrhenius()) for name in ("norton", "strain-hardening")]
-    ranking = ck.select(laws, tests, weights="equal", starts=1, sobol_points=8, frames=16, sums=False)
-    assert ranking.best.law.name == "strain-hardening*arrhenius"
-    assert ranking.best.settings.weights == "equal"
+    with pytest.raises(FitError, match="compares laws by their likelihood, found weights='equal'"):
+        ck.select(["norton", "strain-hardening"], tests, weights="equal")
 
 
 def test_options_for_measured_tests_are_refused_with_identifications() -> None:

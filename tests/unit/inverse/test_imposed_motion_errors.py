@@ -29,7 +29,7 @@ def _relaxation(stiffness: float = E) -> list[ck.History]:
         # of weights that no estimate changes, an error so small that its effect is linear
         (0.05, {"weights": "equal", "nuisances": ()}, 0.05),
         # whole errors, which a likelihood that does not know of them finds as offsets of tests
-        (1.0, {"usual_errors": "none"}, 0.15),
+        (1.0, {"weights": "likelihood", "usual_errors": "none"}, 0.15),
     ],
 )
 def test_the_rate_moves_as_identifications_with_these_errors_say(share, how, tolerance):

@@ -146,7 +146,7 @@ GROUPS = (
     Nuisance("temperature step", "all", sd=30.0, start=START, tests=SLOW),
     Nuisance("temperature step", "all", sd=30.0, start=START, tests=FAST),
 )
-QUICK = IdentificationSettings(starts=1, sobol_points=8, nuisances=GROUPS)
+QUICK = IdentificationSettings(starts=1, sobol_points=8, nuisances=GROUPS, weights="likelihood")
 
 
 def planted(noise=2e-6):
