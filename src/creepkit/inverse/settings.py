@@ -67,8 +67,9 @@ class IdentificationSettings(Options, title="settings of an identification", err
     suspect_frames : "exclude": frames that unload, fall or lie apart (see quality.exclude_suspect_frames) are left out
         when the public functions and commands are handed tests, and the notes of the result name them; or "keep".
     rupture_times : whether ends of tests without curves, rupture times and run-outs, are compared with the law: "auto":
-        where its rate can rise at constant stress (see inverse.compared_tests), in a comparison of laws where that of any
-        can; "use" or "ignore": with every law or with none. Curves that were followed to rupture are compared to it.
+        where its rate can rise at constant stress (see inverse.compared_tests), in a comparison of laws where that of
+        any can; "use" or "ignore": with every law or with none. Curves that were followed to rupture are compared to
+        it.
     usual_errors : of tests, which every interval includes where no nuisance stands for them: "usual" ones (see
         USUAL_ERRORS), {what: one standard deviation} of those that are named alone, or "none".
     """
