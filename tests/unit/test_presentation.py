@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from creepkit.inverse.selection import rank
-from creepkit.inverse.sparsity.result import PenaltyPath
 from creepkit.inverse.uncertainty.correlation import Correlation
 from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
 from creepkit.laws.norton import NORTON
@@ -69,7 +68,6 @@ AXIS = np.array([10.0, 100.0])
 RECORDS = [
     Correlation(("ln A", "n"), np.array([[1.0, -0.5], [-0.5, 1.0]]), np.ones(2)),
     ProfileLikelihood("n", "1", AXIS, np.ones(2), 4.0, None, 5.0, 3.84, 0.95, (3.0, 5.0)),
-    PenaltyPath("l2", ("one",), AXIS, np.ones((2, 1)), AXIS, (("one",), ("one",)), np.zeros(2), np.ones((2, 1)), 1),
 ]
 
 

@@ -86,7 +86,7 @@ def with_bounds(law: Law, bounds: Mapping[str, tuple[float, float]]) -> Law:
     params = dict(law.params)
     for name, limits in bounds.items():
         symbol = law.symbol(name)
-        params[symbol] = replace(params[symbol], bounds=limits)
+        params[symbol] = replace(params[symbol], bounds=limits, widens=False)
     return replace(law, params=params) if bounds else law
 
 

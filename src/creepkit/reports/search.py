@@ -1,4 +1,4 @@
-"""Text and plots of searches: convergence of a global search, term selection, and the path of a penalty."""
+"""Convergence of a global search, and term selection."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.arrays import Floats
 from creepkit.inverse.sparsity.result import LEAST_CONTRIBUTION
 from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import panels_of, place_legend_below, save_figure, set_range
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.inverse.search.global_search import SearchTrace
-    from creepkit.inverse.sparsity.result import PenaltyPath, Sparsity
+    from creepkit.inverse.sparsity.result import Sparsity
 
 
 SMALLEST_DRAWN_COST = 1e-12
@@ -49,8 +48,6 @@ def _draw_costs(axes: Axes, trace: SearchTrace) -> None:
     if trace.refined_cost is not None:
         label = f"after least squares, {trace.refinement_evaluations} more simulations"
         axes.axhline(max(trace.refined_cost, SMALLEST_DRAWN_COST), color="black", lw=1.0, ls="--", label=label)
-    for k, start in enumerate(trace.restarts):
-        axes.axvline(start + 1, color="grey", lw=0.8, ls=":", label="restart" if k == 0 else None)
     axes.set(xlabel="iteration", xlim=(1, max(len(trace), 2)))
     refined = [] if trace.refined_cost is None else [trace.refined_cost]
     drawn = np.maximum(np.concatenate([best, np.ravel(trace.quartiles), refined]), SMALLEST_DRAWN_COST)
@@ -78,53 +75,3 @@ def sparsity_text(sparsity: Sparsity) -> str:
         rows.append((term, *(f"{one:.3f}" for one in numbers), "dropped" if after is None else f"{after:.3f}"))
     lines = [f"{sparsity.penalty}{strength}: {sparsity.verdict}", *aligned(("", "without", "with", "after"), rows)]
     return "\n".join([*lines, f"(contributions; below {LEAST_CONTRIBUTION:g} a term is dropped)"])
-
-
-def penalty_path_text(path: PenaltyPath) -> str:
-    """One row a strength: chi-square, BIC less the least, contributions and the terms that are kept."""
-    rows = []
-    for k, strength in enumerate(path.strengths):
-        numbers = [f"{strength:g}", f"{path.chi_square[k]:.1f}", f"{path.bic_excess[k]:.1f}"]
-        rows.append([*numbers, *(f"{c:.3f}" for c in path.contributions[k]), ", ".join(path.kept_terms[k])])
-    rows[path.chosen][-1] += "   <- chosen"
-    return "\n".join(aligned(("strength", "chi-square", "BIC - least", *path.terms, "kept"), rows))
-
-
-SMALLEST_DRAWN_RISE = 0.1
-"""Rises of chi-square below this are drawn there: the axis is logarithmic."""
-
-
-def penalty_path_figure(path: PenaltyPath, file: str | Path | None = None) -> Figure:
-    """Contributions on the left axis, the rise of chi-square on the right one."""
-    figure, axes = panels_of(7.2, 4.4)
-    positions = _strength_positions(path.strengths)
-    for label, contribution in zip(path.terms, path.contributions.T, strict=True):
-        axes.plot(positions, contribution, "o-", ms=4, lw=1.6, label=label)
-    axes.axvline(positions[path.chosen], color="black", lw=1.0, ls=":", label="chosen by BIC")
-    axes.axhspan(0.0, 0.05, color="black", alpha=0.06, lw=0)
-    axes.set(xscale="log", ylim=(0, 1.05), xlabel="strength of the penalty", ylabel="contribution of each term")
-    _draw_ticks(axes, path, positions)
-    _draw_chi_square(axes, path, positions)
-    place_legend_below(figure, axes, columns=4)
-    axes.set_title(f"{path.penalty}: terms below 5 % (grey) are dropped", fontsize=10)
-    return save_figure(figure, file)
-
-
-def _strength_positions(strengths: Floats) -> Floats:
-    """Where strengths are drawn: none stands to the left of the weakest."""
-    weakest = strengths[1] if strengths.size > 1 else 1.0
-    return np.array([weakest / 3.0, *strengths[1:]])
-
-
-def _draw_ticks(axes: Axes, path: PenaltyPath, positions: Floats) -> None:
-    axes.set_xticks(positions, ["none", *(f"{s:.2g}" if s < 100 else f"{s:.0f}" for s in path.strengths[1:])])
-    axes.minorticks_off()
-
-
-def _draw_chi_square(axes: Axes, path: PenaltyPath, positions: Floats) -> None:
-    """The rise of chi-square over the sum without penalty."""
-    right = axes.twinx()
-    rise = np.maximum(path.chi_square - path.chi_square[0], SMALLEST_DRAWN_RISE)
-    right.plot(positions, rise, "s--", color="grey", ms=3, lw=1.0)
-    set_range(right, "y", float(rise.min()), float(rise.max()), logarithmic=True)
-    right.set_ylabel("rise of chi-square (grey squares)")

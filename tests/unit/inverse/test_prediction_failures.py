@@ -10,7 +10,7 @@ import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.prediction_failures import tests_without_prediction as missing_tests
-from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
+from creepkit.inverse.search.particle_swarm import ParticleSwarm
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import Status
@@ -25,7 +25,6 @@ SEARCHES = {
     "multistart": None,
     "swarm": ParticleSwarm(particles=16, iterations=3),
     "swarm, unrefined": ParticleSwarm(particles=16, iterations=3, refined_candidates=0),
-    "cma": CmaEs(iterations=5, restarts=0),
 }
 
 

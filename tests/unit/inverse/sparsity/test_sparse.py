@@ -1,15 +1,14 @@
-"""A sum reduced to the terms that planted bulge tests need: single laws, two-term laws and paths."""
+"""A sum reduced to the terms that planted bulge tests need: single laws and two-term laws."""
 
 import json
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from creepkit.inverse.identification_document import CODEC
-from creepkit.inverse.search.derivative_free import ParticleSwarm
+from creepkit.inverse.search.particle_swarm import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Sqrt, Subsets
+from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Subsets
 from creepkit.inverse.sparsity.reduced_laws import terms_above
 from creepkit.inverse.sparsity.result import Sparsity
 from creepkit.inverse.sparsity.term_selection import (
@@ -19,7 +18,6 @@ from creepkit.inverse.sparsity.term_selection import (
     identify_full,
     identify_reduced,
     identify_sparse,
-    trace_path,
 )
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
@@ -42,7 +40,7 @@ def hardening():
 
 @pytest.fixture(scope="module")
 def reduced(hardening):
-    return identify_reduced(Sqrt(), *hardening)
+    return identify_reduced(Subsets(), *hardening)
 
 
 def test_a_planted_single_law_is_found(reduced):
@@ -55,22 +53,16 @@ def test_a_planted_single_law_is_found(reduced):
     assert reduced.sparsity.p_value > 0.01
 
 
-def test_subsets_find_it_too(hardening):
-    choice = choose_terms(hardening[1], Subsets())
-    assert choice.kept_terms == (STRAIN,)
-    assert choice.contributions[STRAIN] == pytest.approx(1.0, abs=1e-3)
-
-
 def test_a_swarm_searches_the_penalised_landscape(hardening):
     """Its cost at the optimum is what least squares has there, penalty included."""
     _, reductions = hardening
     stage = reductions.problem
-    penalised = PenalisedTerms.from_problem(stage.problem, Sqrt())
+    penalised = PenalisedTerms.from_problem(stage.problem, L2())
     searched, u = stage.search_problem(penalised), stage.start[: stage.parameter_count]
     wanted = 0.5 * stage.problem.chi_square(stage.start) + penalised.values(u[None])[0]
     assert searched.cost(u[None])[0] == pytest.approx(wanted, rel=1e-9)
-    choice = choose_terms(reductions, Sqrt(), ParticleSwarm(particles=8, iterations=2, refined_candidates=1))
-    assert choice.kept_terms == (STRAIN,)
+    choice = choose_terms(reductions, L2(), ParticleSwarm(particles=8, iterations=2, refined_candidates=1))
+    assert STRAIN in choice.kept_terms
     assert len(choice.trace) == 2
 
 
@@ -86,7 +78,7 @@ def test_squared_l2_shares_the_rate_out(hardening):
 def test_memory_that_is_not_there_is_switched_off():
     """Planted Norton creep ends as strain hardening, or time hardening, of exponent zero, if not as a sinh."""
     tests = planted(NORTON, {"A": 2e-13, "n": 3.5}, [Plan(760, 8, 10)], seed=6, frames=24)
-    fit = identify_sparse(STRAIN_HARDENING + TIME_HARDENING, tests, EXACT, penalty=Sqrt(), settings=QUICK)
+    fit = identify_sparse(STRAIN_HARDENING + TIME_HARDENING, tests, EXACT, penalty=Subsets(), settings=QUICK)
     assert len(fit.law.terms) == 1
     assert len(fit.law.params) == 2
     assert fit.sparsity.exponents_off in (("m_1",), ("m_2",))
@@ -99,26 +91,9 @@ def test_two_terms_are_kept_where_three_pressures_need_them():
     plans = [Plan(760, P, 1.15 * P) for P in (6, 8, 10.5)]
     tests = planted(law, values, plans, seed=7, frames=12)
     exact = QUICK.changed({"usual_errors": "none"})
-    fit = identify_sparse(law, tests, EXACT, penalty=Sqrt(), settings=exact)
+    fit = identify_sparse(law, tests, EXACT, penalty=Subsets(), settings=exact)
     assert fit.sparsity.kept_terms == ("power law", "time hardening")
     assert fit.values["n_1"] == pytest.approx(6.5, abs=0.3)
-
-
-# ---- the path ------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def path(hardening):
-    return trace_path(hardening[1], Sqrt("auto"), strengths=(30.0,))
-
-
-def test_along_the_path_terms_go_and_misfit_grows(path):
-    assert path.strengths[0] == 0
-    assert path.kept_terms[-1] == (STRAIN,)
-    assert (np.diff(path.chi_square) > -0.1).all()
-    assert path.kept_terms[path.chosen] == (STRAIN,)
-    assert path.bic_excess[path.chosen] == 0
-    assert "<- chosen" in str(path)
 
 
 # ---- confirmation and the record -----------------------------------------------------------------------------------

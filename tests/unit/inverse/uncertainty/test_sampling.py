@@ -87,7 +87,7 @@ def test_rates_that_scatter_between_tests_count_once_a_test():
 
 def test_a_bound_cuts_the_posterior(tests):
     """Far more than n = 3 allows: against its bound the density is an exponential tail, all of it below."""
-    short = replace(NORTON, params={A: NORTON.params[A], N: replace(NORTON.params[N], bounds=(1.0, 3.0))})
+    short = NORTON.with_bounds(n=(1.0, 3.0))
     found = sample_posterior(known_scatter(short, tests, SD), seed=2)
     best, covariance = least_squares(tests, SD)
     middle, sd = best[1], float(np.sqrt(covariance[1, 1]))
