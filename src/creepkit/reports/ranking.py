@@ -19,7 +19,15 @@ from creepkit.records import is_logarithmic
 from creepkit.reports.answer import titled_law, unit_text, value_cells
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
-from creepkit.reports.figures import empty_figure, logarithmic_labels, power_of_ten, save_figure, shortened, wrapped
+from creepkit.reports.figures import (
+    empty_figure,
+    logarithmic_labels,
+    panel_grid,
+    power_of_ten,
+    save_figure,
+    shortened,
+    wrapped,
+)
 from creepkit.reports.identification import rejected, scatter_of_rates, verdict_given_law
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
 from creepkit.reports.json_values import fields_to_json
@@ -273,26 +281,18 @@ def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
     The misfit is that of `misfits`; the title is the verdict.
     """
     credible = [r for r in ranking.laws if r.weight > CREDIBLE_WEIGHT][:MOST_LAWS_DRAWN]
-    with_tests = all(r.fit.histories and r.fit.predictor is not None for r in credible)
-    curves = [fitted_curves(r.fit) for r in credible] if with_tests and len(credible) > 1 else []
+    with_tests = len(credible) > 1 and all(r.fit.histories and r.fit.predictor is not None for r in credible)
+    curves = [fitted_curves(r.fit) for r in credible] if with_tests else []
     shown = _tests_to_draw([r.fit for r in credible], curves) if curves else []
-    columns = min(3, len(shown))
-    rows = -(-len(shown) // 3)
-    misfits_height = 2.0 + 0.42 * len(ranking.laws)
-    width = 12.5
-    figure = empty_figure(width, misfits_height + 3.0 * rows + 0.7)
-    heights = [misfits_height, 3.0 * rows] if shown else [misfits_height]
+    heights, width = [2.0 + 0.42 * len(ranking.laws), *([3.0 * -(-len(shown) // 3)] if shown else [])], 12.5
+    figure = empty_figure(width, sum(heights) + 0.7)
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     _draw_misfits(parts[0], ranking)
     if shown:
-        panels = list(parts[1].subplots(rows, columns, squeeze=False).flat)
-        for axes, test in zip(panels, shown, strict=False):
+        for axes, test in zip(panel_grid(len(shown), 3, 0.0, 0.0, part=parts[1])[1], shown, strict=True):
             _draw_test(axes, credible, curves, test)
-        for axes in panels[len(shown) :]:
-            axes.set_visible(False)
         _name_laws(parts[1], credible, every_test=len(shown) == len(ranking.best.tests))
-    title = ranking.verdict
-    figure.suptitle(wrapped(title, width), fontsize=10)
+    figure.suptitle(wrapped(ranking.verdict, width), fontsize=10)
     return save_figure(figure, path)
 
 
@@ -333,7 +333,7 @@ def _draw_misfits(part: Any, ranking: Ranking) -> None:
     image = heat.imshow(
         np.where(values > 0, values, np.nan), norm=LogNorm(labels[0], labels[-1]), cmap="YlOrRd", aspect="auto"
     )
-    heat.set_yticks(range(len(ranking.laws)), [_law_name(r) for r in ranking.laws], fontsize=8)
+    heat.set_yticks(range(len(ranking.laws)), [r.fit.law.name for r in ranking.laws], fontsize=8)
     _label_tests(heat, ranking.best, order)
     if len(order) <= MOST_NUMBERS:
         middle = float(np.sqrt(labels[0] * labels[-1]))
@@ -365,10 +365,6 @@ def _number(value: float) -> str:
     if not np.isfinite(value):
         return "-"
     return f"{value:.2g}" if value < 100 else f"{value:.0f}" if value < 9999.5 else power_of_ten(float(f"{value:.0e}"))
-
-
-def _law_name(ranked: RankedLaw) -> str:
-    return ranked.fit.law.name
 
 
 def _law_colours(ranking: Ranking) -> list[Any]:
@@ -437,7 +433,7 @@ def _draw_test(axes: Axes, laws: Sequence[RankedLaw], curves: Sequence[FittedCur
     drawn = [curve_of_test(r.fit, c, test, output) for r, c in zip(laws, curves, strict=True)]
     for k, (curve, colour) in enumerate(zip(drawn, distinct_colours(len(laws)), strict=True)):
         draw_curve(axes, curve, colour, "-" if k == 0 else "--", dots="0.35" if k == 0 else None)
-    set_curve_ranges([axes], drawn, output)
+    set_curve_ranges(axes, drawn, output)
     axes.set(xlabel="time, h", ylabel=axis_label(output))
     title = f"{shortened(history.name, 48)}: {shortened(program_text(history), 96)}"
     axes.set_title(wrapped(title, PANEL_WIDTH), fontsize=8.5)
@@ -450,6 +446,6 @@ def _name_laws(part: Any, laws: Sequence[RankedLaw], every_test: bool) -> None:
     labels = ["measured"]
     for k, (ranked, colour) in enumerate(zip(laws, distinct_colours(len(laws)), strict=True)):
         handles.append(Line2D([], [], color=colour, ls="-" if k == 0 else "--"))
-        labels.append(f"{_law_name(ranked)}, weight {ranked.weight:.3f}")
+        labels.append(f"{ranked.fit.law.name}, weight {ranked.weight:.3f}")
     title = "credible laws with their 95 % bands" + ("" if every_test else "; the tests in which they differ most")
     part.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, title=title, title_fontsize=8)

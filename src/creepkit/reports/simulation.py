@@ -1,4 +1,4 @@
-"""Text and plots of simulated tests: outputs over time, deformed section."""
+"""Text of simulated tests, and the deformed section of a test piece."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline, shape_functions
-from creepkit.records import Output, Status, output_named
-from creepkit.reports.figures import panels_of, save_figure, set_range
+from creepkit.records import Status
+from creepkit.records.units import time_text
+from creepkit.reports.figures import panels_of, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,52 +62,8 @@ def section_figure(run: BulgeRun, time: float | None, name: str, path: str | Pat
     figure.colorbar(coloured, ax=axes, label=_LABELS.get(name, name), shrink=0.8, pad=0.01, aspect=18)
     pressure = float(run.test.load_history.pressure.at(time))
     axes.set(aspect="equal", xlabel="r, mm", ylabel="z, mm")
-    axes.set_title(f"{run.name}: {_duration(time)}, {pressure:.3g} MPa (dashed: at rest)", fontsize=10)
+    axes.set_title(f"{run.name}: {time_text(time)}, {pressure:.3g} MPa (dashed: at rest)", fontsize=10)
     axes.spines[["top", "right"]].set_visible(False)
-    return save_figure(figure, path, SolveError)
-
-
-def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
-    """Outputs and pressure over time, one below the other; outputs of one quantity that grow with creep as one."""
-    groups: dict[tuple[str, bool], list[Output]] = {}
-    for name in run.outputs:
-        output = output_named(name, run.specimen)
-        groups.setdefault((output.quantity, output.grows), []).append(output)
-    figure, panels = panels_of(
-        6.4,
-        3.0 + 1.2 * len(groups),
-        len(groups) + 1,
-        1,
-        sharex=True,
-        height_ratios=(2.0, *[1.0] * (len(groups) - 1), 0.8),
-    )
-    hours = run.times / 3600.0
-    for axes, group in zip(panels, groups.values(), strict=False):
-        for k, output in enumerate(group):
-            axes.plot(hours, run.outputs[output], lw=1.5, color=f"C{k}", label=output.long_name)
-        axes.set_ylabel(group[0].label if len(group) == 1 else f"{group[0].quantity}, {group[0].unit}")
-        if len(group) > 1:
-            axes.legend(fontsize=8, frameon=False)
-    program = run.test.load_history.pressure
-    inside = program.times[program.times < run.end_time]
-    knots = np.unique(np.concatenate([inside, [0.0, run.end_time]]))
-    panels[-1].plot(knots / 3600.0, program.at(knots), lw=1.5, color="tab:red")
-    panels[-1].set(ylabel="pressure, MPa", xlabel="time, h")
-    for axes in panels:
-        values = np.concatenate([line.get_ydata() for line in axes.lines])
-        values = values[np.isfinite(values)]
-        low = 0.0 if axes in (panels[0], panels[-1]) else float(values.min(initial=np.inf))
-        set_range(
-            axes,
-            "y",
-            min(low, float(values.max(initial=0.0))),
-            (1.1 if axes is panels[-1] else 1.0) * float(values.max(initial=1e-9)),
-            most=5,
-        )
-    set_range(panels[-1], "x", 0.0, float(knots[-1]) / 3600.0)
-    ended = f", ended at {_duration(run.end_time)}: {run.reason}" if run.reason else ""
-    figure.suptitle(f"{run.name}{ended}", fontsize=10)
-    figure.align_ylabels(panels)
     return save_figure(figure, path, SolveError)
 
 
@@ -152,7 +109,3 @@ def _draw_outline(axes: Axes, nodes: Floats, elements: Ints, side: float, **styl
     ends = nodes[elements[chosen[:, 0, None], SIDES[chosen[:, 1]]]]
     curves = np.einsum("pa,eai->epi", weights, ends[(ends[:, :, 0] > 1e-9).any(axis=1)])
     axes.add_collection(LineCollection(list(curves * [side, 1.0]), **style))  # type: ignore[arg-type]
-
-
-def _duration(time: float) -> str:
-    return f"{time / 3600:.4g} h" if time >= 3600 else f"{time:.4g} s"

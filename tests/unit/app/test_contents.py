@@ -15,6 +15,7 @@ from creepkit.errors import ExportError, FitError
 from creepkit.exporters.javascript import script_safe_json
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.records import is_logarithmic
 from helpers.planted_bars import SPL, bars
 
 
@@ -79,7 +80,9 @@ def test_specimens_are_described_by_their_records():
             continue
         one = shown[name]
         assert [o["name"] for o in one["outputs"]] == list(specimen.outputs)
-        assert [(o["title"], o["unit"]) for o in one["outputs"]] == [(o.long_name, o.unit) for o in specimen.outputs]
+        assert [(o["title"], o["unit"]) for o in one["outputs"]] == [
+            (o.long_name, "%" if is_logarithmic(o) else o.unit) for o in specimen.outputs
+        ]
         assert [(load["title"], load["unit"]) for load in one["loads"]] == [
             (load.long_name, load.unit) for load in specimen.loads
         ]

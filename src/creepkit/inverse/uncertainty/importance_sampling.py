@@ -100,7 +100,7 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
 
 
 @dataclass(frozen=True, eq=False)
-class PosteriorSamples(RateStatements, Presentable, text="reports.uncertainty:posterior_text"):
+class PosteriorSamples(RateStatements, Presentable, text="reports.inference:posterior_text"):
     """Draws of a law's values from their posterior.
 
     u : (draws, parameters) conditioned coordinates of equal weight. ranges : that the tests cover, as of an
@@ -131,7 +131,7 @@ class PosteriorSamples(RateStatements, Presentable, text="reports.uncertainty:po
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Every pair of parameters, and each alone; written to `path` when given."""
-        return present("reports.uncertainty:pairs_figure", self, path)
+        return present("reports.inference:pairs_figure", self, path)
 
 
 def sample_posterior(
