@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34537
+TESTS = 34531
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
