@@ -171,3 +171,110 @@ def test_typical_values_say_what_they_claim() -> None:
 
     assert run.end_time / 3600 == pytest.approx(3200, rel=0.02)
     assert largest * TYPICAL["A"] * 240 ** TYPICAL["n"] * run.end_time == pytest.approx(0.27, abs=0.005)
+
+
+# ---- temperature -----------------------------------------------------------------------------------------------------
+
+# Damage over several temperatures: creep and damage keep activation energies of their own, through to rupture.
+
+
+T_REF = 873.15
+GAS_CONSTANT = 8.314462618  # J/(mol K)
+LAW = ck.law("kachanov-rabotnov").fix(alpha=0, m=0).times(ck.arrhenius(T_ref=T_REF))
+PLANTED = {"A": 1e-8 / 120**4, "n": 4.0, "B": 5e-7 / 120**5, "Q_B": 2.6e5, "chi": 5.0, "phi": 6.0, "Q": 3.6e5}
+CONDITIONS = [(T, stress) for T in (848.15, 873.15, 898.15) for stress in (90.0, 120.0, 150.0)]
+HOT_BAR = ck.specimen("uniaxial").replace(strain_limit=10.0)
+
+
+def life(T: float, stress: float) -> float:
+    """Kachanov's rupture time at constant stress, s: 1/(B(T) s^chi), B being (1 + phi) times that of dw/dt."""
+    B = PLANTED["B"] * np.exp(-PLANTED["Q_B"] / GAS_CONSTANT * (1 / T - 1 / T_REF))
+    return float(1 / (B * stress ** PLANTED["chi"]))
+
+
+def strain(T: float, stress: float, share: np.ndarray) -> np.ndarray:
+    """Creep strain at a share of the life: the integral of A(T) s^n (1 - t/t_r)^(-n/(1 + phi))."""
+    A = PLANTED["A"] * np.exp(-PLANTED["Q"] / GAS_CONSTANT * (1 / T - 1 / T_REF))
+    power = 1 - PLANTED["n"] / (1 + PLANTED["phi"])
+    return A * stress ** PLANTED["n"] * life(T, stress) / power * (1 - (1 - share) ** power)
+
+
+def measured(noise: float) -> list[ck.History]:
+    """Nine tests to rupture from the closed forms, with noise of the strain."""
+    rng, share = np.random.default_rng(3), np.linspace(0.02, 0.97, 40)
+    return [
+        ck.History(
+            f"{T:g} K {stress:g} MPa",
+            share * life(T, stress),
+            {"strain": strain(T, stress, share) + rng.normal(0, noise, share.size)},
+            ck.constant_stress(stress, "stress"),
+            T,
+            rupture_time=life(T, stress),
+        )
+        for T, stress in CONDITIONS
+    ]
+
+
+@pytest.mark.parametrize(("T", "stress"), CONDITIONS)
+def test_bars_break_when_the_closed_form_says_at_each_temperature(T: float, stress: float) -> None:
+    plan = ck.History("plan", np.array([10 * life(T, stress)]), {}, ck.constant_stress(stress, "stress"), T)
+    theta = LAW.to_internal({name: PLANTED[name] for name in LAW.names})
+    rupture = HOT_BAR.predict_to_rupture(LAW, theta, [plan]).times_to_strain.rupture_times[0, 0]
+
+    assert rupture == pytest.approx(life(T, stress), rel=1e-4)
+
+
+def test_both_activation_energies_are_identified_from_tests_to_rupture() -> None:
+    fit = ck.identify(LAW, measured(noise=5e-5), using=HOT_BAR, starts=2, frames=30)
+
+    missed = {e.name: (e.low, PLANTED[e.name], e.high) for e in fit.estimates if not e.low <= PLANTED[e.name] <= e.high}
+    assert not missed
+    assert fit.values["Q_B"] == pytest.approx(PLANTED["Q_B"], rel=0.02)
+    assert fit.values["Q"] == pytest.approx(PLANTED["Q"], rel=0.02)
+
+
+def test_one_activation_energy_for_both_does_not_explain_them() -> None:
+    """100 kJ/mol apart over 50 K is a factor of 2.2 in the strain at rupture."""
+    tests = measured(noise=5e-5)
+    shared = ck.law("kachanov-rabotnov").fix(alpha=0, m=0).times(ck.arrhenius(T_ref=T_REF), shared=True)
+    fits = [ck.identify(law, tests, using=HOT_BAR, starts=2, frames=30) for law in (LAW, shared)]
+
+    assert ck.rank(fits).best.law.name == LAW.name
+    assert fits[1].rms > 5 * fits[0].rms
+
+
+# ---- bulge rupture ---------------------------------------------------------------------------------------------------
+
+# Damage laws in the dimple: finite elements with an internal variable, to rupture.
+
+
+TIMES = np.geomspace(60.0, 1e6, 12)
+PRESSED = dict(elastic=ck.Elastic(E=150e3), loading=ck.PressureJump(P1=8, P2=8, Tj=3600), times=TIMES)
+DIMPLE_POWERS = {"A": 1e-14, "n": 4.0, "B": 1e-13, "alpha": 0.5}
+DIMPLE_VALUES = {
+    "kachanov-rabotnov": {**DIMPLE_POWERS, "chi": 4.0, "phi": 5.0, "m": 0.0},
+    "liu-murakami": {**DIMPLE_POWERS, "p": 4.0, "q_2": 3.0},
+    "sinh-damage": {
+        **{"A": 1e-9, "s_s": 30.0, "lambda_": 5.0, "M": 1e-5, "s_t": 120.0, "chi": 3.0, "phi": 4.0},
+        **{"alpha": 0.5, "beta": 0.0},
+    },
+}
+
+
+@pytest.mark.parametrize("name", DIMPLE_VALUES)
+def test_rupture_ends_the_test_with_its_reason(name: str) -> None:
+    """The frames before it are kept; damage is not felt at first and only ever adds to the deflection."""
+    law, values = ck.law(name), DIMPLE_VALUES[name]
+    run = ck.simulate(law, "bulge", values, **PRESSED)
+    sound = law.fix(**{"M" if name == "sinh-damage" else "B": 0})
+    steady = ck.simulate(sound, "bulge", {name: values[name] for name in sound.names}, **PRESSED)
+
+    assert run.status is Status.RUPTURED
+    assert "internal variable" in run.reason
+    assert "limit" in run.reason
+    assert run.times[-1] <= run.end_time < steady.end_time
+    more = run.outputs["amplitude"] / steady.outputs["amplitude"][: run.times.size]
+    assert (run.times == TIMES[: run.times.size]).all()
+    assert abs(more[0] - 1) < 0.01
+    assert (np.diff(more) > -1e-5).all()
+    assert more[-1] > 1.01

@@ -3,10 +3,18 @@
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.inverse.bounds import Bounds
+from creepkit.inverse.identify import identify
+from creepkit.inverse.initial_search import search_problem
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.search.global_search import SearchTrace
+from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
+from creepkit.inverse.search.local_refinement import robust_loss, robust_weight
+from creepkit.inverse.search.multistart import MultiStart, distinct, screened_starts
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.records import History
 from helpers.cost_functions import Known, cube, quadratic, rastrigin, rosenbrock
 
 SWARM, CMA_ES = ParticleSwarm(refined_candidates=0), CmaEs(refined_candidates=0)
@@ -109,3 +117,101 @@ def test_a_trace_keeps_the_lowest_so_far_what_was_asked_and_the_quartiles():
     np.testing.assert_array_equal(trace.evaluations, [3, 6, 11])
     np.testing.assert_array_equal(trace.quartiles, [[6, 7, 8], [7, 8, 9], [4, 5, 6]])
     assert len(trace) == 3
+
+
+# ---- levenberg marquardt ---------------------------------------------------------------------------------------------
+
+# Least squares from several starts at once: planted values found from each of them, within bounds.
+
+
+TIMES = np.geomspace(600.0, 4e5, 25)
+
+
+def landscape(law, values, stresses=(60.0, 90.0, 130.0)):
+    """Uniaxial tests without noise."""
+    bar = ck.specimen("uniaxial")
+    tests = []
+    for stress in stresses:
+        run = ck.simulate(law, bar, values, loading=ck.constant_stress(stress), times=TIMES)
+        tests.append(History(name=f"{stress:g}", times=TIMES, outputs=run.outputs, loading=run.loading,
+                             temperature=293.15))  # fmt: skip
+    return search_problem(LeastSquaresProblem.from_histories(law, tests, bar, IdentificationSettings()), bar)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("norton", {"A": 1e-16, "n": 4.2}), ("strain-hardening", {"A": 3e-16, "n": 4.0, "m": -0.4}),
+     ("hyperbolic-sine", {"A": 2e-9, "n": 1.7, "B": 45.0})],
+)  # fmt: skip
+def test_planted_values_are_found_from_many_starts(name, values):
+    law = ck.law(name)
+    view = landscape(law, values)
+    ends = batched_levenberg_marquardt(view, screened_starts(view, starts=6, draws=32))
+    found = view.coordinates.values(ends[0].x)
+    assert {n: found[n] for n in values} == pytest.approx(values, rel=1e-3)
+    assert sum(end.cost < ends[0].cost + 1e-4 for end in ends) >= 4
+    assert all((view.bounds.lower <= end.x).all() and (end.x <= view.bounds.upper).all() for end in ends)
+
+
+def test_one_prediction_for_all_starts_is_as_good_as_one_each():
+    law = ck.law("strain-hardening")
+    view = landscape(law, {"A": 3e-16, "n": 4.0, "m": -0.4})
+    starts = np.array(screened_starts(view, starts=4, draws=16))
+    values, jacobian = view.candidate_jacobian(starts)
+    for k, u in enumerate(starts):
+        alone = view.residuals(u)
+        assert values[k] == pytest.approx(alone.values, rel=1e-6, abs=1e-9)
+        assert jacobian[k] == pytest.approx(alone.jacobian, rel=1e-4, abs=1e-6)
+
+
+def test_minima_that_predict_the_same_are_one():
+    view = landscape(ck.law("hyperbolic-sine"), {"A": 2e-9, "n": 1.7, "B": 45.0})
+    found = MultiStart().minima(view).minima
+    assert len(distinct(found, view.bounds)) <= 2
+
+
+@pytest.mark.parametrize("loss", ["linear", "soft_l1", "huber", "cauchy", "arctan"])
+def test_losses_have_their_own_slopes(loss):
+    z = np.geomspace(1e-3, 30.0, 40)
+    slope = (robust_loss(z * (1 + 1e-6), loss) - robust_loss(z * (1 - 1e-6), loss)) / (2e-6 * z)
+    assert robust_weight(z, loss) == pytest.approx(slope, rel=1e-6)
+
+
+# ---- bulge -----------------------------------------------------------------------------------------------------------
+
+# The swarm and CMA-ES on the real landscape: a planted bulge test through the stand-in of one degree of freedom.
+
+
+TRUTH = {"A": 2e-16, "n": 4.5}
+FRAMES = np.arange(1800.0, 43201.0, 1800.0)
+LOADING, ELASTIC = ck.PressureJump(P1=8, P2=10, Tj=14400), ck.Elastic(E=150e3)
+NORTON = ck.law("norton")
+SEARCHES = {
+    "swarm": ParticleSwarm(particles=40, iterations=15, refined_candidates=2),
+    "cma": CmaEs(iterations=30, restarts=0, refined_candidates=1),
+}
+
+
+@pytest.fixture(scope="module")
+def stand_in():
+    return ck.specimen("bulge").reduced_order_model()
+
+
+@pytest.fixture(scope="module")
+def test(stand_in):
+    run = ck.simulate(NORTON, stand_in, TRUTH, elastic=ELASTIC, loading=LOADING, times=FRAMES)
+    rng = np.random.default_rng(1)
+    sizes = {"amplitude": 1.5e-3, "width": 0.02, "shape": 0.02}
+    noisy = {name: run.outputs[name] + sd * rng.standard_normal(FRAMES.size) for name, sd in sizes.items()}
+    return ck.History("planted", FRAMES, noisy, LOADING, 293.15, specimen="bulge", elastic=ELASTIC)
+
+
+@pytest.mark.parametrize("name", SEARCHES)
+def test_a_planted_law_lies_in_its_intervals_whatever_searched(stand_in, test, name):
+    fit = identify(NORTON, [test], stand_in, search=SEARCHES[name])
+    default = identify(NORTON, [test], stand_in)
+    assert all(e.low <= TRUTH[e.name] <= e.high for e in fit.estimates)
+    assert fit.log_likelihood == pytest.approx(default.log_likelihood, abs=0.01)
+    assert fit.search_trace is not None
+    assert fit.search_trace.refined_cost <= fit.search_trace.best_cost[-1] + 1e-3 < fit.search_trace.best_cost[0]
+    assert fit.search_trace.evaluations[-1] <= fit.provenance["search_evaluations"]
