@@ -155,7 +155,9 @@ def test_a_report_gives_back_study_lock_and_data_alone(small_study: Path, tmp_pa
 @pytest.mark.parametrize(
     "name", ["../stolen.csv", "inputs/../../stolen.csv", "/stolen.csv", "C:/stolen.csv", "..\\stolen.csv"]
 )
-def test_a_forged_report_writes_nothing_outside_its_folder_or_inside(small_study: Path, tmp_path: Path, name: str) -> None:
+def test_a_forged_report_writes_nothing_outside_its_folder_or_inside(
+    small_study: Path, tmp_path: Path, name: str
+) -> None:
     """A file of its archive is renamed: no name is followed, and not even the sound files are written."""
     page, before, archive = tmp_path / "page.html", sorted(tmp_path.rglob("*")), io.BytesIO()
     with zipfile.ZipFile(archive, "w") as packed:
