@@ -115,25 +115,13 @@ def test_elastic_deflection_or_force_at_time_zero(beam):
 
 
 @LOADED
-@pytest.mark.parametrize("n", [1.0, 2.0, 3.0, 4.5, 6.0, 7.0])
+@pytest.mark.parametrize("n", [1.0, 3.0, 7.0])
 def test_steady_deflection_rate(beam, n):
     A, times = 1e-8 / 60.0**n, np.array([9e7, 1e8])
     run = simulated(beam.replace(strain_limit=10.0), {"A": A, "n": n}, times)
     rate = np.diff(run.outputs["deflection"])[0] / 1e7
 
     assert rate == pytest.approx(steady_rate(beam, A, n, FORCES[beam.name]), rel=3e-4)
-
-
-@LOADED
-def test_half_the_error_of_half_as_many_fibres_is_gone(beam):
-    """Twice the stations and fibres, a tenth of the tolerance: the rate comes nearer by far more than a factor of 4."""
-    A, n, times = 1e-8 / 60.0**5.5, 5.5, np.array([9e6, 1e7])
-    exact = steady_rate(beam, A, n, FORCES[beam.name])
-    coarse, fine = (
-        abs(np.diff(simulated(each, {"A": A, "n": n}, times).outputs["deflection"])[0] / 1e6 / exact - 1)
-        for each in (beam.replace(fibres=3), beam.replace(fibres=3).refined())
-    )
-    assert fine < 0.1 * coarse
 
 
 @pytest.mark.parametrize("beam", HELD, ids=lambda beam: beam.name)
@@ -181,15 +169,8 @@ def test_a_step_and_a_ramp_of_force_at_changing_temperature():
     deflection = run.outputs["deflection"]
 
     assert deflection[3] - deflection[2] == pytest.approx(50.0 * elastic_compliance(ThreePointBend()), rel=1e-3)
-    later = ck.simulate(
-        law,
-        ThreePointBend(),
-        values,
-        loading=ck.constant_load("force", 200.0),
-        times=[1e7, 1.1e7],
-        elastic=ELASTIC,
-        temperature=1030.0,
-    )
+    how = {"loading": ck.constant_load("force", 200.0), "elastic": ELASTIC, "temperature": 1030.0}
+    later = ck.simulate(law, ThreePointBend(), values, times=[1e7, 1.1e7], **how)
     faster = np.exp(-3e5 / 8.314462618 * (1 / 1030 - 1 / 1000))
     expected = steady_rate(ThreePointBend(), 1e-8 / 60.0**3, 3.0, 200.0) * faster
     assert np.diff(later.outputs["deflection"])[0] / 1e6 == pytest.approx(expected, rel=1e-3)
@@ -232,16 +213,6 @@ def test_a_beam_that_breaks_says_when_and_why():
     assert run.status is Status.RUPTURED
     assert run.reason == "creep strain reached the strain limit"
     assert run.times[-1] <= run.end_time
-
-
-@LOADED
-def test_reference_stress_and_growth_describe_steady_creep(beam):
-    """The rate at the reference stress times the growth of the deflection is the steady rate to a factor of 2."""
-    run = simulated(beam, {"A": 1e-8 / 60.0**3, "n": 3.0}, [1e5])
-    (stress,) = beam.reference_stress(run)
-    estimated = 1e-8 / 60.0**3 * stress**3 * beam.growth_per_strain(run)
-
-    assert 0.5 < estimated / steady_rate(beam, 1e-8 / 60.0**3, 3.0, FORCES[beam.name]) < 2.0
 
 
 TIMES = np.geomspace(3600.0, 3.6e6, 30)

@@ -51,16 +51,12 @@ def steady_velocity(inner: float, outer: float, pressure: float, A: float, n: fl
 
     R. W. Bailey 1935, Proc. Inst. Mech. Engrs 131, 131; a closed tube has no axial strain either.
     """
-    return (
-        (np.sqrt(3.0) / 2.0) ** (n + 1)
-        * A
-        * (2.0 * pressure / n / ((outer / inner) ** (2.0 / n) - 1.0)) ** n
-        * outer**2
-    )
+    driving = 2.0 * pressure / n / ((outer / inner) ** (2.0 / n) - 1.0)
+    return (np.sqrt(3.0) / 2.0) ** (n + 1) * A * driving**n * outer**2
 
 
 @pytest.mark.parametrize("ratio", [1.25, 2.0])
-@pytest.mark.parametrize("n", [1.0, 3.0, 5.0, 8.0])
+@pytest.mark.parametrize("n", [1.0, 4.0, 8.0])
 def test_steady_creep_of_a_closed_tube(n: float, ratio: float) -> None:
     """The end force alone keeps the length: the face is free to move and must not. Creep strains are 2e-5."""
     tube = Tube(20.0, 10.0 - 10.0 / ratio, tolerance=1e-4, resolution=1e-5)
@@ -76,12 +72,6 @@ def test_steady_creep_of_an_open_tube() -> None:
     """At the outer surface only the hoop stress is left: 2 p a^2/(b^2 - a^2) for n = 1 (Lame)."""
     run = simulated(OpenTube(20.0, 2.0, tolerance=1e-4, resolution=1e-5), {"A": 1e-11, "n": 1.0}, 20.0, [1e5])
     assert last_rate(run) / 20.0 == pytest.approx(1e-11 * 2.0 * 20.0 * 64.0 / 36.0, rel=1e-3)
-
-
-def test_a_thin_open_tube_creeps_as_a_hoop() -> None:
-    """By the hoop stress p r/t at mid-wall, for t/r = 0.01, but for shares of t/r."""
-    run = simulated(OpenTube(20.1, 0.1, tolerance=1e-4, resolution=1e-5), {"A": 1e-19, "n": 5.0}, 1.0, [1e5])
-    assert last_rate(run) / 20.1 == pytest.approx(1e-19 * 100.0**5, rel=0.02)
 
 
 @pytest.mark.parametrize("n", [2.0, 6.0])
