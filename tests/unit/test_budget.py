@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34531
+TESTS = 32945
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
