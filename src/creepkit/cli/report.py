@@ -86,13 +86,12 @@ def _page_source(names: list[str], histories: list[History]) -> PageSource:
         histories += ck.read_histories(names)
     elif not (laws and histories):
         return _named_source(names[0])
-    tests = [one for one in histories if one.outputs or one.minimum_rate is not None]
-    tried = [ck.law(name) for name in laws] or candidates(tests)[:MOST_FITTED]
-    fitted = LawChanges().applied(tried, tests)
+    tried = [ck.law(name) for name in laws] or candidates(histories)[:MOST_FITTED]
+    fitted = LawChanges().applied(tried, histories)
     with ProgressBar() as progress:
         if len(fitted) == 1:
-            return ck.identify(fitted[0], tests, progress=progress.tick)
-        return ck.select(fitted, tests, sums=False, progress=progress.tick)
+            return ck.identify(fitted[0], histories, progress=progress.tick)
+        return ck.select(fitted, histories, sums=False, progress=progress.tick)
 
 
 def _named_source(name: str) -> PageSource:
