@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 32945
+TESTS = 33016
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
