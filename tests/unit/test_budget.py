@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33032
+TESTS = 30061
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
