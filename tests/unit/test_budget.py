@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1412,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 11477,
+    "inverse": 11473,
     "jobs": 251,
     "kernels": 1703,
     "language": 1506,
@@ -39,9 +39,9 @@ BUDGET = {
     "readers": 5610,
     "records": 1979,
     "registry": 615,
-    "reports": 6358,
+    "reports": 6354,
     "rupture_assessment": 1869,
-    "sampling": 1039,
+    "sampling": 1037,
     "screening": 683,
     "specimens": 3592,
     "studies": 3056,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 33016
+TESTS = 30053
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

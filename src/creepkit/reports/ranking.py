@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -249,7 +248,7 @@ MOST_LAWS_DRAWN = 5
 
 
 MOST_TEST_NAMES = 24
-"""Above this many tests the columns of the misfits are numbered by condition instead of named."""
+"""Columns of the misfits that are named."""
 
 
 SHOWN_QUANTILE = 0.97
@@ -376,33 +375,18 @@ def _law_colours(ranking: Ranking) -> list[Any]:
 
 
 def _columns(fit: Identification) -> list[int]:
-    """The tests from the coldest to the hottest, of one temperature (or without histories) P2 before P10."""
-    names = [_natural_order(test.name) for test in fit.tests]
-    celsius = np.round(temperatures_celsius(fit.histories)) if fit.histories else np.zeros(len(names))
-    return sorted(range(len(names)), key=lambda k: (float(celsius[k]), names[k]))
-
-
-def _natural_order(name: str) -> list[tuple[int, int, str]]:
-    """A key by which numbers within names count as numbers; other text goes before them where both begin alike."""
-    return [(1, int(part), "") if part.isdecimal() else (0, 0, part) for part in re.split(r"(\d+)", name) if part]
+    """The tests from the coldest to the hottest, of one temperature, or without histories, in their order."""
+    celsius = np.round(temperatures_celsius(fit.histories)) if fit.histories else np.zeros(len(fit.tests))
+    return [int(k) for k in np.argsort(celsius, kind="stable")]
 
 
 def _label_tests(axes: Axes, fit: Identification, order: Sequence[int]) -> None:
-    """Names of the tests; of many, the temperature of each run of equal ones."""
-    if len(order) <= MOST_TEST_NAMES or not fit.histories:
-        step = -(-len(order) // MOST_TEST_NAMES)
-        names = [shortened(fit.tests[k].name) for k in order[::step]]
-        axes.set_xticks(range(0, len(order), step), names, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
-        return
-    celsius = np.round(temperatures_celsius(fit.histories))[list(order)]
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(celsius) > 0) + 1, [celsius.size]])
-    for edge in edges[1:-1]:
-        axes.axvline(edge - 0.5, color="black", lw=0.8)
-    centres = 0.5 * (edges[:-1] + edges[1:]) - 0.5
-    step = -(-centres.size // MOST_TEST_NAMES)
-    names = [f"{celsius[edge]:.0f}" for edge in edges[:-1:step]]
-    axes.set_xticks(list(centres[::step]), names, fontsize=8)
-    axes.set_xlabel(f"{len(order)} tests, by temperature, °C", fontsize=9)
+    """Names of the tests, of many those of some."""
+    step = -(-len(order) // MOST_TEST_NAMES)
+    names = [shortened(fit.tests[k].name) for k in order[::step]]
+    axes.set_xticks(range(0, len(order), step), names, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
+    if step > 1:
+        axes.set_xlabel(f"{len(order)} tests, from the coldest to the hottest", fontsize=9)
 
 
 # ---- curves ----------------------------------------------------------------------------------------------------------

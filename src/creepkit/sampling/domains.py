@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -53,10 +53,6 @@ from creepkit.sampling.rates import (
     mean_ln_rate,
     reference_stress_of,
 )
-
-if TYPE_CHECKING:
-    pass
-
 
 CODEC = RecordCodec(
     values={CreepLaw: ValueCodec(law_to_json, law_from_json)},

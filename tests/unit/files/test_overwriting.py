@@ -11,20 +11,10 @@ import pytest
 
 from creepkit.errors import CacheWarning, ExportError
 from creepkit.files.cache_folders import cache_folder, is_ours_alone, warn_once
-from creepkit.files.writing import (
-    RECORD,
-    check_folder_target,
-    check_target,
-    is_foreign,
-    made_from,
-    overwriting,
-    write_bytes,
-    write_text,
-)
-from helpers.command_line import creepkit, one_line
+from creepkit.files.writing import RECORD, check_target, is_foreign, made_from, overwriting, write_bytes, write_text
+from helpers.command_line import creepkit
 
 FOREIGN = "creepkit did not write it as it is now"
-SIMULATE = ("simulate", "norton", "--set", "A=1e-16", "--set", "n=4", "--stress", "60", "--end-h", "1", "--points", "5")
 
 
 def test_a_file_of_ours_is_written_again_until_it_is_changed(tmp_path):
@@ -130,15 +120,6 @@ def test_a_received_file_does_not_choose_which_converted_test_is_lost(tmp_path, 
     assert creepkit("read", "received.csv", "--to", "tests", "--force").exit_code == 0
 
 
-def test_a_folder_is_checked_with_what_goes_into_it(tmp_path):
-    check_folder_target(tmp_path / "new" / "deeper", ExportError, ("a",))
-    (tmp_path / "a").write_text("mine")
-    with pytest.raises(ExportError, match=FOREIGN):
-        check_folder_target(tmp_path, ExportError, ("a",))
-    with pytest.raises(ExportError, match="is no folder; name a folder for the results"):
-        check_folder_target(tmp_path / "a" / "b", ExportError)
-
-
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of a process are those of Linux")
 def test_a_full_disk_leaves_the_old_file(tmp_path):
     """A limit on the size of files stands for the disk: both are OSErrors of write()."""
@@ -168,16 +149,6 @@ def test_two_writers_leave_one_whole_file_that_is_ours(tmp_path):
     assert not is_foreign(tmp_path / "note")
     assert sorted(os.listdir(tmp_path)) == [RECORD, "note"]
     write_bytes(b"c", tmp_path / "note", ExportError)
-
-
-def test_the_command_line_does_not_destroy_a_measured_file(tmp_path):
-    path = tmp_path / "measured.csv"
-    path.write_text("time_h,strain\n0,0\n")
-    assert FOREIGN in one_line(creepkit(*SIMULATE, "--to", str(path)))
-    assert path.read_text() == "time_h,strain\n0,0\n"
-    for words in (("--force",), ()):  # once it is ours, the same command is made again as it is
-        assert creepkit(*SIMULATE, "--to", str(path), *words).exit_code == 0
-    assert "--force 250" not in path.read_text()
 
 
 # ---- cache folders ---------------------------------------------------------------------------------------------------

@@ -204,15 +204,6 @@ def test_two_plugins_with_one_name_are_both_named(write: Write) -> None:
     assert registry.conflicts() == (told,)
 
 
-def test_a_clash_takes_no_other_law_down(install: Write) -> None:
-    for name in ("first-pack", "second-pack"):
-        install(name, LAW.format(name="same"))
-    registry = Registry()
-
-    assert registry.law("norton").name == "norton"
-    assert "same" not in registry.laws()
-
-
 def test_one_plugin_with_a_name_twice_is_broken(write: Write) -> None:
     file = write("double", LAW.format(name="double").replace("[LAW]", "[LAW, LAW]"))
 
@@ -284,18 +275,6 @@ def test_a_missing_file_is_an_error_when_asked_for_and_a_note_in_the_environment
         registry.load_file(missing)
 
 
-def test_a_file_that_was_mended_loads(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = write("mended", "1 / 0\n")
-    monkeypatch.setenv("CREEPKIT_PLUGINS", str(file))
-    registry = Registry()
-    assert of(registry, str(file)).problem
-
-    file.write_text(LAW.format(name="mended"))
-    registry.load_file(file)
-
-    assert registry.law("mended").title == "A law of an outsider"
-
-
 TWO_LAWS = LAW.format(name="first").replace("[LAW]", "[LAW, LAW.rename('second')]")
 
 
@@ -351,15 +330,6 @@ def test_a_law_is_found_whatever_its_capitals_and_by_its_aliases() -> None:
         assert word not in registry.laws()
     assert registry.law("sinh + norton") == registry.law("hyperbolic-sine") + registry.law("norton")
     assert registry.exporter("tex").name == "latex"
-
-
-def test_a_missing_law_says_that_plugins_bring_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    own = [one for one in plugin_sources.installed_modules() if one.is_own]
-    monkeypatch.setattr(plugin_sources, "installed_modules", lambda: own)
-
-    with pytest.raises(LawError, match=r'there is no law .*; plugins bring more: pip install "creepkit\[plugins\]"'):
-        Registry().law("kachanov-rabotnov")
-    assert Registry().law("garofalo").name == "hyperbolic-sine"
 
 
 def test_a_plugin_whose_commands_fail_is_told_and_the_others_add_theirs(write: Write) -> None:

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats
 from creepkit.inverse.goodness_of_fit import OutputErrors
 from creepkit.presentation import Presentable
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import chi2, multivariate_t, norm, qmc
@@ -40,7 +39,7 @@ from creepkit.presentation import Presentable, present
 from creepkit.records import Predictor
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 ROUNDS, MOST_ROUNDS = 4, 12
 """Of proposals: at least, and where the samples are still worth too few."""
@@ -129,9 +128,9 @@ class PosteriorSamples(RateStatements, Presentable, text="reports.inference:post
         median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
         return median, low, high
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Every pair of parameters, and each alone; written to `path` when given."""
-        return present("reports.inference:pairs_figure", self, path)
+    def to_arviz(self) -> Any:
+        """An xarray Dataset for arviz, whose plots and summaries take it: one chain, with units of the parameters."""
+        return present("reports.dataframes:to_arviz", self)
 
 
 def sample_posterior(
