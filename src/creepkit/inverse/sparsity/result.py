@@ -26,7 +26,7 @@ class FitStatistics:
 
 
 @dataclass(frozen=True)
-class Sparsity(Presentable, text="reports.search:sparsity_text"):
+class Sparsity(Presentable, text="reports.inference:sparsity_text"):
     """How a sum was reduced; the terms are those of `law`, the sum.
 
     penalty : its class; strength : None of a choice among subsets, which has none.
