@@ -34,7 +34,7 @@ SINH_DAMAGE = CreepLaw(
     title="Sinh creep damage of Stewart",
     terms={"damaged creep": A * sympy.sinh(stress / s_s) * sympy.exp(lambda_ * w ** sympy.Rational(3, 2))},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-3), scale="log", off=0.0, widens=True),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-3), scale="log", off=0.0),
         s_s: Param("breakdown stress of creep", unit="MPa", bounds=(3.0, 1e3), scale="log"),
         lambda_: Param("ln of the final over the minimum rate", bounds=(0, 15)),
         M: Param("damage rate coefficient", unit="1/s", bounds=(1e-40, 1e-2), scale="log", off=0.0),

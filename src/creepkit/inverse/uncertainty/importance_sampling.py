@@ -187,7 +187,7 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
         weights = np.exp(0.5 * np.maximum(log_density[usable] - log_density.max(), LEAST_LOG_WEIGHT))
         surface = QuadraticResiduals.fitted(u[usable], residuals[usable], weights, centre, shape)
         density = _corrected(replace(posterior, quadratic=surface), u[usable], log_density[usable], weights)
-        samples = posterior_samples(density, centre, shape, seed + k)
+        samples = posterior_samples(density, centre, shape, seed + k, least=2.0 * SAMPLES)
         if samples is None:
             return None
         judged = samples[:: len(samples) // points][:points]
@@ -223,7 +223,7 @@ LEAST_POINTS = 32
 """Simulated points that quadratic residuals are fitted to at least."""
 
 
-JUDGED_POINTS = (32, 32, 100)
+JUDGED_POINTS = (32, 32, 400)
 """Draws at which each of the fits of quadratic residuals is judged; the last are weighted by what predictions say."""
 
 
