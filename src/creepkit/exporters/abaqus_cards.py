@@ -42,6 +42,11 @@ _TABLE_NOTE = (
 )
 
 
+_TABLE_OF_MODULI = (
+    "*ELASTIC needs a row at each temperature of *CREEP in CalculiX, which else creeps by the first row at every one."
+)
+
+
 _FORMULAS = {
     "STRAIN": "rate = (A q^n [(m+1) e]^m)^(1/(m+1)), of equivalent stress q and creep strain e",
     "TIME": "rate = A q^n t^m, of equivalent stress q and total time t, which must start with the load",
@@ -76,11 +81,13 @@ class AbaqusCards(CodeInput):
         creep_comments, creep = self._creep_cards(source, forms)
         names = Identifiers((), ignore_case=True, max_length=80)
         requested = source.name or source.law.name
-        rows = elastic_table(source, (self.lowest_temperature, self.highest_temperature), step=25.0)
+        table = self._temperatures(source, forms)
+        rows = elastic_table(source, (self.lowest_temperature, self.highest_temperature), step=25.0, at=table)
         elastic = ["*ELASTIC", *(_data_line(m.E, m.nu, m.T) for m in rows)] if rows else []
         cards = [f"*MATERIAL, NAME={names.unique(requested)}", *elastic, *creep]
-        missing = [] if elastic else ["*ELASTIC is missing: no modulus was given; write it beside *CREEP."]
-        return [*names.renaming_notes([requested]), *creep_comments, *missing], cards
+        notes = [] if elastic else ["*ELASTIC is missing: no modulus was given; write it beside *CREEP."]
+        notes += [_TABLE_OF_MODULI] if elastic and table else []
+        return [*names.renaming_notes([requested]), *creep_comments, *notes], cards
 
     def _creep_cards(self, source: LawWithValues, forms: Sequence[CreepForm]) -> CreepCards:
         form, functions = forms[0], {form.stress_function for form in forms}
@@ -112,11 +119,18 @@ class AbaqusCards(CodeInput):
             )
         if not form.Q:
             return _power_law(source, form, m, {None: form.log_coefficient}, [])
-        low, high = temperature_span(source, self.lowest_temperature, self.highest_temperature)
-        step = _temperature_step(form, low)
-        rows: dict[float | None, float] = {T: form.log_coefficient_at(T) for T in temperature_grid(low, high, step)}
+        temperatures = self._temperatures(source, [form])
+        rows: dict[float | None, float] = {T: form.log_coefficient_at(T) for T in temperatures}
+        low, high, step = temperatures[0], temperatures[-1], _temperature_step(form, temperatures[0])
         note = _TABLE_NOTE.format(low=low, high=high, step=step, tolerance=_INTERPOLATION_TOLERANCE)
         return _power_law(source, form, m, rows, [note])
+
+    def _temperatures(self, source: LawWithValues, forms: Sequence[CreepForm]) -> list[float]:
+        """K, of the rows of a power law that hardens and depends on temperature; none of what needs no table."""
+        if len(forms) > 1 or not forms[0].Q or forms[0].is_steady:
+            return []
+        low, high = temperature_span(source, self.lowest_temperature, self.highest_temperature)
+        return temperature_grid(low, high, _temperature_step(forms[0], low))
 
 
 def _power_law(

@@ -42,6 +42,7 @@ class CreepSubroutine:
 
     def text(self, source: LawWithValues) -> str:
         """Return the file's text; ExportError where CREEP is not given what the law needs."""
+        source = source.without_inactive_terms()
         self._check_inputs(source.law)
         stems = Identifiers(("creep",), ignore_case=True, max_length=_MAX_STEM_LENGTH)
         stem = stems.unique(source.name or source.law.name)
@@ -72,7 +73,7 @@ class CreepSubroutine:
         if law.uses(principal_stress):
             raise ExportError(
                 f"law '{law.name}' needs the largest principal stress, which {self.solver} does not pass to "
-                "CREEP; write it as mfront, or choose a law of the von Mises stress"
+                "CREEP; export it as 'mfront', or choose a law of the von Mises stress"
             )
 
     def _state_statements(self, stem: str, count: int) -> dict[str, str]:
@@ -137,9 +138,11 @@ class CalculixCreepSubroutine(CreepSubroutine):
 
     def usage_notes(self, code: LawCode) -> Iterator[str]:
         """Lines for the head of the file."""
-        yield "CalculiX: replace creep.f of its source, or preload it as a shared library before a shared ccx;"
-        yield "*CREEP, LAW=USER in the material, *VISCO as the step. It insists on *INITIAL CONDITIONS,"
-        yield "TYPE=TEMPERATURE whether or not the law depends on temperature."
+        yield "CalculiX: replace creep.f of its source, or preload it as a shared library before a ccx that is built as"
+        yield "one; an ordinary ccx, one program as Debian has it, ignores a preloaded CREEP without a word (PEEQ stays"
+        yield "0). *CREEP, LAW=USER in the material without TYPE=ORTHO, by which ccx runs a law of its own, and *VISCO,"
+        yield "CETOL=... as the step, which insists on CETOL. It insists on *INITIAL CONDITIONS, TYPE=TEMPERATURE"
+        yield "whether or not the law depends on temperature."
         if code.states:
             state_list = ", ".join(s.name for s in code.law.states)
             yield (
@@ -150,7 +153,9 @@ class CalculixCreepSubroutine(CreepSubroutine):
     def _check_inputs(self, law: CreepLaw) -> None:
         super()._check_inputs(law)
         if law.uses(mean_stress):
-            raise ExportError(f"law '{law.name}' needs the mean stress, which CalculiX does not pass to CREEP")
+            raise ExportError(
+                f"law '{law.name}' needs the mean stress, which CalculiX does not pass to CREEP; export it as 'mfront'"
+            )
 
     def _state_statements(self, stem: str, count: int) -> dict[str, str]:
         if count == 0:

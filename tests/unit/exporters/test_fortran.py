@@ -212,5 +212,15 @@ def test_what_creep_is_not_told_is_refused():
         AbaqusCreepSubroutine().text(LawWithValues(first, NORTON_VALUES))
     mean = law(A * (stress + mean_stress) ** n, {A: RATE, n: POWER})
     assert "-p*mpa" in AbaqusCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
-    with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass"):
+    with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass.*export it as 'mfront'"):
         CalculixCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
+    shared = law(A * (a * principal_stress + (1 - a) * stress) ** n, {A: RATE, n: POWER, a: Param("share", (0, 1))})
+    text = AbaqusCreepSubroutine().text(LawWithValues(shared, {**NORTON_VALUES, "a": 0.0}))
+    assert "switched off and left out: a = 0" in text, "a share that is zero by value leaves the von Mises stress"
+    head = " ".join(re.sub(r"^! *", "", text_of_calculix(), flags=re.MULTILINE).split())
+    assert "ignores a preloaded CREEP" in head
+    assert "insists on CETOL" in head
+
+
+def text_of_calculix():
+    return CalculixCreepSubroutine().text(LawWithValues(NORTON, NORTON_VALUES))

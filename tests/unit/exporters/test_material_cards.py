@@ -215,6 +215,27 @@ def test_moduli_that_depend_on_temperature_are_tabulated_or_written_as_a_formula
     assert elastic["NU"](1000.0) == 0.3
 
 
+def test_moduli_stand_at_every_temperature_of_a_table_of_creep():
+    """CalculiX creeps by the first row of *CREEP at every temperature unless *ELASTIC has a row at each."""
+    source = CASES["strain hardening with temperature"].replace(elastic=STEEL)
+    cards = abaqus_cards(EXPORTERS["abaqus-cards"].text(source))
+    creep, elastic = ([row[-1] for row in cards[keyword][1]] for keyword in ("CREEP", "ELASTIC"))
+    assert creep == elastic
+    assert len(creep) > 10
+    assert {tuple(row[:2]) for row in cards["ELASTIC"][1]} == {(150e3, 0.3)}
+
+
+def test_names_that_neml2_or_its_file_keep_are_renamed_openly():
+    law = CASES["two power laws"].law
+    for label in ("lambda", "class", "yield", "stress", "E", "strain", "plastic strain", "sum"):
+        first, second = law.terms.values()
+        renamed = replace(law, terms={label: first, "other": second})
+        text = ck.export(renamed, "neml2", CASES["two power laws"].values, elastic=STEEL)
+        name = label.replace(" ", "_")
+        assert f"# '{label}' is called {name}_2 here" in text
+        assert {f"{name}_2", "other"} <= hit(text)["Models"].keys()
+
+
 @pytest.mark.parametrize("name", ["moose", "neml2"])
 def test_moduli_that_depend_on_temperature_are_refused_where_numbers_are_needed(name):
     with pytest.raises(ExportError, match=r"the elastic moduli depend on temperature.*give elastic.at\(1073\)"):
@@ -250,7 +271,7 @@ REFUSED = [
     ),
     ("code_aster", valued(HYPERBOLIC_SINE, B=40, **AT), "is a sinh of stress; export it as 'mfront'"),
     ("neml2", valued(TIME_HARDENING, m=-0.5, **AT), "steady power laws of stress only.*time exponent -0.5"),
-    ("neml2", valued(NORTON, **AT), "needs the moduli; give elastic=Elastic"),
+    ("neml2", valued(NORTON, **AT), r"needs the moduli; give export\(\) elastic=ck.Elastic"),
 ]
 
 
@@ -301,8 +322,10 @@ def test_every_registered_law_gives_a_card_with_its_rate_or_a_reason():
             try:
                 rate = READERS[name](exporter.text(source))
             except ExportError as error:
-                sensible = f"law '{law.name}'" in str(error) and "; export it as '" in str(error)
-                bad += [] if sensible else [f"{law.name} as {name}: {error}"]
+                ways_out = re.findall(r"'([\w-]+)'", str(error).partition("; export it as ")[2])
+                bad += [] if ways_out and f"law '{law.name}'" in str(error) else [f"{law.name} as {name}: {error}"]
+                for other in ways_out:
+                    assert default_registry().exporter(other).text(source), f"{law.name} as {other}, which {name} names"
                 continue
             accepted.add((law.name, name))
             for s, e, t, T in points(8):
