@@ -87,7 +87,7 @@ def _read(path: Path, histories: list[History]) -> Identification | ModelAverage
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.ranking_document import read_fit_or_ranking
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-    from creepkit.rupture_assessment.assessment_document import ASSESSMENT
+    from creepkit.rupture_assessment.assessment import ASSESSMENT
 
     advice = "give an identification, a ranking.json or a rupture assessment that creepkit wrote"
     data = read_json(path, FileKind("a result", ReportError, advice))

@@ -265,10 +265,10 @@ def format_number(value: float) -> str:
     return f"{value:.13g}"
 
 
-def temperature_span(source: LawWithValues, low: float, high: float) -> tuple[float, float]:
-    """Ends of tables against temperature, K: what the tests covered and 25 K to each side, else `low` and `high`."""
+def temperature_span(source: LawWithValues) -> tuple[float, float]:
+    """Ends of tables against temperature, K: what the tests covered and 25 K to each side, else 873 K to 1273 K."""
     tested_range = source.ranges.get("temperature")
-    return (low, high) if tested_range is None else (tested_range[0] - 25.0, tested_range[1] + 25.0)
+    return (873.15, 1273.15) if tested_range is None else (tested_range[0] - 25.0, tested_range[1] + 25.0)
 
 
 def temperature_grid(low: float, high: float, step: float) -> list[float]:
@@ -298,18 +298,16 @@ def constant_elasticity(source: LawWithValues) -> ElasticConstants | None:
     return _elastic_constants_at(source, elastic, None)
 
 
-def elastic_table(
-    source: LawWithValues, limits: tuple[float, float], step: float, at: Sequence[float] = ()
-) -> list[ElasticConstants]:
+def elastic_table(source: LawWithValues, step: float, at: Sequence[float] = ()) -> list[ElasticConstants]:
     """The moduli in steps of temperature, or once where they do not depend on it; none where they are not given.
 
-    limits : K, of the table where no tests are known. step : K. at : K, of the rows where another table decides.
+    step : K. at : K, of the rows where another table decides.
     """
     elastic = source.elastic
     if elastic is None or not (at or elasticity_varies(elastic)):
         constant = constant_elasticity(source)
         return [constant] if constant else []
-    temperatures = at or temperature_grid(*temperature_span(source, *limits), step)
+    temperatures = at or temperature_grid(*temperature_span(source), step)
     return [_elastic_constants_at(source, elastic.at(T), T) for T in temperatures]
 
 

@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from creepkit.errors import ExportError
-from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine
-from creepkit.exporters.fortran_code import FORTRAN_RESERVED, law_subroutine
+from creepkit.exporters.creep_subroutine import (
+    FORTRAN_RESERVED,
+    AbaqusCreepSubroutine,
+    CalculixCreepSubroutine,
+    law_subroutine,
+)
 from creepkit.exporters.law_code import Identifiers, LawCode
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
 from creepkit.language.symbols import POINT_VARIABLES
@@ -70,7 +74,7 @@ def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path, gfor
         "double precision, intent(out) :: out(6)",
         *(f"out({k}) = {name}(a)" for k, name in enumerate(PROBED, 1)),
     ]
-    from creepkit.exporters.fortran_code import fortran_statements, stable_function_definitions
+    from creepkit.exporters.creep_subroutine import fortran_statements, stable_function_definitions
 
     text = fortran_statements([*lines, "contains", *stable_function_definitions(PROBED), "end subroutine probe"])
     library = compile_fortran(gfortran, "\n".join(text) + "\n", tmp_path, "probe")[0]

@@ -7,8 +7,13 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from creepkit.errors import ExportError
-from creepkit.exporters.latex import LatexExporter, MarkdownExporter
-from creepkit.exporters.mathml import MATHML_NAMESPACE, MathmlExporter, MathmlPrinter
+from creepkit.exporters.documents import (
+    MATHML_NAMESPACE,
+    LatexExporter,
+    MarkdownExporter,
+    MathmlExporter,
+    MathmlPrinter,
+)
 from creepkit.language import arrhenius, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from creepkit import available
 from creepkit.errors import CreepkitError, ExportError, LawError
+from creepkit.exporters.documents import LatexExporter, latex_number
 from creepkit.exporters.exporting import export
-from creepkit.exporters.latex import LatexExporter, latex_number
 from creepkit.exporters.law_files import JsonExporter, read_valued_law
 from creepkit.language import CreepLaw, Param, State, activated, arrhenius, linear, parameters, states, stress
 from creepkit.laws.combined import COMBINED

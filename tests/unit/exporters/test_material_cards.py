@@ -13,9 +13,7 @@ from scipy.stats import qmc
 
 import creepkit as ck
 from creepkit.errors import ExportError
-from creepkit.exporters.abaqus_cards import AbaqusCards
-from creepkit.exporters.ansys import AnsysCards
-from creepkit.exporters.code_aster import CodeAsterMaterial
+from creepkit.exporters.material_cards import AbaqusCards, AnsysCards, CodeAsterMaterial
 from creepkit.exporters.moose_neml2 import MooseBlock, Neml2Model
 from creepkit.kernels import lower
 from creepkit.kernels.multiprecision import MultiprecisionLaw

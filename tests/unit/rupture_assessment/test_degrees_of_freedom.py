@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import gumbel_l, t
 
-from creepkit.rupture_assessment.degrees_of_freedom import variance_freedom
-from creepkit.rupture_assessment.log_time_distributions import WeibullLogTime
+from creepkit.rupture_assessment.rupture_fit import WeibullLogTime, variance_freedom
 
 HEATS, EACH = 6, 8
 MEMBERS = np.repeat(np.eye(HEATS), EACH, axis=0)

@@ -5,8 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal, norm
 
-from creepkit.rupture_assessment.fitting import conditions_of, fit_method
-from creepkit.rupture_assessment.likelihood import GroupedTimes
+from creepkit.rupture_assessment.fitting import GroupedTimes, conditions_of, fit_method
 from creepkit.rupture_assessment.methods import METHODS, RuptureMethod
 from creepkit.rupture_assessment.observed_tests import rupture_tests
 from helpers.planted_rupture import MOTORETTES, larson_miller, planted, rupture_test

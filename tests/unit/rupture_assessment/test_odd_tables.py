@@ -5,7 +5,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.rupture_assessment.likelihood import GroupedTimes, _shared_tests
+from creepkit.rupture_assessment.fitting import GroupedTimes, _shared_tests
 from helpers.planted_rupture import larson_miller, planted
 
 TESTS = planted(larson_miller, count=18)

@@ -8,7 +8,7 @@ import pytest
 import creepkit as ck
 from creepkit.records import Status
 from creepkit.sampling.criteria import SimulationOutcome, conditioned_criteria, paper_criteria
-from creepkit.sampling.draws import Draws
+from creepkit.sampling.rates import Draws
 
 PAPER = {c.name: c for c in paper_criteria(ck.specimen("bulge"))}
 INFORMATIVE = {c.name: c for c in conditioned_criteria(ck.law("drifting-exponent"), ck.specimen("bulge"), 43200.0)}

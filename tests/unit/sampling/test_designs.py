@@ -15,7 +15,7 @@ from creepkit.errors import DatasetError
 from creepkit.records import PressureJump
 from creepkit.sampling.conditions import TimeGrid, hold_times, planned_test
 from creepkit.sampling.domains import SamplingDomain, sampling_design
-from creepkit.sampling.draws import Draws, sobol_rows
+from creepkit.sampling.rates import Draws, sobol_rows
 from helpers.mistakes import said_otherwise
 
 DIMPLE, BAR = ck.specimen("bulge"), ck.specimen("uniaxial")
