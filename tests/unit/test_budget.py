@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 34548
+TESTS = 32961
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -2,13 +2,16 @@
 
 import json
 import os
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import creepkit as ck
 from creepkit.cli.app import COMMANDS
+from creepkit.cli.asking import put_questions
 from creepkit.cli.command_options import parsed_integer, parsed_number
+from creepkit.errors import HistoryError
 from helpers.command_line import answers, creepkit, one_line
 
 FALLING = """
@@ -376,3 +379,143 @@ def test_digits_of_other_scripts_are_no_numbers(text: str):
     for parsed in (parsed_number, parsed_integer):
         with pytest.raises(ValueError, match=text):
             parsed(text)
+
+
+# ---- names before work -----------------------------------------------------------------------------------------------
+
+# Options that name things, and temperatures that no solid has, are refused before the work.
+
+
+BARS = sorted(str(path) for path in ck.example_data("planted creep curves").glob("*.csv"))
+
+
+@pytest.fixture
+def no_identification(monkeypatch):
+    def refuse(*arguments, **options):
+        raise AssertionError("an identification began")
+
+    monkeypatch.setattr("creepkit.discovery.discover.identify", refuse)
+
+
+def test_forms_and_parameters_of_a_temperature_study(no_identification, tmp_path):
+    table = {
+        "--form n=lin": "no temperature form 'lin': did you mean 'linear'",
+        "--form m=linear": "'m'",
+        "--prior A.arrhenus=10": "did you mean 'arrhenius'",
+        "--prior B.arrhenius=10": "'B'",
+    }
+    line = f"discover {' '.join(BARS)} --law norton --to {tmp_path / 'd'}"
+    assert answers((f"{line} {words}", said) for words, said in table.items()) == []
+
+
+def test_a_target_of_exports_before_the_values_of_the_law():
+    assert "did you mean 'abaqus'" in one_line(creepkit("export", "norton", "--to", "abaqs"))
+
+
+def test_temperatures_above_which_nothing_is_solid():
+    """Tungsten melts at 3695 K, hafnium carbonitride at about 4300 K; 4227 °C are 4500.15 K."""
+    line = "simulate norton --set A=1e-15 --set n=4 --stress 80 --end-h 1 --temperature-c"
+    assert answers((f"{line} {celsius}", "4500 K") for celsius in (8000, 4227)) == []
+
+
+# ---- read with bad files ---------------------------------------------------------------------------------------------
+
+# `creepkit read` of a folder with a file that cannot be read: the others are shown, then its error.
+
+
+GOOD = "# stress_MPa: 150\n# temperature_C: 600\nTime (h),Creep strain (%)\n" + "".join(
+    f"{h},{0.01 * h**0.6:.5f}\n" for h in range(1, 20)
+)
+
+
+def test_the_good_files_are_shown_and_the_errors_come_last(tmp_path):
+    (tmp_path / "good.csv").write_text(GOOD)
+    (tmp_path / "other.csv").write_text(GOOD.replace("150", "170"))
+    (tmp_path / "spoilt.csv").write_text("# Ofenplatz: 3\n" + GOOD)
+    result = creepkit("read", str(tmp_path))
+    assert result.exit_code == 1
+    assert "good: uniaxial, 150 MPa" in result.output
+    assert "other: uniaxial, 170 MPa" in result.output
+    assert "unknown key 'Ofenplatz'" in result.output
+
+
+# ---- reduced model ---------------------------------------------------------------------------------------------------
+
+# `creepkit surrogate reduce`: what it says.
+
+
+def test_a_model_is_trained_and_described():
+    said = creepkit("surrogate reduce --geometry apex_thickness=0.52")
+    assert said.exit_code == 0, said.output
+    assert "modes" in said.output
+    assert "amplitude" in said.output
+
+
+def test_a_bar_has_no_reduced_order_model_to_train():
+    words = "it has no reduced-order model that is trained; name one of those that have one: bulge"
+    assert words in one_line(creepkit("surrogate reduce --specimen uniaxial"))
+
+
+# ---- asking ----------------------------------------------------------------------------------------------------------
+
+# `creepkit read --ask`: questions one after another, answers beside the data, nothing changed in the files.
+
+
+TABLE = "Temp (C);Stress (MPa);tr (h);Status\n600;320;4454;A\n600;260;23220;B\n650;320;233;A\n"
+CURVE = "# stress_MPa: 120\n# temperature_C: 600\nZeit (h);Dehnung (%);Kanal 7;W\n0;0;4;1\n10;0.1;4;1\n20;0.18;4;2\n"
+
+
+def typing(*answers):
+    left = list(answers)
+    return lambda prompt: left.pop(0), left
+
+
+def test_questions_are_answered_one_after_another(tmp_path, capsys):
+    (tmp_path / "a.csv").write_text(CURVE, encoding="utf-8")
+    (tmp_path / "rates.csv").write_text(TABLE, encoding="utf-8")
+    answer, left = typing("1", "unused", "9", "")
+    (file,) = put_questions(partial(ck.read_histories, tmp_path), answer)
+    assert (file.name, left) == ("tests.toml", [])
+    assert "'9' is none of these" in capsys.readouterr().out
+    tests = {one.name: one for one in ck.read_histories(tmp_path)}
+    assert [tests[name].unruptured for name in ("rates 2", "rates 3", "rates 4")] == [False, True, False]
+    assert tests["a"].outputs["strain"][-1] == pytest.approx(0.0018)
+    assert (tmp_path / "rates.csv").read_text(encoding="utf-8") == TABLE
+
+
+def test_the_same_question_of_several_files_is_put_once(tmp_path):
+    head = "Stress (MPa);120\nTemperature (C);600\nTime (h);Extension (mm)\n"
+    for name in ("RX1.csv", "RX2.csv"):
+        (tmp_path / name).write_text(f"{head}0;0,01\n10;0,05\n50;0,1\n100;0,16\n", encoding="utf-8")
+    answer, left = typing("40")
+    put_questions(partial(ck.read_histories, tmp_path), answer)
+    assert left == []
+    assert (tmp_path / "tests.toml").read_text(encoding="utf-8") == '["RX*.csv"]\ngauge_length_mm = 40\n'
+    assert [one.outputs["strain"][-1] for one in ck.read_histories(tmp_path)] == pytest.approx([0.004, 0.004])
+
+
+def test_a_question_may_stay_open(tmp_path):
+    (tmp_path / "rates.csv").write_text(TABLE, encoding="utf-8")
+    answer, _ = typing("?")
+    assert put_questions(partial(ck.read_histories, tmp_path), answer) == []
+    assert not (tmp_path / "tests.toml").exists()
+
+
+def test_without_a_terminal_each_question_is_a_line(tmp_path, capsys):
+    (tmp_path / "a.csv").write_text(CURVE, encoding="utf-8")
+    (tmp_path / "rates.csv").write_text(TABLE, encoding="utf-8")
+    with pytest.raises(HistoryError, match=r"3 questions open; answer them in tests.toml"):
+        put_questions(partial(ck.read_histories, tmp_path), None)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 3
+    assert 'tests.toml beside it: ["rates.csv"] ended = {B = "stopped", A = "ruptured"}' in lines[2]
+
+
+def test_a_specimen_and_lengths_that_nobody_stated_are_asked_for(tmp_path):
+    head = "# pressure_MPa: 8\n# temperature_C: 800\ntime_s,amplitude_mm\n"
+    (tmp_path / "d.csv").write_text(f"{head}60,0.08\n300,0.09\n900,0.1\n", encoding="utf-8")
+    answer, left = typing("", "0.48", "", "", "", "", "")
+    put_questions(partial(ck.read_histories, tmp_path), answer)
+    (test,) = ck.read_histories(tmp_path)
+    assert (test.specimen, test.geometry["apex_thickness"], test.geometry["cavity_radius"]) == ("bulge", 0.48, 7.5)
+    assert (left, "by default" in test.labels.get("assumed", "")) == ([], False)

@@ -9,8 +9,12 @@ from scipy.stats import norm
 
 import creepkit as ck
 from creepkit.errors import CreepkitError, FitError
+from creepkit.forecasts.bands import band_of_draws
 from creepkit.forecasts.draws import law_draws
 from creepkit.forecasts.forecast import forecast
+from creepkit.inverse.output_transforms import LinearTransform
+from creepkit.inverse.ranking_document import read_fit_or_ranking, write_ranking_document
+from creepkit.inverse.selection.ranking import ranking_from_scores
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.records import Status
 from creepkit.reports.forecast import forecast_to_json
@@ -349,3 +353,114 @@ def test_celsius_is_refused_and_may_be_insisted_on(fit):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         fit.rate(100.0, 800.0, warn=False)
+
+
+# ---- bands -----------------------------------------------------------------------------------------------------------
+
+# Bands of draws whose distribution is known.
+
+
+IDENTITY = LinearTransform(1.0, 10.0)
+RNG = np.random.default_rng(0)
+
+
+def band(values, noise=0.0, grows=True, level=0.95):
+    noise = np.broadcast_to(noise, values.shape[1:]).astype(float)
+    times = 1.0 + np.arange(values.shape[1])
+    return band_of_draws(values, times, noise, IDENTITY, level, np.random.default_rng(1), grows=grows)
+
+
+def test_parallel_curves_have_one_band():
+    curves = RNG.standard_normal((20000, 1)) + np.linspace(0.0, 5.0, 7)
+    result = band(curves)
+    np.testing.assert_allclose(result.high - result.median, 1.96, atol=0.06)
+    np.testing.assert_allclose(result.highest, result.high, atol=0.06)
+
+
+def test_independent_times_need_the_quantile_of_the_largest():
+    times = 20
+    result = band(np.zeros((20000, times)) + 1e-6 * RNG.standard_normal((20000, 1)), noise=1.0)
+    # Sidak (1967): all of m independent normal variables lie within this with probability 0.95.
+    sidak = norm.ppf(0.5 + 0.5 * 0.95 ** (1.0 / times))
+    np.testing.assert_allclose(result.highest, sidak, rtol=0.03)
+    np.testing.assert_allclose(result.high, 1.96, rtol=0.01)
+
+
+def test_new_curves_lie_inside_as_often_as_stated():
+    def walks(count):
+        return np.cumsum(RNG.standard_normal((count, 30)), axis=1)
+
+    result = band(walks(4000), level=0.9)
+    new = walks(4000)
+    inside = ((new >= result.lowest) & (new <= result.highest)).all(axis=1).mean()
+    assert inside == pytest.approx(0.9, abs=0.02)
+    assert ((new >= result.low) & (new <= result.high)).mean() == pytest.approx(0.9, abs=0.02)
+
+
+def test_where_many_have_ruptured_there_is_no_upper_end():
+    curves = np.tile(np.linspace(0.0, 1.0, 5), (1000, 1)) + 0.01 * RNG.standard_normal((1000, 1))
+    curves[:100, 3:] = np.nan
+    result = band(curves)
+    assert np.isfinite(result.high[:3]).all()
+    assert np.isinf(result.high[3:]).all()
+    assert np.isfinite(result.low).all()
+
+
+def test_new_curves_lie_inside_while_they_last():
+    times = np.linspace(0.1, 1.6, 25)
+
+    def ruptured(count):
+        clock = times / np.exp(0.2 * RNG.standard_normal((count, 1)))
+        return np.where(clock < 1.0, -np.log(np.maximum(1.0 - clock, 1e-12)), np.nan)
+
+    result = band_of_draws(ruptured(2000), times, np.zeros(25), IDENTITY, 0.9, np.random.default_rng(1), grows=True)
+    new = ruptured(2000)
+    assert np.isinf(result.median[-1])
+    inside = (np.isnan(new) | ((new >= result.lowest) & (new <= result.highest))).all(axis=1).mean()
+    assert inside == pytest.approx(0.92, abs=0.05)
+
+
+def test_an_output_that_ends_says_nothing_after_most_have_ended():
+    curves = 1.0 + 0.01 * RNG.standard_normal((1000, 4))
+    curves[:600, 3] = np.nan
+    result = band(curves, grows=False)
+    assert np.isnan(result.low[3])
+    assert np.isfinite(result.low[:3]).all()
+
+
+# ---- ranking files ---------------------------------------------------------------------------------------------------
+
+# Files of identifications and rankings from which forecasts are made; and what is refused of them.
+
+
+@pytest.fixture(scope="module")
+def saved_fit():
+    times, rng = np.geomspace(3.6e3, 3.6e5, 20), np.random.default_rng(3)
+    tests = [
+        ck.History(
+            f"bar {s:g}", times, {"strain": 1e-18 * s**5 * times + rng.normal(0.0, 2e-6, 20)},
+            ck.constant_stress(s, "stress"), 1073.15,
+        )
+        for s in (80.0, 100.0, 120.0)
+    ]  # fmt: skip
+    return ck.identify("norton", tests, using=BAR, starts=1, nuisances=[ck.Nuisance("rate", sd=0.1)])
+
+
+def test_a_ranking_has_a_file(saved_fit, tmp_path):
+    saved_fit.save(tmp_path / "norton.json")
+    write_ranking_document({"norton.json": 1.0}, tmp_path / "ranking.json")
+    source = read_fit_or_ranking(tmp_path / "ranking.json")
+    assert isinstance(source, ModelAverage)
+    assert source.fits[0].values == saved_fit.values
+
+
+def test_a_ranking_saves_its_laws_beside_itself(saved_fit, tmp_path):
+    other = replace(saved_fit, law=replace(saved_fit.law, name="ranking"))  # a law of the name of the file itself
+    ranking = ranking_from_scores([saved_fit, other], np.array([0.0, 2.0]), "bic", independent_frames=60.0)
+    path = ranking.save(tmp_path / "ranking.json")
+    assert path == tmp_path / "ranking.json"
+    found = ck.load_ranking(path)
+    assert [one.law.name for one in found.fits] == ["norton", "ranking"]
+    weight = 1.0 / (1.0 + np.exp(-1.0))  # of a law whose criterion is lower by 2
+    assert found.weights == pytest.approx([weight, 1.0 - weight])
+    assert {file.name for file in tmp_path.glob("[!.]*")} == {"ranking.json", "norton.json", "ranking-2.json"}

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.inverse.composite_predictor import predict
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
@@ -23,15 +24,18 @@ from creepkit.inverse.perturbations import (
     with_random_effects,
 )
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.selection.ranking import rank
+from creepkit.inverse.settings import USUAL_ERRORS, IdentificationSettings
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import History, Nuisance, PressureJump, StressSteps, constant_stress
+from creepkit.reports.ranking import ranking_text
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.planted_bars import carried_out
 from helpers.steady_rate_predictor import Steady, planted
+from helpers.two_outputs_predictor import TwoOutputs, with_two_outputs
 
 T_REF, R = 1048.15, 8.314462618
 BAR = Uniaxial(tolerance=1e-9)
@@ -293,3 +297,119 @@ def test_a_predictor_that_does_not_know_a_length_has_no_effect_of_it():
     tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(60.0, 1000.0), (80.0, 1000.0)], seed=0, noise=1e-5)
     fit = identify(NORTON, tests, Toleranced(), settings=SETTINGS)
     assert "thickness" not in {e.kind for e in fit.unmodelled}
+
+
+# ---- nuisance plausibility -------------------------------------------------------------------------------------------
+
+# Nuisances of implausible size: a planted jump of an output and a planted temperature weaken what is said of a law.
+
+
+STRAIN_NOISE = {"amplitude": 2e-3, "width": 2e-2}
+
+
+def fitted(jump, *nuisances, law=NORTON):
+    """One law on three tests, of which the second has jumped by so many mm of amplitude at the start."""
+    bars = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(s, 1000.0) for s in (50.0, 70.0, 100.0)], seed=0, frames=40)
+    tests = with_two_outputs(bars, STRAIN_NOISE, seed=1)
+    moved = {**tests[1].outputs, "amplitude": tests[1].outputs["amplitude"] + jump}
+    tests[1] = tests[1].replace(outputs=moved)
+    settings = IdentificationSettings(
+        starts=1, sobol_points=8, frames=60, weights="likelihood", nuisances=nuisances or (Nuisance("offset"),)
+    )
+    return identify(law, tests, TwoOutputs(), settings=settings), tests[1]
+
+
+def test_a_law_that_needs_a_large_offset_explains_only_with_it():
+    fit, test = fitted(0.3)
+    share = 0.3 / test.outputs["amplitude"].max()
+    assert share > 0.1  # else nothing is planted
+    adequacy = fit.adequacy
+    assert adequacy.explains
+    assert not adequacy.explains_plausibly
+    (named,) = adequacy.implausible
+    assert (named.kind, named.owner, named.output, named.unit) == ("offset", test.name, "amplitude", "mm")
+    assert named.value == pytest.approx(0.3, rel=0.03)
+    assert named.standard_deviations == pytest.approx(0.3 / 2e-3, rel=0.03)
+    assert named.share == pytest.approx(share, rel=0.03)
+    assert f"only with an offset of 0.3 mm in amplitude of '{test.name}', {100 * share:.2g} %" in str(adequacy)
+    (note,) = (n for n in fit.notes if "offset of amplitude" in n and "the noise of a frame (0.002 mm)" in n)
+    assert f"{named.standard_deviations:.2g} times" in note
+
+
+@pytest.mark.parametrize("jump", [0.0, 0.008])
+def test_a_small_offset_is_not_named(jump):
+    adequacy = fitted(jump)[0].adequacy
+    assert adequacy.explains_plausibly
+    assert "only with" not in str(adequacy)
+
+
+def test_a_stated_prior_decides_what_is_plausible():
+    wide = fitted(0.3, Nuisance("offset", output="amplitude", sd=0.2))[0].adequacy
+    assert wide.explains_plausibly
+    narrow = fitted(0.3, Nuisance("offset", output="amplitude", sd=0.02))[0].adequacy
+    assert narrow.implausible[0].size_source == "stated"
+    assert narrow.implausible[0].standard_deviations == pytest.approx(15.0, rel=0.1)
+
+
+def test_no_answer_is_decisive_with_such_an_offset():
+    ranking = rank([fitted(0.3)[0], fitted(0.3, law=STRAIN_HARDENING)[0]])
+    assert not ranking.decisive
+    assert "only with an offset of 0.3 mm" in ranking.verdict
+    assert "only with a large offset" in ranking_text(ranking)
+
+
+# ---- imposed motion errors -------------------------------------------------------------------------------------------
+
+# Errors of the modulus and of held strains common to all relaxation tests, against identifications that have them.
+
+
+E, A, N = 150e3, 2e-8 / 200.0**6, 6.0
+
+
+def _relaxation(stiffness: float = E) -> list[ck.History]:
+    """Of Norton's law from E strain on, ds/dt = -E A s^n in closed form; files that state another modulus."""
+    times, rng, tests = np.geomspace(30.0, 1.4e5, 30), np.random.default_rng(5), []
+    for k, strain in enumerate((0.0015, 0.0018, 0.0020)):
+        first = E * np.log1p(strain)
+        stress = (first ** (1 - N) + (N - 1) * E * A * times) ** (1 / (1 - N)) + 0.4 * rng.standard_normal(30)
+        loading = ck.constant_strain(strain)
+        elastic = ck.Elastic(E=stiffness)
+        tests.append(ck.History(f"R{k}", times, {"stress": stress}, loading, 1073.15, "relaxation", elastic=elastic))
+    return tests
+
+
+@pytest.mark.parametrize(
+    ("share", "how", "tolerance"),
+    [
+        # of weights that no estimate changes, an error so small that its effect is linear
+        (0.05, {"weights": "equal", "nuisances": ()}, 0.05),
+        # whole errors, which a likelihood that does not know of them finds as offsets of tests
+        (1.0, {"weights": "likelihood", "usual_errors": "none"}, 0.15),
+    ],
+)
+def test_the_rate_moves_as_identifications_with_these_errors_say(share, how, tolerance):
+    fit = ck.identify("norton", _relaxation(), starts=1, **how)
+    effects = {e.kind: e for e in fit.unmodelled if e.common}
+    stiffer = _relaxation(E * (1 + share * USUAL_ERRORS["modulus"]))
+    factor = 1 + share * USUAL_ERRORS["motion"]
+    strained = [replace(h, loading=ck.constant_strain(h.loading.program().values[-1] * factor)) for h in _relaxation()]
+    stress = fit.reference.stress
+    for kind, altered in (("modulus", stiffer), ("imposed strain", strained)):
+        again = ck.identify("norton", altered, starts=1, **how)
+        moved = np.log(again.rate(stress)[0] / fit.rate(stress)[0])
+        assert share * effects[kind].rate_change == pytest.approx(moved, rel=tolerance)
+    assert effects["modulus"].sentence.endswith("with Young's moduli 2 % above those stated, in all 3 tests")
+
+
+def test_creep_tests_have_neither():
+    how = {"times": np.geomspace(1e3, 1e6, 12), "elastic": ck.Elastic(E=E), "loading": ck.constant_stress(150.0)}
+    curve = ck.simulate("norton", "uniaxial", {"A": A, "n": N}, **how)
+    kinds = {e.kind for e in ck.identify("norton", [curve], starts=1).unmodelled}
+    assert not {"modulus", "imposed strain"} & kinds
+
+
+def test_a_nuisance_parameter_of_all_tests_stands_for_the_modulus():
+    fit = ck.identify("norton", _relaxation(), starts=1, nuisances=[ck.Nuisance("modulus", scope="all", sd=0.02)])
+    kinds = {e.kind for e in fit.unmodelled if e.common}
+    assert "modulus" not in kinds
+    assert "imposed strain" in kinds

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from creepkit.inverse.goodness_of_fit import output_errors, relative_squared_error
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
 from creepkit.inverse.output_transforms import LinearTransform
+from creepkit.inverse.residuals import life_sensitivity, orthogonal_distance
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import restricted_covariance
 from creepkit.inverse.variance_components import (
@@ -171,3 +173,77 @@ def test_a_discrepancy_is_not_taken_for_less_than_it_is():
         plain.append(estimate_variance_components(replace(unit, values=left), start, ()).discrepancy)
     assert np.median(plain) < 0.75
     assert np.median(restricted) == pytest.approx(1.0, abs=0.25)
+
+
+# ---- scatter of lives ------------------------------------------------------------------------------------------------
+
+# Scatter of rupture lives: the closed form of its effect on a residual, against a curve that is moved in life.
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.8, 0.95, 0.99])
+def test_a_longer_life_moves_the_residual_of_a_frame_as_stated(share):
+    """Kachanov and Rabotnov's curve e = tr l [1 - (1 - t / tr)^(1/l)], its life longer by 1e-5 at the same rate."""
+    growth, step = 5.0, 1e-5
+
+    def strain(t, life):
+        return life * growth * (1.0 - (1.0 - t / life) ** (1.0 / growth))
+
+    def log_time(e, life):
+        return np.log(life * (1.0 - (1.0 - e / (life * growth)) ** growth))
+
+    e = strain(share, 1.0)
+    slope = share * (1.0 - share) ** (1.0 / growth - 1.0) / e
+
+    def moved(strain_error, time_error):
+        found = orthogonal_distance(np.array(strain_error), np.array(time_error), np.array(slope))
+        return float(found.values) / step
+
+    by_life = -moved(np.log(strain(share, np.exp(step)) / e), np.log(share) - log_time(e, np.exp(step)))
+    by_rate = moved(slope * step, step)
+    residuals = SimpleNamespace(present=np.ones((1, 1), bool), log_rate_sensitivity=np.full((1, 1), by_rate))
+    observations = SimpleNamespace(followed_frames=np.ones((1, 1), bool))
+    assert life_sensitivity(residuals, observations)[0, 0] == pytest.approx(abs(by_life), rel=2e-3, abs=1e-3)
+    observations.followed_frames = np.zeros((1, 1), bool)
+    assert life_sensitivity(residuals, observations)[0, 0] == 0.0
+
+
+# ---- goodness of fit -------------------------------------------------------------------------------------------------
+
+# Relative squared error in its three readings, by hand; errors that were not predicted stay unknown.
+
+
+MEASURED = [np.array([1.0, 3.0]), np.array([5.0, 7.0])]
+PREDICTED = [np.array([1.0, 4.0]), np.array([5.0, 5.0])]
+
+
+def test_three_means():
+    """Squares 1 + 4; about 4 they are 9 + 1 + 1 + 9, about 2 and 6 four times 1, about 3 and 5 four times 4."""
+    assert relative_squared_error(MEASURED, PREDICTED) == pytest.approx(5 / 20)
+    assert relative_squared_error(MEASURED, PREDICTED, about="test") == pytest.approx(5 / 4)
+    assert relative_squared_error(MEASURED, PREDICTED, about="frame") == pytest.approx(5 / 16)
+
+
+def test_the_mean_itself_has_an_error_of_one():
+    assert relative_squared_error(MEASURED, [np.full(2, 4.0)] * 2) == pytest.approx(1.0)
+
+
+def test_errors_of_one_output():
+    found = output_errors(np.array([1.0, 3.0]), np.array([1.0, 4.0]), np.array([0.5, 0.5]))
+    assert (found.frames, found.mean_squared_error, found.mean_absolute_error) == (2, 0.5, 0.5)
+    assert found.relative_squared_error == pytest.approx(1 / 2)
+    assert found.relative_rms_error == pytest.approx(np.sqrt(0.5 / 5))
+    assert found.chi_square == pytest.approx(0.5 * (1 / 0.5) ** 2)
+
+
+def test_a_frame_that_was_not_predicted_leaves_no_number():
+    found = output_errors(np.array([1.0, 3.0]), np.array([1.0, np.nan]), np.ones(2))
+    assert all(
+        np.isnan(v)
+        for v in (
+            found.relative_squared_error,
+            found.mean_squared_error,
+            found.mean_absolute_error,
+            found.relative_rms_error,
+            found.chi_square,
+        )
+    )

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.language import Elastic
 from creepkit.quality import FRAME_FLAG_KINDS, check_data_quality, exclude_suspect_frames
+from creepkit.quality.idle_time import idle_parts
+from creepkit.quality.loading_strain import unstated_loading_strain
 from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, Prediction, PressureJump, StressSteps
 from helpers.paths import SHARED, needs_shared_data
@@ -268,3 +271,120 @@ def test_histories_with_next_to_nothing():
     silent = empty.replace(outputs={})
     assert not list(check_data_quality([empty, silent]))
     assert not list(check_data_quality([]))
+
+
+# ---- idle time -------------------------------------------------------------------------------------------------------
+
+# Idle time is found with its length where it was planted, and nowhere else.
+
+
+def curve(hours: np.ndarray, kind: int) -> np.ndarray:
+    """Strain by the time under load: hardening, steady after primary creep, or softening."""
+    if kind == 0:
+        return 1e-3 * hours**0.4
+    if kind == 3:
+        return 2e-2 * (0.3 * (hours / 101) ** 0.3 + 0.7 * hours / 101 / (1.05 - hours / 101))
+    if kind == 1:
+        return 2e-3 * (1 - np.exp(-hours / 5)) + 1e-4 * hours
+    return 1e-4 * hours + 2e-4 * (np.exp(hours / 40) - 1)
+
+
+def sampled(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Times by the clock, h, evenly or over decades."""
+    return np.linspace(0.5, 100, count) if rng.random() < 0.5 else np.geomspace(0.1, 100, count)
+
+
+@pytest.mark.parametrize("kind", range(3))
+def test_idle_time_that_was_planted(kind: int) -> None:
+    """An interruption of 8 to 20 h, seen by frames taken in it or not, is found within a tenth or an interval."""
+    rng = np.random.default_rng(kind)
+    for trial in range(20):
+        idle, start = rng.uniform(8, 20), rng.uniform(30, 60)
+        clock = np.linspace(0.5, 120, 81)
+        if trial % 2:
+            clock = clock[(clock < start) | (clock > start + idle)]  # the logger was off, too
+        loaded = np.where(clock < start, clock, np.maximum(clock - idle, start))
+        strain = curve(loaded, kind) + rng.normal(0.0, 3e-6, clock.size)
+        (part,) = idle_parts(3600 * clock, strain)
+        assert part.idle / 3600 == pytest.approx(idle, abs=max(0.1 * idle, 1.6)), (trial, idle)
+        assert clock[part.first] - 1.6 <= start + 1e-9 <= clock[part.last], trial
+
+
+def test_no_idle_time_where_none_was() -> None:
+    """Of 600 curves, with noise from none to a hundredth of their range and gaps of frames, none is flagged."""
+    rng = np.random.default_rng(7)
+    flagged = 0
+    for trial in range(600):
+        clock = sampled(rng, int(rng.integers(15, 200)))
+        strain = curve(clock, trial % 4)
+        if trial % 5 == 0:
+            clock = clock[(clock < 40) | (clock > 60)]
+            strain = curve(clock, trial % 4)
+        noise = np.ptp(strain) * 10.0 ** rng.uniform(-5, -2)
+        flagged += bool(idle_parts(3600 * clock, strain + rng.normal(0.0, noise, clock.size)))
+    assert flagged == 0
+
+
+# ---- loading strain --------------------------------------------------------------------------------------------------
+
+# Strain of loading that nothing states: planted jumps are questioned, primary creep of ordinary laws is not.
+
+
+HOURS = {
+    "dense": np.r_[0.0, np.geomspace(0.01, 500, 80)],
+    "sparse": np.r_[0.0, np.geomspace(1, 500, 25)],
+    "even": np.r_[0.0, np.arange(1, 500, 3.0)],
+    "dense first": np.r_[0.0, 0.02, 0.04, 0.06, 0.08, 0.1, 1, np.arange(2, 400, 2.0)],
+}
+
+
+CURVES = {
+    "cube root": lambda t: 2e-3 * t ** (1 / 3) + 1e-5 * t,
+    "strain hardening, m = -0.5": lambda t: 1e-3 * t ** (1 / 1.5),
+    "strain hardening, m = -2": lambda t: 2e-3 * t ** (1 / 3),
+    "quarter power": lambda t: 2e-3 * t**0.25,
+    "steady": lambda t: 1e-5 * t,
+    "saturating": lambda t: 5e-3 * (1 - np.exp(-t / 20)) + 1e-5 * t,
+    "logarithmic": lambda t: 1e-3 * np.log(1 + t / 0.1),
+    "to rupture": lambda t: 2e-3 * t ** (1 / 3) + 0.01 * np.expm1(t / 300),
+}
+
+
+def history(hours, strain, **fields):
+    return ck.History(
+        times=hours * 3600, outputs={"strain": strain}, loading=ck.StressSteps(((0.0, 145.0),)), temperature=923.15,
+        specimen="uniaxial", name="x", **fields,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-5, 1e-4])
+@pytest.mark.parametrize("curve", CURVES)
+@pytest.mark.parametrize("frames", HOURS)
+def test_primary_creep_is_not_questioned(frames, curve, noise):
+    hours = HOURS[frames]
+    strain = CURVES[curve](hours) + noise * np.random.default_rng(3).standard_normal(hours.size) * (hours > 0)
+    assert unstated_loading_strain(history(hours, strain)) is None
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-5])
+def test_a_jump_is_questioned(noise):
+    hours = np.r_[0.0, 0.05, 0.2, 0.5, np.geomspace(1, 250, 25)]
+    creep = 2.75e-4 * hours ** (1 / 1.4)
+    scatter = noise * np.random.default_rng(3).standard_normal(hours.size) * (hours > 0)
+    total = history(hours, creep + 1.38e-3 * (hours > 0) + scatter)
+    (flag,) = [one for one in ck.check_data_quality([total]) if one.kind == "loading"]
+    assert flag.frames == (1,)
+    assert "looks like loading strain; state loading_strain_pct" in str(flag)
+    assert unstated_loading_strain(total.replace(labels={"loading_strain": "0.00138"})) is None
+    # 145 MPa over 165 GPa is 0.088 %: 0.05 % of the jump is plastic; a record with the elastic part alone is sound
+    stiff = ck.Elastic(165e3)
+    assert unstated_loading_strain(total.replace(elastic=stiff, includes_elastic=True)) is not None
+    elastic = history(hours, creep + 145 / 165e3 * (hours > 0) + scatter, elastic=stiff, includes_elastic=True)
+    assert unstated_loading_strain(elastic) is None
+
+
+def test_a_fit_says_what_it_took_for_creep():
+    hours = np.r_[0.0, 0.05, 0.2, 0.5, np.geomspace(1, 250, 25)]
+    total = history(hours, 2.75e-4 * hours ** (1 / 1.4) + 1.38e-3 * (hours > 0))
+    law = ck.law("strain-hardening").fix(n=5.0)
+    assert any("looks like loading strain" in note for note in ck.identify(law, [total], starts=1).notes)

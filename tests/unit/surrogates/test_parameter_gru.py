@@ -1,5 +1,7 @@
 """ParameterGru as a predictor: derivatives, nuisances, the domain, laws that are reductions, and identification."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
@@ -9,12 +11,15 @@ import torch
 import creepkit as ck
 from creepkit.dataset.dataset import Dataset
 from creepkit.errors import SolveError, SurrogateError
-from creepkit.records import Program, RecordedLoading, Status
+from creepkit.records import History, Program, RecordedLoading, Status
 from creepkit.sampling.conditions import TimeGrid
 from creepkit.surrogates.parameter_gru import ParameterGru, Training
+from creepkit.surrogates.parameter_inputs import LawInputs, LoadHistoryInputs
 from creepkit.surrogates.parameter_network import sample_tensors
+from creepkit.surrogates.reference_stress_model import ReferenceStressModel
 from creepkit.surrogates.surrogate import Surrogate, load_surrogate
 from creepkit.surrogates.training import train
+from helpers.cantilever import Cantilever
 from helpers.planted_datasets import HOURS, bars, data_set, dimples, measured
 
 BRIEF = Training(epochs=2, batch=32, rate=1e-2)
@@ -324,3 +329,78 @@ def test_simulate_with_a_network_is_a_history_of_its_specimen(learnt: Surrogate,
         tension.law, learnt, tension.values_of(0), loading=ck.constant_stress(100.0), times=[HOURS, 2 * HOURS]
     )
     assert (run.specimen, run.status) == ("uniaxial", Status.COMPLETE)
+
+
+# ---- parameter inputs ------------------------------------------------------------------------------------------------
+
+# What a network of parameters and loads sees: inputs of laws with their slopes, and of histories of load.
+
+
+def test_slopes_of_inputs_are_central_differences() -> None:
+    inputs = LawInputs(ck.law("combined"))
+    theta = np.array([[p.to_internal(p.bounds[0] ** 0.4 * p.bounds[1] ** 0.6 if p.scale == "log" else p.center)
+                       for p in inputs.law.params.values()]])  # fmt: skip
+    slopes = inputs.derivatives(theta)
+    for k in range(theta.shape[1]):
+        shift = 1e-5 * np.eye(theta.shape[1])[k]
+        numeric = (inputs.input_rows(theta + shift) - inputs.input_rows(theta - shift)) / 2e-5
+        assert slopes[:, :, k] == pytest.approx(numeric, rel=1e-6, abs=1e-7)
+
+
+def test_a_coefficient_that_is_off_has_no_number_and_a_switch() -> None:
+    inputs = LawInputs(ck.law("norton"))
+    rows = inputs.input_rows(inputs.law.to_internal({"A": np.array([0.0, 1e-12]), "n": np.array([4.0, 2.0])}))
+    assert inputs.names == ("log10 A", "n", "A is off")
+    assert rows == pytest.approx(np.array([[np.nan, 4.0, 1.0], [-12.0, 2.0, 0.0]]), nan_ok=True)
+    assert (inputs.derivatives(inputs.law.to_internal({"A": 0.0, "n": 4.0}))[0, :, 0] == 0).all()
+
+
+def test_mean_loads_hold_the_time_of_the_jump() -> None:
+    made = LoadHistoryInputs(ck.specimen("uniaxial"), (), ("load", "mean_load", "time", "step"))
+    history = bars(1).planned_test(0).replace(loading=ck.StressSteps(((0.0, 100.0), (25.0, 140.0))))
+    found = made.series_values(history, np.array([0.0, 20.0, 40.0]))
+    expected = [[100, 100, 0, 0], [100, 100, np.log10(21), np.log10(21)], [140, 130, np.log10(41), np.log10(21)]]
+    assert found == pytest.approx(np.array(expected))
+
+
+# ---- reference stress model ------------------------------------------------------------------------------------------
+
+# The model at the reference stress, in closed form.
+
+
+NORTON, HOUR = ck.law("norton"), 3600.0
+VALUES = {"A": 1e-16, "n": 4.0}
+TIMES = np.array([0.0, HOUR, 4 * HOUR, 10 * HOUR])
+
+
+def held(**geometry: float) -> History:
+    return History("beam", TIMES, {}, ck.load_steps("force", [(0, 10.0), (4 * HOUR, 12.0)]), 293.15,
+                   specimen="cantilever", geometry=geometry)  # fmt: skip
+
+
+def deflection(span: float = 50.0, height: float = 2.0) -> np.ndarray:
+    """By hand: Norton's strain at 0.7 of the stress at the root, times L^2/(3 h)."""
+    stresses = [0.7 * 6.0 * force * span / (10.0 * height**2) for force in (10.0, 12.0)]
+    rates = [VALUES["A"] * stress ** VALUES["n"] for stress in stresses]
+    strain = rates[0] * np.minimum(TIMES, 4 * HOUR) + rates[1] * np.maximum(TIMES - 4 * HOUR, 0.0)
+    return span**2 / (3.0 * height) * strain
+
+
+def test_the_deflection_is_that_of_a_bar_under_the_reference_stress() -> None:
+    found = ReferenceStressModel(Cantilever()).predict(NORTON, NORTON.to_internal(VALUES), [held(), held(span=60.0)])
+    assert found.outputs == ("deflection",)
+    np.testing.assert_allclose(found.values[0, 0, :, 0], deflection(), rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(found.values[0, 1, :, 0], deflection(span=60.0), rtol=1e-5, atol=1e-12)
+
+
+def test_candidates_with_lengths_of_their_own() -> None:
+    theta = np.repeat(NORTON.to_internal(VALUES), 2, axis=0)
+    nuisances = {"height": np.array([[1.9], [2.1]])}
+    found = ReferenceStressModel(Cantilever()).predict(NORTON, theta, [held()], nuisances=nuisances)
+    for row, height in enumerate((1.9, 2.1)):
+        np.testing.assert_allclose(found.values[row, 0, :, 0], deflection(height=height), rtol=1e-5, atol=1e-12)
+
+
+def test_an_output_that_falls_has_no_such_model() -> None:
+    with pytest.raises(SurrogateError, match="its output falls under creep"):
+        ReferenceStressModel(ck.specimen("relaxation"))

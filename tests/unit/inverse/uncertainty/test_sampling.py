@@ -1,16 +1,26 @@
 """Samples of the posterior against closed forms."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import beta, multivariate_normal, norm, truncnorm
 from scipy.stats import t as student
 
+from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.uncertainty.importance_sampling import sample_posterior
+from creepkit.inverse.uncertainty import importance_sampling
+from creepkit.inverse.uncertainty.importance_sampling import (
+    SAMPLES,
+    needs_samples,
+    posterior_samples,
+    sample_posterior,
+    shortened_covariance,
+    with_samples,
+)
 from creepkit.inverse.uncertainty.posterior import Posterior
+from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals
 from creepkit.inverse.uncertainty.quantities import exponent_at, rate_at
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
@@ -123,3 +133,201 @@ def test_a_seed_repeats_the_draws(fit):
     first, again = (sample_posterior(fit, seed=5) for _ in range(2))
     assert np.array_equal(first.u, again.u)
     assert not np.array_equal(first.u, sample_posterior(fit, seed=6).u)
+
+
+# ---- importance sampling ---------------------------------------------------------------------------------------------
+
+# Samples where Laplace's approximation fails: truncated normal distributions, and a grid of the posterior.
+
+
+SETTINGS = IdentificationSettings(starts=1, sobol_points=8, weights="likelihood", nuisances=(), usual_errors="none")
+BOUNDED = replace(NORTON, params={A: NORTON.params[A], N: replace(NORTON.params[N], bounds=(1.0, 4.0))})
+"""Norton's law with n of at most 4."""
+
+
+def sampled(log_density, centre, covariance, seed=0):
+    """Samples of ln p (candidates, parameters) from a Gaussian about `centre`."""
+
+    def density(u):
+        return np.atleast_1d(log_density(u))
+
+    centre = np.array(centre)
+    return posterior_samples(density, centre, shortened_covariance(density, centre, np.array(covariance)), seed)
+
+
+# ---- closed forms ------------------------------------------------------------------------------------------------
+
+PROBABILITIES = np.array([0.025, 0.25, 0.5, 0.75, 0.975])
+
+
+@pytest.mark.parametrize("upper", [0.0, -1.0, 2.0])
+def test_quantiles_of_a_truncated_normal(upper):
+    """N(0, 1) below a bound, beside a parameter that is normal: 3 % of the standard deviation in each quantile."""
+
+    def density(u):
+        inside = (u[:, 0] <= upper) & (u[:, 0] > -30)
+        return np.where(inside, -0.5 * u[:, 0] ** 2 - 0.5 * (u[:, 1] - 5.0) ** 2 / 0.04, -np.inf)
+
+    samples = sampled(density, [min(upper, 0.0), 5.0], np.diag([1.0, 0.04]))
+    assert samples.shape == (SAMPLES, 2)
+    assert samples[:, 0].max() <= upper
+    truth = truncnorm(-np.inf, upper).ppf(PROBABILITIES)
+    np.testing.assert_allclose(
+        np.quantile(samples[:, 0], PROBABILITIES), truth, atol=0.12 * truncnorm(-99, upper).std()
+    )
+    assert samples[:, 1].mean() == pytest.approx(5.0, abs=0.03)
+    assert samples[:, 1].std() == pytest.approx(0.2, rel=0.12)
+
+
+def test_a_covariance_that_is_far_too_narrow_is_made_wider():
+    """Laplace's standard deviations are a third of the true ones, and the parameters are correlated by 0.9."""
+    truth = multivariate_normal([1.0, -2.0], [[1.0, 0.9], [0.9, 1.0]])
+    samples = sampled(truth.logpdf, [1.0, -2.0], np.eye(2) / 9.0)
+    np.testing.assert_allclose(samples.mean(axis=0), [1.0, -2.0], atol=0.15)
+    np.testing.assert_allclose(np.cov(samples.T), [[1.0, 0.9], [0.9, 1.0]], atol=0.2)
+
+
+def test_a_parameter_of_which_only_the_bounds_are_known_is_uniform():
+    """Its standard deviation is that of the bounds: 1 / sqrt(12)."""
+
+    def density(u):
+        return np.where((u[:, 0] >= 0) & (u[:, 0] <= 1), -0.5 * (u[:, 1] / 0.1) ** 2, -np.inf)
+
+    samples = sampled(density, [0.5, 0.0], np.diag([1 / 12, 0.01]))[:, 0]
+    np.testing.assert_allclose(np.quantile(samples, PROBABILITIES), beta(1, 1).ppf(PROBABILITIES), atol=0.04)
+
+
+def test_too_few_draws_that_count_are_no_samples():
+    """A needle far from the optimum, and a density that is zero everywhere."""
+    needle = multivariate_normal([3.0, 3.0], 1e-10 * np.eye(2)).logpdf
+    assert sampled(needle, [0.0, 0.0], np.eye(2)) is None
+    assert sampled(lambda u: np.full(len(u), -np.inf), [0.0, 0.0], np.eye(2)) is None
+
+
+# ---- identifications ---------------------------------------------------------------------------------------------
+
+
+def steady_tests(n=4.0, noise=4e-4):
+    made = planted(NORTON, {"A": 1e-15, "n": n}, [(s, 1000.0) for s in (60.0, 70.0, 80.0)], seed=3, noise=noise)
+    return [h.replace(standard_deviation={"strain": np.full(h.times.size, noise)}) for h in made]
+
+
+@pytest.fixture(scope="module")
+def at_bound():
+    """n of 4.1 planted, at most 4 allowed."""
+    return identify(BOUNDED, steady_tests(4.1), Steady(), settings=SETTINGS)
+
+
+def test_a_value_at_its_bound_gets_samples(at_bound):
+    assert at_bound.estimates[1].verdict == "at its bound"
+    assert needs_samples(at_bound)
+    assert at_bound.samples.shape == (SAMPLES, 2)
+    assert at_bound.coordinates.theta(at_bound.samples)[:, 1].max() <= 4.0
+
+
+def test_quantiles_are_those_of_a_grid_of_the_posterior(at_bound):
+    """exp(ln p) summed over 300 x 300 points within the bounds, marginal in each coordinate."""
+    posterior, u = Posterior.from_identification(at_bound), at_bound.u
+    samples, spread = at_bound.samples, at_bound.samples.std(axis=0)
+    axes = [
+        np.linspace(max(c - 9 * s, low), min(c + 9 * s, high), 300)
+        for c, s, low, high in zip(u, spread, posterior.lower, posterior.upper, strict=True)
+    ]
+    points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=-1)
+    density = np.exp(posterior(points)).reshape(300, 300)
+    for k in range(2):
+        marginal = density.sum(axis=1 - k)
+        cumulative = (np.cumsum(marginal) - 0.5 * marginal) / marginal.sum()
+        found = np.interp(np.quantile(samples[:, k], PROBABILITIES), axes[k], cumulative)
+        assert np.abs(found - PROBABILITIES).max() < 0.04
+        assert np.abs(found - PROBABILITIES)[[0, -1]].max() < 0.02
+
+
+def test_intervals_come_from_the_samples_and_hold_the_value(at_bound):
+    value, low, high = at_bound.local_exponent(70.0, 1000.0)
+    draws = at_bound.coordinates.theta(at_bound.samples)[:, 1]
+    assert low == pytest.approx(np.quantile(draws, 0.025), abs=1e-3)
+    assert high == pytest.approx(4.0, abs=1e-3)
+    assert low < value <= high
+    rate, low, high = at_bound.rate(70.0, 1000.0)
+    assert low < rate < high
+    laplace = replace(at_bound, samples=None).local_exponent(70.0, 1000.0)
+    assert laplace[2] > 4.0
+
+
+def test_values_inside_their_bounds_need_none():
+    fit = identify(NORTON, steady_tests(), Steady(), settings=SETTINGS)
+    assert not needs_samples(fit)
+    assert fit.samples is None
+
+
+@dataclass(frozen=True)
+class Shifted(Steady):
+    """The same but for a constant factor: it agrees once it is corrected."""
+
+    def predict(self, law, theta, histories, *, sensitivities=False):
+        found = Steady.predict(self, law, theta, histories, sensitivities=sensitivities)
+        jacobian = None if found.jacobian is None else 1.05 * found.jacobian
+        return replace(found, values=1.05 * found.values, jacobian=jacobian)
+
+
+def test_a_cheaper_predictor_is_corrected_before_samples_are_drawn_through_it(at_bound):
+    found = with_samples(replace(at_bound, samples=None), Shifted())
+    deviation = (found.samples.mean(axis=0) - at_bound.samples.mean(axis=0)) / at_bound.samples.std(axis=0)
+    assert np.abs(deviation).max() < 0.3
+
+
+def test_the_same_seed_gives_the_same_samples():
+    runs = [sampled(multivariate_normal([0.0, 0.0]).logpdf, [0.0, 0.0], np.eye(2), s) for s in (1, 1, 2)]
+    assert (runs[0] == runs[1]).all()
+    assert (runs[0] != runs[2]).any()
+
+
+def test_samples_that_fail_are_said(at_bound, monkeypatch):
+    monkeypatch.setattr(Posterior, "__call__", lambda _self, u: np.full(len(u), -np.inf))
+    found = with_samples(replace(at_bound, samples=None))
+    assert isinstance(found, Identification)
+    assert found.samples is None
+    assert found.notes[-1].endswith("could not be sampled: intervals of rates may be too narrow")
+
+
+# ---- quadratic residuals -----------------------------------------------------------------------------------------
+
+
+def test_quadratic_functions_come_back_with_their_derivatives():
+    """Of 12 points six terms are found, whatever the weights; derivatives are those of differences."""
+    rng = np.random.default_rng(0)
+    a, b, c = rng.standard_normal((1, 3)), rng.standard_normal((2, 3)), rng.standard_normal((2, 2, 3))
+
+    def residuals(u):
+        return (a + u @ b + np.einsum("ni,ijo,nj->no", u, c, u))[:, None, :]
+
+    u = np.array([3.0, -1.0]) + rng.standard_normal((12, 2))
+    shape = np.array([[1.0, 0.3], [0.3, 0.5]])
+    found = QuadraticResiduals.fitted(u, residuals(u), rng.uniform(0.1, 1.0, 12), np.array([3.0, -1.0]), shape)
+    further = np.array([[5.0, 2.0], [1.0, 0.0]])
+    values, jacobian = found.candidate_jacobian(further)
+    np.testing.assert_allclose(values, residuals(further), rtol=1e-9)
+    for k, step in enumerate(1e-5 * np.eye(2)):
+        difference = (residuals(further + step) - residuals(further - step)) / 2e-5
+        np.testing.assert_allclose(jacobian[..., k], difference, rtol=1e-6, atol=1e-6)
+
+
+def test_few_points_are_predicted_where_residuals_are_smooth(at_bound, monkeypatch):
+    """The same quantiles as of predictions alone, to a tenth of the spread, of a tenth as many points."""
+    counts = []
+    posterior_residuals = Posterior.residuals
+
+    def counting(self, u):
+        counts.append(0 if self.quadratic is not None else len(u))
+        return posterior_residuals(self, u)
+
+    monkeypatch.setattr(Posterior, "residuals", counting)
+    quick, count = with_samples(replace(at_bound, samples=None)), sum(counts)
+    counts.clear()
+    monkeypatch.setattr(importance_sampling, "FITS", 0)
+    slow = with_samples(replace(at_bound, samples=None))
+    assert 0 < count < 0.15 * sum(counts)
+    spread = slow.samples.std(axis=0)
+    quantiles = [np.quantile(one.samples, PROBABILITIES, axis=0) for one in (quick, slow)]
+    assert (np.abs(quantiles[0] - quantiles[1]) < 0.1 * spread).all()

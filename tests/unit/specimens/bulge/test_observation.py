@@ -5,6 +5,9 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
+from creepkit.fem.surface_interpolation import surface_interpolation
+from creepkit.fem.time_interpolation import TimeInterpolation
+from creepkit.specimens.bulge.field_fit import fit_field
 from creepkit.specimens.bulge.observation import Observation
 from helpers.bulge_profiles import FINE, LOOKED_AT, NODES, bell, cross, plates, profile_with_apex, richardson, table
 from helpers.paths import needs_shared_data
@@ -225,3 +228,130 @@ def test_the_defaults_of_the_field_are_dense_enough():
 
 def test_rest_alone_has_no_shape():
     np.testing.assert_array_equal(Observation().observe(NODES, np.zeros((2, 41))), [[0.0, np.nan, np.nan]] * 2)
+
+
+# ---- displacement fields ---------------------------------------------------------------------------------------------
+
+# Fields of points, as cameras give them, to D_amp, S_d, S_p and the place of the bulge.
+
+
+def pixels(points=50):
+    side = np.linspace(-8.0, 8.0, points)
+    return np.meshgrid(side, side)
+
+
+@pytest.mark.parametrize("D", [0.35, -0.35])
+def test_planted_field_is_recovered(D):
+    x, y = pixels()
+    fit = fit_field(x, y, cross(x - 0.7, y + 0.4, D, 3.6, 2.3))
+    got = [fit.amplitude, fit.width, fit.shape, fit.x_center, fit.y_center]
+    np.testing.assert_allclose(got, [D, 3.6, 2.3, 0.7, -0.4], rtol=1e-10)
+    assert max(fit.standard_errors) < 1e-10
+    assert fit.points == 2500
+
+
+@pytest.mark.nightly
+def test_standard_errors_of_a_field_are_its_scatter():
+    x, y = pixels(30)
+    truth, noise = np.array([0.35, 3.6, 2.3, 0.7, -0.4]), np.random.default_rng(8).normal(size=(150, 30, 30))
+    surface = cross(x - 0.7, y + 0.4, *truth[:3])
+    fits = [fit_field(x, y, surface + 0.02 * some) for some in noise]
+    values = np.array([[f.amplitude, f.width, f.shape, f.x_center, f.y_center] for f in fits])
+    scores = (values - truth) / [f.standard_errors for f in fits]
+    np.testing.assert_allclose(scores.std(axis=0), 1.0, atol=0.2)  # 150 draws know a deviation to 6 %
+    np.testing.assert_allclose([f.residual_sd for f in fits], 0.02, rtol=0.15)
+
+
+def test_lost_and_wild_points():
+    x, y = pixels()
+    surface = cross(x - 0.7, y + 0.4, 0.35, 3.6, 2.3)
+    surface[3, 4], surface[9:12, 9] = 2.0, np.nan
+    fit = fit_field(x, y, surface)
+    assert fit.points == 2497
+    np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], [0.35, 3.6, 2.3], rtol=0.005)
+
+
+@needs_shared_data
+def test_field_and_operator_see_the_same():
+    nodes, profile = profile_with_apex(0.81)
+    x, y = pixels(160)
+    inside = np.hypot(x, y) <= 5.0
+    heights = surface_interpolation(nodes, np.hypot(x, y)[inside]) @ profile[0]
+    fit = fit_field(x[inside] + 1.3, y[inside] - 2.0, heights)
+    expected = Observation("field", 5.0).observe(nodes, profile)[0]
+    np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], expected, rtol=2e-4)  # pixels end raggedly
+    np.testing.assert_allclose([fit.x_center, fit.y_center], [1.3, -2.0], atol=1e-6)
+
+
+# ---- observation at times --------------------------------------------------------------------------------------------
+
+# What is observed at the times of frames, from the accepted steps of a simulation, in one call.
+
+
+TIMES = np.concatenate([[0.0, 0.0], np.geomspace(10, 14400, 12), [14400.0], 14400 + np.geomspace(10, 28800, 12)])
+SEGMENTS = np.repeat([0, 1], [14, 13])
+PROGRAM = np.zeros((2, 10))
+PROGRAM[:, :4] = [[0, 14400, 8, 8], [14400, 43200, 10, 10]]
+STEPS = TimeInterpolation.from_steps(TIMES, SEGMENTS, PROGRAM)
+FRAMES = np.append(np.linspace(0.0, 43200.0, 31), 50000.0)
+
+
+def profiles(growth=1.0, width=3.6):
+    """Of the accepted steps, at rest first: (steps, nodes), mm."""
+    share = (TIMES / 43200.0)[:, None]
+    moved = bell(NODES, 0.1 + 0.5 * growth * share**0.7, width + 0.3 * share, 2.0 + 0.3 * share)
+    return np.where(np.arange(TIMES.size)[:, None] == 0, 0.0, moved)
+
+
+@pytest.mark.parametrize("operator", [Observation(), Observation("field"), Observation("profile", 5.3, 51)], ids=str)
+def test_one_call_does_what_two_do(operator):
+    got = operator.observe_at_times(NODES, profiles(), STEPS, FRAMES)
+    np.testing.assert_allclose(got, STEPS.interpolate(operator.observe(NODES, profiles()), FRAMES), rtol=1e-14)
+    assert np.isnan(got[-1]).all()
+
+
+@pytest.mark.parametrize("lanes", ["2", "4", "8"])
+def test_every_width_of_vectors_gives_the_same(monkeypatch, lanes):
+    expected, derivatives = Observation("field").observe_with_derivatives(NODES, profiles())
+    monkeypatch.setenv("CREEPKIT_LANES", lanes)  # a processor that has fewer takes what it has
+    got, got_derivatives = Observation("field").observe_with_derivatives(NODES, profiles())
+    np.testing.assert_allclose(got, expected, rtol=1e-13)
+    np.testing.assert_allclose(got_derivatives, derivatives, rtol=1e-10, atol=1e-12)
+
+
+def test_derivatives_against_differences():
+    operator = Observation()
+    fit = operator.sampling(NODES).fit
+    directions = [dict(growth=1.0), dict(width=3.6)]
+    base = [1.0, 3.6]
+
+    def difference(function, k):
+        name = next(iter(directions[k]))
+        return richardson(lambda h: function(**{name: base[k] + h}), 1e-3)
+
+    changes = np.stack([difference(profiles, k) for k in range(2)], axis=-1)
+    _, derivatives = fit.observe_at_times(profiles(), STEPS, FRAMES, changes)
+    for k in range(2):
+        expected = difference(lambda **v: operator.observe_at_times(NODES, profiles(**v), STEPS, FRAMES), k)
+        np.testing.assert_allclose(derivatives[:-1, :, k], expected[:-1], rtol=1e-7, atol=1e-8)
+
+
+# ---- profile ---------------------------------------------------------------------------------------------------------
+
+# Displacement at any radius, between the nodes of the top.
+
+
+def test_interpolation_is_exact_for_parabolas_and_nodal():
+    nodes = np.concatenate([[0.0], np.cumsum(np.repeat(np.random.default_rng(1).uniform(0.2, 0.9, 8), 2))])
+    wanted = np.linspace(0.0, nodes[-1], 57)
+    parabola = np.polynomial.Polynomial([0.3, -0.2, 0.07])
+    np.testing.assert_allclose(surface_interpolation(nodes, wanted) @ parabola(nodes), parabola(wanted), atol=1e-13)
+    np.testing.assert_allclose(surface_interpolation(nodes, nodes), np.eye(nodes.size), atol=1e-13)
+
+
+def test_interpolation_follows_the_element_where_its_middle_node_is_off():
+    first, middle, last = nodes = np.array([1.0, 1.4, 2.0])
+    for c in (-0.9, -0.3, 0.2, 0.7):
+        shapes = np.array([c * (c - 1) / 2, 1 - c * c, c * (c + 1) / 2])
+        np.testing.assert_allclose(surface_interpolation(nodes, [shapes @ nodes])[0], shapes, atol=1e-13)
+    assert first < middle < last
