@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 32961
+TESTS = 32960
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -221,10 +221,7 @@ def test_what_creep_is_not_told_is_refused():
     shared = law(A * (a * principal_stress + (1 - a) * stress) ** n, {A: RATE, n: POWER, a: Param("share", (0, 1))})
     text = AbaqusCreepSubroutine().text(LawWithValues(shared, {**NORTON_VALUES, "a": 0.0}))
     assert "switched off and left out: a = 0" in text, "a share that is zero by value leaves the von Mises stress"
-    head = " ".join(re.sub(r"^! *", "", text_of_calculix(), flags=re.MULTILINE).split())
+    calculix = CalculixCreepSubroutine().text(LawWithValues(NORTON, NORTON_VALUES))
+    head = " ".join(re.sub(r"^! *", "", calculix, flags=re.MULTILINE).split())
     assert "ignores a preloaded CREEP" in head
     assert "insists on CETOL" in head
-
-
-def text_of_calculix():
-    return CalculixCreepSubroutine().text(LawWithValues(NORTON, NORTON_VALUES))
