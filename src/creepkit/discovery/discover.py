@@ -17,9 +17,8 @@ from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.discovery.combinations import rank_combinations
 from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms, check_form_names
-from creepkit.discovery.refitting import refit
 from creepkit.discovery.regression import IsothermalEstimates, check_temperatures, isothermal_groups
-from creepkit.discovery.temperature_law import TemperatureLaw, temperature_law_from_combinations
+from creepkit.discovery.temperature_law import TemperatureLaw, refit, temperature_law_from_combinations
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.coordinates import Coordinates

@@ -23,7 +23,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import ERROR_VALUES, Dialect, is_missing, is_number, parse_number, parse_numbers
-from creepkit.files.limits import how_to_raise, raised
+from creepkit.files.reading import how_to_raise, raised
 from creepkit.readers.column_names import plain_name, split_written_name
 from creepkit.readers.cut_files import CutNumber
 

@@ -16,8 +16,7 @@ from creepkit.cli.shared import read_law_file
 from creepkit.errors import CreepkitError, FitError, HistoryError, SolveError, printable, quoted
 from creepkit.fem.mesh_files import read_input_deck, read_mesh
 from creepkit.files.hdf5_files import open_hdf5
-from creepkit.files.limits import VARIABLE, raised
-from creepkit.files.reading import FileKind, read_bytes
+from creepkit.files.reading import VARIABLE, FileKind, raised, read_bytes
 from creepkit.language.law_codec import law_from_json
 from creepkit.records import histories_in
 from creepkit.studies.lock import read_lock

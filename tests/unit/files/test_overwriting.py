@@ -10,14 +10,16 @@ from pathlib import Path
 import pytest
 
 from creepkit.errors import CacheWarning, ExportError
-from creepkit.files.cache_folders import cache_folder, is_ours_alone, warn_once
 from creepkit.files.writing import (
     RECORD,
+    cache_folder,
     check_folder_target,
     check_target,
     is_foreign,
+    is_ours_alone,
     made_from,
     overwriting,
+    warn_once,
     write_bytes,
     write_text,
 )

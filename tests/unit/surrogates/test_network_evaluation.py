@@ -14,9 +14,8 @@ from torch import nn
 
 import creepkit as ck
 from creepkit.errors import CreepkitError, SurrogateError
-from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.network_evaluation import FRAMES_IN_BLOCK, ParameterNetwork
-from creepkit.surrogates.parameter_gru import ParameterGru, Training
+from creepkit.surrogates.parameter_gru import ApplicabilityDomain, ParameterGru, Training
 from creepkit.surrogates.parameter_network import ParameterModule, weights_of
 from creepkit.surrogates.surrogate import CODEC
 from creepkit.surrogates.training import train

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from creepkit.files.file_names import file_stem
+from creepkit.files.writing import file_stem
 from creepkit.inverse.compared_tests import duration_known
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import SECONDS_PER_HOUR
