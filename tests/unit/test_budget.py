@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 136,
     "modules": 781,
     "quality": 1477,
-    "readers": 5517,
+    "readers": 5610,
     "records": 1979,
     "registry": 615,
     "reports": 7256,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 32960
+TESTS = 33031
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

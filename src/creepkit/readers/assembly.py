@@ -102,10 +102,11 @@ def assemble_history(
     )
     used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
     if "strain" in outputs:
-        record = without_loading(
-            conditions, frames.times, outputs["strain"], used, _elastic_strain(loading, temperature, elastic)
-        )
+        stress = loading.program().at(frames.times) if loading.quantity == "stress" else None
+        modulus = None if elastic is None else _modulus(elastic, temperature)
+        record = without_loading(conditions, frames.times, outputs["strain"], used, stress, modulus)
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
+        elastic = elastic if record.modulus is None else _elastic_of(record.modulus)
     else:
         elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
     outputs = without_steps(conditions, frames.times, outputs, used)
@@ -282,12 +283,17 @@ def _refuse_unknown_specimen(named: str, terms: Terms, location: str) -> None:
         raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
 
 
-def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Elastic | None) -> float | None:
-    """Stress over modulus at the beginning, None where one of them is not known."""
-    if elastic is None or loading.quantity != "stress":
-        return None
+def _modulus(elastic: Elastic, temperature: float | Program) -> float:
+    """Young's modulus at the beginning, MPa."""
     start = temperature.values[0] if isinstance(temperature, Program) else temperature
-    return float(loading.program().values[0]) / float(elastic.at(float(start)).E)
+    return float(elastic.at(float(start)).E)
+
+
+def _elastic_of(modulus: float) -> Elastic:
+    """Elastic data of a modulus that a record showed."""
+    from creepkit.language.elastic import Elastic
+
+    return Elastic(modulus)
 
 
 def _lengths_by_default(specimen: str, geometry: Mapping[str, float]) -> dict[str, float]:

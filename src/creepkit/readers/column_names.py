@@ -57,7 +57,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "temperature": (
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
-        *("probentemperatur", "ofen", "ofentemperatur", "température", "température d'essai", "four"),
+        *("probentemperatur", "ofen", "ofentemperatur", "température", "température d'essai", "four", "temp ctrl"),
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
@@ -71,9 +71,13 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("déformation de fluage", "allongement relatif", "deformation relative"),
     ),
     "loading_strain": ("anfangsdehnung",),
-    "force": ("load", "applied load", "axial load", "kraft", "prüfkraft", "last", "zugkraft", "effort", "force axiale"),
+    "force": (
+        *("load", "applied load", "axial load", "axial force", "tensile load", "tensile force", "load cell", "kraft"),
+        *("prüfkraft", "standardkraft", "last", "zugkraft", "effort", "force axiale"),
+    ),
     "elongation": (
         *("extension", "creep extension", "extensometer", "gauge extension", "axial extension", "verlängerung"),
+        *("tensile extension", "axial extensometer", "strain gauge extension", "extensometer extension"),
         *("längenänderung", "allongement"),
     ),
     "modulus": (
@@ -208,8 +212,15 @@ class NameTable:
         }
 
     def meaning(self, name: str) -> str | None:
-        """The quantity, or the key of a text, that a name without its unit means; None when it means none."""
+        """The quantity, or the key of a text, that a name without its unit means; None when it means none.
+
+        A name may have its symbol behind it, `Durchmesser d0`.
+        """
         meant = self.symbols.get(name) or self._plain_names.get(plain_name(name))
+        words, _, symbol = name.rpartition(" ")
+        if meant is None and symbol in self.symbols:
+            meant = self._plain_names.get(plain_name(words))
+            meant = meant if meant == self.symbols[symbol] else None
         return meant if meant in self.kinds or meant in self.texts else None
 
     def standard(self, text: str) -> str:
@@ -222,6 +233,8 @@ class NameTable:
         quantity = self.meaning(name)
         if quantity == "elongation" and unit_suffix(unit) in STRAIN.units:
             quantity = "strain"  # of its gauge length
+        elif quantity == "strain" and unit_suffix(unit) in LENGTH.units and "elongation" in self.kinds:
+            quantity = "elongation"
         if quantity is None or (unit and quantity not in self.kinds):
             last = re.split(r"[\s_\-()\[\],]+", text.strip(" )]"))[-1]
             return text if last in ("1", *CAPITALS_THAT_MATTER) else self._plain_keys.get(plain_name(text), text)
@@ -230,6 +243,6 @@ class NameTable:
 
 TEST_NAME_COLUMNS = (
     *("test", "test id", "test name", "test no", "test number", "sample", "sample id", "specimen id", "versuch"),
-    *("probe", "probennummer"),
+    *("probe", "probennummer", "proben nr", "specimen label"),
 )
 """Names, in small letters, of columns and rows that tell which test it is where a table holds several."""

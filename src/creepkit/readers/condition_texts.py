@@ -152,6 +152,10 @@ def _stated(
     return None
 
 
+_OF_AREA = ("area", "diameter", "width")
+"""What lengths of a cross-section begin with."""
+
+
 def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table: CellTable, known: Terms) -> bool:
     """Whether steps, programs, columns or another load leave nothing to state."""
     names, terms = [*entries, *table.columns], known
@@ -160,6 +164,8 @@ def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table
     if quantity not in terms.load_kinds:
         return False
     others = [(split_unit(name, terms.load_kinds) or ("", ""), name in entries) for name in names]
+    if quantity == "stress" and not any(name.startswith(_OF_AREA) for name in entries):
+        others = [(found, is_entry) for found, is_entry in others if found[0] != "force"]  # is none without an area
     forms = ("steps", "program", "1", *LENGTH.units)
     return any(
         load and (is_entry or load in terms.number_kinds) and (unit in forms or unit in terms.load_kinds[load].units)

@@ -122,7 +122,7 @@ def _errors_of_format(grid: CellTable) -> Iterator[None]:
         raise HistoryError(f"{error} (a LabVIEW measurement: {where})") from None
 
 
-TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv", ".lvm"), (".txt", ".dat", ".asc")
+TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv", ".lvm"), (".txt", ".dat", ".asc", ".tra", ".prn")
 """Endings of files that are taken for tables, and of those that are where a column of time is among the first names."""
 
 

@@ -242,10 +242,11 @@ class HeadOfTest:
                     self.put(quantity, text, row)
             elif cells:
                 value, *cells = cells
+                is_label = not (known.is_condition(plain) or known.misspelt(plain))  # nor nearly a condition
                 if cells and is_number(value, self.table.dialect) and unit_suffix(cells[0]):
-                    key, cells = _with_unit(key, cells[0], place), cells[1:]
-                # A key that is no condition, nor nearly one, is that of a label.
-                self.put(key if known.is_condition(plain) or known.misspelt(plain) else f"label {plain}", value, row)
+                    key, value = (key, f"{value} {cells[0]}") if is_label else (_with_unit(key, cells[0], place), value)
+                    cells = cells[1:]
+                self.put(f"label {plain}" if is_label else key, value, row)
             elif known.is_condition(key):
                 raise HistoryError(f"{place}: '{quoted(key)}' stands above the names of the columns without a value")
             else:

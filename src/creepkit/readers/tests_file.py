@@ -29,7 +29,7 @@ from creepkit.readers.column_names import NameTable, split_written_name, words_o
 from creepkit.readers.columns_of_tests import NAMES
 from creepkit.readers.ends_of_tests import LABEL, RUPTURED, STOPPED
 from creepkit.readers.frames import UNUSED
-from creepkit.readers.questions import ANSWERS_FILE, raise_all
+from creepkit.readers.questions import ANSWERS_FILE, raise_all, toml_value
 from creepkit.readers.standard_names import ELAPSED, OF_DAY
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 
@@ -147,7 +147,8 @@ def with_answer(text: str, name: str, key: str, value: str) -> str:
             end -= 1
         lines.insert(end, f"{key} = {value}")
     elif value.startswith("{") and lines[at].rstrip().endswith("}"):
-        lines[at] = f"{lines[at].rstrip()[:-1].rstrip()}, {value[1:]}"
+        earlier, new = (tomllib.loads(f"x = {one}")["x"] for one in (lines[at].partition("=")[2], value))
+        lines[at] = f"{key} = {toml_value({**earlier, **new})}"
     else:
         lines[at] = f"{key} = {value}"
     return "\n".join(lines) + "\n"

@@ -85,8 +85,8 @@ def test_a_record_of_an_instrument(tmp_path: Path) -> None:
 
 
 def test_what_is_not_understood_names_the_format(tmp_path: Path) -> None:
-    (tmp_path / "x.lvm").write_text(head() + segment(units="MPa\tdegC\tmm"))
-    with pytest.raises(HistoryError, match=r"x.lvm:22: the unit 'mm' of 'Strain .mm.*LabVIEW.*Y_Unit_Label"):
+    (tmp_path / "x.lvm").write_text(head() + segment(units="MPa\tdegC\tN"))
+    with pytest.raises(HistoryError, match=r"x.lvm:22: the unit 'N' of 'Strain .N.*LabVIEW.*Y_Unit_Label"):
         ck.read_histories(tmp_path / "x.lvm")
 
 
