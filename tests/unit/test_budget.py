@@ -22,7 +22,7 @@ BUDGET = {
     "dataset": 765,
     "discovery": 1402,
     "experiments": 1584,
-    "exporters": 2659,
+    "exporters": 2658,
     "extraction": 1307,
     "fem": 1827,
     "files": 1396,

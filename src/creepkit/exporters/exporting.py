@@ -30,7 +30,6 @@ def export(
     target: str | Exporter,
     values: Mapping[str, float] | None = None,
     *,
-    elastic: Elastic | None = None,
     units: Units | Mapping[str, str] | None = None,
     temperature: float | None = None,
     name: str = "",
@@ -41,7 +40,7 @@ def export(
 
     source : a law, which needs `values` {parameter: value}, or an identification or a temperature law, whose intervals
         and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or the
-        record of law_with_values(), which may have notes as well. elastic : moduli, for targets that state them.
+        record of law_with_values(), which may have moduli and notes as well.
     target : one of `available("exporters")`, or an exporter itself. units : of stress and time in the text,
         Units("Pa", "h") or {"stress": "Pa"}.
     temperature : K, puts a number in the place of the temperature, for targets that know none.
@@ -50,7 +49,7 @@ def export(
     ExportError, with the reason, when the target cannot express the law.
     """
     exporter = default_registry().exporter(target) if isinstance(target, str) else target
-    record = law_with_values(source, values, elastic=elastic, name=name)
+    record = law_with_values(source, values, name=name)
     if units is not None:
         record = record.replace(units=_units(units))
     if temperature is not None:

@@ -116,7 +116,10 @@ class RuptureMethod:
     def parameters(
         self, coefficients: Floats, k: float, degree: int, fixed: Mapping[str, float], centre: Centre
     ) -> dict[str, float]:
-        """{name: value} of the constants that were fitted, as the literature writes them."""
+        """{name: value} of the constants that were fitted, as the literature writes them.
+
+        coefficients : (constants,) in the order of the columns.
+        """
         names = [name for name in self.columns(_ANY_CONDITION, degree, centre) if name not in fixed]
         return self.literature(dict(zip(names, map(float, coefficients), strict=True)), k, centre)
 

@@ -228,7 +228,7 @@ def test_names_that_neml2_or_its_file_keep_are_renamed_openly():
     for label in ("lambda", "class", "yield", "stress", "E", "strain", "plastic strain", "sum"):
         first, second = law.terms.values()
         renamed = replace(law, terms={label: first, "other": second})
-        text = ck.export(renamed, "neml2", CASES["two power laws"].values, elastic=STEEL)
+        text = ck.export(ck.law_with_values(renamed, CASES["two power laws"].values, elastic=STEEL), "neml2")
         name = label.replace(" ", "_")
         assert f"# '{label}' is called {name}_2 here" in text
         assert {f"{name}_2", "other"} <= hit(text)["Models"].keys()
@@ -269,7 +269,7 @@ REFUSED = [
     ),
     ("code_aster", valued(HYPERBOLIC_SINE, B=40, **AT), "is a sinh of stress; export it as 'mfront'"),
     ("neml2", valued(TIME_HARDENING, m=-0.5, **AT), "steady power laws of stress only.*time exponent -0.5"),
-    ("neml2", valued(NORTON, **AT), r"needs the moduli; give export\(\) elastic=ck.Elastic"),
+    ("neml2", valued(NORTON, **AT), r"needs the moduli; give ck.law_with_values\(..., elastic=ck.Elastic"),
 ]
 
 
