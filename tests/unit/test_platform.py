@@ -19,7 +19,6 @@ from hypothesis import strategies as st
 from packaging.tags import mac_platforms
 
 import creepkit as ck
-from creepkit.core import LIBRARY_NAMES
 from creepkit.files.writing import DEVICE_NAMES, file_stem, hashed_stem, numbered_stems
 from helpers import source_tree
 from helpers.paths import ROOT
@@ -91,14 +90,6 @@ def test_any_text_gives_a_name_that_any_system_can_save(text, suffix) -> None:
         assert stem
         assert is_savable(stem + suffix)
         assert not any(ord(sign) < 32 for sign in stem)
-
-
-@given(st.lists(st.sampled_from(["Norton", "norton", "NORTON", "a/b", "a:b", "CON", "con", "x.", "x", "norton-2"])))
-def test_names_differ_by_more_than_case(texts) -> None:
-    names = numbered_stems(texts)
-    assert len({name.casefold() for name in names}) == len(texts)
-    hashed = [hashed_stem(text, others=texts) for text in dict.fromkeys(texts)]
-    assert len({name.casefold() for name in hashed}) == len(hashed)
 
 
 # ---- terminals -----------------------------------------------------------------------------------------------------
@@ -216,10 +207,6 @@ def module_of(path):
 
 
 COMPILATION = module_of(ROOT / "src" / "core" / "compile.py")
-
-
-def test_the_library_has_one_name_for_its_compilation_and_for_its_use():
-    assert COMPILATION.LIBRARY_NAMES == LIBRARY_NAMES
 
 
 def test_on_windows_the_compiler_is_that_of_a_package(monkeypatch):

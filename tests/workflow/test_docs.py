@@ -229,19 +229,13 @@ def assert_intervals_hold(fit, values):
 
 @pytest.mark.parametrize("page", STUDY_OF_PAGE)
 def test_study_files_hold_what_the_page_shows(page):
-    files = [path.read_text(encoding="utf-8") for path in (STUDIES / STUDY_OF_PAGE[page]).glob("*.toml")]
+    paths = [*(STUDIES / STUDY_OF_PAGE[page]).glob("*.toml")]
+    files = [path.read_text(encoding="utf-8") for path in paths]
     assert [block for block in blocks(page, "toml") if not any(block in text for text in files)] == []
-
-
-@pytest.mark.parametrize("page", STUDY_OF_PAGE)
-def test_linked_reports_are_those_of_the_study(page):
     text = (TUTORIALS / f"{page}.md").read_text(encoding="utf-8")
+    reports = {ck.Study.load(path).file.model.report.file.removesuffix(".html") for path in paths}
     linked = set(re.findall(r"\]\(report:([\w/]+)\)", text))
-    written = {
-        f"{STUDY_OF_PAGE[page]}/{ck.Study.load(path).file.model.report.file.removesuffix('.html')}"
-        for path in (STUDIES / STUDY_OF_PAGE[page]).glob("*.toml")
-    }
-    assert linked == written
+    assert linked == {f"{STUDY_OF_PAGE[page]}/{name}" for name in reports}
 
 
 def test_constant_loads_leave_both_hardening_laws_and_a_step_decides(tmp_path, monkeypatch):

@@ -1,7 +1,6 @@
 """What a page gets to show: laws of every kind of source, specimens by their records, tests with noise and offsets."""
 
 import json
-import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from xml.etree import ElementTree
@@ -13,13 +12,13 @@ import creepkit as ck
 from creepkit.app.contents import MOST_TESTS, page_contents
 from creepkit.app.documents import MOST_FRAMES, contents_document, law_data
 from creepkit.app.page import page_fragment, page_html, shared_scripts
-from creepkit.app.runtime_files import RUNTIME_FILES, runtime_files, runtime_script
+from creepkit.app.runtime_files import runtime_script
 from creepkit.errors import CreepkitError, ExportError, FitError
 from creepkit.exporters.javascript import script_safe_json
 from creepkit.inverse.defect_correction import NumericalError
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.laws.norton import NORTON
+from creepkit.records import is_logarithmic
 from helpers.planted_bars import SPL, bars
 
 
@@ -64,18 +63,6 @@ def test_an_identification_brings_its_tests_intervals_and_covariance(fit, histor
     assert shown["tests"][0]["noise"]["strain"] == pytest.approx(2e-5)
 
 
-def test_a_ranking_brings_its_laws_by_weight(fit, histories):
-    other = ck.identify("norton", histories, starts=1)
-    shown = document(ModelAverage((other, fit), (0.1, 0.9)), histories)
-    assert [law["name"] for law in shown["laws"]] == ["strain-hardening", "norton"]
-    assert [law["weight"] for law in shown["laws"]] == [0.9, 0.1]
-
-
-def test_a_law_with_values_begins_there():
-    shown = document(ck.law_with_values("norton", {"A": 2e-17, "n": 5.5}))
-    assert [p["value"] for p in shown["laws"][0]["parameters"]] == [2e-17, 5.5]
-
-
 def test_specimens_are_described_by_their_records():
     shown = {one["name"]: one for one in document("norton")["specimens"]}
     for name, specimen in ck.available("specimens").items():
@@ -84,7 +71,9 @@ def test_specimens_are_described_by_their_records():
             continue
         one = shown[name]
         assert [o["name"] for o in one["outputs"]] == list(specimen.outputs)
-        assert [(o["title"], o["unit"]) for o in one["outputs"]] == [(o.long_name, o.unit) for o in specimen.outputs]
+        assert [(o["title"], o["unit"]) for o in one["outputs"]] == [
+            (o.long_name, "%" if is_logarithmic(o) else o.unit) for o in specimen.outputs
+        ]
         assert [(load["title"], load["unit"]) for load in one["loads"]] == [
             (load.long_name, load.unit) for load in specimen.loads
         ]
@@ -138,12 +127,6 @@ def test_a_law_without_temperature_over_several_temperatures_is_warned_of(histor
     assert document(ck.with_arrhenius(ck.law("norton"), hot), hot)["laws"][0]["warning"] == ""
 
 
-def test_a_page_that_is_too_large_is_one_sentence(monkeypatch, tmp_path):
-    monkeypatch.setattr("creepkit.app.page.LARGEST_PAGE", 1000)
-    with pytest.raises(ExportError, match=r"the page would have 0\.4 MB, allowed is 0\.001 MB; give fewer tests"):
-        ck.interactive_page("norton", tmp_path / "page.html")
-
-
 def test_a_test_without_stated_minimum_rate_shows_that_of_its_readings():
     """Strain in proportion to time has one slope."""
     times = np.linspace(3600.0, 360000.0, 50)
@@ -184,7 +167,6 @@ def test_a_law_alone_has_the_middle_of_its_bounds_and_no_intervals():
     assert (A["name"], A["unit"], A["scale"], A["low"], A["high"]) == ("A", "1/s", "log", 1e-40, 1e-5)
     assert (n["unit"], n["scale"], n["value"], n["title"]) == ("", "linear", 4.5, "stress exponent")
     assert [p["interval"] for p in data["parameters"]] == [None, None]
-    assert data["directions"] == []
     assert data["variables"] == ["stress"]
 
 
@@ -200,10 +182,7 @@ def planted_fit():
     return ck.identify(NORTON, tests, using="uniaxial")
 
 
-def test_a_fit_brings_its_values_intervals_and_likely_directions():
-    """The steps along the directions make the covariance of (ln A, n), and the longest is where they trade off."""
-    from creepkit.inverse.uncertainty.correlation import correlation
-
+def test_a_fit_brings_its_values_and_intervals():
     fit = planted_fit()
     data = law_data(fit)
     rows = {p["name"]: p for p in data["parameters"]}
@@ -214,12 +193,6 @@ def test_a_fit_brings_its_values_intervals_and_likely_directions():
         assert row["verdict"] in (
             *("determined", "poorly determined", "at its bound", "bounded on one side only", "not determined"),
         )
-    steps = np.array([[step[name] for name in fit.law.names] for step in data["directions"]])
-    known = correlation(fit)
-    np.testing.assert_allclose(steps.T @ steps, known.matrix * np.outer(known.sd, known.sd), rtol=1e-6)
-    lengths = np.linalg.norm(steps / known.sd, axis=1)
-    assert (np.diff(lengths) <= 0).all()
-    assert steps[0, 0] * steps[0, 1] < 0  # a larger exponent goes with a smaller coefficient
 
 
 class Elements(HTMLParser):
@@ -247,19 +220,6 @@ def test_nothing_of_a_hostile_law_leaves_its_script_element():
     data = law_data(law)
     page = f"<p></p><script>x = {script_safe_json(data)};</script><script>y = {data['source']};</script><em></em>"
     assert Elements(page).names == ["p", "script", "script", "em"]
-
-
-def test_the_runtime_is_strict_small_and_ends_no_script_element():
-    files = runtime_files()
-    assert tuple(files) == RUNTIME_FILES
-    for name, text in files.items():
-        assert re.search(r'^"use strict";$', text, re.MULTILINE), name
-        assert len(text.splitlines()) <= 400, name
-        assert max(map(len, text.splitlines())) <= 140, name
-    script = runtime_script()
-    assert len(script) < 150_000
-    assert "</script" not in script.lower()
-    assert not re.search(r"\b(eval|Function|import|require|fetch|XMLHttpRequest|document|window)\s*\(", script)
 
 
 def test_a_page_without_the_core_in_webassembly_says_what_to_install(monkeypatch, tmp_path):

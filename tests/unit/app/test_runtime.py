@@ -1,6 +1,5 @@
 """The runtime of the page, run in node, gives the creep and relaxation of bars that the specimens give."""
 
-import json
 import re
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.app.models import rom_data
-from creepkit.errors import SolveError
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import Program, RecordedLoading
@@ -300,14 +298,3 @@ def test_mistakes_about_a_dimple_are_one_sentence(data, tmp_path):
         "RangeError: the pressure must not be negative, and a bulge test needs one above zero",
         "RangeError: the last time is 0 s, where the load only begins; ask for a time after it",
     ]
-
-
-def test_the_packed_model_is_small_and_json(data):
-    text = json.dumps(data, allow_nan=False)
-    assert len(text) < 200_000
-
-
-def test_rings_have_no_fit_for_a_page():
-    rings = ck.specimen("bulge").replace(observation="rings 0, 2 mm")
-    with pytest.raises(SolveError, match="observe a profile or a field"):
-        rom_data(rings.reduced_order_model())

@@ -11,18 +11,7 @@ import pytest
 import creepkit as ck
 from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import HistoryError
-from helpers.camera_samples import (
-    LOST,
-    SAMPLES,
-    dice,
-    dice_blanks,
-    dome,
-    pyvale,
-    vic_3d,
-    vic_3d_images,
-    vic_3d_mat,
-    zeiss,
-)
+from helpers.camera_samples import LOST, SAMPLES, dice, dice_blanks, dome, vic_3d, vic_3d_images, vic_3d_mat, zeiss
 from helpers.paths import SHARED, needs_shared_data
 
 
@@ -316,13 +305,6 @@ def test_frames_of_other_columns(tmp_path: Path) -> None:
         frames[2]
 
 
-def test_an_image_that_comes_twice_in_a_file_of_a_folder(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path / "test", ["f_1.csv", "f_2.csv"], vic_3d)
-    (folder / "f_2.csv").write_bytes(vic_3d() + vic_3d())
-    with pytest.raises(HistoryError, match="f_2.csv:53: the line of columns comes again"):
-        ck.read_frames(folder)[1]
-
-
 @pytest.mark.parametrize(
     ("names", "message"),
     [
@@ -334,14 +316,6 @@ def test_an_image_that_comes_twice_in_a_file_of_a_folder(tmp_path: Path) -> None
 def test_files_that_are_no_one_sequence(names: list[str], message: str, tmp_path: Path) -> None:
     with pytest.raises(HistoryError, match=message):
         ck.read_frames(folder_of(tmp_path / "test", names))
-
-
-def test_the_reference_comes_first(tmp_path: Path) -> None:
-    """As pyvale calls it, beside the numbered frames."""
-    names = ["dic_results_ref_img.csv", *(f"dic_results_def_img_{k}.csv" for k in (1, 2, 10, 12))]
-    frames = ck.read_frames(folder_of(tmp_path / "test", names, pyvale))
-    assert apexes(frames) == [0.0, 0.1, 0.2, 0.3, 0.4]
-    assert frames.missing == (3, 4, 5, 6, 7, 8, 9, 11)
 
 
 def test_patterns_and_lists(tmp_path: Path) -> None:
@@ -397,8 +371,3 @@ def test_times_in_heads_and_names_with_decimals(tmp_path: Path) -> None:
 def test_times_of_frames_from_a_file(tmp_path, text, expected):
     (tmp_path / "times.csv").write_text(text)
     np.testing.assert_allclose(read_frame_times(tmp_path / "times.csv"), expected, rtol=1e-12)
-
-
-def test_numbers_may_count_in_steps(tmp_path: Path) -> None:
-    frames = ck.read_frames(folder_of(tmp_path / "test", [f"run2_{k:05d}_0.csv" for k in (10, 20, 30, 50)], vic_3d))
-    assert frames.missing == (40,)

@@ -10,7 +10,6 @@ import pytest
 import creepkit as ck
 from creepkit.cli.app import COMMANDS
 from creepkit.cli.asking import put_questions
-from creepkit.cli.command_options import parsed_integer, parsed_number
 from creepkit.errors import HistoryError
 from helpers.command_line import answers, creepkit, one_line
 
@@ -33,28 +32,6 @@ LAW = CreepLaw(
 @hookimpl
 def creepkit_laws():
     return [LAW]
-"""
-
-BRITTLE = """
-from creepkit.language import CreepLaw, Param, State, hookimpl, parameters, states, stress
-
-(A,), (w,) = parameters("A"), states("w")
-RATE = A * stress / (1 - w)
-COEFFICIENT = Param("rate coefficient", unit="1/s", bounds=(1e-20, 1e-5), scale="log")
-
-
-@hookimpl
-def creepkit_laws():
-    return [CreepLaw("brittle", {"creep": RATE}, {A: COEFFICIENT}, states={w: State(0, RATE, "damage", limit=0.9)})]
-"""
-
-COMMAND = """
-from creepkit.language import hookimpl
-
-
-@hookimpl
-def creepkit_commands(app):
-    app.command("greet")(lambda: None)
 """
 
 
@@ -95,10 +72,6 @@ def test_what_is_meant_is_said_for_what_there_is_not() -> None:
     assert answers(UNKNOWN.items()) == []
 
 
-def test_version() -> None:
-    assert creepkit("--version").stdout.startswith("creepkit 0.")
-
-
 def test_debug_lets_the_traceback_through() -> None:
     quiet, loud = creepkit("list", "laws", "nortn"), creepkit("--debug", "list", "laws", "nortn")
 
@@ -108,32 +81,6 @@ def test_debug_lets_the_traceback_through() -> None:
 
 
 # ---- laws ----------------------------------------------------------------------------------------------------------
-
-
-def test_laws_are_listed_with_their_parameters() -> None:
-    result = creepkit("list", "laws")
-
-    assert result.exit_code == 0
-    assert "norton" in result.stdout
-    assert "A n_0 n_inf C tau_d tau_r" in result.stdout
-
-
-def test_laws_as_json_hold_what_table_1_says() -> None:
-    laws = {law["name"]: law for law in json.loads(creepkit("list", "laws", "--json").stdout)}
-
-    m = laws["strain-hardening"]["parameters"]["m"]
-    assert (m["bounds"], m["off"]) == ([-1, 0], 0)
-    assert laws["combined"]["parameters"]["A_1"]["bounds"] == [1e-40, 1e-5]
-    assert laws["norton"]["provenance"].startswith("plugin 'norton' (creepkit ")
-
-
-def test_one_law_in_full() -> None:
-    shown = creepkit("list", "laws", "norton").stdout
-
-    assert "A*stress**n" in shown
-    assert r"A \sigma_e^{n}" in shown
-    assert "Norton (1929)" in shown
-    assert json.loads(creepkit("list", "laws", "norton", "--json").stdout)["terms"] == {"power law": "A*stress**n"}
 
 
 # ---- plugins -------------------------------------------------------------------------------------------------------
@@ -146,22 +93,6 @@ def test_a_plugin_file_joins_the_laws() -> None:
 
     assert result.exit_code == 0
     assert f"from plugin 'mine' ({Path('mine.py').resolve()})" in result.stdout
-
-
-def test_a_state_as_json_says_where_the_material_ends() -> None:
-    Path("brittle.py").write_text(BRITTLE)
-
-    law = json.loads(creepkit("--plugin", "brittle.py", "list", "laws", "brittle", "--json").stdout)
-
-    rate = "A*stress/(1 - w)"
-    assert law["states"] == {"w": {"meaning": "damage", "unit": "1", "rate": rate, "initial": 0.0, "limit": 0.9}}
-
-
-def test_a_plugin_file_that_is_asked_for_must_work() -> None:
-    Path("mine.py").write_text("A = (\n")
-
-    assert f"({Path('mine.py').resolve()}, line 1)" in one_line(creepkit("--plugin", "mine.py", "list", "laws"))
-    assert "plugin file none.py does not exist" in one_line(creepkit("--plugin", "none.py", "list", "laws"))
 
 
 def test_plugins_are_listed_broken_ones_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,12 +124,6 @@ def test_a_law_that_breaks_a_promise_fails_the_check() -> None:
     assert result.exit_code == 1
     assert "stress" in result.stdout
     assert result.stderr == "creepkit: 1 of 1 laws failed the check\n"
-
-
-def test_a_file_without_laws_cannot_be_checked() -> None:
-    Path("commands.py").write_text(COMMAND)
-
-    assert "offers no law" in one_line(creepkit("check", "commands.py"))
 
 
 def test_a_file_that_has_the_name_of_a_law_is_not_executed() -> None:
@@ -241,49 +166,6 @@ def test_a_dimple_is_simulated_with_all_it_needs_in_the_head() -> None:
     assert run.geometry == same.geometry
     assert run.outputs["amplitude"].tolist() == same.outputs["amplitude"].tolist()
     assert Path("section.png").stat().st_size > 20_000
-
-
-def test_the_cameras_of_a_dimple_take_a_frame_every_150_s() -> None:
-    lines = creepkit(f"{DIMPLE} --pressure 8").stdout.splitlines()
-
-    assert "# pressure_1_MPa: 8.0" in lines
-    assert [line.split(",")[0] for line in lines[-2:]] == ["7050.0", "7200.0"]
-
-
-def test_more_pressures_are_a_program_of_ramps() -> None:
-    lines = creepkit(f"{DIMPLE} --pressure 8 --pressure 3600:10 --pressure 5000:0").stdout.splitlines()
-
-    assert (
-        "# pressure_program: 0.0 s 0.0 MPa; 5.0 s 8.0 MPa; 3600.0 s 8.0 MPa; 3605.0 s 10.0 MPa; 5000.0 s 10.0 MPa; "
-        "5005.0 s 0.0 MPa"
-    ) in lines
-
-
-def test_a_burst_is_told_and_the_history_ends_there() -> None:
-    result = creepkit(f"{DIMPLE} --pressure 8 --to run.csv".replace("5e-13", "1e-9"))
-
-    assert result.exit_code == 0
-    assert " h: the surface reached the deflection limit; the history ends there\n" in result.stderr
-    (run,) = ck.read_histories("run.csv")
-    assert run.times[-1] < run.rupture_time < 7200
-    assert run.labels["ended"] == "the surface reached the deflection limit"
-
-
-def test_a_bar_with_a_modulus_has_its_elastic_strain() -> None:
-    creepkit(f"{NORTON} --stress 100 --control stress --modulus-gpa 100 --points 3 --to bar.csv")
-
-    (run,) = ck.read_histories("bar.csv")
-    assert run.outputs["strain"].tolist() == pytest.approx([1e-3, 1e-3 + 5e-7 * 3600, 1e-3 + 5e-7 * 7200], rel=1e-6)
-    assert run.includes_elastic
-
-
-def test_specimens_are_listed_with_their_outputs() -> None:
-    listed = {one["name"]: one for one in json.loads(creepkit("list", "specimens", "--json").stdout)}
-
-    assert {"uniaxial", "relaxation", "point", "bulge"} <= listed.keys()
-    assert listed["relaxation"]["outputs"] == ["stress"]
-    assert listed["relaxation"]["nuisances"] == ["temperature", "modulus"]
-    assert "strain strain_11" in creepkit("list", "specimens").stdout
 
 
 def test_a_bar_relaxes() -> None:
@@ -372,15 +254,6 @@ def test_a_file_that_cannot_be_written_is_said_before_the_simulation(monkeypatch
     assert answers((f"{DIMPLE} --pressure 8 {words}", said) for words, said in UNWRITABLE) == []
 
 
-@pytest.mark.parametrize("text", ["٣", "1_0", "２"])
-def test_digits_of_other_scripts_are_no_numbers(text: str):
-    assert parsed_number(" 1e3 ") == 1000.0
-    assert parsed_integer("-3") == -3
-    for parsed in (parsed_number, parsed_integer):
-        with pytest.raises(ValueError, match=text):
-            parsed(text)
-
-
 # ---- names before work -----------------------------------------------------------------------------------------------
 
 # Options that name things, and temperatures that no solid has, are refused before the work.
@@ -406,16 +279,6 @@ def test_forms_and_parameters_of_a_temperature_study(no_identification, tmp_path
     }
     line = f"discover {' '.join(BARS)} --law norton --to {tmp_path / 'd'}"
     assert answers((f"{line} {words}", said) for words, said in table.items()) == []
-
-
-def test_a_target_of_exports_before_the_values_of_the_law():
-    assert "did you mean 'abaqus'" in one_line(creepkit("export", "norton", "--to", "abaqs"))
-
-
-def test_temperatures_above_which_nothing_is_solid():
-    """Tungsten melts at 3695 K, hafnium carbonitride at about 4300 K; 4227 °C are 4500.15 K."""
-    line = "simulate norton --set A=1e-15 --set n=4 --stress 80 --end-h 1 --temperature-c"
-    assert answers((f"{line} {celsius}", "4500 K") for celsius in (8000, 4227)) == []
 
 
 # ---- read with bad files ---------------------------------------------------------------------------------------------
@@ -451,11 +314,6 @@ def test_a_model_is_trained_and_described():
     assert "amplitude" in said.output
 
 
-def test_a_bar_has_no_reduced_order_model_to_train():
-    words = "it has no reduced-order model that is trained; name one of those that have one: bulge"
-    assert words in one_line(creepkit("surrogate reduce --specimen uniaxial"))
-
-
 # ---- asking ----------------------------------------------------------------------------------------------------------
 
 # `creepkit read --ask`: questions one after another, answers beside the data, nothing changed in the files.
@@ -481,24 +339,6 @@ def test_questions_are_answered_one_after_another(tmp_path, capsys):
     assert [tests[name].unruptured for name in ("rates 2", "rates 3", "rates 4")] == [False, True, False]
     assert tests["a"].outputs["strain"][-1] == pytest.approx(0.0018)
     assert (tmp_path / "rates.csv").read_text(encoding="utf-8") == TABLE
-
-
-def test_the_same_question_of_several_files_is_put_once(tmp_path):
-    head = "Stress (MPa);120\nTemperature (C);600\nTime (h);Extension (mm)\n"
-    for name in ("RX1.csv", "RX2.csv"):
-        (tmp_path / name).write_text(f"{head}0;0,01\n10;0,05\n50;0,1\n100;0,16\n", encoding="utf-8")
-    answer, left = typing("40")
-    put_questions(partial(ck.read_histories, tmp_path), answer)
-    assert left == []
-    assert (tmp_path / "tests.toml").read_text(encoding="utf-8") == '["RX*.csv"]\ngauge_length_mm = 40\n'
-    assert [one.outputs["strain"][-1] for one in ck.read_histories(tmp_path)] == pytest.approx([0.004, 0.004])
-
-
-def test_a_question_may_stay_open(tmp_path):
-    (tmp_path / "rates.csv").write_text(TABLE, encoding="utf-8")
-    answer, _ = typing("?")
-    assert put_questions(partial(ck.read_histories, tmp_path), answer) == []
-    assert not (tmp_path / "tests.toml").exists()
 
 
 def test_without_a_terminal_each_question_is_a_line(tmp_path, capsys):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-import errno
 import importlib
 import inspect
 import io
@@ -20,10 +18,8 @@ import pytest
 import creepkit as ck
 from creepkit.cli.app import COMMANDS, STAGES
 from creepkit.cli.command_options import OutputPath
-from creepkit.cli.ending import AS_TERMINALS_CAN
 from creepkit.options import Option, Options, options_of
 from creepkit.reports import terminal
-from helpers import source_tree
 from helpers.command_line import answers, creepkit, one_line
 
 CREEPKIT = (sys.executable, "-m", "creepkit")
@@ -45,11 +41,6 @@ def test_a_fault_is_one_line(monkeypatch):
     said = one_line(creepkit(SIMULATE))
     assert said.startswith("creepkit: internal error (ZeroDivisionError: two lines \\u001b[2J); this is a fault")
     assert isinstance(creepkit(f"--debug {SIMULATE}").exception, ZeroDivisionError)
-
-
-def test_no_memory_is_no_fault(monkeypatch):
-    monkeypatch.setattr(ck, "law", raising(MemoryError()))
-    assert "not enough memory" in one_line(creepkit(SIMULATE))
 
 
 @LINUX
@@ -79,11 +70,6 @@ def test_a_narrow_encoding_shows_codes(encoding, tmp_path):
         (run.stdout + run.stderr).decode(encoding)
 
 
-def test_a_degree_is_left_out_where_the_encoding_lacks_it():
-    assert "850 °C, ü".encode("ascii", AS_TERMINALS_CAN) == b"850 C, \\xfc"
-    assert "850 °C".encode("cp1252", AS_TERMINALS_CAN).decode("cp1252") == "850 °C"
-
-
 @LINUX
 def test_without_a_home_or_a_cache_or_a_known_user(tmp_path):
     """As in a container that runs under any number of a user; the cache folder is none."""
@@ -102,12 +88,6 @@ def test_without_a_home_or_a_cache_or_a_known_user(tmp_path):
     assert "time" in run.stdout
 
 
-def test_without_temporary_folder_training_says_what_to_set(monkeypatch):
-    none = FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/none']")
-    monkeypatch.setattr(ck, "law", raising(none))
-    assert "set the environment variable TMPDIR" in one_line(creepkit(SIMULATE))
-
-
 # ---- names on terminals ----------------------------------------------------------------------------------------------
 
 # Names of files steer no terminal: whatever commands print of them for people is shown as codes. Texts for programs
@@ -116,22 +96,6 @@ def test_without_temporary_folder_training_says_what_to_set(monkeypatch):
 
 HOSTILE = "\x1b]0;owned\x07\x1b[31mred\rover\n\u202egnp\x9b"
 BARS = ck.example_data("planted creep curves")
-WAYS_TO_PRINT = {
-    "creepkit.reports.terminal": "the functions that all others call",
-    "creepkit.cli.ending": "what ends the command line, before anything is imported and without stderr that works",
-}
-
-
-def _prints(node: ast.AST) -> bool:
-    if not isinstance(node, ast.Call):
-        return False
-    name = ast.unparse(node.func)
-    return name in ("print", "typer.echo", "typer.secho", "click.echo", "sys.stdout.write", "sys.stderr.write")
-
-
-def test_everything_is_printed_by_one_module() -> None:
-    printing = {name for name in source_tree.modules() if any(map(_prints, ast.walk(source_tree.tree(name))))}
-    assert printing <= set(WAYS_TO_PRINT)
 
 
 def test_controls_are_shown_as_codes_and_lines_and_tabs_stay(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,7 +1,6 @@
 """Options that identify and discover share: changes of laws, subsets of tests."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,13 +54,6 @@ def test_a_wrong_change_of_a_law_is_one_sentence(fix: list[str] | None, bound: l
     with pytest.raises(FitError) as raised:
         change_laws([NORTON, HARDENING], fix, bound)
     assert message in str(raised.value)
-
-
-def test_bounds_and_fixed_values_must_make_sense() -> None:
-    with pytest.raises(LawError, match="bounds are reversed or empty"):
-        change_laws([NORTON], None, ["n=8:1"])
-    with pytest.raises(LawError, match="cannot fix n = 9; allowed are 1 to 8"):
-        change_laws([NORTON], ["n=9"], ["n=1:8"])
 
 
 def test_only_takes_labels() -> None:
@@ -140,17 +132,6 @@ def test_nuisances_are_added_to_the_usual_two():
     assert parse_nuisances(["rate=none", "offset=none"]) == ()
 
 
-def test_steps_have_a_start_and_tests():
-    step = Nuisance("temperature step", sd=30.0, start=8250.0)
-    for text, scope, tests in (
-        ("", "test", ()),
-        (" for all", "all", ()),
-        (" for alloy", "alloy", ()),
-        (" for test_09, test_11", "all", ("test_09", "test_11")),
-    ):
-        assert parse_nuisances([f"temperature step=0:30@8250{text}"])[-1] == replace(step, scope=scope, tests=tests)
-
-
 def test_nuisances_that_cannot_be_read_are_refused():
     with pytest.raises(FitError, match="--nuisance ofset=3: nuisance 'ofset' is not known; did you mean 'offset'"):
         parse_nuisances(["ofset=3"])
@@ -216,13 +197,6 @@ def test_a_changed_file_of_the_former_run_is_neither_removed_nor_mixed_with_anot
     assert (tmp_path / "norton.tex").read_text() == "edited by hand"
 
 
-def test_a_ranking_refuses_a_file_that_another_run_has_written_under_the_same_name(rankings, tmp_path):
-    _run(rankings[0], tmp_path)
-    rankings[1].best.save(tmp_path / "norton.json")
-    with pytest.raises(FitError, match=r"norton\.json is not the file that this ranking was made with"):
-        load_ranking(tmp_path / "ranking.json")
-
-
 # ---- law sources -----------------------------------------------------------------------------------------------------
 
 # Laws as `simulate` and `export` name them: a registered law first, then a file that holds one with its values.
@@ -259,9 +233,3 @@ def test_names_of_laws_come_before_files_and_a_file_without_a_suffix_needs_its_p
     assert creepkit("simulate", "./norton", *TEST).exit_code == 0
     for command in (("simulate", "mine", *TEST), ("export", "mine", "--to", "latex")):
         assert "for the file of that name write ./mine" in one_line(creepkit(*command))
-
-
-def test_values_that_the_law_of_a_file_does_not_have_are_refused(tmp_path):
-    file = tmp_path / "valued.json"
-    ck.export("norton", "json", {"A": 1e-16, "n": 4.0}, to=file)
-    assert "has no parameter 'm'" in one_line(creepkit("simulate", str(file), "--set", "m=5", *TEST))

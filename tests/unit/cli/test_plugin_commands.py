@@ -15,7 +15,6 @@ import creepkit as ck
 from creepkit.errors import CreepkitError, LawError
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.language.law_codec import law_from_json, law_to_json
-from creepkit.registry import default_registry
 from helpers.command_line import creepkit, one_line
 
 COMMAND = """
@@ -108,11 +107,6 @@ def test_help_imports_no_plugin_that_adds_no_command(install: Install) -> None:
     assert not Path("imported").exists()
 
 
-def test_a_hook_in_a_module_inside_a_package_is_seen(install: Install) -> None:
-    install("packed", packed__commands=COMMAND.format(name="pack"), packed____init__="")
-    assert "  pack  Say pack to the world." in creepkit("--help").stdout.splitlines()
-
-
 def test_a_plugin_that_fails_is_told_in_a_line_and_the_others_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("good.py").write_text(COMMAND.format(name="greet"))
     Path("bad.py").write_text("creepkit_commands = 1 / 0\n")
@@ -132,12 +126,6 @@ def test_a_plugin_that_fails_is_told_in_a_line_and_the_others_stay(monkeypatch: 
     assert missed.exit_code == 2
     assert missed.stderr.splitlines()[:3] == [f"creepkit: {line.strip()}" for line in (bad, raising, signature)]
     assert creepkit("greet").stderr == "", "what is asked for works, so nothing is to be said"
-
-
-def test_a_plugin_file_that_is_missing_is_told_in_the_help() -> None:
-    assert section(creepkit("--plugin", "none.py", "--help").stdout, "Plugins that failed") == [
-        "  plugin file none.py does not exist; name a Python file with hooks in it"
-    ]
 
 
 def test_a_plugin_cannot_take_the_place_of_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -269,26 +257,12 @@ def test_a_name_that_python_uses_does_no_harm(kind: str, name: str) -> None:
     assert creepkit("--plugin", f"{name}.py", "list", "plugins").exit_code == 0
 
 
-def test_a_package_does_not_hide_one_that_is_installed() -> None:
-    assert "a module 'creepkit_logarithmic' is installed already" in one_line(creepkit("new", "reader", "logarithmic"))
-    assert not Path("logarithmic").exists()
-
-
 # ---- missing laws ----------------------------------------------------------------------------------------------------
 
 # The package that a law came from; hard limits of parameters.
 
 
 A, n = parameters("A n")
-
-
-def test_a_law_tells_which_package_it_came_from() -> None:
-    known = default_registry()
-    sum_of_two = (ck.law("logarithmic") + ck.law("norton")).times(ck.arrhenius())
-    version = ck.__version__
-    assert known.distributions_of(ck.law("logarithmic").fix(n=4)) == "creepkit-logarithmic 0.1.0"
-    assert known.distributions_of(sum_of_two) == f"creepkit {version}, creepkit-logarithmic 0.1.0"
-    assert known.distributions_of(limited(None)) == ""
 
 
 # ---- limits --------------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from creepkit.dataset.generation import GenerationJob
 from creepkit.dataset.simulation import empty_dataset, rounded_outputs, simulate_rows
 from creepkit.errors import DatasetError
 from creepkit.records import Status, SupportsReducedOrderModel
-from creepkit.sampling.criteria import BURST_TIME_FACTOR, SimulationOutcome, conditioned_criteria, paper_criteria
+from creepkit.sampling.criteria import BURST_TIME_FACTOR, SimulationOutcome, paper_criteria
 from creepkit.sampling.domains import sampling_design
 from helpers.dataset_runs import assert_same
 from helpers.planted_sampling import BAR, GRID, Planted, Raising, strain, stress_of
@@ -76,11 +76,6 @@ def test_a_sample_that_does_not_converge_at_all_has_failed(tmp_path):
     assert len(stuck.failures) == (stuck.reasons == -1).sum() == (stuck.conditions[:, 0] <= 120.0).sum()
 
 
-def test_when_all_samples_fail_that_is_an_error(tmp_path):
-    with pytest.raises(DatasetError, match="the first 8 simulations all failed: ZeroDivisionError: stress of no use"):
-        simulated(tmp_path, Planted((Raising(),)))
-
-
 def test_histories_of_rejected_samples_keep_one_part_in_4000(tmp_path):
     values = np.array([0.0, np.nan, 1e-30, -3.14159, 5000.5], dtype=np.float32)
     np.testing.assert_allclose(rounded_outputs(values), values, rtol=1.3e-4)
@@ -130,13 +125,6 @@ assert "creepkit" not in sys.modules
     assert {int(row): text for row, text in failed.items()} == data.failures
 
 
-def test_a_bulge_is_rebuilt_with_its_geometry_but_for_its_threads(tmp_path):
-    dimple = ck.specimen("bulge").replace(apex_thickness=0.48, threads=2, tolerance=0.02)
-    data = replace(simulated(tmp_path), specimen=dimple)
-    again = storage.read_dataset(storage.write_dataset(data, tmp_path / "a.h5"))
-    assert again.specimen == dimple.replace(threads=None)
-
-
 def test_rows_keep_what_belongs_to_them(data):
     (row,) = data.failures
     part = data.rows([31, row])
@@ -168,36 +156,11 @@ def test_no_file_a_folder_and_text(tmp_path):
     assert "not an HDF5 file" in sentence(tmp_path / "empty.h5")
 
 
-def test_a_foreign_hdf5_file(tmp_path):
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        file.create_dataset("x", data=np.arange(3), dtype=np.int64)
-    assert "an HDF5 file, but no data set of creepkit" in sentence(tmp_path / "a.h5")
-
-
 def test_every_truncation_of_a_file_is_noticed(data, tmp_path):
     whole = storage.write_dataset(data, tmp_path / "a.h5").read_bytes()
     for length in range(0, len(whole), max(len(whole) // 23, 1)):
         (tmp_path / "cut.h5").write_bytes(whole[:length])
         sentence(tmp_path / "cut.h5")
-
-
-def test_a_target_that_cannot_be_written(data, tmp_path):
-    (tmp_path / "file").touch()
-    for target in (tmp_path / "no folder" / "a.h5", tmp_path / "file" / "a.h5"):
-        with pytest.raises(DatasetError, match=r"a\.h5: cannot be written: "):
-            storage.write_dataset(data, target)
-
-
-def test_long_attributes_are_no_trouble(data, tmp_path):
-    long = replace(data, design_document={"name": "long", "numbers": list(range(30_000))})
-    assert storage.read_dataset(storage.write_dataset(long, tmp_path / "a.h5")).design_document == long.design_document
-
-
-def test_a_specimen_that_a_file_cannot_hold_is_refused(data, tmp_path):
-    odd = ck.specimen("bulge")
-    mesh = odd.geometry.mesh(0.5)
-    with pytest.raises(DatasetError, match="bulge.mesh is a Mesh, which a data set cannot hold"):
-        storage.write_dataset(replace(data, specimen=odd.replace(mesh=mesh)), tmp_path / "a.h5")
 
 
 # ---- files that mean harm ------------------------------------------------------------------------------------------
@@ -343,11 +306,6 @@ def test_little_growth_rules_nothing_out(growths):
     assert not PAPER["4"].rejects_early(sketch(growths=growths, status=Status.COMPLETE))
 
 
-def test_without_a_number_of_seconds_a_burst_rules_nothing_out():
-    full = {c.name: c for c in conditioned_criteria(NORTON, ck.specimen("bulge"), END)}["full history"]
-    assert not full.rejects_early(sketch(1.0))
-
-
 # ---- a design ------------------------------------------------------------------------------------------------------
 
 
@@ -376,20 +334,6 @@ def test_what_was_ruled_out_is_rejected_when_it_is_simulated(all_simulated, some
     others = ~left_out
     np.testing.assert_array_equal(some_simulated.reasons[others], all_simulated.reasons[others])
     np.testing.assert_array_equal(some_simulated.values[others], all_simulated.values[others])
-
-
-def test_unscreened_every_draw_that_passes_is_simulated(all_simulated):
-    before = (all_simulated.reasons == 1) | (all_simulated.reasons == 2)
-    np.testing.assert_array_equal(all_simulated.status < 0, before)
-
-
-def test_the_description_says_how_many_were_not_simulated(some_simulated):
-    third = some_simulated.reasons == 3
-    unseen = int((third & (some_simulated.status < 0)).sum())
-    assert unseen > 0
-    told = f"{third.sum()} rejected: criterion 3, simulation converged and lasted 1 h; "
-    told += "not simulated" if unseen == third.sum() else f"{unseen} of them not simulated"
-    assert told in str(some_simulated)
 
 
 def test_whether_samples_are_screened_decides_what_a_generation_is(tmp_path):

@@ -7,14 +7,13 @@ from scipy.integrate import cumulative_simpson
 import creepkit as ck
 from creepkit.discovery.discover import discover, group_by_temperature, isothermal_tests, temperature_study
 from creepkit.errors import FitError
-from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identify import identify
-from creepkit.inverse.reference_conditions import ReferencePoint, spans_temperatures
+from creepkit.inverse.reference_conditions import spans_temperatures
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.kernels import lower
-from creepkit.language import Elastic, arrhenius, linear, temperature
+from creepkit.language import arrhenius, linear, temperature
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, PressureJump, Program, constant_stress
+from creepkit.records import History, Program, constant_stress
 from helpers.steady_rate_predictor import Steady, planted
 
 T_REF = 1023.15
@@ -122,16 +121,6 @@ def test_a_test_with_a_step_of_temperature_is_left_out_by_its_name(tests, trend)
         temperature_study(NORTON, [step], Steady(), settings=QUICK)
 
 
-def test_tests_of_several_specimens_are_studied_together(tests, trend):
-    """Two specimens of one predictor: which test is of which makes no difference."""
-    mixed = [test.replace(specimen="twin") if k % 2 else test for k, test in enumerate(tests)]
-    using = {"uniaxial": Steady(), "twin": Steady()}
-    found = temperature_study(NORTON, mixed, using, settings=QUICK, forms=FEW)
-    assert found.temperature_law.forms == trend.forms
-    for name, value in trend.values.items():
-        assert found.temperature_law.values[name] == pytest.approx(value, rel=1e-3)
-
-
 def test_what_happened_after_the_last_used_frame_does_not_count(tests):
     """A test that is cut at its step is one at a single temperature for all that is said of temperatures."""
     step = stepped(tests[7], 20.0)
@@ -144,13 +133,6 @@ def test_what_happened_after_the_last_used_frame_does_not_count(tests):
     assert not spans_temperatures([before])
 
 
-def test_a_form_is_where_it_should_be_at_its_reference_temperature():
-    coordinates = Coordinates(TRUE, ReferencePoint(100.0, 0.01, 7e3, T_REF))
-    theta = np.array([np.log(1.5e-16), 4.6, -8e-3, 4.2e5])
-    assert np.allclose(coordinates.theta(coordinates.u(theta)), theta, rtol=1e-12)
-    assert np.isfinite(coordinates.jacobian(coordinates.u(theta))).all()
-
-
 # ---- the command ---------------------------------------------------------------------------------------------------
 
 
@@ -158,36 +140,6 @@ def test_a_form_is_where_it_should_be_at_its_reference_temperature():
 
 
 # ---- a dimple ------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.nightly
-def test_a_dimple_at_three_temperatures_through_the_surrogate():
-    model, rng = ck.surrogate("dimple"), np.random.default_rng(8)
-    law = NORTON.times(arrhenius(1033.15))
-    truth = {"A": 1.5e-6 / 100.0**4.5, "n": 4.5, "Q": 4.2e5}
-    sd = {"amplitude": 1.5e-3, "width": 0.02, "shape": 0.02}
-    tests = []
-    for T in (973.15, 1033.15, 1083.15):
-        run = ck.simulate(
-            law,
-            model,
-            truth,
-            loading=PressureJump(8.0, 10.0, 7200.0),
-            times=np.arange(1200.0, 14401.0, 1200.0),
-            temperature=T,
-            elastic=Elastic(E=100e3),
-            name=f"{T:.0f} K",
-        )
-        noisy = {name: value + sd[name] * rng.normal(size=value.size) for name, value in run.outputs.items()}
-        known = {name: np.full(run.times.size, s) for name, s in sd.items()}
-        tests.append(run.replace(outputs=noisy, standard_deviation=known))
-    settings = IdentificationSettings(starts=1, sobol_points=8, frames=12, nuisances=())
-    fits = [identify(NORTON, [test], model, settings=settings) for test in tests]
-    trend = discover(fits, forms={"A": ("arrhenius",), "n": ("constant", "linear")}, histories=tests)
-    assert trend.forms == {"A": "arrhenius", "n": "constant"}
-    Q = trend.estimate("Q")
-    assert Q.low <= truth["Q"] <= Q.high
-    assert Q.high - Q.low < 1e5
 
 
 # ---- paper law -------------------------------------------------------------------------------------------------------
@@ -247,17 +199,3 @@ def test_the_planted_values_lie_in_their_intervals(campaign):
 
 def _inside(estimate, value):
     return estimate.low <= value <= estimate.high
-
-
-def test_how_long_it_takes_is_said_after_the_first_of_its_parts(campaign):
-    _, steps = campaign
-    names = list(dict.fromkeys(name for name, _, _ in steps))
-    assert len(names) == 2
-    for name, what in zip(names, ("combinations of forms", "refits of forms"), strict=True):
-        assert f"{what} at most, about " in name
-
-
-def test_few_refits_are_made(campaign):
-    """An identification of all tests is what costs; it was one for each of 35 before."""
-    found, _ = campaign
-    assert len(found.candidates) <= 9

@@ -2,14 +2,13 @@
 
 import copy
 import pickle
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.experiments.candidate_tests import frame_times, grid_of_rig
+from creepkit.experiments.candidate_tests import grid_of_rig
 from creepkit.experiments.design import design
 from creepkit.experiments.rig import Rig, rigs_of
 from creepkit.inverse.identify import identify
@@ -186,21 +185,7 @@ def test_the_expected_chi_square_is_met_when_the_test_is_made(hardening):
     assert 1 / 1.5 < met / expected < 1.5
 
 
-def test_where_one_law_remains_nothing_is_proposed(hardening):
-    alone = rank([hardening.best])
-    assert alone.further_tests().tests == ()
-    assert "one law remains, " in design(alone, goal="law").sentence
-
-
 # ---- records ---------------------------------------------------------------------------------------------------------
-
-
-def test_a_test_that_hardly_decides_is_not_advised(hardening):
-    found = design(hardening)
-    poor = tuple(replace(t, expectation=replace(t.expectation, probability=0.1)) for t in found.tests)
-    said = replace(found, tests=poor, plan=(), expected=None).sentence
-    assert said.startswith(f"none of the {len(poor)} tests considered is likely to tell")
-    assert "with probability 0.10" in said
 
 
 def test_work_that_is_stopped_gives_the_best_so_far(hardening):
@@ -242,12 +227,6 @@ def test_a_number_in_the_map_is_one_of_the_table(hardening):
         first.setdefault(place, f"{test.expectation.probability:.2f}")
     drawn = [text.get_text() for panel in found.plot().axes[:2] for text in panel.texts]
     assert sorted(drawn) == sorted(first.values())
-
-
-def test_the_same_question_has_the_same_answer(line):
-    first, second = (design(line, rig=RIG, goal=rate_at(40.0), seed=3) for _ in range(2))
-    assert [t.description for t in first.tests] == [t.description for t in second.tests]
-    assert first.best.expectation.sd == second.best.expectation.sd
 
 
 # ---- candidate tests -------------------------------------------------------------------------------------------------
@@ -302,13 +281,6 @@ def test_temperatures_are_varied_where_the_laws_know_them():
     (base,) = bars_made(50.0)
     assert {c.histories[0].temperature for c in grid_of_rig(rig, base)} == {1000.0, 1050.0}
     assert {c.histories[0].temperature for c in grid_of_rig(rig, base, by_temperature=False)} == {1000.0}
-
-
-def test_frames_come_at_the_interval_of_the_rig():
-    assert frame_times(3600.0, 60.0).size == 60
-    assert frame_times(3600.0, 100.0)[0] == pytest.approx(100.0)
-    assert frame_times(3600.0, 900.0).size == 8
-    assert frame_times(1e6, 60.0).size == 60
 
 
 def test_any_load_is_varied_in_its_unit_after_the_ramp_that_was_made():

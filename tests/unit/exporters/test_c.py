@@ -14,8 +14,7 @@ from creepkit.language import CreepLaw, Param, State, parameters, states, stress
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
-from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import LawWithValues, Units
+from creepkit.records import LawWithValues
 from helpers.compilers import shared_library
 from helpers.export_cases import LAWS, case, disagreements, labelled_values
 from helpers.javascript import run_in_node
@@ -86,39 +85,7 @@ def test_every_law_agrees_with_50_digits(tmp_path, gcc):
 # ---- what the text holds -------------------------------------------------------------------------------------------
 
 
-def test_a_file_has_the_authors_numbers_and_says_how_to_call_it():
-    text = CExporter().text(LawWithValues(NORTON, {"A": 1.2e-16, "n": 5.2}, ["n = 5.2 +- 0.1 (95 %)"]))
-    for line in (
-        " * Stress in MPa, time in s, rates in 1/s. stress is a ratio to 1 MPa, time to 1 s, rates are per s.",
-        " * Note: n = 5.2 +- 0.1 (95 %)",
-        " *   double norton_rate(double stress);",
-        " *   double norton_log_rate(double stress, double slopes[1]);",
-        "static const double A = 1.2e-16; /* 1/s, rate coefficient */",
-        "static const double n = 5.2; /* stress exponent */",
-        "double norton_rate(double stress)",
-    ):
-        assert line in text.splitlines()
-    assert [line for line in text.splitlines() if line.startswith("#")] == ["#include <math.h>"]
-
-
 # ---- what the compiled file does -----------------------------------------------------------------------------------
-
-
-def test_units_are_converted_on_entry_and_on_exit(tmp_path, gcc):
-    """With stress in Pa and time in h, rates are per hour and slopes per Pa and per hour."""
-    law = LAWS["foreign Kachanov-Rabotnov"] + TIME_HARDENING
-    values = law.center()
-    units = Units("Pa", "h")
-    sources = [LawWithValues(law, values, name="native"), LawWithValues(law, values, name="converted", units=units)]
-    library = compile_c(gcc, tmp_path, sources)
-    plain, other = (Compiled(library, name, law) for name in ("native", "converted"))
-    point = np.array([120.0, 0.01, 7.2e4, 1000.0, 90.0, 40.0, 0.3])
-    scales = np.array([1e6, 1.0, 1 / 3600, 1.0, 1e6, 1e6, 1.0])
-    rows, log = plain.rows(point)
-    found, found_log = other.rows(point * scales)
-    np.testing.assert_allclose(found[:, 0], 3600 * rows[:, 0], rtol=1e-13)
-    np.testing.assert_allclose(found[:, 1:], 3600 * rows[:, 1:] / scales, rtol=1e-13)
-    assert found_log == pytest.approx(log + math.log(3600), rel=1e-14)
 
 
 def test_internal_variables_start_and_end_as_the_law_says(tmp_path, gcc):
@@ -126,26 +93,6 @@ def test_internal_variables_start_and_end_as_the_law_says(tmp_path, gcc):
     library = compile_c(gcc, tmp_path, [LawWithValues(law, law.center(), name="damage")])
     assert ctypes.c_double.in_dll(library, "damage_initial").value == 0.0
     assert ctypes.c_double.in_dll(library, "damage_limit").value == 0.99
-
-
-def test_virgin_and_unloaded_material_has_finite_numbers(tmp_path, gcc):
-    library = compile_c(gcc, tmp_path, [LawWithValues(COMBINED, COMBINED.center())])
-    law = Compiled(library, "combined", COMBINED)
-    for point in ([100.0, 0.0, 0.0], [0.0, 0.01, 1.0], [0.0, 0.0, 0.0]):
-        rows, log = law.rows(point + [0.0] * 3)
-        assert np.isfinite(rows).all()
-        assert math.isfinite(log)
-
-
-def test_beyond_doubles_the_rate_is_infinite_and_its_logarithm_is_not(tmp_path, gcc):
-    """ln A sinh(x)^n = ln A + n (x - ln 2) for large x."""
-    law = LAWS["registered hyperbolic-sine"]
-    library = compile_c(gcc, tmp_path, [LawWithValues(law, {"A": 1e-5, "n": 8.0, "B": 1.0})])
-    found = Compiled(library, "hyperbolic_sine", law)
-    assert found.rate([2000.0]) == math.inf
-    log, slopes = found.log_rate([2000.0])
-    assert log == pytest.approx(math.log(1e-5) + 8 * (2000 - math.log(2)), rel=1e-14)
-    assert slopes == [pytest.approx(8.0)]
 
 
 # ---- javascript ------------------------------------------------------------------------------------------------------

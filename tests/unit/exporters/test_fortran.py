@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 
 from creepkit.errors import ExportError
-from creepkit.exporters.creep_subroutine import (
-    FORTRAN_RESERVED,
-    AbaqusCreepSubroutine,
-    CalculixCreepSubroutine,
-    law_subroutine,
-)
+from creepkit.exporters import creep_subroutine
+from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine, law_subroutine
 from creepkit.exporters.law_code import Identifiers, LawCode
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
 from creepkit.language.symbols import POINT_VARIABLES
@@ -34,7 +30,7 @@ def law(term, params, name="foreign", **more):
 
 
 def routine_of(values, name):
-    return law_subroutine(LawCode(values, Identifiers(FORTRAN_RESERVED, ignore_case=True)), name)
+    return law_subroutine(LawCode(values, Identifiers(creep_subroutine.FORTRAN_RESERVED, ignore_case=True)), name)
 
 
 # ---- the law -------------------------------------------------------------------------------------------------------
@@ -182,16 +178,6 @@ def test_nothing_in_a_note_or_a_title_becomes_code(exporter, tmp_path, gfortran)
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert b"creep_" in (tmp_path / "law.o").read_bytes()
-
-
-@pytest.mark.parametrize("exporter", [AbaqusCreepSubroutine(), CalculixCreepSubroutine()])
-def test_names_that_are_long_or_those_of_routines_compile(exporter, tmp_path, gfortran):
-    clash, long, longer = parameters(f"foreign_law a_{80 * 'y'} a_{80 * 'y'}z")
-    source = law(clash * stress**long * longer, {clash: RATE, long: POWER, longer: POWER})
-    text = exporter.text(LawWithValues(source, {clash.name: 1e-16, long.name: 5, longer.name: 2}))
-    assert "! 'foreign_law' is called foreign_law_2 here" in text
-    assert max(len(line) for line in text.splitlines() if line[:1] != "!") <= 72
-    assert not compile_fortran(gfortran, text, tmp_path, "clash")[1]
 
 
 def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_path, gfortran):

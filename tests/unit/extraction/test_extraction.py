@@ -15,7 +15,7 @@ import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.extraction.frame_checks import frames_at_rest
 from creepkit.extraction.noise import autocorrelation, patch_covariance, patch_numbers, rigid_gains, time_correlation
-from creepkit.extraction.plate import plate_axes, point_areas, rigid_motions
+from creepkit.extraction.plate import plate_axes, rigid_motions
 from creepkit.extraction.temperature_fields import InfraredCamera, image_of_numbers, temperature_between
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.records import CameraFrame, Channel, Frames, InstrumentRecord
@@ -131,16 +131,6 @@ def test_bad_frames_are_flagged_and_change_no_other(extraction, frames):
     assert np.isfinite(found.outputs["amplitude"][35])  # a bump is taken off: the frame is there for who wants it
 
 
-def test_points_in_another_order_are_the_same_points(extraction, frames):
-    def shuffled(frame):
-        order = np.random.default_rng(3).permutation(np.flatnonzero(frame.valid))
-        parts = (frame.points, frame.displacements, frame.valid, frame.confidence)
-        return CameraFrame(*(part[order] for part in parts), frame.time, frame.source)
-
-    (found,) = ck.extract(changed(frames, dict.fromkeys(range(1, len(frames)), shuffled)), subset=CAMERA.subset)
-    np.testing.assert_allclose(found.outputs["amplitude"], extraction.outputs["amplitude"], atol=1e-7)
-
-
 @pytest.mark.parametrize("given", [False, True])
 def test_axes_that_point_away_from_the_cameras_are_turned(extraction, frames, given, tmp_path):
     """As DICe exports them: x to the right, y down, z away; a dome then falls."""
@@ -214,13 +204,6 @@ def test_axes_of_a_tilted_plate_leave_a_fixture_out():
     np.testing.assert_allclose(axes.place_of(*here[:2]), [1.5, -2.0], atol=1e-9)
 
 
-def test_areas_of_points_fill_the_plate():
-    side = np.arange(-10.0, 10.01, 0.5)
-    x, y = (g.ravel() for g in np.meshgrid(side, side))
-    areas = point_areas(np.stack([x + 0.2 * np.sin(y), y], axis=1), 0.5)
-    np.testing.assert_allclose(areas[np.hypot(x, y) < 8.0], 0.25, rtol=0.02)
-
-
 def test_patches_give_the_scatter_of_a_fit_to_correlated_errors():
     """The linear fit of a plane and a bell to noise that neighbours share; patches see its residuals alone."""
     random = np.random.default_rng(5)
@@ -289,14 +272,6 @@ def test_at_a_thermocouple_it_is_what_that_says_and_its_course_is_kept() -> None
     assert found.values.mean() == pytest.approx(1113.0, abs=3.0)
     assert np.ptp(found.values) == pytest.approx(1.0)
     assert found.sd < 3.5  # the tolerance is 1.9 K at 840 C
-
-
-def test_between_two_it_is_on_the_straight_line() -> None:
-    record = recorded({"T1": 1000.0, "T2": 1100.0})
-    found = temperature_between(record, ["T1", "T2"], PLACES, (0.0, -20.0))
-    assert found.values.mean() == pytest.approx(1050.0, abs=0.2)
-    nearer = temperature_between(record, ["T1", "T2"], PLACES, (25.0, -20.0))
-    assert nearer.values.mean() == pytest.approx(1075.0, abs=2.0)
 
 
 def test_intervals_hold_of_planted_fields() -> None:

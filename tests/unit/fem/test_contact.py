@@ -11,7 +11,6 @@ import pytest
 import creepkit as ck
 from creepkit import kernels
 from creepkit.core import address, function
-from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.solver import StageConditions, assemble
 from creepkit.laws.norton import NORTON
@@ -97,13 +96,6 @@ def test_a_body_leaves_when_its_force_does() -> None:
     assert run.status is Status.COMPLETE
     assert abs(unloaded) < 0.02 * loaded
     assert again == pytest.approx(loaded, rel=1e-4)
-
-
-def test_one_body_moves_at_most() -> None:
-    section = BallOnBlock().section("force")
-    two = section.touch("top", (60.0, 5.0), (60.0, 0.0), name="ring", force=-1.0)
-    with pytest.raises(SolveError, match="2 rigid bodies of a section move freely; allowed is one"):
-        two.model(np.zeros(0, dtype=np.int64))
 
 
 # ---- pressure --------------------------------------------------------------------------------------------------------

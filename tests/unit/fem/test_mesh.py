@@ -10,16 +10,12 @@ import pytest
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import (
     CORNERS,
-    GAUSS_POINTS,
     Mesh,
     discretize,
     geometry_derivative,
-    half_bandwidth,
-    outline,
     shape_functions,
     shape_gradients,
     strip_mesh,
-    strip_nodes,
 )
 from creepkit.fem.section import Section
 from creepkit.fem.simulation import LoadHistory, Simulation, simulate
@@ -64,13 +60,6 @@ def test_shape_gradients_are_the_differences_of_the_values():
         np.testing.assert_allclose(shape_gradients(PLACES)[:, :, k], slope, atol=1e-9)
 
 
-def test_points_are_those_of_gauss_near_the_corner_of_their_number():
-    for i, j in [(0, 0), (1, 0), (3, 2), (2, 2), (3, 3)]:
-        exact = (2 / (i + 1) if i % 2 == 0 else 0) * (2 / (j + 1) if j % 2 == 0 else 0)
-        assert (GAUSS_POINTS[:, 0] ** i * GAUSS_POINTS[:, 1] ** j).sum() == pytest.approx(exact, abs=1e-15)
-    assert (np.sign(GAUSS_POINTS) == CORNERS).all()
-
-
 def test_a_linear_field_has_its_gradient_at_every_point_of_a_curved_mesh():
     mesh = ring(5, 3)
     at = discretize(mesh)
@@ -79,17 +68,6 @@ def test_a_linear_field_has_its_gradient_at_every_point_of_a_curved_mesh():
     np.testing.assert_allclose((at.by_height * values).sum(axis=2), -5.0, atol=1e-12)
     there = 2.0 + 3.0 * at.points[:, :, 0] - 5.0 * at.points[:, :, 1]
     np.testing.assert_allclose((at.over_radius * values).sum(axis=2), there / at.points[:, :, 0], atol=1e-12)
-
-
-def test_area_and_volume_of_a_ring_converge_with_the_fourth_order():
-    area, first_moment = 0.75 * np.pi, 3 * 0.75 * np.pi + 7 / 3  # of r; the centroid of the quarter is 28/(9 pi) off
-    errors = []
-    for n in (2, 4, 8):
-        at = discretize(ring(n, n))
-        errors.append([(at.weights / at.points[:, :, 0]).sum() / area - 1, at.weights.sum() / first_moment - 1])
-    orders = np.log2(np.abs(np.array(errors[:-1]) / errors[1:]))
-    assert (orders > 3.7).all()
-    assert np.abs(errors[-1]).max() < 1e-5
 
 
 def test_geometry_change_is_the_derivative_of_what_the_mesh_becomes():
@@ -103,15 +81,6 @@ def test_geometry_change_is_the_derivative_of_what_the_mesh_becomes():
     slopes = np.stack([at.by_radius, at.by_height], axis=3)
     moved = (np.stack([ahead.by_radius, ahead.by_height], 3) - np.stack([behind.by_radius, behind.by_height], 3)) / 2e-6
     np.testing.assert_allclose(-np.einsum("epaj,epji->epai", slopes, change.gradient), moved, atol=1e-6)
-
-
-@pytest.mark.parametrize(("columns", "layers"), [(1, 1), (5, 3), (12, 4)])
-def test_a_strip_is_numbered_across(columns, layers):
-    mesh = ring(columns, layers)
-    assert len(mesh.elements) == columns * layers
-    assert len(mesh.nodes) == (columns + 1) * (2 * layers + 1) + columns * (layers + 1)
-    assert set(mesh.elements.ravel()) == set(range(len(mesh.nodes)))
-    assert half_bandwidth(mesh.elements) == 6 * layers + 9
 
 
 def test_sides_of_a_strip_lie_on_its_lines_with_the_solid_to_their_left():
@@ -128,18 +97,6 @@ def test_sides_of_a_strip_lie_on_its_lines_with_the_solid_to_their_left():
     np.testing.assert_allclose(body.nodes[body.first][:, 0], 3.0, atol=1e-15)
     np.testing.assert_allclose(body.nodes[body.last][:, 1], 0.0, atol=1e-15)
     np.testing.assert_allclose(body.nodes[body.last][:, 0], [4, 4.1, 4.2, 4.6, 5.0], rtol=1e-14)
-
-
-def test_nodes_of_a_strip_are_linear_in_its_sides():
-    rng, breaks = np.random.default_rng(3), np.array([0, 0.3, 1.0])
-    a, b, c, d = rng.normal(size=(4, 7, 2))
-    both = strip_nodes(a + 2 * c, b + 2 * d, breaks)
-    np.testing.assert_allclose(both, strip_nodes(a, b, breaks) + 2 * strip_nodes(c, d, breaks), atol=1e-14)
-
-
-def test_the_outline_of_a_strip_are_its_four_sides():
-    mesh = ring(5, 3)
-    assert len(outline(mesh.elements)) == 2 * (5 + 3)
 
 
 def test_quality_is_one_of_a_rectangle_and_the_sine_of_a_parallelogram():
@@ -211,15 +168,6 @@ def test_a_dead_force_stretches_a_bar_as_hooke_says() -> None:
         bar = face(BAR.hold("bottom", z=True)).pull("top", force)
         strain = np.log1p(top_of(bar, simulated(bar, [], load=1.0)) / 3.0)
         np.testing.assert_allclose(strain * np.exp(-strain), 1e-3, rtol=1e-6)
-
-
-def test_a_force_is_shared_as_the_area_is() -> None:
-    """A unit force has the sum 1/(2 pi) over the radian, and pulls evenly: no shear, the same strain everywhere."""
-    bar = BAR.hold("bottom", z=True).pull("top", 5.0)
-    assert bar.forces[:, 1].sum() * 2 * np.pi == pytest.approx(5.0, rel=1e-12)
-    made = simulated(bar, [], load=100.0)
-    heights, axial = bar.nodes[:, 1], made.displacements[-1, :, 1]
-    np.testing.assert_allclose(axial, heights / 3.0 * axial.max(), atol=1e-12)
 
 
 def test_a_plane_has_one_displacement() -> None:

@@ -94,14 +94,6 @@ def test_a_date_that_may_be_two_is_asked_for(tmp_path: Path, order: str, day: st
     assert record.start == np.datetime64(day).astype("datetime64[s]").astype(float)
 
 
-def test_other_rows_decide_on_the_order_of_a_date(tmp_path: Path) -> None:
-    by_number = ck.read_record(written(tmp_path, table(["12/8/2025 23:59:00", "13/8/2025 00:00:00"])))
-    by_order = ck.read_record(written(tmp_path, table(["3/4/2025 23:59:00", "3/5/2025 00:00:00"])))
-    assert by_number.times.tolist() == by_order.times.tolist() == [0.0, 60.0]
-    assert "its dates have the day first" in by_number.notes
-    assert any("month first" in note for note in by_order.notes)
-
-
 def test_clocks_that_are_put_back_for_winter(tmp_path: Path) -> None:
     stamps = [f"2025-11-02 {hour}:{minute:02d}:00" for hour in ("00", "01", "01", "02") for minute in (0, 30)]
     path = written(tmp_path, table(stamps))
@@ -203,11 +195,6 @@ def test_whether_a_pressure_is_absolute_stands_in_its_unit_or_its_name(
     assert (channel.quantity, channel.reference) == ("pressure", reference)
 
 
-def test_a_row_of_units_that_says_more_than_the_names(tmp_path: Path) -> None:
-    record = ck.read_record(written(tmp_path, "time_s,p [bar],T (upper)\ns,barg,K\n0,1,800\n1,2,800\n"))
-    assert [(c.reference, c.quantity) for c in record.channels.values()] == [("gauge", "pressure"), ("", "temperature")]
-
-
 @needs_shared_data
 def test_the_record_of_dimple_d1() -> None:
     record = ck.read_record(SHARED / "cameras/dabi_static/D1_record.csv")
@@ -231,13 +218,6 @@ def test_units_that_are_nearly_known_are_not_taken_in_silence(tmp_path: Path) ->
     assert "p: taken for numbers without a unit; if 'psgi' means psi, write psi into the head" in text
     assert "V: numbers in 'rpm', which is not converted" in text
     assert not any(note.startswith(("valve", "T_set")) for note in record.notes)
-
-
-@pytest.mark.parametrize(("order", "day"), [("year first", "2025-08-18"), ("day first", "2018-08-25")])
-def test_years_of_two_digits(tmp_path: Path, order: str, day: str) -> None:
-    content = "time,p_bar\n25-08-18 00:00,1\n25-08-18 00:01,2\n"
-    record = ck.read_record(written(tmp_path, content), date_order=order, time_zone="+00:00")
-    assert record.start == np.datetime64(day).astype("datetime64[s]").astype(float)
 
 
 # ---- imposed ---------------------------------------------------------------------------------------------------------

@@ -114,13 +114,6 @@ def test_outputs_at_a_jump_show_what_holds_from_then_on() -> None:
     )
 
 
-def test_without_load_nothing_happens() -> None:
-    result = run(DAMAGING, {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5}, {"13": prescribed_strain(0.0)}, [1e3])
-    assert result.status == Status.COMPLETE
-    assert not result.stress.any()
-    assert not result.strain.any()
-
-
 class TestEnds:
     def test_a_state_at_its_limit(self) -> None:
         """Kachanov: (1 - damage)^(v+1) = 1 - (v+1) C s^v t; outputs beyond are left out."""

@@ -5,18 +5,15 @@ import pytest
 from scipy.stats import binom, ttest_1samp
 
 import creepkit as ck
-from creepkit.errors import FitError
-from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, followed_duration
-from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identified_values import minimum_rates_of
 from creepkit.inverse.identify import identify
-from creepkit.inverse.minimum_rates import apparent_exponent, least_slope, measured_minimum_rate, with_minimum_rates
+from creepkit.inverse.minimum_rates import apparent_exponent, least_slope, with_minimum_rates
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import SIGNIFICANCE, SingleValue, contradicting_values
 from creepkit.laws.norton import NORTON
-from creepkit.records import UNKNOWN_DURATION, History, Nuisance, Program, constant_stress
+from creepkit.records import UNKNOWN_DURATION, History, Nuisance, constant_stress
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.literature_laws import EQUATIONS
 from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, rate_table, whole_life_table
@@ -81,12 +78,6 @@ def test_derivatives_are_those_of_the_rate():
     np.testing.assert_allclose(jacobian, (moved[: theta.size] - moved[theta.size :]) / 2e-4, rtol=1e-3)
     _, rough = minimum_rate(law, values, test)
     np.testing.assert_allclose(rough, jacobian, rtol=0.02)
-
-
-def test_a_test_of_unknown_duration_is_followed_to_a_strain_at_its_rate():
-    assert followed_duration(stated(rate=1e-9)) == STRAIN_OF_UNKNOWN_DURATION / 1e-9
-    assert followed_duration(stated(duration=3e6)) == 3e6
-    assert followed_duration(stated(duration=3e6, rupture_time=3e6)) == 3e6
 
 
 # ---- identification -----------------------------------------------------------------------------------------------
@@ -164,18 +155,6 @@ def test_a_run_out_moves_nothing_that_it_does_not_contradict(whole_life):
     censored = [k for k, h in enumerate(tests) if h.unruptured]
     assert len(censored) == 2
     assert not (residuals.present & problem.observations.rupture_mask)[censored].any()
-
-
-def test_a_condition_is_held_out_of_a_table():
-    tests = whole_life_table(np.random.default_rng(3), lives=False)[2:6]
-    fit = ck.identify(NORTON, tests, starts=1)
-    validation = cross_validate(fit, by="condition")
-    held = [values["minimum rate"] for values in validation.single_values.values()]
-    assert len(held) == len(tests)
-    assert sum(one.low <= one.measured <= one.high for one in held) >= 3
-    assert "minimum rate predicted over measured" in str(validation)
-    with pytest.raises(FitError, match="these tests have none; take by='test'"):
-        cross_validate(fit, by="time")
 
 
 def curve(stress, factor=1.0):
@@ -285,15 +264,6 @@ def test_noise_does_not_lower_it_by_more_than_it_is_allowed_to() -> None:
 def test_a_slope_that_noise_hides_is_not_known() -> None:
     times = np.linspace(0.0, END, 30)[1:]
     assert np.isnan(least_slope(times, 1e-6 * times / END, np.full(times.size, 1e-4)))
-
-
-def test_a_test_under_a_load_that_changes_has_none() -> None:
-    times = np.linspace(0.0, END, 40)[1:]
-    bar = History("bar", times, {"strain": 1e-9 * times}, constant_stress(50.0, "stress"), 1000.0)
-    assert measured_minimum_rate(bar) == pytest.approx(1e-9, rel=1e-9)
-    heated = bar.replace(temperature=Program(np.array([0.0, END]), np.array([900.0, 1000.0])))
-    assert np.isnan(measured_minimum_rate(heated))
-    assert measured_minimum_rate(bar.replace(minimum_rate=2e-9)) == 2e-9
 
 
 def test_of_steady_creep_measured_and_predicted_rates_are_that_of_the_law() -> None:

@@ -1,6 +1,6 @@
 """Unmodelled effects: each against a simulation, or an identification, in which it is there."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +14,6 @@ from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.perturbation import DRIFT, unmodelled_note
 from creepkit.inverse.perturbations import (
     OFFSET_IN_NOISES,
-    USUAL_ACTIVATION_ENERGY,
     USUAL_DRIFT,
     _likeness_of_hardening,
     _log_rate_gradient,
@@ -24,13 +23,11 @@ from creepkit.inverse.perturbations import (
     with_random_effects,
 )
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.selection.ranking import rank
 from creepkit.inverse.settings import USUAL_ERRORS, IdentificationSettings
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import History, Nuisance, PressureJump, StressSteps, constant_stress
-from creepkit.reports.ranking import ranking_text
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.planted_bars import carried_out
@@ -106,27 +103,6 @@ def test_independent_drifts_move_the_rate_by_no_more_than_their_own_mean(law, no
     found = perturbations(problem, linear, NoiseModel({"strain": OutputNoise(noise)}), tests)
     drift = next(e for e in found if e.kind == DRIFT)
     assert 0.3 < drift.rate_change / (0.5 * USUAL_DRIFT * drift.per_kelvin / np.sqrt(3.0)) < 1.0
-
-
-def test_a_law_without_temperature_has_the_usual_activation_energy():
-    """At constant stress the strain of a steady rate changes by rate x Q / R T^2 x 5 K x t^2 / 2 t_end."""
-    plain = NORTON_AT.fix(Q=420e3).at(1040.0)
-    VALUES[plain.name] = {name: value for name, value in VALUES[NORTON_AT.name].items() if name != "Q"}
-    tests = [h.replace(temperature=1040.0) for h in bars(plain)]
-    effects, problem, linear = effects_of(plain, tests)
-    rate = BAR.predict(plain, theta(plain)[None], tests).values[0, 0, -1, 0] / END
-    expected = rate * USUAL_ACTIVATION_ENERGY / (R * 1040.0**2) * USUAL_DRIFT * problem.observations.times**2 / 2 / END
-    found = effects[DRIFT].residual_change / linear.residuals.offset_sensitivity
-    np.testing.assert_allclose(found, expected, rtol=0.02, atol=1e-8)
-
-
-def test_a_recorded_temperature_leaves_no_drift_and_a_nuisance_neither():
-    tests = bars(NORTON_AT, [constant_stress(s, "stress") for s in (70.0, 90.0, 110.0)])
-    assert set(effects_of(NORTON_AT, tests)[0]) == {DRIFT, "offset of strain"}
-    recorded = [h.replace(temperature=h.temperature_program()) for h in tests]
-    assert set(effects_of(NORTON_AT, recorded)[0]) == {"offset of strain"}
-    modelled = replace(SETTINGS, nuisances=(Nuisance("offset"),))
-    assert set(effects_of(NORTON_AT, tests, settings=modelled)[0]) == {DRIFT}
 
 
 # ---- what an effect does to the rate ------------------------------------------------------------------------------
@@ -252,12 +228,6 @@ def test_a_change_that_is_the_hardening_itself_has_correlation_one():
     assert _likeness_of_hardening(problem, x, linear, factor, -0.5 * hardening + 7.0 * other)[1] == pytest.approx(1.0)
 
 
-def test_a_law_that_does_not_harden_is_like_no_drift():
-    problem, x, linear = at_the_truth(NORTON_AT, bars(NORTON_AT))
-    factor = CovarianceFactor.of_residuals(linear.residuals, NoiseModel({"strain": OutputNoise(NOISE)}))
-    assert np.isnan(_likeness_of_hardening(problem, x, linear, factor, np.ones_like(linear.residuals.values))).all()
-
-
 def test_cooling_looks_like_strain_hardening_and_is_said_with_its_sign():
     """One test at one stress, the exponents and energy fixed: a furnace that cools slows creep as hardening does."""
     law = HARDENING_AT.fix(n=4.0, Q=420e3)
@@ -284,19 +254,6 @@ def test_an_effect_in_the_covariance_is_a_rank_of_one_in_each_test():
     np.testing.assert_allclose(found, np.broadcast_to(np.eye(len(expected[0])), found.shape), atol=1e-5)
     again = with_random_effects(with_both, [effects[DRIFT]])
     assert again.residuals.random_effect_sensitivities.shape[-1] == 3
-
-
-@dataclass(frozen=True)
-class Toleranced(Steady):
-    """States a tolerance of a length that it does not know as a nuisance parameter."""
-
-    tolerances = {"thickness": 0.02}  # noqa: RUF012
-
-
-def test_a_predictor_that_does_not_know_a_length_has_no_effect_of_it():
-    tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(60.0, 1000.0), (80.0, 1000.0)], seed=0, noise=1e-5)
-    fit = identify(NORTON, tests, Toleranced(), settings=SETTINGS)
-    assert "thickness" not in {e.kind for e in fit.unmodelled}
 
 
 # ---- nuisance plausibility -------------------------------------------------------------------------------------------
@@ -343,21 +300,6 @@ def test_a_small_offset_is_not_named(jump):
     assert "only with" not in str(adequacy)
 
 
-def test_a_stated_prior_decides_what_is_plausible():
-    wide = fitted(0.3, Nuisance("offset", output="amplitude", sd=0.2))[0].adequacy
-    assert wide.explains_plausibly
-    narrow = fitted(0.3, Nuisance("offset", output="amplitude", sd=0.02))[0].adequacy
-    assert narrow.implausible[0].size_source == "stated"
-    assert narrow.implausible[0].standard_deviations == pytest.approx(15.0, rel=0.1)
-
-
-def test_no_answer_is_decisive_with_such_an_offset():
-    ranking = rank([fitted(0.3)[0], fitted(0.3, law=STRAIN_HARDENING)[0]])
-    assert not ranking.decisive
-    assert "only with an offset of 0.3 mm" in ranking.verdict
-    assert "only with a large offset" in ranking_text(ranking)
-
-
 # ---- imposed motion errors -------------------------------------------------------------------------------------------
 
 # Errors of the modulus and of held strains common to all relaxation tests, against identifications that have them.
@@ -399,13 +341,6 @@ def test_the_rate_moves_as_identifications_with_these_errors_say(share, how, tol
         moved = np.log(again.rate(stress)[0] / fit.rate(stress)[0])
         assert share * effects[kind].rate_change == pytest.approx(moved, rel=tolerance)
     assert effects["modulus"].sentence.endswith("with Young's moduli 2 % above those stated, in all 3 tests")
-
-
-def test_creep_tests_have_neither():
-    how = {"times": np.geomspace(1e3, 1e6, 12), "elastic": ck.Elastic(E=E), "loading": ck.constant_stress(150.0)}
-    curve = ck.simulate("norton", "uniaxial", {"A": A, "n": N}, **how)
-    kinds = {e.kind for e in ck.identify("norton", [curve], starts=1).unmodelled}
-    assert not {"modulus", "imposed strain"} & kinds
 
 
 def test_a_nuisance_parameter_of_all_tests_stands_for_the_modulus():

@@ -11,12 +11,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
 from creepkit.inverse.identify import identify
-from creepkit.inverse.predictor_documents import (
-    missing_predictor,
-    predictor_documents,
-    predictor_from_documents,
-    registered_specimens,
-)
+from creepkit.inverse.predictor_documents import missing_predictor, predictor_documents, predictor_from_documents
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
 from helpers.planted_alloys import bars
@@ -44,21 +39,6 @@ def fit():
 @pytest.fixture(scope="module")
 def document(fit):
     return json.loads(json.dumps(identification_to_json(fit)))
-
-
-def test_it_predicts_without_using(fit, tmp_path):
-    back = ck.load(fit.save(tmp_path / "fit.json"))
-
-    assert back.predictor == BAR
-    np.testing.assert_array_equal(back.predict(TESTS).values, fit.predict(TESTS).values)
-    np.testing.assert_array_equal(back.rupture_times(TESTS), fit.rupture_times(TESTS))
-    np.testing.assert_array_equal(back.rate(80.0), fit.rate(80.0))
-    assert ck.confirm(back, TESTS).verdict == ck.confirm(fit).verdict
-
-
-def test_a_specimen_of_changed_settings_confirms_its_own_fit(fit):
-    assert registered_specimens(fit.predictor) == {"uniaxial": BAR}
-    assert ck.confirm(fit).noise_ratio == 0.0
 
 
 def test_several_specimens_come_back_each_with_its_settings(fit):
@@ -99,20 +79,6 @@ def test_a_reduced_order_model_is_found_again_with_the_fields_of_its_specimen():
     gone = {"": replace(documents[""], name="torsion-tube")}
     assert predictor_from_documents(gone) is None
     assert "made with specimen 'torsion-tube', which is not known here" in missing_predictor(gone)
-
-
-def test_with_its_histories_alone_it_is_the_whole_identification(fit, tmp_path):
-    back = ck.load(fit.save(tmp_path / "fit.json")).with_histories(TESTS)
-
-    assert back.predictor == BAR
-    again, profile = back.profile("n"), fit.profile("n")
-    assert (again.low, again.high) == pytest.approx((profile.low, profile.high), rel=1e-6)
-    assert ck.load(back.save(tmp_path / "again.json")).predictor == BAR
-
-
-def test_a_specimen_under_another_ones_name_is_no_specimen():
-    (document,) = predictor_documents(Foreign("uniaxial")).values()
-    assert document.kind == "other"
 
 
 # ---- identification document -----------------------------------------------------------------------------------------

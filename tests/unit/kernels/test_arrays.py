@@ -65,14 +65,6 @@ def test_candidates_and_points_broadcast(target: Any, array: Callable[[Any], Any
 
 
 @each_target
-def test_numbers_alone_give_a_number(target: Any, array: Callable[[Any], Any]) -> None:
-    rate = lower(NORTON, target).rate({"A": 1e-10, "n": 2.0}, stress=3.0)
-
-    assert rate.shape == ()
-    assert float(rate) == pytest.approx(9e-10, rel=1e-14)
-
-
-@each_target
 def test_log_rate_reaches_where_the_rate_does_not(target: Any, array: Callable[[Any], Any]) -> None:
     kernel = lower(HYPERBOLIC_SINE, target)
     values = {"A": 1e-5, "n": 8.0, "B": 1.0}
@@ -265,24 +257,11 @@ def test_the_exponent_is_that_of_the_closed_form(of: CreepLaw, values: dict[str,
     assert leading(of, **values) == pytest.approx(beta, rel=1e-12)
 
 
-def test_a_term_that_starts_with_strain_itself_does_not_lead() -> None:
-    growing = law({"base": A * stress, "growing": A * stress**n * strain**2}, {A: RATE, n: POWER})
-
-    assert leading(growing) == 1.0
-
-
 def test_an_exponent_that_varies_with_temperature_is_taken_at_the_point() -> None:
     warm = EQUATIONS["exponent of time with temperature"]
     point = [100.0, 0.0, 0.0, 1173.15, 100.0, 33.0]  # 100 K above T_ref
 
     assert leading(warm, point, m=-0.5, m_T=1e-3) == pytest.approx(0.6, rel=1e-12)
-
-
-def test_candidates_are_taken_together() -> None:
-    compiled = lower(TIME_HARDENING, "compiled")
-    theta = TIME_HARDENING.to_internal({"A": 1e-10, "n": 3.0, "m": np.array([-0.9, -0.5, 0.0])})
-
-    np.testing.assert_allclose(compiled.leading_exponent(theta), [0.1, 0.5, 1.0], rtol=1e-12)
 
 
 # ---- source ----------------------------------------------------------------------------------------------------------

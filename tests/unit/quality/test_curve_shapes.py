@@ -70,11 +70,6 @@ def test_tertiary_creep_is_seen_through_noise():
     assert share(TERTIARY, 2, 0.0, SIZES[:3]) >= 0.9
 
 
-def test_a_steady_curve_without_noise_is_not_tertiary():
-    rng = np.random.default_rng(0)
-    assert not shows_tertiary_creep(planted(CONCAVE["straight"], 40, 0.0, 0.0, rng))
-
-
 def test_a_rate_that_rises_and_falls_again_is_tertiary_creep():
     def s_shaped(x):
         return 0.4 * x + 0.6 / (1.0 + np.exp(-8.0 * (x - 0.5)))
@@ -160,18 +155,6 @@ def test_a_step_of_the_furnace_is_found_with_its_time_and_size(factor):
         assert flag.temperature_steps[name] == pytest.approx(expected)
     assert '"temperature step" (or "rate step")' in flag.proposal
     assert "cut the frames after" in flag.proposal
-
-
-def test_a_step_of_temperature_is_that_of_arrhenius():
-    """10 K at 1073.15 K and 400 kJ/mol multiply a rate by exp(Q/R (1/T1 - 1/T2))."""
-    factor = np.exp(400e3 / 8.314462618 * (1 / 1073.15 - 1 / 1083.15))
-    assert temperature_step(1073.15, factor, 400e3) == pytest.approx(10.0)
-
-
-def test_one_test_alone_is_no_event_of_the_rig():
-    rng = np.random.default_rng(2)
-    tests = [dimple(rng, k, **({"event": 9000.0, "factor": 0.3} if k == 7 else {})) for k in range(2, 8)]
-    assert not events(tests)
 
 
 def test_changes_at_unlike_times_are_no_event_of_the_rig():
@@ -297,16 +280,6 @@ def test_repeated_measurements_are_no_copies(noise, decimals, count):
             assert not copied_tests(pair), (seed, scatter)
 
 
-def test_coarse_readings_of_equal_rates_are_no_copies_for_they_may_be_repeats():
-    how = {"noise": 0.0, "scatter": 0.0, "decimals": 4}
-    assert not copied_tests([bar(1, name="a", **how), bar(2, name="b", **how)])
-
-
-def test_simulations_of_one_condition_are_one_test():
-    how = {"noise": 0.0, "scatter": 0.0, "decimals": 12}
-    assert copied_tests([bar(1, name="a", **how), bar(2, name="b", **how)]) == {1: 0}
-
-
 def test_quality_names_copies_and_all_of_four_copies_count_once():
     tests = [bar(1, name="F08"), bar(2, name="F05"), *(changed(bar(1), name=f"F08_{k}") for k in range(1, 4))]
     flags = [flag for flag in check_data_quality(tests) if flag.kind == "copy"]
@@ -359,9 +332,3 @@ def test_a_row_that_repeats_a_rate_and_a_time_is_told_and_kept():
 )
 def test_rows_that_differ_in_a_digit_or_in_the_heat_are_two(other):
     assert repeated_rows([row("a", 150.0, hours=812.4, rate=3.21e-9), other]) == {}
-
-
-def test_one_rate_may_agree_by_chance_and_two_hardly():
-    once = [row("a", 150.0, rate=3.2e-9), row("b", 170.0, rate=6.1e-9), row("c", 150.0, rate=3.2e-9)]
-    assert repeated_rows(once) == {}
-    assert repeated_rows([*once, row("d", 170.0, rate=6.1e-9)]) == {2: 0, 3: 1}

@@ -137,15 +137,6 @@ def test_no_false_alarms_on_clean_bars():
         assert not list(check_data_quality([bar(rng, times=times, noise=10 ** rng.uniform(-6, -4))]))
 
 
-def test_no_false_alarm_without_creep_or_noise():
-    rng = np.random.default_rng(2)
-    flat = bulge(rng, amplitude=np.full(TIMES.size, 0.055))
-    constant = bulge(rng, amplitude=np.full(TIMES.size, 0.055), noise=0.0)
-    exact = bulge(rng, noise=0.0)
-    rounded = exact.replace(outputs={"amplitude": exact.outputs["amplitude"].round(3)})
-    assert not [f for test in (flat, constant, exact, rounded) for f in check_data_quality([test])]
-
-
 @pytest.mark.parametrize("frames", [1, 3, 5])
 def test_unloading_at_the_end(frames):
     test = bulge(np.random.default_rng(3))
@@ -157,13 +148,6 @@ def test_unloading_at_the_end(frames):
     assert "the load was taken off" in found.reason
 
 
-def test_frames_after_the_end_are_told():
-    test = bulge(np.random.default_rng(4))
-    used = np.arange(96) < 94
-    (found,) = check_data_quality([test.replace(used=used, labels={"frames_after_end": "2"})])
-    assert str(found) == "planted: unloading: frames 94-95: from 3.958 h on, after the end of the test"
-
-
 def test_an_amplitude_that_falls_under_a_held_pressure():
     rng = np.random.default_rng(5)
     shape = np.where(TIMES < 9000, TIMES / 9000, 2 - TIMES / 9000)
@@ -172,12 +156,6 @@ def test_an_amplitude_that_falls_under_a_held_pressure():
     assert abs(found.frames[0] - 59) <= 4  # 9000 s is frame 59
     assert found.frames[-1] == 95
     assert "is held at 8 MPa" in found.reason
-
-
-def test_a_fall_after_the_pressure_was_lowered_is_no_fault():
-    rng = np.random.default_rng(6)
-    amplitude = np.where(TIMES > 2 * HOUR, 0.2 - 0.05 * (TIMES - 2 * HOUR) / 2 / HOUR, 0.06 + 0.15 * TIMES / 2 / HOUR)
-    assert not list(check_data_quality([bulge(rng, amplitude=amplitude, P2=4.0)]))
 
 
 @pytest.mark.parametrize("frame", [2, 40, 93])
@@ -193,44 +171,10 @@ def test_single_frames_that_jump(frame):
     assert marked.labels["suspect"] == f"outlier, frame {frame}"
 
 
-def test_two_jumps_in_a_bar():
-    test = bar(np.random.default_rng(8))
-    strain = test.outputs["strain"].copy()
-    strain[[20, 50]] -= 1e-3
-    found = check_data_quality([test.replace(outputs={"strain": strain})])
-    assert {s.frames for s in found} == {(20,), (50,)}
-    assert all("neighbours by -0.001 of strain" in s.reason for s in found)
-
-
-def test_a_step_of_the_load_is_no_jump():
-    rng = np.random.default_rng(9)
-    times = np.linspace(1e3, 1e6, 60)
-    test = bar(rng, times=times, steps=((0.0, 100.0), (5e5, 120.0)))
-    strain = test.outputs["strain"] + np.where(times > 5e5, 2e-3, 0.0)
-    assert not list(check_data_quality([test.replace(outputs={"strain": strain})]))
-
-
 def campaign(rng, **faults):
     """Eight tests from 720 to 800 C, and a twin of the last one at 801 C."""
     plans = [(f"t{k}", 720 + 80 * k / 7) for k in range(8)] + [("twin", 801.0)]
     return [bulge(rng, name=name, celsius=c, **faults.get(name, {})) for name, c in plans]
-
-
-def test_a_twin_far_from_the_other():
-    rng = np.random.default_rng(10)
-    assert not list(check_data_quality(campaign(rng)))
-    found = check_data_quality(campaign(rng, twin={"rate": 0.5}))
-    assert ("twin", "replicate") in kinds(found)
-    assert {s.history for s in found} == {"twin"}
-    pair = campaign(rng, twin={"rate": 0.5})[-2:]
-    assert kinds(check_data_quality(pair)) == {("t7", "replicate"), ("twin", "replicate")}  # two alone cannot tell
-
-
-def test_twins_have_one_alloy_and_one_load():
-    rng = np.random.default_rng(11)
-    one, two = campaign(rng, twin={"rate": 0.5})[-2:]
-    assert not list(check_data_quality([one, two.replace(alloy="another")]))
-    assert not list(check_data_quality([one, two.replace(loading=PressureJump(6.0, 6.0, HOUR))]))
 
 
 def test_a_temperature_out_of_line():

@@ -44,12 +44,6 @@ TIMES = np.array([0.0, 100.0, 400.0, 900.0, 1600.0, 2500.0])
 RELAXING = 300.0 / (1.0 + TIMES / 500.0)
 
 
-def test_held_strain_in_the_head(read):
-    history = read(HOT + "# modulus_GPa: 150\n# strain_pct: 0.2\ntime_s,stress_MPa\n" + rows(TIMES, RELAXING))
-    assert (history.specimen, history.loading) == ("relaxation", StrainSteps(((0.0, 0.002),)))
-    np.testing.assert_allclose(history.outputs["stress"], RELAXING)
-
-
 def test_held_strain_without_a_unit(read):
     body = "time_s,stress_MPa\n" + rows(TIMES, RELAXING)
     history = read(HOT + "# modulus_GPa: 150\n# strain: 0.002\n" + body)
@@ -68,11 +62,6 @@ def test_a_held_column_of_strain_beside_a_falling_stress_is_a_relaxation(read):
     assert "strain imposed, for its column is held" in assumed(history)
     named = read(HOT + "# modulus_GPa: 150\n# specimen: relaxation\n" + body)
     assert named.loading == history.loading
-
-
-def test_a_held_column_of_stress_beside_a_growing_strain_is_creep(read):
-    history = read(HOT + "time_s,strain_pct,stress_MPa\n" + rows(TIMES, TIMES / 1e4, np.full(6, 120.0)))
-    assert (history.specimen, history.loading) == ("uniaxial", StressSteps(((0.0, 120.0),)))
 
 
 # Steps of load and temperature.

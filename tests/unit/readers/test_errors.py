@@ -121,11 +121,6 @@ def test_bytes_that_are_no_text(tmp_path: Path):
         HISTORY_CSV.read(path)
 
 
-def test_file_that_is_not_there(tmp_path: Path):
-    with pytest.raises(HistoryError, match=r"x.csv: there is no such file"):
-        HISTORY_CSV.read(tmp_path / "x.csv")
-
-
 # ---- contradictions --------------------------------------------------------------------------------------------------
 
 # What a file says twice, or cannot mean, is refused: units, durations beside rupture times, marks of frames.
@@ -215,14 +210,6 @@ def test_none_of_600_misspelt_keys_is_accepted(template: str, specimen: str, tmp
         assert "\n" not in str(caught.value)
 
 
-def test_heat_and_laboratory_are_labels_of_their_own(tmp_path: Path):
-    history = read_text_of(HEAD + "# cast: X7\n# lab: north\n# label furnace: 4\n" + ROWS, tmp_path / "x.csv")
-    assert {"heat": "X7", "laboratory": "north", "furnace": "4"}.items() <= history.labels.items()
-    text = write_history(history, tmp_path / "y.csv").read_text()
-    assert "# label heat: X7\n" in text
-    assert HISTORY_CSV.read(tmp_path / "y.csv")[0].labels == history.labels
-
-
 def test_the_names_of_a_laboratory_are_misspelt_as_well(tmp_path: Path):
     """A column `yongs_MPa` was a label, and the test was read without its modulus."""
     (tmp_path / "curves.csv").write_text("key,time_s,strain_pct\na,0,0\na,10,0.1\n")
@@ -260,13 +247,6 @@ def test_capitals_blanks_hyphens_and_brackets_do_not_matter(tmp_path: Path):
     assert (history.temperature, history.loading) == (expected.temperature, expected.loading)
     assert (history.elastic, history.strain_measure, history.specimen) == (expected.elastic, "logarithmic", "uniaxial")
     assert dict(history.labels) == {}
-
-
-def test_what_was_assumed_stays_known(tmp_path: Path):
-    text = HEAD + "# label assumed: modulus of the data sheet\n" + ROWS
-    assert (
-        read_text_of(text, tmp_path / "x.csv").labels["assumed"].startswith("modulus of the data sheet, control load")
-    )
 
 
 # ---- cut files -------------------------------------------------------------------------------------------------------
@@ -346,16 +326,6 @@ def test_the_last_test_of_a_table_of_rates(lost, tmp_path):
     assert (f"{written} in line 31 is whole" in last.labels["assumed"]) == (lost > 0)
     said = " ".join(creepkit("read", str(path)).stdout.split())
     assert ("fewer digits than the numbers above have" in said) == (lost > 0)
-
-
-@pytest.mark.parametrize("form", ["fixed", "exponents"])
-def test_forms_of_one_length_show_each_digit_that_is_lost(form):
-    lines = [f"{k},{FORMS[form](0.5 + 0.013 * k)}" for k in range(50)]
-    text = "time_h,strain_pct\n" + "\n".join(lines)
-    assert cut_number(text, Dialect()) is None
-    for lost in (1, 2, 3):
-        found = cut_number(text[:-lost], Dialect())
-        assert (found.line, found.column, found.text) == (51, 1, lines[-1].split(",")[1][:-lost])
 
 
 # ---- decimal signs ---------------------------------------------------------------------------------------------------

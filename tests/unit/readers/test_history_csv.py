@@ -112,17 +112,6 @@ def test_frames_of_one_time_become_their_mean_and_are_counted(read):
     assert history.labels["merged_frames"] == "2"
 
 
-def test_marked_frames(read):
-    history = read(CREEP + "time_s,strain_1,used\n0,0,1\n1,0.1,0\n2,0.1,1\n")
-    assert history.used.tolist() == [True, False, True]
-
-
-def test_text_of_the_specimen_is_a_label_and_its_name_a_name(read):
-    assert read(CREEP + "# specimen: bar\ntime_s,strain_1\n0,0\n1,0.1\n").specimen == "bar"
-    history = read(CREEP + "# specimen: Round bar, 6 mm\ntime_s,strain_1\n0,0\n1,0.1\n")
-    assert (history.specimen, history.labels["specimen"]) == ("uniaxial", "Round bar, 6 mm")
-
-
 @pytest.mark.parametrize("text", ["\ufeff{}", "{}\n\n", "{}   \n"])
 def test_marks_blank_lines_and_spaces_do_not_matter(read, text):
     plain = CREEP + "time_s,strain_1\n0,0\n1,0.1"
@@ -148,28 +137,6 @@ def test_reader_with_columns_accepts_only_files_that_have_them(tmp_path):
     (tmp_path / "a.csv").write_text("# x: 1\n\nZeit_h,Dehnung_pct\n0,0\n")
     (tmp_path / "b.csv").write_text("time_h,strain_1\n0,0\n")
     assert [reader.accepts(tmp_path / name) for name in ("a.csv", "b.csv", "c.csv")] == [True, False, False]
-
-
-def test_column_that_never_changes_is_a_constant(read):
-    history = read("# temperature_C: 700\ntime_s,strain_1,stress_MPa,temperature_C\n0,0,50,700\n1,1e-3,50,700\n")
-    assert history.temperature == 973.15
-    assert history.loading.steps == ((0.0, 50.0),)
-
-
-def test_one_standard_deviation_serves_all_frames(read):
-    history = read(CREEP + "# strain_sd_1: 1e-5\ntime_s,strain_1\n0,0\n1,0.1\n")
-    np.testing.assert_array_equal(history.standard_deviation["strain"], [1e-5, 1e-5])
-
-
-def test_geometry_is_in_mm_unless_it_says_otherwise(read):
-    history = read(CREEP + "# geometry apex_thickness_um: 480\n# geometry angle: 3\ntime_s,strain_1\n0,0\n1,0.1\n")
-    assert history.geometry == pytest.approx({"apex_thickness": 0.48, "angle": 3.0})
-
-
-def test_frames_after_the_end_are_kept_but_not_used(read):
-    history = read(CREEP + "# end_time_h: 4\ntime_s,strain_1\n0,0\n14400,0.1\n14550,0.09\n")
-    assert history.used.tolist() == [True, True, False]
-    assert history.labels["frames_after_end"] == "1"
 
 
 # ---- noise correlation -----------------------------------------------------------------------------------------------

@@ -8,13 +8,12 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.quality.copies import duplicate_tests
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE, IndexedFolderReader
 from creepkit.readers.questions import Question, SeveralErrors
 from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.readers.tests_file import answers_of, with_answer
 from creepkit.readers.vocabulary import HeaderVocabulary
-from creepkit.records import History, Program, constant_stress
+from creepkit.records import History, constant_stress
 
 INDEX = "key,temperature_C,stress_MPa,youngs_MPa,state\na/1,900,25,149000,Ruptured\na/2,950,20,144000,\n"
 CURVES = (
@@ -108,11 +107,6 @@ def test_any_file_of_the_folder_leads_to_it(tmp_path):
     assert not INDEXED_FILES.accepts(made / "notes.csv")
 
 
-def test_alloy_from_the_index(tmp_path):
-    index = "test,temperature_C,stress_MPa,alloy\nA,980,230,CMSX-6\nB,980,140,CMSX-6\n"
-    assert {history.alloy for history in INDEXED_FILES.read(folder(tmp_path, files(index)))} == {"CMSX-6"}
-
-
 # ---- reading ---------------------------------------------------------------------------------------------------------
 
 # Which reader gets which file, and what tests are called when they come together.
@@ -166,32 +160,8 @@ def test_files_folders_and_patterns(tests_in_folders):
         read_histories(one, READERS)
 
 
-def test_indexed_folder_reached_by_a_pattern_over_its_files(tmp_path):
-    (tmp_path / "index.csv").write_text("test,temperature_C,stress_MPa\nA,980,230\nB,980,140\n")
-    for name in "AB":
-        text = "time_h,creep_extension_pct,T_top_C,T_mid_C,T_bot_C\n0,0,980,980,980\n2,0.5,980,980,980\n"
-        (tmp_path / f"{name}_creep.csv").write_text(text)
-    assert names(f"{tmp_path}/*", READERS) == ["A", "B"]
-    assert names(f"{tmp_path}/B*", READERS) == ["B"]
-
-
 def test_general_reader_yields_to_another_one(tests_in_folders):
     assert names(tests_in_folders / "two", [*READERS, Always("lab")]) == ["lab a"]
-
-
-def planned(name: str, end: float = 1e6, strain: float = 0.4, stress: float = 25.0, temperature: object = 1173.15):
-    return History(name, [0, end], {"strain": [0, strain]}, constant_stress(stress), temperature)
-
-
-def test_test_published_twice_is_found():
-    records = [planned("a"), planned("b", stress=26.0), planned("c", end=1e6 + 0.7), planned("d", strain=0.40001)]
-    assert duplicate_tests(records) == [("a", "c"), ("a", "d"), ("c", "d")]
-
-
-def test_like_tests_are_no_duplicates():
-    others = ({"end": 1.001e6}, {"strain": 0.41}, {"stress": 26.0}, {"temperature": 1223.15})
-    for other in (*others, {"temperature": Program([0, 1], [1173.15, 1174])}):
-        assert duplicate_tests([planned("a"), planned("b", **other)]) == [], other
 
 
 # ---- tests file ------------------------------------------------------------------------------------------------------
@@ -246,12 +216,6 @@ def test_a_table_is_found_by_the_answers_alone(tmp_path):
     written(tmp_path, tests__toml=f'["x.csv"]\ncolumns = {{{columns}}}\n')
     first, second = ck.read_histories(tmp_path)
     assert (first.name, first.rupture_time, second.unruptured) == ("A", 900 * 3600.0, True)
-
-
-def test_a_test_is_named(tmp_path):
-    written(tmp_path, r__csv="test,T (C),stress_MPa,tr (h)\nA,600,100,900\nB,600,90,2000\n")
-    written(tmp_path, tests__toml='["r.csv"]\nended = {B = "stopped"}\n')
-    assert [one.unruptured for one in ck.read_histories(tmp_path)] == [False, True]
 
 
 def test_a_step_after_an_interruption_is_taken_off(tmp_path):

@@ -242,13 +242,6 @@ def test_files_of_laboratories(tmp_path: Path, kind: str) -> None:
     assert (test.times[-1], test.outputs["strain"][-1]) == (pytest.approx(36000.0), pytest.approx(1e-3))
 
 
-def test_sensors_of_one_test_are_no_tests(tmp_path: Path) -> None:
-    head = "Temperature (°C);600\nStress (MPa);100\nGauge length (mm);40\n"
-    (tmp_path / "x.csv").write_text(f"{head}Time (h);Extensometer 1 (mm);Extensometer 2 (mm)\n0;0;0\n1;0.02;0.021\n")
-    with pytest.raises(HistoryError, match="may be tests or sensors of one test"):
-        ck.read_histories(tmp_path / "x.csv")
-
-
 # ---- words of laboratories -------------------------------------------------------------------------------------------
 
 # What laboratories write in tables: remarks that a test did not break, marks of missing values, German names.
@@ -397,12 +390,6 @@ def test_times_to_strains_are_frames(tmp_path, names):
     assert first.times == pytest.approx([120 * HOUR, 1900 * HOUR])
     assert (first.rupture_time, second.unruptured, second.times[-1]) == (5200 * HOUR, True, 9000 * HOUR)
     assert list(second.used) == [True, True, False]  # a creep strain of zero, 0.2 %, and the end
-
-
-def test_a_name_above_several_columns(tmp_path):
-    head = "Temp;Stress;Time to strain;;Rupture\n°C;MPa;0.2 %;1 %;time\n;;h;h;h\n"
-    (one,) = read(tmp_path, f"{head}550;200;120;1900;5200\n")
-    assert (list(one.times), one.rupture_time) == ([120 * HOUR, 1900 * HOUR], 5200 * HOUR)
 
 
 def test_times_that_are_no_times_to_strains_are_asked_for_or_refused(tmp_path):

@@ -30,7 +30,7 @@ from creepkit.records import (
 from creepkit.records.camera_format import LENGTH_UNITS
 from creepkit.records.quantities import LENGTH, STRESS, TEMPERATURE, TIME
 from creepkit.records.recorded_programs import recorded_program
-from creepkit.records.units import UNITS, celsius_text, hours_number, time_text
+from creepkit.records.units import UNITS, celsius_text
 from helpers.mistakes import said_otherwise
 
 LOADINGS = [
@@ -125,15 +125,6 @@ def test_history_marks_frames_from_the_first_one_beyond_a_limit():
     assert history(used=[True, False, True]).up_to("strain", 0.06).used.tolist() == [True, False, True]
 
 
-def test_condition_in_words():
-    for loading, temperature, words in (
-        (constant_stress(43.0), 1123.15, "850 °C, 43 MPa"),
-        (PressureJump(8, 10, 14580), 1075.6, "802 °C, 8 to 10 MPa"),
-        (constant_stress(43.0), Program([0, 10], [1123.15, 1173.15]), "850 to 900 °C, 43 MPa"),
-    ):
-        assert history(loading=loading, temperature=temperature).condition == words
-
-
 def test_prediction_gives_the_frames_of_one_test():
     padded = np.arange(2 * 2 * 3 * 1, dtype=float).reshape(2, 2, 3, 1)
     prediction = Prediction(padded, ("strain",), np.array([3, 2]), np.zeros((2, 2), int), np.ones((2, 2)))
@@ -181,8 +172,6 @@ def test_temperatures_are_written_in_degrees_of_celsius_and_times_in_hours():
     assert celsius_text(872.92, 893.15) == "599.8 to 620 °C"
     assert celsius_text(872.92, 893.15, digits=0) == "600 to 620 °C"
     assert celsius_text(872.92, 873.15, digits=0) == "600 °C"
-    assert (time_text(599.0), time_text(3600.0)) == ("599 s", "1 h")
-    assert [hours_number(s) for s in (5.4e6, float("inf"), float("nan"))] == ["1500", "later", "?"]
 
 
 # ---- recorded programs -----------------------------------------------------------------------------------------------
@@ -325,14 +314,6 @@ def test_a_load_step_scales_a_stress_and_keeps_its_control():
     assert isinstance(loaded, RecordedLoading)
     assert (loaded.quantity, loaded.control) == ("stress", "stress")
     np.testing.assert_allclose(loaded.program().at([100, 402.5, 500, 700]), [40, 42, 44, 66])
-
-
-def test_what_changes_no_program_leaves_the_history_as_it_is():
-    plain = rig_history()
-    assert with_program_nuisances(plain, {"rate drift": 0.3, "thickness": 0.5}) is plain
-    stepped = with_program_nuisances(plain, {"rate step@400": 0.3}).temperature_program()
-    np.testing.assert_array_equal(stepped.times, [0, 400, 405])
-    np.testing.assert_array_equal(stepped.values, 1000.0)
 
 
 @pytest.mark.parametrize("start", [8250.0, 0.1, 1e7 / 3])

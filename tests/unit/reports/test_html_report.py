@@ -131,10 +131,6 @@ def test_every_table_has_a_caption_and_heads(page: str) -> None:
         assert len(set(rows)) == 1
 
 
-def test_the_same_contents_are_the_same_page() -> None:
-    assert report_html(contents()) == page_of(False)
-
-
 def test_hostile_names_are_shown_as_text() -> None:
     html = page_of(True)
     words = "\n".join(e.text or "" for e in elements(parsed(html)) if tag(e) not in ("script", "style"))
@@ -179,14 +175,6 @@ def test_the_verb_takes_results_and_keeps_existing_files(tmp_path: Path) -> None
         ck.report([], tmp_path / "other.html")
 
 
-def test_identifications_of_the_same_tests_are_ranked() -> None:
-    from creepkit.reports.report import report_contents
-
-    fits = [one.fit for one in ranking().laws]
-    (group,) = report_contents(fits).groups
-    assert {r.fit.law.name for r in group.result.laws} == {"norton", "strain-hardening"}
-
-
 # ---- notebook --------------------------------------------------------------------------------------------------------
 
 # Records in a notebook: one line of repr, HTML without scripts, tables of pandas that read back.
@@ -226,14 +214,6 @@ def test_tables_hold_the_numbers() -> None:
     forecast = fit.forecast(test).to_dataframe()
     assert (forecast.low <= forecast.value).all()
     assert (forecast.value <= forecast.high).all()
-
-
-def test_a_bulge_test_keeps_its_outputs_by_name() -> None:
-    """Columns carry units, amplitude_mm; names of outputs do not."""
-    bulge = ck.read_histories(ck.example_data("planted bulge test"))[0]
-    frame = bulge.to_dataframe()
-    again = ck.History.from_dataframe(frame, "again", bulge.loading, bulge.temperature, specimen=bulge.specimen)
-    assert set(again.outputs) == set(bulge.outputs)
 
 
 def test_key_figures_are_those_of_the_law() -> None:
@@ -289,11 +269,6 @@ def test_what_separates_two_laws_is_stated_by_the_number_of_the_ranking(weights:
     assert text.endswith(f"is {number(found.laws[1].excess, 3)} larger in all")
     share = float(re.findall(r"(\d+) % of the chi-square", text)[0])
     assert 25.0 <= share <= 100.0  # the largest of four
-
-
-@pytest.mark.parametrize("weights", ["likelihood", "noise"])
-def test_nothing_separates_laws_that_predict_the_same(weights: str) -> None:
-    assert separating_test(ranking_by(weights, wide=False)) == []
 
 
 def test_laws_of_equal_weights_are_compared_at_their_optima_under_the_common_covariance() -> None:

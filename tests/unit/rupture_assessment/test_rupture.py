@@ -157,17 +157,6 @@ def test_laboratories_scatter_beside_heats():
     assert fit.scatter["heat"] < 0.05
 
 
-def test_a_weibull_distribution_gives_the_same_strength(with_heats):
-    tests = planted(larson_miller, count=48, seed=7)
-    options = {"methods": "larson-miller", "hours": [1e3], "temperatures": [873.15]}
-    normal = ck.rupture(tests, **options, settings=NO_POLYNOMIAL_BUT_2).strength(873.15, hours=1e3)
-    settings = ck.RuptureSettings(degrees=(2,), distribution="weibull")
-    weibull = ck.rupture(tests, **options, settings=settings).strength(873.15, hours=1e3)
-    assert weibull.value == pytest.approx(normal.value, rel=0.01)
-    assert weibull.bounds_of_test[0] < weibull.bounds_of_mean[0] < weibull.value
-    assert weibull.value < weibull.bounds_of_mean[1] < weibull.bounds_of_test[1]
-
-
 def test_a_method_is_not_decisive_where_a_check_fails():
     """Most tests are short, and the long ones break far too early: a tenth of the tests decides over the strength."""
     tests = planted(larson_miller, count=60, scatter=0.02, seed=3)
@@ -348,12 +337,3 @@ def test_wider_quantiles_give_wider_bounds():
                 _bound(STRESS, median(STRESS) + sign * width, 1e5, 100.0, upper=upper)[0] for width in (half, wider)
             )
             assert wide is None or (narrow is not None and sign * (wide - narrow) > -1e-9 * wide)
-
-
-def test_where_no_stress_is_excluded_there_is_no_bound():
-    never_long = np.minimum(median(STRESS) - 0.5, 4.8)
-    assert _bound(STRESS, never_long, 1e5, 100.0, upper=False)[0] is None
-    turning = np.where(STRESS > 40.0, median(STRESS) - 2.0, median(np.array(40.0)) - 2.0 + np.log2(STRESS / 40.0))
-    bound, reason = _bound(STRESS, turning, 1e5, 100.0, upper=False)
-    assert bound is None
-    assert "predicted times get shorter again below 39.8 MPa" in reason

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -13,7 +11,7 @@ import creepkit as ck
 from creepkit import registry
 from creepkit.errors import DatasetError
 from creepkit.language import temperature
-from creepkit.records import Program, Status
+from creepkit.records import Status
 from creepkit.sampling.coefficients import term_groups
 from creepkit.sampling.conditions import TimeGrid, creep_output, hold_times, planned_test, specimen_conditions
 from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion, SimulationOutcome, paper_criteria
@@ -46,16 +44,6 @@ def test_the_rate_of_nortons_law_lies_where_creep_is_visible_and_the_test_lasts(
     assert low < strain.min() < low + 0.01
     assert high - 0.01 < strain.max() < high
     assert abs(strain.mean() - (low + high) / 2) < 2e-3  # uniform in the logarithm
-
-
-def test_a_thinner_dimple_and_a_shorter_test_shift_the_window():
-    changes = {"apex_thickness": 0.45, "end_time": 3600.0}
-    draws = sampling_design(ck.law("norton"), DIMPLE, **changes).draw(0, 1024, seed=2)
-    p = columns(draws, ck.law("norton"))
-    stress = reference(draws) * 0.9**-1.17
-    strain = np.log10(p["A"] * stress ** p["n"] * 3600.0)
-    np.testing.assert_allclose(strain.min(), np.log10(0.5 * 0.02 / (KAPPA * 0.9**-0.486)), atol=0.01)
-    np.testing.assert_allclose(strain.max(), np.log10(0.2), atol=0.01)
 
 
 def test_mixtures_have_the_shares_and_the_total_that_were_drawn():
@@ -150,11 +138,6 @@ def test_terms_that_share_a_coefficient_are_one_part():
     assert [len(part.law.terms) for part in parts] == [1, 1, 1, 3]
 
 
-def test_a_law_without_a_coefficient():
-    with pytest.raises(DatasetError, match="term 'power law' has no linear rate coefficient"):
-        sampling_design(ck.law("norton").fix(A=1e-15), DIMPLE)
-
-
 # ---- what they give -------------------------------------------------------------------------------------------------
 
 
@@ -173,10 +156,6 @@ def informative_share(design, specimen, samples):
     return good / samples
 
 
-def test_at_least_80_percent_of_bars_creep_visibly_and_last():
-    assert informative_share(sampling_design(ck.law("combined"), BAR), BAR, 60) >= 0.8
-
-
 def test_at_least_80_percent_of_dimples_do():
     assert informative_share(sampling_design(ck.law("norton"), DIMPLE), DIMPLE, 16) >= 0.8
 
@@ -187,7 +166,6 @@ def test_at_least_80_percent_of_dimples_do():
 
 
 BEAM, NORTON = Cantilever(), ck.law("norton")
-TEST = {"force_1": 10.0, "force_2": 12.0, "jump_time": 7200.0}
 
 
 def test_conditions_are_those_of_the_record() -> None:
@@ -200,21 +178,6 @@ def test_conditions_are_those_of_the_record() -> None:
     relaxation = specimen_conditions(ck.specimen("relaxation"))
     assert relaxation.names == ("modulus", "strain_1", "strain_2", "jump_time", "end_time", "temperature")
     assert [relaxation.unit(name) for name in relaxation.names] == ["MPa", "", "", "s", "s", "K"]
-
-
-def test_the_test_of_a_beam() -> None:
-    made = planned_test(BEAM, {**TEST, "span": 60.0, "end_time": 36000.0}, TimeGrid.every())
-    assert made.loading.quantity == "force"
-    assert made.loading.program() == Program(np.array([0.0, 7200.0, 7205.0]), np.array([10.0, 10.0, 12.0]))
-    assert (made.specimen, made.geometry, made.elastic) == ("cantilever", {"span": 60.0}, None)
-    np.testing.assert_array_equal(hold_times(made), [0.0, 7200.0, 7205.0, 36000.0])
-
-
-def test_the_test_of_a_bar_in_relaxation() -> None:
-    conditions = {"modulus": 150e3, "strain_1": 0.002, "strain_2": 0.003, "jump_time": 600.0}
-    made = planned_test(ck.specimen("relaxation"), conditions, TimeGrid.every(60.0, 3600.0))
-    assert (made.loading.quantity, made.elastic) == ("strain", ck.Elastic(150e3))
-    np.testing.assert_allclose(hold_times(made), [0.0, 600.0, 600.6, 3600.0])
 
 
 def test_general_names_are_those_of_a_specimen_with_names_of_its_own() -> None:
@@ -246,30 +209,6 @@ def test_rates_of_a_beam_lie_where_its_deflection_is_visible_and_the_test_lasts(
     assert -1e-9 < share.min() < 0.01
     assert 0.99 < share.max() < 1 + 1e-9
     assert abs(share.mean() - 0.5) < 3e-3  # uniform in the logarithm
-
-
-@dataclass(frozen=True)
-class OneByOne(type(ck.specimen("uniaxial"))):  # type: ignore[misc]
-    """A bar whose tests are asked one by one for their stress."""
-
-    load_scaling = None
-
-    def reference_stress(self, history):
-        return history.loading.program().values
-
-
-def test_tests_asked_one_by_one_have_the_stresses_of_all_rows_at_once() -> None:
-    bar = ck.specimen("uniaxial")
-    designs = [sampling_design(NORTON, specimen) for specimen in (bar, OneByOne())]
-    draws = [design.draw(0, 64, seed=1) for design in designs]
-    np.testing.assert_allclose(draws[1].conditions, draws[0].conditions)
-    np.testing.assert_allclose(draws[1].parameters, draws[0].parameters, rtol=1e-9)
-
-
-def test_a_design_of_any_specimen_travels() -> None:
-    design = sampling_design(NORTON, BEAM)
-    assert pickle.loads(pickle.dumps(design)) == design
-    assert design.document()["reference_stress"]["visible_creep"] == 0.02
 
 
 def test_an_output_that_falls_shows_creep_by_its_fall() -> None:

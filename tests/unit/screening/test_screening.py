@@ -16,16 +16,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.readers.history_csv import write_history
 from creepkit.records import PressureJump
 from creepkit.screening import files
-from creepkit.screening.alloys import (
-    ATOMIC_WEIGHTS,
-    Alloy,
-    Compositions,
-    atomic_percent,
-    check_tests,
-    group_by_alloy,
-    limitations,
-    read_compositions,
-)
+from creepkit.screening.alloys import Alloy, Compositions, atomic_percent, check_tests, limitations, read_compositions
 from creepkit.screening.screen import ScreeningOptions, screen
 from creepkit.specimens.bulge.outputs import profile_displacement
 from helpers.narrow_predictor import Narrow
@@ -219,11 +210,6 @@ def test_the_table_has_a_row_an_alloy(plate, tmp_path):
 BULGE = ck.specimen("bulge")
 
 
-def test_tests_are_grouped_by_alloy_and_one_without_is_its_own():
-    found = group_by_alloy([bulge("a", "X"), bulge("b"), bulge("c", "X")])
-    assert [(alloy.name, [t.name for t in alloy.tests]) for alloy in found] == [("X", ["a", "c"]), ("b", ["b"])]
-
-
 def test_growth_is_what_creeps_while_the_load_is_held():
     """A straight line of slope s: means of outer thirds lie two thirds of a hold apart, in each of two holds."""
     test = bulge(rise=0.0, noise=1e-9)
@@ -240,13 +226,6 @@ def test_the_standard_error_of_a_growth_is_that_of_many_draws():
     assert not any(g.shows_creep for g in drawn)
 
 
-def test_elastic_data_have_no_creep_to_identify():
-    with pytest.raises(
-        FitError, match="alloy 'X': elastic only, there is no creep to identify: its amplitude grows by"
-    ):
-        check_tests(Alloy("X", (bulge("a", "X", rise=0.0),)), BULGE)
-
-
 def test_tests_of_another_specimen_need_a_predictor_of_their_own():
     mixed = Alloy("X", (bulge("a", "X"), *bars("X")))
     with pytest.raises(FitError, match=r"its tests are of different specimens \(bulge, uniaxial\) and using= predicts"):
@@ -258,21 +237,12 @@ def test_tests_of_another_specimen_need_a_predictor_of_their_own():
     assert "tests of several specimens (bulge, uniaxial) are identified together" in limitations(mixed, both)
 
 
-def test_without_the_leading_output_creep_cannot_be_told():
-    with pytest.raises(FitError, match="test 'a' has no amplitude, without which creep cannot be seen; it has width"):
-        check_tests(Alloy("X", (bulge("a", "X", outputs=("width",)),)), BULGE)
-
-
 def test_displacement_at_a_radius_is_equation_3():
     rows = {"amplitude": np.array([0.5, 0.5]), "width": np.array([4.0, 4.0]), "shape": np.array([2.0, 2.0])}
     np.testing.assert_allclose(profile_displacement(rows, 4.0), 0.5 / np.e, rtol=1e-14)
     np.testing.assert_allclose(profile_displacement(rows, 2.0), 0.5 * np.exp(-0.25), rtol=1e-14)
     assert np.isnan(profile_displacement({"amplitude": np.ones(2)}, 2.0)).all()
     np.testing.assert_array_equal(profile_displacement({"amplitude": np.ones(2)}, 0.0), 1.0)
-
-
-def test_one_creeping_test_is_enough():
-    check_tests(Alloy("X", (bulge("a", "X", rise=0.0), bulge("b", "X", rise=0.05))), BULGE)
 
 
 def test_one_test_says_what_it_cannot_know():
@@ -309,19 +279,9 @@ def test_atomic_per_cent_of_316l_against_hand_arithmetic():
     assert found == pytest.approx(expected, abs=2e-3)
 
 
-def test_masses_are_those_of_iupac():
-    """A few of the standard atomic weights of 2021, as printed there to five digits."""
-    told = {"Fe": 55.845, "Ni": 58.693, "Co": 58.933, "Cr": 51.996, "Mo": 95.95, "W": 183.84, "Al": 26.982, "Y": 88.906}
-    assert {name: ATOMIC_WEIGHTS[name] for name in told} == told
-
-
 def test_classes_follow_the_principal_element_unless_the_second_is_near():
     table = Compositions({"a": {"Fe": 70.0, "Cr": 30.0}, "b": {"Co": 40.0, "Ni": 35.1, "Cr": 24.9}, "c": {"Ni": 100.0}})
     assert [table.class_of(name) for name in "abcd"] == ["Fe-rich", "near-equimolar", "Ni-rich", "unknown"]
-
-
-def test_five_atomic_per_cent_apart_is_not_near():
-    assert Compositions({"a": {"Co": 40.0, "Ni": 35.0}}).class_of("a") == "Co-rich"
 
 
 def test_a_table_is_read_in_its_unit(tmp_path):

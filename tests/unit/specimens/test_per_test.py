@@ -133,33 +133,6 @@ def test_a_length_is_what_the_test_states_else_its_nuisance_else_the_default():
     np.testing.assert_allclose(changed.values, given.values, rtol=1e-12)
 
 
-def test_a_diameter_is_found_as_a_nuisance_parameter():
-    """Five wires drawn to 1 %: each diameter lies within three of its standard deviations."""
-    rng = np.random.default_rng(5)
-    tests, diameters = [], 1.0 + 0.01 * rng.standard_normal(5)
-    for k, (diameter, weight) in enumerate(zip(diameters, (40.0, 50.0, 60.0, 70.0, 80.0), strict=True)):
-        plan = wire(diameter=diameter).replace(loading=ck.constant_load("weight", weight), name=f"wire {k}")
-        exact = Wire().predict(NORTON, NORTON.to_internal(TRUTH), [plan]).of(0)[:, 0]
-        noisy = exact + 1e-3 * rng.standard_normal(TIMES.size)
-        sd = {"elongation": np.full(TIMES.size, 1e-3)}
-        tests.append(plan.replace(outputs={"elongation": noisy}, standard_deviation=sd, geometry={}))
-    nuisance = ck.Nuisance("diameter", sd=0.01)
-    fit = ck.identify("norton", tests, Wire(), starts=1, sobol_points=16, nuisances=[nuisance], weights="likelihood")
-    for estimate in fit.estimates:
-        assert estimate.low < TRUTH[estimate.name] < estimate.high
-    assert "mm" in fit.details()
-    for estimate, truth in zip(fit.nuisances, diameters, strict=True):
-        assert abs(estimate.value - truth) < 3.0 * estimate.sd
-
-
-def test_it_simulates_and_forecasts():
-    run = ck.simulate(NORTON, Bar(), TRUTH, loading=ck.constant_stress(80.0, "stress"), times=TIMES)
-    np.testing.assert_allclose(run.outputs["strain"], 1e-16 * 80.0**4 * TIMES, rtol=1e-12)
-    fit = ck.identify(NORTON, planted(), Bar(), starts=1, nuisances=[ck.Nuisance("rate", sd=0.1)])
-    one = fit.forecast(plans(70.0)).tests[0].outputs["strain"]
-    assert one.band.low[-1] < 1e-16 * 70.0**4 * TIMES[-1] < one.band.high[-1]
-
-
 # ---- hostile specimens -----------------------------------------------------------------------------------------------
 
 # Specimens of plugins that say nonsense, or do it, are refused in one sentence and harm no other.

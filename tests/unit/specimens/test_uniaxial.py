@@ -7,14 +7,12 @@ import pytest
 import sympy
 
 import creepkit as ck
-from creepkit.errors import LawError, SolveError
+from creepkit.errors import LawError
 from creepkit.language import Elastic, arrhenius, wachtman
 from creepkit.laws.norton import NORTON
-from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import History, Program, Status, StressSteps, constant_stress
 from creepkit.specimens.bar import elastic_strain
 from creepkit.specimens.uniaxial import Uniaxial
-from helpers.kachanov_law import kachanov
 from helpers.literature_laws import EQUATIONS
 
 TIMES = np.array([0.0, 10.0, 100.0, 1000.0])
@@ -82,17 +80,6 @@ def test_temperature_steps_reach_the_law() -> None:
     np.testing.assert_allclose(result.of(0)[:, 0], expected, rtol=1e-9)
 
 
-def test_a_logged_temperature_of_thousands_of_rows_is_integrated() -> None:
-    """A thermocouple's zigzag of +- 3 K: each leg takes the mean of the Arrhenius factor, by Gauss quadrature."""
-    law = NORTON.times(arrhenius(T_ref=1000.0))
-    ends = np.linspace(0.0, 1000.0, 3001)
-    logged = Program(ends, 1000.0 + 3.0 * (-1.0) ** np.arange(ends.size))
-    nodes, weights = np.polynomial.legendre.leggauss(10)
-    factor = 0.5 * (weights @ np.exp(-3e5 / 8.314462618 * (1 / (1000 + 3 * nodes) - 1 / 1000)))
-    result = Uniaxial().predict(law, law.to_internal({**VALUES, "Q": 3e5}), [history(temperature=logged)])
-    assert result.of(0)[-1, 0] == pytest.approx(RATE * 1000 * factor, rel=1e-5)
-
-
 def test_a_heating_ramp_is_integrated() -> None:
     """exp(c (T - T0)) is nearly Arrhenius; the reference is Gauss quadrature of the Arrhenius factor."""
     law = NORTON.times(arrhenius(T_ref=1000.0))
@@ -121,49 +108,9 @@ def test_a_burst_keeps_the_history_so_far() -> None:
     assert np.isnan(result.of(0)[2]).all()
 
 
-def test_simulate_adds_the_elastic_strain_when_elastic_data_are_given() -> None:
-    held = constant_stress(100.0, "stress")
-    run = ck.simulate(NORTON, Uniaxial(), VALUES, loading=held, times=TIMES, elastic=Elastic(E=150e3))
-    np.testing.assert_allclose(run.outputs["strain"], RATE * TIMES + 100 / 150e3, rtol=1e-9)
-    assert (run.status, run.reason, run.end_time) == (Status.COMPLETE, "", 1000.0)
-    assert run.includes_elastic
-    np.testing.assert_array_equal(Uniaxial().run(NORTON, VALUES, run).outputs["strain"], run.outputs["strain"])
-
-
-def test_tolerance_tightens_the_answer() -> None:
-    times = np.linspace(100, 1e5, 20)
-    law = NORTON + STRAIN_HARDENING
-    values = {"A_1": 1e-16, "n_1": 4.0, "A_2": 1e-18, "n_2": 4.0, "m": -0.8}
-    exact = Uniaxial(tolerance=1e-11).predict(law, law.to_internal(values), [history(times=times)]).of(0)
-    errors = [
-        np.abs(
-            Uniaxial(tolerance=tolerance).predict(law, law.to_internal(values), [history(times=times)]).of(0) / exact
-            - 1
-        ).max()
-        for tolerance in (1e-4, 1e-6, 1e-8)
-    ]
-    assert errors[0] < 1e-3
-    assert errors[1] < 1e-5
-    assert errors[2] < 1e-7
-
-
 def test_a_missing_value_is_named() -> None:
     with pytest.raises(LawError, match="needs a value for n"):
         ck.simulate(NORTON, Uniaxial(), {"A": 1e-13}, loading=constant_stress(100.0), times=TIMES)
-
-
-def test_an_early_end_names_values_outside_their_bounds_and_a_modulus_in_gpa() -> None:
-    import creepkit as ck
-
-    times = np.linspace(1.0, 7200.0, 10)
-    with pytest.raises(SolveError, match="; n = 40 lies outside its bounds, 1 to 8$"):
-        ck.simulate("norton", "uniaxial", {"A": 1e-16, "n": 40.0}, loading=constant_stress(100.0), times=times)
-    soft = ck.simulate(
-        "norton", "bulge", {"A": 1e-16, "n": 5.0}, loading=ck.PressureJump(8, 10, 3600), times=times,
-        temperature=1073.0, elastic=ck.Elastic(E=150.0),
-    )  # fmt: skip
-    assert soft.reason.endswith("; E is 150 MPa (write 150000 if GPa were meant)")
-    assert soft.labels["ended"] == soft.reason
 
 
 # ---- uniaxial rupture ------------------------------------------------------------------------------------------------
@@ -271,34 +218,6 @@ def test_a_load_program_is_followed_beyond_its_last_step():
 # ---- bar states ------------------------------------------------------------------------------------------------------
 
 # Internal variables of a simulated bar, against the closed form of Kachanov's damage at constant true stress.
-
-
-STRESS, C, v = 100.0, 1e-16, 4.0
-RUPTURE = 1.0 / ((v + 1.0) * C * STRESS**v)
-"""s; w = 1 - (1 - t/t_r)^(1/(v + 1)) solves w' = C (s/(1 - w))^v."""
-
-
-def test_damage_of_a_bar_is_its_closed_form_up_to_its_end():
-    law = kachanov(ck.stress, limit=0.9)
-    times = np.append(np.linspace(0.0, 0.95, 9), [1.2]) * RUPTURE
-    values = {"A": 1e-16, "n": 3.0, "C": C, "v": v}
-    run = ck.simulate(law, "uniaxial", values, loading=ck.constant_stress(STRESS, "stress"), times=times)
-    assert run.status is ck.Status.RUPTURED
-    assert run.times.size == 9
-    np.testing.assert_allclose(
-        run.states["damage"], 1.0 - (1.0 - run.times / RUPTURE) ** (1.0 / (v + 1.0)), rtol=1e-3, atol=1e-7
-    )
-    np.testing.assert_allclose(run.creep_strain, run.outputs["strain"], rtol=1e-12)
-
-
-def test_a_bar_without_internal_variables_has_none():
-    loading = ck.constant_strain(1e-3)
-    elastic = ck.Elastic(150e3)
-    run = ck.simulate(
-        "norton", "relaxation", {"A": 1e-16, "n": 4.0}, loading=loading, elastic=elastic, times=[0.0, 3600.0]
-    )
-    assert run.states == {}
-    np.testing.assert_allclose(run.outputs["stress"], 150e3 * (1e-3 - run.creep_strain), rtol=1e-12)
 
 
 # ---- threshold forms -------------------------------------------------------------------------------------------------

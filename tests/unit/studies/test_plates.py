@@ -67,17 +67,6 @@ def test_a_common_record_is_of_both_cameras_and_times_are_by_name(tmp_path: Path
     assert model.camera[0].channels == {"": ["P", "TC1", "TC2"]}  # the room is no thermocouple of the plate
 
 
-def test_files_in_the_folder_of_the_frames_are_of_these(tmp_path: Path) -> None:
-    write_views(tmp_path, {"a": 6, "b": 6})
-    for name, lag in (("a", 1.0), ("b", 2.0)):
-        write_times(tmp_path / name / "stamps.csv", Schedule(frames=6).times)
-        write_record(tmp_path / name / "log.csv", Schedule(frames=6), lag, {"T [C]": 800.0})
-    _, model = proposed(tmp_path)
-    assert [one.times for one in model.camera] == ["a/stamps.csv", "b/stamps.csv"]
-    records = {one.name: one.file for one in model.record}
-    assert [records[one.record] for one in model.camera] == ["a/log.csv", "b/log.csv"]
-
-
 def test_folders_say_that_they_hold_frames_and_files_may_have_the_number_alone(tmp_path: Path) -> None:
     write_views(tmp_path, {"run1_frames": 6, "run2_frames": 6})
     for k in (1, 2):
@@ -228,17 +217,6 @@ def test_priors_of_the_table_enter_and_rates_of_one_test_do_not(tmp_path: Path) 
     assert kinds == [("offset", None), ("rate", 0.2), ("thickness", 0.1)]
 
 
-def test_dimples_are_known_by_number_and_by_their_whole_name(tmp_path: Path) -> None:
-    path = tmp_path / "alloys.csv"
-    path.write_text("dimple,alloy\nWest D1,A\nwest d2,B\neast D1,C\n")
-    rows = read_alloy_table(path, BULGE).of_camera("west", ["D1", "D2"])
-    assert {name: row.alloy for name, row in rows.items()} == {"D1": "A", "D2": "B"}
-    path.write_text("Kamera,Dimple,Alloy\nwest,1,A\nwest,2,B\neast,1,C\n")
-    table = read_alloy_table(path, BULGE)
-    table.check("west", ["D1", "D2"], ["west", "east"])
-    assert table.of_camera("east", ["D1"])["D1"].alloy == "C"
-
-
 def test_numbers_of_dimples_are_no_names_of_the_record(tmp_path: Path) -> None:
     """A record of A1, B2 and D1 does not lend the channels of its D1 to the first of several dimples in the view."""
     from creepkit.api.extraction import ImposedChannels
@@ -321,15 +299,6 @@ def test_a_mistake_is_one_sentence_with_its_line(folder: Path, old: str, new: st
     assert f"study.toml:{line}:" in text
 
 
-def test_only_frames_are_inputs_and_a_folder_that_holds_none_is_refused(folder: Path) -> None:
-    study = loaded(folder, CAMERA)
-    (camera,) = study.cameras
-    assert [path.name for path in camera.files[0]] == [f"plate-{k:03d}_0.csv" for k in range(3)]
-    (folder / "empty").mkdir()
-    with pytest.raises(StudyError, match="has no files of frames"):
-        loaded(folder, CAMERA.replace('"frames"', '"empty"'))
-
-
 def test_a_camera_that_fails_leaves_the_tests_of_files(folder: Path) -> None:
     """49 points cannot hold a clamped plate; the curve of the file is identified all the same."""
     (path,) = ck.example_data("planted creep curves").glob("*850C_70MPa*.csv")
@@ -372,36 +341,6 @@ def curves(tmp_path: Path) -> Path:
     for path in ck.example_data("planted creep curves").glob("*850C*.csv"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
     return tmp_path
-
-
-def test_points_under_several_components_and_bars_under_strain_are_forecast(curves: Path) -> None:
-    result = loaded(curves, CURVES).run()
-    assert result.failures == ()
-    fit = result.rankings[""].best
-    point = result.forecasts["combined"].tests[0].outputs
-    A, n = fit.values["A"], fit.values["n"]
-    tension, both = A * 30.0**n, A * (30.0**2 + 3.0 * 10.0**2) ** (n / 2)  # Norton's law of the von Mises stress
-    assert point["strain"].value[-1] == pytest.approx(18000 * (tension + both), rel=1e-3)
-    stress = result.forecasts["bolt"].tests[0].outputs["stress"].value[-1]
-    held = 150e3 * 0.002  # integral of d(stress)/dt = -E A stress^n
-    assert stress == pytest.approx((held ** (1 - n) + (n - 1) * 150e3 * A * 36000) ** (1 / (1 - n)), rel=1e-2)
-    assert {one.state for one in loaded(curves, CURVES).run().stages} == {"kept"}
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("stress_11_MPa = 30", "stress_44_MPa = 30", "no unit of 'stress' that is known"),
-        ("stress_11_MPa = 30", "strain_12 = 0", "component 12 has both"),
-        ("strain = 0.002", "strain = 0.002, stress_MPa = 3", "has one load, found strain and stress_MPa"),
-        ("modulus_GPa = 150", "", "needs modulus_GPa"),
-        ("stress_11_MPa = 30", "strain_11 = 0.001", "needs modulus_GPa"),
-        ("load = { strain = 0.002 }", "load = {}", "a planned test has a load"),
-    ],
-)
-def test_loads_that_no_test_can_have(curves: Path, old: str, new: str, words: str) -> None:
-    with pytest.raises(StudyError, match=words):
-        loaded(curves, CURVES.replace(old, new, 1))
 
 
 def test_a_report_alone_says_which_results_it_shows(curves: Path) -> None:

@@ -91,23 +91,6 @@ def test_the_source_of_the_data_is_cited_and_kept(study: Path, plain_pages: None
     assert lock["declared"]["data"]["citation"] == [source]
 
 
-def test_a_proposed_study_has_a_place_for_the_source_of_its_data(study: Path) -> None:
-    text = propose_study(study.parent / "data", study).text
-    assert text.count("# citation = ") == 1
-    assert parse_study(study, text.replace("# citation", "citation")).model.data.citation
-
-
-def test_a_study_and_its_result_are_printed_in_few_lines(study: Path, plain_pages: None) -> None:
-    study.write_text(ONE_FIT + "[report]\n")
-    loaded = ck.Study.load(study)
-    assert repr(loaded) == f"Study 'one law' ({study}): data, identification, report"
-    result = loaded.run()
-    first, verdict, report = repr(result).splitlines()
-    assert first == "StudyResult 'one law': 2 tests; stages: 3 made"
-    assert verdict.strip().startswith("norton describes strains to ")
-    assert report.strip() == f"report: {result.report}"
-
-
 # ---- carried studies -------------------------------------------------------------------------------------------------
 
 # Forged reports, and names of exports: a study writes beside itself alone, and only over what is its own.
@@ -278,19 +261,6 @@ def test_a_factor_of_temperature_is_bounded_and_fixed(folder):
     assert np.log(other / one) == pytest.approx(4.2e5 / GAS_CONSTANT * (1.0 / 873.15 - 1.0 / 900.0), rel=1e-6)
     with pytest.raises(ck.errors.StudyError, match="no law has a parameter 'Q'"):
         identified(folder, 'laws = ["norton"]\ntemperature = "none"\nfix = { Q = 4.2e5 }')
-
-
-def test_one_law_has_one_set_of_values(folder):
-    """The law of the findings and the one beside the forms of temperature."""
-    path = folder / "study.toml"
-    path.write_text('[data]\nfiles = ["data/*.csv"]\n[identification]\nlaws = ["norton"]\nstarts = 1\n[selection]\n'
-                    '[temperature]\nforms = { A = ["arrhenius"], n = ["constant"] }\n')  # fmt: skip
-    results = ck.Study.load(path).run()
-    best, study = results.rankings[""].best, results.temperature[""]
-    assert study.joint_fit.values == best.values
-    assert [(e.low, e.high) for e in study.joint_fit.estimates] == [(e.low, e.high) for e in best.estimates]
-    law = {e.name: e for e in study.temperature_law.estimates}
-    assert law["n"].value == pytest.approx(best.values["n"], rel=0.01)
 
 
 def test_answers_beside_the_data_are_among_its_files(folder):

@@ -88,23 +88,6 @@ def test_a_result_that_cannot_be_stored_says_so(study: Path, monkeypatch: pytest
     assert record.sentence == "is made again in each run, for it cannot be stored: a record of a plugin"
 
 
-def test_a_law_that_is_added_leaves_the_fits_of_the_others(study: Path) -> None:
-    from creepkit.inverse.kept_fits import keep_fits
-
-    ck.Study.load(study).run(only="identification")
-    fits = study.parent / "study.results" / "fits"
-    before = set(fits.glob("*.json"))
-    study.write_text(STUDY.replace('"strain-hardening"]', '"strain-hardening", "time-hardening"]'))
-    ck.Study.load(study).run(only="identification")
-    assert len(set(fits.glob("*.json")) - before) == 2  # one for each alloy
-    assert before < set(fits.glob("*.json"))
-    with keep_fits(fits) as kept:  # and Python asks the same question
-        histories = ck.read_histories(study.parent / "data")
-        tests = [h for h in ck.exclude_suspect_frames(histories) if h.alloy == "A"]
-        ck.select(["norton", "strain-hardening"], tests, sums=False, starts=1, frames=12, further_laws=0)
-    assert (kept.made, kept.read) == (0, 2)
-
-
 def test_identifications_are_written_as_other_commands_read_them(study: Path) -> None:
     """Each law of each group as ck.load reads it, and rankings with the weights; the page holds the same files."""
     result = ck.Study.load(study).run(only="identification")
@@ -203,15 +186,6 @@ def test_any_error_of_a_stage_leaves_the_others(study: Path, monkeypatch: pytest
     result = ck.Study.load(study).run()
     assert {one.sentence for one in result.failures} == {"ZeroDivisionError: of a plugin"}
     assert set(result.rankings) == {"A", "B"}
-
-
-def test_damaged_results_are_made_again(study: Path) -> None:
-    first = ck.Study.load(study).run()
-    results = sorted((study.parent / "study.results").rglob("*.json"))
-    for k, path in enumerate(results):
-        text = path.read_text()
-        path.write_text([text[: len(text) // 2], "", text.replace("e", "3"), '{"format": 3}'][k % 4])
-    assert numbers(ck.Study.load(study).run()) == numbers(first)
 
 
 def test_two_processes_do_not_run_one_study_at_once(study: Path) -> None:

@@ -2,25 +2,17 @@
 
 import ast
 import json
-import subprocess
-import sys
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from torch import nn
 
-import creepkit as ck
 from creepkit.errors import CreepkitError, SurrogateError
 from creepkit.surrogates.network_evaluation import FRAMES_IN_BLOCK, ParameterNetwork
-from creepkit.surrogates.parameter_gru import ApplicabilityDomain, ParameterGru, Training
+from creepkit.surrogates.parameter_gru import ApplicabilityDomain
 from creepkit.surrogates.parameter_network import ParameterModule, weights_of
 from creepkit.surrogates.surrogate import CODEC
-from creepkit.surrogates.training import train
 from helpers import source_tree
-from helpers.planted_datasets import bars
 
 CONSTANTS, SERIES, OUTPUTS, HIDDEN, LAYERS = 4, 2, 3, 5, 3
 SIZES = CONSTANTS, SERIES, OUTPUTS
@@ -115,32 +107,6 @@ def test_weights_of_another_network_are_refused() -> None:
         ParameterNetwork.from_weights(weights, SIZES, ("lstm", HIDDEN, LAYERS), logarithm=False, corrects_base=False)
 
 
-@pytest.mark.parametrize(("cell", "kind"), [("gru", nn.GRU), ("lstm", nn.LSTM)])
-def test_all_weights_that_are_fitted_are_counted(cell: str, kind: type) -> None:
-    expected = sum(p.numel() for p in kind(CONSTANTS + SERIES, HIDDEN, LAYERS).parameters()) + (HIDDEN + 1) * OUTPUTS
-    assert network_of(module_of(cell), cell).weight_count == expected
-
-
-NO_TORCH = """
-import sys
-import numpy as np
-import creepkit as ck
-model = ck.surrogate({path!r})
-law = ck.law("norton")
-history = ck.History("bar", np.linspace(1800.0, 36000.0, 9), {{}}, ck.constant_stress(100.0), 293.15, "uniaxial")
-theta = law.to_internal({{"A": 1e-7 / 100.0**4, "n": 4.0}})
-found = model.predict(law, theta, [history], sensitivities=True)
-assert np.isfinite(found.jacobian).all()
-noise = 1 + 1e-3 * np.random.default_rng(0).normal(size=found.values[0, 0, :, 0].shape)
-outputs = {{"strain": found.values[0, 0, :, 0] * noise}}
-measured = ck.History("bar", history.times, outputs, history.loading, 293.15, "uniaxial")
-str(model)
-str(ck.identify(law, [measured], using=model, starts=1))
-str(ck.identify(law, [measured], starts=1))
-assert "torch" not in sys.modules
-"""
-
-
 TRAINING = {"surrogates.parameter_network", "surrogates.training"}
 """Modules that import torch when they are imported, beside the functions of the torch target of kernels."""
 
@@ -154,14 +120,6 @@ def test_only_training_and_the_torch_target_import_torch() -> None:
         if any(name.split(".")[0] == "torch" for name in names):
             found.add(module.removeprefix("creepkit."))
     assert found == {*TRAINING, "kernels.torch_functions"}
-
-
-def test_prediction_and_identification_load_no_torch(tmp_path: Path) -> None:
-    model = train(bars(40), ParameterGru(4, 1, target="log", training=Training(epochs=2, batch=16)))
-    program = NO_TORCH.format(path=str(model.save(tmp_path / "bars.safetensors")))
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert ck.surrogate(tmp_path / "bars.safetensors").weight_count == model.weight_count
 
 
 # ---- applicability domain --------------------------------------------------------------------------------------------
@@ -180,11 +138,6 @@ def test_the_limit_is_the_largest_distance_of_a_row_from_all_others() -> None:
     assert ApplicabilityDomain.from_rows("abc", rows).limit == pytest.approx(brute, rel=1e-9)
 
 
-def test_training_rows_are_inside() -> None:
-    rows = np.random.default_rng(1).uniform(size=(200, 6))
-    assert not ApplicabilityDomain.from_rows("abcdef", rows).outside(rows).any()
-
-
 def test_one_input_beyond_its_range_is_outside() -> None:
     domain = ApplicabilityDomain.from_rows(
         ("log10 A", "n"), np.random.default_rng(2).uniform(size=(100, 2)) * [10, 1] + [-20, 3]
@@ -201,42 +154,6 @@ def test_a_combination_that_never_occurred_is_outside_though_each_input_is_withi
     assert (odd < domain.high).all()
     assert domain.outside(odd)
     assert not domain.outside(np.array([-7.0 - 2.0 * 5.0, 5.0]))
-
-
-def test_what_never_varied_may_not_vary() -> None:
-    rows = np.stack([np.full(50, 0.5), np.linspace(0, 1, 50)], axis=1)
-    domain = ApplicabilityDomain.from_rows(("apex_thickness", "x"), rows)
-    assert not domain.outside(np.array([0.5, 0.3]))
-    assert domain.outside(np.array([0.51, 0.3]))
-
-
-def test_each_input_is_forgiven_what_it_is_told() -> None:
-    rows = np.random.default_rng(7).uniform(size=(400, 2)) * [1, 10]
-    domain = replace(ApplicabilityDomain.from_rows(("thickness", "exponent"), rows, [0.05, 0.5]), limit=np.inf)
-    assert domain.outside(np.array([[1.04, 5.0], [1.06, 5.0], [0.5, 14.5], [0.5, 15.5]])).tolist() == [0, 1, 0, 1]
-
-
-def test_a_document_without_margins_is_damaged() -> None:
-    rows = np.stack([np.linspace(0.0, 1.0, 50), np.random.default_rng(8).normal(size=50)], axis=1)
-    document = CODEC.to_json(ApplicabilityDomain.from_rows("ab", rows, 0.5))
-    del document["margin"]
-    with pytest.raises(CreepkitError, match="'margin' is missing"):
-        CODEC.from_json(ApplicabilityDomain, document)
-
-
-def test_inputs_that_are_not_there_are_not_far() -> None:
-    rows = np.random.default_rng(4).uniform(size=(50, 2))
-    rows[::3, 0] = np.nan
-    domain = ApplicabilityDomain.from_rows("ab", rows)
-    assert not domain.outside(np.array([np.nan, 0.5]))
-    assert domain.outside(np.array([np.nan, 5.0]))
-
-
-def test_few_rows_leave_the_box_alone() -> None:
-    domain = ApplicabilityDomain.from_rows("abc", np.array([[0.0, 0, 0], [1.0, 1, 0], [0.0, 1, 1]]))
-    assert domain.limit == np.inf
-    assert not domain.outside(np.array([0.5, 0.5, 0.5]))
-    assert domain.outside(np.array([1.5, 0.5, 0.5]))
 
 
 def test_the_document_is_json_and_gives_the_same_distances() -> None:

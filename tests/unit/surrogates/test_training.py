@@ -6,24 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from creepkit.dataset.dataset import Dataset
 from creepkit.errors import DatasetError, SurrogateError
-from creepkit.sampling.conditions import TimeGrid
 from creepkit.surrogates.evaluation import (
-    PAPER_EVALUATION_TIMES,
     PredictionComparison,
     comparison_metrics,
     dataset_fingerprint,
-    error_metrics,
     evaluate,
-    evaluation_times,
     relative_squared_error,
-    training_split,
 )
 from creepkit.surrogates.parameter_gru import ParameterGru, Training
-from creepkit.surrogates.parameter_network import ParameterModule
 from creepkit.surrogates.training import epochs_since_best, train
 from helpers.mistakes import said_otherwise
 from helpers.planted_datasets import bars
@@ -66,19 +59,6 @@ def test_resumed_is_bit_for_bit_uninterrupted(data: Dataset, tmp_path: Path) -> 
     assert names_in(tmp_path) == ["m.safetensors"]
 
 
-def test_a_training_leaves_the_generator_of_others_alone(data: Dataset) -> None:
-    torch.manual_seed(11)
-    expected = torch.rand(3)
-    torch.manual_seed(11)
-    train(data, SMALL, training=Training(epochs=1))
-    assert torch.equal(torch.rand(3), expected)
-
-
-def test_another_seed_is_another_training(data: Dataset) -> None:
-    one, other = (train(data, SMALL, seed=seed, training=Training(epochs=1)) for seed in (0, 1))
-    assert one.metadata.curves["loss"] != other.metadata.curves["loss"]
-
-
 def test_what_is_done_is_returned_and_what_is_another_is_kept(data: Dataset, tmp_path: Path) -> None:
     path = tmp_path / "m.safetensors"
     once = train(data, SMALL, to=path, seed=3)
@@ -88,25 +68,6 @@ def test_what_is_done_is_returned_and_what_is_another_is_kept(data: Dataset, tmp
     assert again.metadata.curves == once.metadata.curves
     with pytest.raises(SurrogateError, match="another surrogate is there already; remove it or choose another name"):
         train(data, SMALL, to=path, seed=4)
-
-
-def test_the_checkpoint_of_another_training_is_kept(data: Dataset, tmp_path: Path) -> None:
-    path = tmp_path / "m.safetensors"
-    with pytest.raises(Interrupted):
-        train(data, SMALL, to=path, progress=stop_at(1))
-    left = (tmp_path / "m.safetensors.checkpoint").read_bytes()
-    with pytest.raises(SurrogateError, match=r"left by another training \(there and here recipe.hidden is "):
-        train(data, replace(SMALL, hidden=9), to=path, seed=1)
-    with pytest.raises(SurrogateError, match=r"left by another training \(there and here data is "):
-        train(data.rows(slice(50)), SMALL, to=path)
-    assert (tmp_path / "m.safetensors.checkpoint").read_bytes() == left
-
-
-def test_a_damaged_checkpoint_says_so(data: Dataset, tmp_path: Path) -> None:
-    path = tmp_path / "m.safetensors.checkpoint"
-    path.write_bytes(b"torn")
-    with pytest.raises(SurrogateError, match="checkpoint: damaged"):
-        train(data, SMALL, to=tmp_path / "m.safetensors")
 
 
 def test_early_stop_and_the_best_epoch(data: Dataset) -> None:
@@ -129,18 +90,6 @@ def test_training_learns_and_the_file_holds_the_same_network(data: Dataset, tmp_
     assert sorted(model.metadata.metrics["times"]) == ["18750"[:5], "31250", "6250"]
 
 
-def test_the_cosine_ends_at_zero(data: Dataset) -> None:
-    model = train(data, SMALL, training=Training(rate=1e-2, schedule="cosine", epochs=4, batch=128))
-    assert model.metadata.curves["rate"] == pytest.approx(5e-3 * (1 + np.cos(np.pi * np.arange(4) / 4)))
-
-
-def test_rows_set_aside_are_a_fifth_and_none_is_lost() -> None:
-    aside, kept = training_split(101, Training(), seed=0)[::-1]
-    assert len(aside) == 20
-    assert sorted([*aside.tolist(), *kept.tolist()]) == list(range(101))
-    assert training_split(101, Training(), seed=1)[1].tolist() != aside.tolist()
-
-
 def test_frames_that_are_not_numbers_teach_nothing(data: Dataset) -> None:
     values = data.values.copy()
     values[::2, 7:] = np.nan
@@ -159,26 +108,6 @@ def test_samples_that_were_rejected_teach_nothing(data: Dataset) -> None:
         DatasetError, match="a data set with 9 accepted samples of 96 is too small to train on; 10 are the least"
     ):
         train(replace(data, reasons=reasons), SMALL)
-
-
-def test_a_constant_column_is_told_and_harmless(data: Dataset) -> None:
-    parameters = data.parameters.copy()
-    parameters[:, 1] = 4.5
-    model = train(replace(data, parameters=parameters), SMALL)
-    assert model.metadata.notes == ("constant in training, so that nothing is known beyond: n",)
-    assert math.isfinite(model.metadata.metrics["loss"])
-
-
-def test_a_data_set_of_another_kind_cannot_judge(data: Dataset) -> None:
-    model = train(data, SMALL)
-    with pytest.raises(DatasetError, match="another specimen than the surrogate: specimen.fields.tolerance"):
-        evaluate(model, replace(data, specimen=data.specimen.replace(tolerance=1e-4)))
-
-
-def test_a_training_that_diverges_says_so(data: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ParameterModule, "loss", lambda self, batch: self(batch).sum() * math.nan)
-    with pytest.raises(SurrogateError, match=r"diverged in epoch 1: .* lower the rate \(0.01\) or limit the gradient"):
-        train(data, SMALL)
 
 
 def test_fingerprints_see_what_can_be_learnt(data: Dataset) -> None:
@@ -250,12 +179,6 @@ def test_outputs_count_in_units_of_their_deviations() -> None:
     assert relative_squared_error(true * big, predicted * big, mask, big) == pytest.approx(alone, rel=1e-12)
 
 
-def test_errors_of_one_output() -> None:
-    true, predicted = np.array([[0.0], [2.0], [4.0]]), np.array([[0.0], [2.0], [1.0]])
-    found = error_metrics(true, predicted, np.ones((3, 1), bool))
-    assert found == pytest.approx({"rse": 9 / 8, "mse": 3.0, "mae": 1.0, "r2": 1 - 9 / 8})
-
-
 def test_at_a_time_between_frames_values_are_linear_and_short_histories_are_left_out() -> None:
     true = np.array([[[0.0], [1.0], [2.0]], [[5.0], [6.0], [7.0]]])
     mask = np.array([[True, True, True], [True, True, False]])
@@ -274,9 +197,3 @@ def test_the_worst_samples_come_first_with_their_numbers() -> None:
     assert (second["index"], second["error"], second["time"]) == (10, 1.0, 200.0)
     assert found["outputs"]["a"]["largest_median"] == 0.5
     assert found["outputs"]["a"]["r2"] is None  # the truth does not vary, and JSON has no NaN
-
-
-def test_times_looked_at_are_the_papers_or_their_shares() -> None:
-    assert evaluation_times(TimeGrid.every(150.0, 43200.0), 0.0) == PAPER_EVALUATION_TIMES == (7500.0, 22500.0, 37500.0)
-    shares = evaluation_times(TimeGrid(np.array([0.0, 1.0]), relative=True), 1200.0)
-    assert shares == pytest.approx((208.3, 625.0, 1042.0), rel=1e-3)

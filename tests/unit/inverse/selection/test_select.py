@@ -15,10 +15,10 @@ from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.perturbation_trials import Challenge
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores, verdict_of
-from creepkit.inverse.selection.select import _richer_laws, sums_of_two
+from creepkit.inverse.selection.select import _richer_laws
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import LinearisedProblem
-from creepkit.language import Param, arrhenius, strain, temperature, time
+from creepkit.language import Param, strain, temperature, time
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Program
@@ -99,24 +99,6 @@ def test_hold_out_and_sums_are_asked_for_by_name():
     assert held.best.law.name == "strain-hardening"
 
 
-def test_single_terms_of_the_combined_law_with_exponents_in_or_out_hold_the_laws_of_table_1():
-    law = ck.law("combined")
-    single = [law.only(term) for term in law.terms]
-    off = [one.fix(**{name: 0.0}) for one in single for name, p in one.table.items() if p.scale != "log" and p.off == 0]
-    assert {form(ck.law(name)) for name in LAWS} <= {form(one) for one in (*single, *off)}
-
-
-def form(law):
-    """The rate with its parameters renamed in the law's order."""
-    names = {symbol: f"p{k}" for k, symbol in enumerate(law.params)}
-    return sum(law.terms.values()).subs(names)
-
-
-def test_sums_leave_out_what_is_there_already():
-    laws = [ck.law("norton"), ck.law("norton"), ck.law("strain-hardening")]
-    assert [law.fingerprint for law in sums_of_two(laws)] == [(laws[0] + laws[2]).fingerprint]
-
-
 def test_a_law_that_cannot_be_identified_is_named_and_the_others_go_on():
     norton = ck.law("norton")
     A, n = norton.params
@@ -148,20 +130,6 @@ def tried(*adequacies, laws=("norton", "hyperbolic-sine")):
     return SimpleNamespace(laws=ranked)
 
 
-@pytest.mark.parametrize(
-    "adequacies",
-    [
-        (LEAVES, replace(LEAVES, verdict="explains")),
-        (replace(LEAVES, verdict="cannot be judged"), LEAVES),
-        (None, LEAVES),
-        (LEAVES, replace(LEAVES, remedies=("thickness",))),
-    ],
-    ids=["one explains", "one cannot be judged", "unknown", "an effect would explain"],
-)
-def test_nothing_further_is_tried_without_need(adequacies):
-    assert _richer_laws(tried(*adequacies), []) == []
-
-
 def test_sums_with_the_best_come_first_then_laws_with_a_memory_that_none_of_the_tried_has():
     richer = _richer_laws(tried(LEAVES, LEAVES), [])
     assert richer[0].fingerprint == (ck.law("norton") + ck.law("hyperbolic-sine")).fingerprint
@@ -175,13 +143,6 @@ def test_sums_with_the_best_come_first_then_laws_with_a_memory_that_none_of_the_
     assert not any(law.uses(temperature) for law in richer)
     remembering = [len(law.params) for law in richer[1 : 1 + sum(has_memory)]]
     assert remembering == sorted(remembering)
-
-
-def test_with_temperatures_all_of_them_have_one():
-    laws = [ck.law(name).times(arrhenius(T_ref=1000.0)) for name in ("norton", "strain-hardening")]
-    plain = measured("norton", {"A": 1e-16, "n": 4.2})
-    tests = [h.replace(temperature=T) for h, T in zip(plain, (950.0, 1000.0, 1050.0), strict=True)]
-    assert all(law.uses(temperature) for law in _richer_laws(tried(LEAVES, LEAVES, laws=laws), tests))
 
 
 def softening():
@@ -262,14 +223,6 @@ def test_with_any_part_missing_it_is_not_decisive():
         "alone": ranking_of([1.0]),
     }
     assert [why for why, one in short.items() if one.decisive or one.verdict.startswith("decisive")] == []
-
-
-def test_singled_out_needs_adequacy_and_weight_but_no_challenge():
-    assert ranking_of([0.97, 0.03], challenges=None).singled_out
-    assert ranking_of([0.97, 0.03], further=("norton",)).singled_out
-    assert not ranking_of([0.9, 0.1]).singled_out
-    assert not ranking_of([0.97, 0.03], [LEFT, EXPLAINS]).singled_out
-    assert not ranking_of([0.97, 0.03], [None, None]).singled_out
 
 
 # ---- rankings ----------------------------------------------------------------------------------------------------
@@ -414,14 +367,6 @@ def law(seed, size=1.0, **changes):
     )
 
 
-def test_little_trust_in_a_test_does_not_make_a_law_better():
-    best, poor = law(0), law(1, size=3.0)
-    doubting = law(1, size=3.0, test_weights=np.array([1.0, 0.1, 0.1]))
-    found = under_common_covariance([best, poor, doubting])
-    assert found.reference_law == 0
-    assert found.chi_square[2] == pytest.approx(found.chi_square[1], rel=1e-12)
-
-
 def test_rates_that_matter_more_to_a_law_do_not_excuse_it():
     best, poor = law(0), law(1, size=3.0)
     excusing = law(1, size=3.0, log_rate_sensitivity=np.full((TESTS, ENTRIES), 20.0))
@@ -438,19 +383,3 @@ def test_chi_square_between_laws_is_that_of_their_difference_under_the_covarianc
     other.linearised = replace(other.linearised, residuals=residuals)
     white = under_common_covariance([one, other]).whitened
     assert ((white[0] - white[1]) ** 2).sum() == pytest.approx(12.0, rel=1e-9)
-
-
-def test_a_law_that_has_nothing_to_say_of_an_entry_is_compared_by_the_others():
-    present = np.ones((TESTS, ENTRIES), bool)
-    present[2, -1] = False
-    silent = law(1)
-    r = silent.linearised.residuals
-    blank = {
-        name: np.where(present, getattr(r, name), 0.0)
-        for name in ("values", "offset_sensitivity", "log_rate_sensitivity")
-    }
-    residuals = replace(r, present=present, jacobian=present[..., None].astype(float), **blank)
-    silent.linearised = replace(silent.linearised, residuals=residuals)
-    found = under_common_covariance([law(0), silent])
-    assert found.whitened.shape == (2, TESTS * ENTRIES)
-    assert found.whitened[1, -1] == 0.0

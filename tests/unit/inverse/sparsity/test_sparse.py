@@ -8,13 +8,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import approx_fprime
 
-from creepkit.errors import FitError
 from creepkit.inverse.identification_document import CODEC
-from creepkit.inverse.search.derivative_free import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.contributions import STRESS_FACTORS, EvaluationPoints, strain_history, stress_history
+from creepkit.inverse.sparsity.contributions import STRESS_FACTORS
 from creepkit.inverse.sparsity.penalties import L2, GroupL2, PenalisedTerms, Sqrt, Subsets, switchable_exponents
-from creepkit.inverse.sparsity.reduced_laws import terms_above
 from creepkit.inverse.sparsity.result import Sparsity
 from creepkit.inverse.sparsity.term_selection import (
     TermChoice,
@@ -30,7 +27,7 @@ from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import History, PressureJump, StressSteps, constant_stress
+from creepkit.records import History, PressureJump
 from helpers.reduced_bulge_predictor import OneDegree, Plan, planted
 from helpers.term_contributions import bar, contributions, internal
 
@@ -48,13 +45,6 @@ def test_two_power_laws_at_one_stress_have_the_closed_form():
     wanted = [np.sqrt(np.mean(share**2)), np.sqrt(np.mean((1 - share) ** 2))]
     assert_allclose(own.values(u[None])[0], wanted, rtol=1e-12)
     assert own.by_term(u) == pytest.approx(dict(zip(law.terms, wanted, strict=True)))
-
-
-def test_equal_rates_everywhere_are_equal_shares():
-    law = NORTON + NORTON
-    own = contributions(law, [bar(30.0), bar(60.0, "other")])
-    u = own.coordinates.u(internal(law, A_1=1e-14, n_1=4.0, A_2=1e-14, n_2=4.0))
-    assert_allclose(own.values(u[None])[0], [0.5, 0.5], rtol=1e-12)
 
 
 def test_an_arrhenius_factor_on_all_terms_changes_no_share():
@@ -78,14 +68,6 @@ def test_factors_of_single_terms_shift_shares_between_temperatures():
     assert_allclose(own.values(u[None])[0, 0], np.sqrt(np.mean(share**2)), rtol=1e-9)
 
 
-def test_candidates_are_taken_at_once():
-    own = contributions(COMBINED, [bar(40.0)])
-    rng = np.random.default_rng(2)
-    u = own.coordinates.u(internal(COMBINED, **COMBINED.center())) + rng.normal(0, 0.3, (7, len(COMBINED.params)))
-    assert own.values(u).shape == (7, 3)
-    assert_allclose(own.values(u)[4], own.values(u[4:5])[0], rtol=1e-13)
-
-
 def test_the_jacobian_is_that_of_the_closed_form():
     """d share_i / d ln A_j = share_i (delta_ij - share_j); A_j moves with its log rate at the reference."""
     law = NORTON + NORTON
@@ -106,26 +88,7 @@ def test_nothing_overflows_where_rates_do():
     assert_allclose(c, [1.0, 0.0, 0.0], atol=1e-12)
 
 
-def test_all_tests_weigh_alike():
-    visited = EvaluationPoints.from_histories([bar(40.0, frames=3), bar(80.0, "long", frames=400)])
-    assert visited.weight.sum() == pytest.approx(1.0)
-    assert visited.weight[visited.stress > 1.31 * 40.0].sum() == pytest.approx(0.5, abs=0.2)
-    low = np.isin(np.round(visited.stress / 40.0, 6), STRESS_FACTORS) & (visited.weight > visited.weight.min())
-    assert visited.weight[low].sum() == pytest.approx(0.5)
-
-
 # ---- where tests go ------------------------------------------------------------------------------------------------
-
-
-class Dimple:
-    """A predictor that states a reference stress for each level of pressure."""
-
-    def reference_stress(self, history):
-        levels = np.unique(history.loading.program().values)
-        return 12.5 * levels[levels > 0]
-
-    def growth_per_strain(self, history):
-        return 30.0
 
 
 def dimple(**more):
@@ -135,34 +98,6 @@ def dimple(**more):
         "dimple", times, {"amplitude": grown}, PressureJump(P1=8, P2=10, Tj=4 * HOUR), 1000.0, specimen="bulge",
         elastic=Elastic(150e3), **more,
     )  # fmt: skip
-
-
-def test_stress_follows_the_jump_of_pressure():
-    times = np.array([1 * HOUR, 3.9 * HOUR, 4.1 * HOUR, 12 * HOUR])
-    assert_allclose(stress_history(dimple(), Dimple(), times)[:, 0], [100.0, 100.0, 125.0, 125.0])
-
-
-def test_stress_of_a_bar_follows_its_steps():
-    steps = StressSteps(((0.0, 30.0), (5 * HOUR, 60.0), (8 * HOUR, 30.0)), "stress")
-    test = bar(30.0).replace(loading=steps)
-    times = np.array([1.0, 6.0, 9.0]) * HOUR
-    assert_allclose(stress_history(test, None, times)[:, 0], [30.0, 60.0, 30.0])
-
-
-def test_strain_of_a_dimple_is_its_growth_over_that_of_a_unit_of_strain():
-    course = strain_history(dimple(), Dimple())
-    assert course[-1] == pytest.approx((0.3 * 47 / 48) / 30.0, rel=1e-6)
-    assert (np.diff(course) >= 0).all()
-    assert course[0] > 0
-
-
-def test_a_test_without_load_is_left_out_and_none_is_an_error():
-    idle = bar(30.0, "idle").replace(loading=constant_stress(0.0, "stress"))
-    assert_allclose(
-        np.unique(EvaluationPoints.from_histories([idle, bar(40.0)]).stress), 40.0 * np.array(STRESS_FACTORS)
-    )
-    with pytest.raises(FitError, match="no test is ever under load"):
-        EvaluationPoints.from_histories([idle])
 
 
 # ---- penalties -------------------------------------------------------------------------------------------------------
@@ -191,10 +126,6 @@ def test_the_square_root_is_smallest_in_a_corner():
     values = Sqrt.OF_CONTRIBUTIONS.value(simplex())
     assert values.argmin() in (0, 1, 2)
     assert values[3] == values.max()
-
-
-def test_group_l2_is_the_same_all_over_the_simplex():
-    assert_allclose(GroupL2.OF_CONTRIBUTIONS.value(simplex()), 1.0)
 
 
 @pytest.mark.parametrize("penalty", EVERY, ids=lambda p: type(p).__name__)
@@ -230,28 +161,6 @@ def test_residuals_are_the_penalty_and_their_gradient_is_its_gradient(penalty, c
     assert_allclose(jacobian.T @ residuals, wanted, atol=2e-5)
 
 
-@pytest.mark.parametrize("penalty", EVERY, ids=lambda p: type(p).__name__)
-def test_with_weights_kept_residuals_touch_at_that_point_and_lie_above_elsewhere(penalty, combined):
-    own, u = combined
-    found = PenalisedTerms(own, penalty, 3.0)
-    kept = found.frozen_weights_at(u)
-    assert 0.5 * (kept.residuals(u) ** 2).sum() == pytest.approx(found.values(u[None])[0], rel=1e-12)
-    rng = np.random.default_rng(1)
-    for v in u + rng.normal(0, 0.3, (20, u.size)):
-        assert 0.5 * (kept.residuals(v) ** 2).sum() >= found.values(v[None])[0] - 1e-9
-    slopes = approx_fprime(u, kept.residuals, 1e-7)
-    assert_allclose(kept.jacobian(u), slopes, atol=3e-6)
-
-
-def test_unknowns_of_tests_cost_nothing(combined):
-    own, u = combined
-    found, x = PenalisedTerms(own, Sqrt(), 3.0), np.append(u, [0.02, -0.1])
-    assert_allclose(found.residuals(x), found.residuals(u))
-    assert found.values(x[None]) == found.values(u[None])
-    assert found.jacobian(x).shape == (6, u.size + 2)
-    assert (found.jacobian(x)[:, -2:] == 0).all()
-
-
 def test_exponents_that_can_be_off_are_those_of_memory():
     """n of 1 to 8 has {0} outside its bounds; m of -1 to 0 can get there."""
     assert [COMBINED.names[k] for k, _ in switchable_exponents(COMBINED)] == ["m_1", "m_2"]
@@ -266,13 +175,6 @@ def test_a_simple_term_costs_less_than_one_with_memory(combined):
     same = PenalisedTerms(own, Sqrt(exponents=0.0), 1.0).values(both)
     dearer = PenalisedTerms(own, Sqrt(), 1.0).values(both) - same
     assert dearer[0] > dearer[1]
-
-
-def test_a_law_without_such_exponents_is_penalised_too():
-    law = NORTON + NORTON
-    own = contributions(law, [bar(40.0)])
-    u = own.coordinates.u(internal(law, A_1=2e-13, n_1=3.0, A_2=1e-16, n_2=5.0))
-    assert PenalisedTerms(own, Sqrt(), 1.0).residuals(u).shape == (3,)
 
 
 # ---- sparse ----------------------------------------------------------------------------------------------------------
@@ -312,28 +214,6 @@ def test_subsets_find_it_too(hardening):
     choice = choose_terms(hardening[1], Subsets())
     assert choice.kept_terms == (STRAIN,)
     assert choice.contributions[STRAIN] == pytest.approx(1.0, abs=1e-3)
-
-
-def test_a_swarm_searches_the_penalised_landscape(hardening):
-    """Its cost at the optimum is what least squares has there, penalty included."""
-    _, reductions = hardening
-    stage = reductions.problem
-    penalised = PenalisedTerms.from_problem(stage.problem, Sqrt())
-    searched, u = stage.search_problem(penalised), stage.start[: stage.parameter_count]
-    wanted = 0.5 * stage.problem.chi_square(stage.start) + penalised.values(u[None])[0]
-    assert searched.cost(u[None])[0] == pytest.approx(wanted, rel=1e-9)
-    choice = choose_terms(reductions, Sqrt(), ParticleSwarm(particles=8, iterations=2, refined_candidates=1))
-    assert choice.kept_terms == (STRAIN,)
-    assert len(choice.trace) == 2
-
-
-def test_squared_l2_shares_the_rate_out(hardening):
-    """What one term gives alone is given by several: the penalty is smallest at equal shares."""
-    stage = hardening[1].problem
-    x = stage.minimise(stage.start, PenalisedTerms.from_problem(stage.problem, L2(240.0))).x
-    contributions = stage.contributions_at(x)
-    assert max(contributions.values()) < max(stage.contributions_at(stage.start).values())
-    assert len(terms_above(contributions)) > 1
 
 
 def test_memory_that_is_not_there_is_switched_off():
@@ -381,11 +261,6 @@ def test_a_term_that_is_needed_comes_back(hardening):
     _, reductions = hardening
     wrong = TermChoice((SINE,), {SINE: 0.6, STRAIN: 0.3, TIME: 0.1}, reductions.problem.start)
     assert STRAIN in confirmed_law(reductions, wrong).kept_terms
-
-
-def test_the_largest_term_stays_whatever_the_least_share():
-    assert terms_above({"a": 0.6, "b": 0.04}) == ("a",)
-    assert terms_above({"a": 0.03, "b": 0.04}) == ("b",)
 
 
 def test_the_record_says_what_was_dropped_and_survives_a_file(reduced):

@@ -84,13 +84,6 @@ def test_the_posterior_distribution_integrates_to_that_of_the_prior_without_info
     assert posterior.median("test") == pytest.approx(sd[np.searchsorted(shares, 0.5)], rel=0.1)
 
 
-def test_many_tests_overrule_the_prior():
-    z = np.random.default_rng(2).normal(0.0, 0.05, 200)
-    posterior = scatter_of(z).posterior
-    assert np.sqrt(posterior.mean_square("test")) == pytest.approx(z.std(ddof=1), rel=0.01)
-    assert (1.0 / (posterior.weight**2).sum()) > 10  # nodes within the posterior distribution, not one of them
-
-
 def bars(count, scatter, seed, noise=2e-6):
     """Norton bars at one stress, their strains in closed form, e = A s^n t."""
     rng = np.random.default_rng(seed)
@@ -106,16 +99,6 @@ def bars(count, scatter, seed, noise=2e-6):
         )
         for k, f in enumerate(factors)
     ], np.log(factors)
-
-
-def test_each_test_says_its_own_factor():
-    tests, log_factors = bars(6, 0.1, 3)
-    fit = ck.identify(ck.law("norton").fix(n=5.0), tests, using=BAR, starts=1, usual_errors="none")
-    told = fit.rate_scatter.log_factor
-    np.testing.assert_allclose(told - told.mean(), log_factors - log_factors.mean(), atol=4e-3)
-    # Known scatter: the law's rate is known to s / sqrt(N).
-    sd = np.sqrt(fit.rate_scatter.joint(np.array([0.1]))[1][0, 0])
-    assert sd == pytest.approx(0.1 / np.sqrt(6), rel=0.02)
 
 
 def test_heats_and_laboratories_are_read_from_labels():
@@ -140,28 +123,6 @@ def test_a_test_without_a_heat_makes_no_second_heat_beside_one_that_is_named():
     assert [(e.value, e.low, e.high) for e in fit.estimates] == [(e.value, e.low, e.high) for e in labelled.estimates]
     assert f"{fit.histories[4].name} states no heat: taken for one of heat b, as the others are" in fit.notes
     assert not any("states no heat" in one for one in labelled.notes)
-
-
-def test_a_test_without_a_heat_is_one_of_its_own_beside_two_that_are_named():
-    fit = heats_of(*"aabb", "", "b")
-    assert fit.rate_scatter.levels == ("heat", "test")
-    assert len(set(fit.rate_scatter.members["heat"])) == 3
-    assert not fit.rate_scatter.common
-    assert any(one.endswith("taken for a heat of its own") for one in fit.notes)
-
-
-def test_a_new_test_of_the_named_heat_has_the_same_band_with_and_without_the_unlabelled_test():
-    fit, labelled = heats_of(*"bbbb", "", "b"), heats_of(*"bbbbbb")
-    new = labelled.histories[0].replace(name="new")
-    assert fit.rate_scatter.new_test(new) == labelled.rate_scatter.new_test(new)
-    assert fit.rate_scatter.new_test(new).unseen == ()
-    assert fit.rate_scatter.new_test(new.replace(labels={"heat": "c"})).unseen == ("heat",)
-
-
-def test_a_given_standard_deviation_is_taken():
-    posterior = scatter_of([0.1, -0.3, 0.2], known=0.07).posterior
-    assert posterior.sd.tolist() == [[0.07]]
-    assert posterior.weight.tolist() == [1.0]
 
 
 # ---- law misfit ------------------------------------------------------------------------------------------------------
@@ -248,11 +209,6 @@ def test_the_tests_nearest_to_the_question_are_predicted_from_the_others():
     found = power_law(y)[0].at(40.0, 900.0)
     assert found.stress == 60.0
     assert np.exp(found.log_factor) == pytest.approx(2.0, rel=0.1)
-
-
-def test_two_stresses_show_nothing():
-    stresses = np.array([60.0, 60.0, 90.0, 90.0])
-    assert power_law(5.0 * np.log(stresses), stresses)[0].at(40.0, 900.0) is None
 
 
 def test_intervals_of_rates_hold_it_outside_the_tests_and_a_file_keeps_it(tmp_path):

@@ -72,14 +72,6 @@ def test_field_sees_equation_7_as_a_dense_grid_of_pixels_does():
     assert abs(got[2] - 2.4) > 0.05  # and it is not what Eq. (3) sees
 
 
-def test_both_forms_are_one_for_p_of_two():
-    profile = [bell(FINE, 0.66, 3.7, 2.0)]
-    for window in (4.0, 5.0, 7.5):
-        one, other = (Observation(form, window).observe(FINE, profile) for form in ("profile", "field"))
-        np.testing.assert_allclose(one, other, rtol=1e-11)
-        np.testing.assert_allclose(other, [[0.66, 3.7, 2.0]], rtol=1e-11)
-
-
 # Frames: at rest, noisy, hopeless
 
 
@@ -134,13 +126,6 @@ def test_noise_is_averaged_and_no_frame_leans_on_the_one_before(operator):
     np.testing.assert_allclose(together.mean(axis=0), clean[0], atol=0.4 * expected.max())
 
 
-def test_scale_does_not_matter():
-    for size in (1e-7, 1e3, 1e150):
-        seen = Observation().observe(NODES, size * plates(NODES))
-        expected = Observation().observe(NODES, plates(NODES)) * [size, 1.0, 1.0]
-        np.testing.assert_allclose(seen, expected, rtol=1e-12)
-
-
 # Derivatives
 
 
@@ -153,15 +138,6 @@ def test_slopes_against_differences(operator):
         change = 0.1 * profiles[:, :1] * direction
         expected = richardson(lambda h, change=change: operator.observe(NODES, profiles + h * change), 1e-3)
         np.testing.assert_allclose(np.einsum("fvn,fn->fv", slopes, change), expected, rtol=1e-8, atol=1e-9)
-
-
-def test_slopes_hold_far_from_a_perfect_fit():
-    ragged = bell(NODES, 0.5, 3.8, 2.2) * (1 + 0.2 * np.cos(2.1 * NODES))
-    seen, slopes = Observation().observe_with_derivatives(NODES, [ragged])
-    for node in (0, 3, 11, 20):
-        expected = richardson(lambda h, k=node: Observation().observe(NODES, [ragged + h * np.eye(41)[k]])[0], 2e-4)
-        np.testing.assert_allclose(slopes[0, :, node], expected, rtol=1e-7, atol=1e-8)
-    assert np.isfinite(seen).all()
 
 
 @pytest.mark.parametrize("operator", FORMS, ids=str)
@@ -208,26 +184,7 @@ def test_window_at_an_apex_of_two_thirds_of_a_mm():
         assert abs(p - shape) < 6e-3
 
 
-@needs_shared_data
-def test_the_two_forms_part_on_a_real_profile():
-    # Eq. (3) .805, 3.853, 2.203 and Eq. (7) .814, 3.789, 2.133 are quoted for another law at the same apex
-    nodes, profile = profile_with_apex(0.81)
-    one, other = (Observation(form, 5.0).observe(nodes, profile)[0] for form in ("profile", "field"))
-    np.testing.assert_allclose(one, [0.805, 3.853, 2.203], atol=0.017)
-    np.testing.assert_allclose(other, [0.814, 3.789, 2.133], atol=0.008)
-    np.testing.assert_allclose(other - one, [0.009, -0.064, -0.07], atol=0.01)
-
-
 # The operator as text
-
-
-def test_the_defaults_of_the_field_are_dense_enough():
-    dense, usual = (Observation("field", 7.5, points).observe(NODES, plates(NODES)) for points in (600, None))
-    np.testing.assert_allclose(usual, dense, atol=1e-4, rtol=0)
-
-
-def test_rest_alone_has_no_shape():
-    np.testing.assert_array_equal(Observation().observe(NODES, np.zeros((2, 41))), [[0.0, np.nan, np.nan]] * 2)
 
 
 # ---- displacement fields ---------------------------------------------------------------------------------------------
@@ -271,18 +228,6 @@ def test_lost_and_wild_points():
     np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], [0.35, 3.6, 2.3], rtol=0.005)
 
 
-@needs_shared_data
-def test_field_and_operator_see_the_same():
-    nodes, profile = profile_with_apex(0.81)
-    x, y = pixels(160)
-    inside = np.hypot(x, y) <= 5.0
-    heights = surface_interpolation(nodes, np.hypot(x, y)[inside]) @ profile[0]
-    fit = fit_field(x[inside] + 1.3, y[inside] - 2.0, heights)
-    expected = Observation("field", 5.0).observe(nodes, profile)[0]
-    np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], expected, rtol=2e-4)  # pixels end raggedly
-    np.testing.assert_allclose([fit.x_center, fit.y_center], [1.3, -2.0], atol=1e-6)
-
-
 # ---- observation at times --------------------------------------------------------------------------------------------
 
 # What is observed at the times of frames, from the accepted steps of a simulation, in one call.
@@ -301,13 +246,6 @@ def profiles(growth=1.0, width=3.6):
     share = (TIMES / 43200.0)[:, None]
     moved = bell(NODES, 0.1 + 0.5 * growth * share**0.7, width + 0.3 * share, 2.0 + 0.3 * share)
     return np.where(np.arange(TIMES.size)[:, None] == 0, 0.0, moved)
-
-
-@pytest.mark.parametrize("operator", [Observation(), Observation("field"), Observation("profile", 5.3, 51)], ids=str)
-def test_one_call_does_what_two_do(operator):
-    got = operator.observe_at_times(NODES, profiles(), STEPS, FRAMES)
-    np.testing.assert_allclose(got, STEPS.interpolate(operator.observe(NODES, profiles()), FRAMES), rtol=1e-14)
-    assert np.isnan(got[-1]).all()
 
 
 @pytest.mark.parametrize("lanes", ["2", "4", "8"])

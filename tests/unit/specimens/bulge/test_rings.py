@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import FitError
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.records import History, SurfacePoints, growing_output
-from creepkit.specimens.bulge.camera_points import observe_surface, surface_center
-from creepkit.specimens.bulge.field_fit import fit_field, paper_parameters
+from creepkit.specimens.bulge.camera_points import observe_surface
 from creepkit.specimens.bulge.observation import Observation
 from creepkit.specimens.bulge.specimen import Bulge
-from helpers.bulge_profiles import NODES, bell, plates
+from helpers.bulge_profiles import NODES, plates
 from helpers.paths import SHARED, needs_shared_data
 from helpers.static_test import static_test
 
@@ -39,15 +37,6 @@ def test_text_and_operator_are_one(text: str) -> None:
     assert str(operator) == text
     assert Observation.from_text(f" {text.replace(', ', ' ,')} ") == operator
     assert operator.outputs == tuple(f"displacement_{k + 1}" for k in range(len(operator.radii)))
-
-
-def test_a_bell_is_read_where_the_rings_are() -> None:
-    radii = (0.0, 2.1, 4.7)
-    frames = np.array([bell(NODES, D, 3.8, 2.2) for D in (0.0, 0.1, 0.8)])
-    seen, slopes = Observation("rings", radii=radii).observe_with_derivatives(NODES, frames)
-    expected = [bell(np.array(radii), D, 3.8, 2.2) for D in (0.0, 0.1, 0.8)]
-    np.testing.assert_allclose(seen, expected, atol=2e-4)  # quadratic between nodes
-    np.testing.assert_allclose(np.einsum("fon,fn->fo", slopes, frames), seen, rtol=1e-12)  # linear, at rest too
 
 
 def test_tests_of_several_operators_are_predicted_together() -> None:
@@ -169,12 +158,6 @@ def test_gains_are_the_derivatives_of_the_outputs():
         assert np.sqrt((missed**2).mean() / (expected**2).mean()) < 0.5  # 12 % of the standard deviation
 
 
-def test_one_centre_serves_all_frames():
-    center, covariance = surface_center(grid(0.5, center=(0.6, -0.4)), 7.5)
-    np.testing.assert_allclose(center, [0.6, -0.4], atol=3e-3)
-    assert np.sqrt(np.diag(covariance)).max() < 0.01
-
-
 def test_lost_points_are_not_filled():
     points = grid(0.4)
     heights = np.array(points.heights)
@@ -192,23 +175,6 @@ def test_rings_from_points(subset):
     truth = PROFILES @ surface_interpolation(NODES, radii).T
     got = np.stack(list(seen.outputs.values()), axis=1)
     assert np.abs(got - truth).max() < 2e-3 * truth.max()
-
-
-def test_eight_parameters_as_those_of_the_paper():
-    side = np.linspace(-8.0, 8.0, 81)
-    x, y = np.meshgrid(side, side)
-    p = 2.2
-    fit = fit_field(x, y, 0.4 * np.exp(-0.5 * (np.abs(x / 2.7) ** p + np.abs(y / 2.7) ** p)))
-    np.testing.assert_allclose(paper_parameters(0.4, 2.7, 2.7, p), [fit.amplitude, fit.width, fit.shape], rtol=1e-9)
-    c = np.sqrt(0.5)
-    along, across = c * (x + y), c * (y - x)
-    turned = fit_field(x, y, 0.4 * np.exp(-0.5 * (np.abs(along / 2.7) ** 2 + np.abs(across / 2.7) ** 2)))
-    np.testing.assert_allclose(
-        paper_parameters(0.4, 2.7, 2.7, 2.0, 0.25 * np.pi), [turned.amplitude, turned.width, 2.0]
-    )
-    assert paper_parameters(0.4, 2.5, 2.8, 2.2, offset=-0.02).amplitude == pytest.approx(0.38)
-    with pytest.raises(FitError, match=r"no bulge has sigma_x = -1\.0"):
-        paper_parameters(0.4, -1.0, 2.7, 2.2)
 
 
 @needs_shared_data
