@@ -13,7 +13,6 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError, quoted
-from creepkit.readers.condition_texts import with_weak_sources
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
     StatedConditions,
@@ -21,7 +20,14 @@ from creepkit.readers.conditions import (
     errors_located_at,
     read_noise_correlation,
 )
-from creepkit.readers.derived_records import as_plain_bar, modulus_of_ramp, without_loading, without_steps
+from creepkit.readers.derived_records import (
+    as_plain_bar,
+    end_of_ramp,
+    from_loading_on,
+    modulus_of_ramp,
+    without_loading,
+    without_steps,
+)
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
@@ -40,6 +46,7 @@ from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table import CellTable, SourceText
+from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records import (
     UNKNOWN_DURATION,
@@ -81,6 +88,7 @@ def assemble_history(
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
     frames = as_plain_bar(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
+    frames = from_loading_on(conditions, frames)
     for assumption in frames.table.assumptions[len(table.assumptions) :]:
         conditions.record_assumption(assumption)
     if count := len(frames.marked):
@@ -103,11 +111,17 @@ def assemble_history(
     used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
     if "strain" in outputs:
         record = without_loading(
-            conditions, frames.times, outputs["strain"], used, _elastic_strain(loading, temperature, elastic)
+            conditions, frames, outputs["strain"], used, _elastic_strain(loading, temperature, elastic)
         )
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
     else:
-        elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
+        stated = conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
+        elastic_included = stated == "yes"
+        if stated == "no" and not any(name.startswith("strain") for name in outputs):
+            what = (
+                f"{' and '.join(outputs)} with the elastic part all the same; that of a {specimen} always includes it"
+            )
+            conditions.record_assumption(what.replace(",", ";"))
     outputs = without_steps(conditions, frames.times, outputs, used)
     merged = {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
     rupture_time, unruptured = _end_of_test(conditions, frames, used, name, loading.quantity != "strain")
@@ -171,10 +185,15 @@ def assemble_without_frames(
     end = conditions.take_number("end_time")
     if is_end:
         time, end = None, end or time
+    if ended == RUPTURED and time is None and end is not None:
+        time, end = end, None
     if rate_known and time is None and ended == RUPTURED:  # when it broke is not known
         conditions.labels.setdefault("ended", ended)
         ended = ""
     _check_end_without_frames(time, end, ended, location)
+    if not rate_known and end is not None and not ended:
+        what = f"'{end.key}' says how long the test lasted, and nothing whether it broke then; which is it?"
+        raise conditions.question(what, "ended", RUPTURED, STOPPED, location=end.location, is_free=False)
     if not rate_known and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
@@ -283,11 +302,12 @@ def _refuse_unknown_specimen(named: str, terms: Terms, location: str) -> None:
 
 
 def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Elastic | None) -> float | None:
-    """Stress over modulus at the beginning, None where one of them is not known."""
+    """Stress over modulus when the load is on, None where one of them is not known."""
     if elastic is None or loading.quantity != "stress":
         return None
     start = temperature.values[0] if isinstance(temperature, Program) else temperature
-    return float(loading.program().values[0]) / float(elastic.at(float(start)).E)
+    program = loading.program()
+    return float(program.values[end_of_ramp(program.values)]) / float(elastic.at(float(start)).E)
 
 
 def _lengths_by_default(specimen: str, geometry: Mapping[str, float]) -> dict[str, float]:
@@ -329,6 +349,9 @@ def _specimen_and_outputs(
         chosen = [name for name in present if load in terms.loads.get(name, [load])] or present
     _refuse_unknown_specimen(named, terms, location)
     if len(chosen) != 1:
+        if len(chosen) > 1:
+            what = f"the columns are those of {' and '.join(chosen)}; which specimen is it?"
+            raise conditions.question(what, "specimen", *chosen, location=location, is_free=False)
         raise _unidentified(named, present if named in terms.outputs else chosen, terms, location)
     outputs = {name: frames.values[name] for name in terms.outputs[chosen[0]] if name in frames.values}
     return named or chosen[0], outputs
@@ -342,9 +365,8 @@ def _unidentified(named: str, present: Sequence[str], terms: Terms, location: st
         return HistoryError(
             f"{location}: missing column: the columns hold {description}, those of {named} are needed: {known}"
         )
-    known = "; ".join(f"{', '.join(outputs)} ({name})" for name, outputs in terms.outputs.items())
-    advice = f"name one, such as '# specimen: {present[0]}'" if present else "those of one specimen are needed"
-    return HistoryError(f"{location}: missing column: the columns hold {description}, {advice}: {known}")
+    known = "strain_pct, stress_MPa (relaxation), deflection_mm (beams), elongation_mm, amplitude_mm (bulge)"
+    return HistoryError(f"{location}: missing column: no output of a specimen, such as {known}")
 
 
 def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], location: str) -> None:
@@ -361,12 +383,22 @@ def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], l
 def _elastic(
     conditions: StatedConditions, frames: TableFrames | None = None, loading: Loading | None = None
 ) -> Elastic | None:
-    """The elastic data that are stated; of a test with imposed strain else those of its loading ramp."""
+    """The elastic data that are stated; else those of a loading ramp whose strain and stress were recorded."""
     modulus = conditions.take_number("modulus")
-    if modulus is None and frames is not None and loading is not None and loading.quantity == "strain":
-        if not {"strain", "stress"} <= frames.values.keys():
+    is_recorded = frames is not None and {"strain", "stress"} <= frames.values.keys()
+    if modulus is None and frames is not None and loading is not None and is_recorded:
+        strain, stress, is_held = frames.values["strain"], frames.values["stress"], loading.quantity != "strain"
+        if is_held:
+            stated = ("includes_elastic", "includes_loading", "loading_strain", "loading_time")
+            end = 0 if any(map(conditions.states, stated)) else end_of_ramp(stress)
+            if not end:
+                return None
+        else:
+            strain = loading.program().at(frames.times)
+            end = int(np.argmax(strain >= strain.max()))
+        found = modulus_of_ramp(strain, stress, end + 1, is_held)
+        if found is None and is_held:
             return None
-        found = modulus_of_ramp(loading.program().at(frames.times), frames.values["stress"])
         if found is None:
             raise conditions.missing_error(
                 "Young's modulus, and no loading ramp that shows it",

@@ -35,10 +35,10 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import HistoryError
-from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.conditions import StatedConditions
 from creepkit.readers.frames import TableFrames
 from creepkit.readers.table import SourceText
+from creepkit.readers.vocabulary import unit_suffix
 from creepkit.records.quantities import TIME
 from creepkit.records.recorded_programs import noise_of_readings
 from creepkit.records.units import time_text
@@ -59,6 +59,14 @@ CREEP_SHOWS = 0.01
 
 
 FEWEST_RAMP_FRAMES = 3
+
+
+PRELOAD, STARTS_BELOW, RISES_BY = 0.02, 0.1, 0.01
+"""Of the largest stress: a preload at most, and that at the beginning of a ramp; of the stress, its rise in a ramp."""
+
+
+SOFTEST, STIFFEST = 3e3, 1e6
+"""MPa, of any modulus."""
 
 
 def as_plain_bar(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
@@ -106,7 +114,7 @@ def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict
     column = values.pop("force", None)
     stated = conditions.take_number("force")
     area, how = _area(conditions)
-    if "stress" in values or conditions.states_load("stress"):
+    if "stress" in values or (conditions.states_load("stress") and (column is None or area is None)):
         return ["the load beside the stress not used"]
     if area is None:
         where = stated.location if stated is not None else frames.table.location(frames.table.columns_line)
@@ -137,15 +145,40 @@ def _area(conditions: StatedConditions) -> tuple[float | None, str]:
     return None, ""
 
 
-def modulus_of_ramp(strain: Floats, stress: Floats) -> tuple[float, str] | None:
+def from_loading_on(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
+    """The frames from the last one on in which a bar bears its preload alone; time counts from there."""
+    stress = frames.values.get("stress")
+    if stress is None or any(conditions.states(f"stress_{form}") for form in ("steps", "program", "1")):
+        return frames
+    before = int(np.argmax(stress > PRELOAD * stress.max())) - 1
+    if before < 1 or stress.size - before < 3:
+        return frames
+    start, values = float(frames.times[before]), {name: one[before:] for name, one in frames.values.items()}
+    what = f"time counts from the end of a preload of {stress[before]:.3g} MPa at {time_text(start)}"
+    conditions.record_assumption(what)
+    return replace(frames, values={**values, "time": values["time"] - start}, lines=frames.lines[before:])
+
+
+def end_of_ramp(stress: Floats) -> int:
+    """The frame with which a ramp from nearly no stress ends; 0 where a record does not begin with one.
+
+    stress : (frames,) MPa.
+    """
+    if stress.size < 3 or stress[0] > STARTS_BELOW * stress.max():
+        return 0
+    rises = np.diff(stress) > RISES_BY * np.maximum(stress[:-1], STARTS_BELOW * stress.max())
+    return int(np.argmin(rises)) if not rises.all() else 0
+
+
+def modulus_of_ramp(strain: Floats, stress: Floats, end: int, is_held: bool = False) -> tuple[float, str] | None:
     """Young's modulus, MPa, of the frames of a loading ramp, and what is said of it; None where too few show it.
 
-    strain, stress : (frames,) of the program that was imposed, without the noise of its record, and MPa. The line is
-    fitted by least squares; its 95 % interval is that of Student's t.
+    strain, stress : (frames,) of which what was imposed is without the noise of its record; MPa. end : frame behind the
+    ramp. is_held : whether the stress was, so that it does not tell whether creep bends the ramp. The line is fitted by
+    least squares; its 95 % interval is that of Student's t.
     """
-    end = int(np.argmax(strain >= strain.max())) + 1
     low, high = (part * float(stress[end - 1]) for part in RAMP_RANGE)
-    if stress.size > end and stress[end] < (1.0 - CREEP_SHOWS) * stress[end - 1]:
+    if is_held or (stress.size > end and stress[end] < (1.0 - CREEP_SHOWS) * stress[end - 1]):
         high = CREEP_RANGE * float(stress[end - 1])
     kept = np.flatnonzero((stress[:end] >= low) & (stress[:end] <= high) & (np.diff(strain[:end], prepend=-1.0) > 0.0))
     if kept.size < FEWEST_RAMP_FRAMES:
@@ -154,7 +187,7 @@ def modulus_of_ramp(strain: Floats, stress: Floats) -> tuple[float, str] | None:
 
     line = linregress(strain[kept], stress[kept])
     modulus, half = float(line.slope), float(t.ppf(0.975, kept.size - 2) * line.stderr)
-    if not modulus > 0.0 or half > 0.25 * modulus:
+    if not SOFTEST < modulus < STIFFEST or half > 0.25 * modulus:
         return None
     value, least, most = (f"{1e-3 * one:.4g}" for one in (modulus, modulus - half, modulus + half))
     return modulus, f"modulus {value} GPa of {kept.size} frames of the loading ramp (95 %: {least} to {most})"
@@ -200,13 +233,14 @@ class StrainRecord:
 
 
 def without_loading(
-    conditions: StatedConditions, times: Floats, strain: Floats, used: Bools, elastic_strain: float | None
+    conditions: StatedConditions, frames: TableFrames, strain: Floats, used: Bools, elastic_strain: float | None
 ) -> StrainRecord:
     """The strain as its model means it.
 
-    times : (frames,) s. strain : (frames,). used : (frames,) which may be fitted. elastic_strain : stress over modulus
-    at the beginning, None where the modulus is not known.
+    strain : (frames,). used : (frames,) which may be fitted. elastic_strain : stress over modulus when the load is on,
+    None where the modulus is not known.
     """
+    times = frames.times
     location = conditions.location_of("includes_loading", "loading_strain", "loading_time", "includes_elastic")
     total, end = conditions.take_number("loading_strain"), conditions.take_number("loading_time")
     includes_loading = conditions.take_choice("includes_loading", ("yes", "no"), required=False)
@@ -219,7 +253,7 @@ def without_loading(
     if total is not None:
         conditions.labels["loading_strain"] = f"{total.value:.6g}"
     if not (stated or includes_loading or total is not None):
-        return _decided(conditions, times, strain, used, elastic_strain)
+        return _decided(conditions, frames, strain, used, elastic_strain)
     elastic = conditions.take_choice("includes_elastic", ("yes", "no"), required=not includes_loading and total is None)
     first = int(np.argmax(used))
     if total is not None and not (includes_loading or stated):
@@ -244,10 +278,20 @@ def without_loading(
 
 
 def _decided(
-    conditions: StatedConditions, times: Floats, strain: Floats, used: Bools, elastic_strain: float | None
+    conditions: StatedConditions, table: TableFrames, strain: Floats, used: Bools, elastic_strain: float | None
 ) -> StrainRecord:
     """What the first frames say, where the file says nothing."""
-    frames = np.flatnonzero(used)
+    frames, times = np.flatnonzero(used), table.times
+    if ramp := end_of_ramp(table.values["stress"]) if "stress" in table.values else 0:
+        at_end, stress = float(strain[ramp] - strain[0]), float(table.values["stress"][ramp])
+        if elastic_strain and _is_elastic(at_end, elastic_strain, PLATEAU_RANGE):
+            ratio = f"{at_end / elastic_strain:.2f} of stress over modulus"
+            conditions.record_assumption(f"includes_elastic yes (the strain at the end of the loading ramp is {ratio})")
+            return StrainRecord(strain, used, includes_elastic=True)
+        if SOFTEST * at_end < stress < STIFFEST * at_end:
+            what = f"includes_elastic no (loading strain {at_end:.3g} at the end of the loading ramp subtracted)"
+            conditions.record_assumption(f"{what} and frames before it not used")
+            return StrainRecord(strain - strain[ramp], used & (times >= times[ramp]), includes_elastic=False)
     if frames.size > 2 and times[frames[0]] == 0.0:
         first = float(strain[frames[0]])
         if first > max(SMALLEST_STRAIN, NOISE_FACTOR * noise_of_readings(strain[frames[:SEARCHED_FRAMES]])):

@@ -34,10 +34,6 @@ UNKNOWN_DURATION = 1.0
 """s; the one time of a test without frames whose duration nobody stated."""
 
 
-CUT_LABEL = "cut_number"
-"""Label of a test whose file may have been cut within its last number: a sentence, which checks of quality show."""
-
-
 EVERY_FRAME: Bools = frozen([], dtype=bool)
 """The value of History.used that marks every frame."""
 

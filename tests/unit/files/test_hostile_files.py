@@ -166,14 +166,6 @@ def test_whatever_a_reader_raises_names_file_and_reader(tmp_path, error):
     assert len(message) < 1000
 
 
-def test_a_table_of_a_million_texts_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr("creepkit.readers.text_files.MAXIMUM_TEXTS", 100)
-    path = tmp_path / "x.csv"
-    path.write_text("# stress_MPa: 5\ntime_h,strain_pct,remark\n" + "".join(f"{k},{k},x\n" for k in range(40)))
-    with pytest.raises(HistoryError, match="number of cells that are not all numbers 123.*CREEPKIT_LIMITS=2"):
-        ck.read_histories(path)
-
-
 def test_special_files_are_refused_by_every_reader(tmp_path):
     os.mkfifo(tmp_path / "x.csv")
     for read in (ck.read_histories, ck.read_frames, ck.read_record, ck.load, ck.surrogate, ck.read_dataset):

@@ -5,10 +5,9 @@ from pathlib import Path
 import pytest
 
 from creepkit.errors import HistoryError
-from creepkit.readers.column_names import plain_name
 from creepkit.readers.history_csv import HISTORY_CSV, write_history
 from creepkit.readers.indexed_folders import INDEXED_TABLE
-from creepkit.readers.vocabulary import HeaderVocabulary
+from creepkit.readers.vocabulary import HeaderVocabulary, plain_name
 from creepkit.records import History
 from helpers.misspellings import misspelt_keys
 

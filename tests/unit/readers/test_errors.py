@@ -19,7 +19,7 @@ CASES = [
     (HEAD + "time_s,strain_1\n0,0\n", "x.csv:4: only one frame in time; at least two are needed"),
     (HEAD + "time_s,strain_1\n1,0\n1,1\n", "x.csv:4: only one frame in time"),
     (HEAD + "strain\n0\n1\n", "x.csv:3: missing column: no time among strain; name one time_s, time_min"),
-    (HEAD + "time_s,temperature_C\n0,850\n1,850\n", "x.csv:3: missing column: the columns hold no output"),
+    (HEAD + "time_s,temperature_C\n0,850\n1,850\n", "x.csv:3: missing column: no output of a specimen"),
     (HEAD + "time_s,strain_1,shape\n0,0,2\n1,0,2\n", "x.csv:3: a column of shape has no meaning beside strain, stress"),
     (HEAD + "# specimen: bulge\n" + BODY, "x.csv:4: .* outputs of point and uniaxial, those of bulge are"),
     (HEAD + "time_s,strian\n0,0\n1,0\n", "x.csv:3: column 'strian' is not understood; did you mean 'strain'"),

@@ -8,7 +8,7 @@ import pytest
 
 from creepkit.cameras.reading import TIME_UNITS
 from creepkit.instruments.column_heads import channel_unit
-from creepkit.readers.column_names import unit_suffix
+from creepkit.readers.vocabulary import unit_suffix
 from creepkit.records.camera_format import LENGTH_UNITS
 from creepkit.records.quantities import LENGTH, STRESS, TEMPERATURE, TIME
 from creepkit.records.units import UNITS, celsius_text, hours_number, time_text
