@@ -22,7 +22,6 @@ from creepkit.readers.conditions import (
 )
 from creepkit.readers.derived_records import (
     as_plain_bar,
-    end_of_ramp,
     from_loading_on,
     modulus_of_ramp,
     without_loading,
@@ -110,17 +109,16 @@ def assemble_history(
     )
     used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
     if "strain" in outputs:
-        record = without_loading(
-            conditions, frames, outputs["strain"], used, _elastic_strain(loading, temperature, elastic)
-        )
+        stress = loading.program().at(frames.times) if loading.quantity == "stress" else None
+        modulus = None if elastic is None else _modulus(elastic, temperature)
+        record = without_loading(conditions, frames.times, outputs["strain"], used, stress, modulus)
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
+        elastic = elastic if record.modulus is None else _elastic_of(record.modulus)
     else:
         stated = conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
         elastic_included = stated == "yes"
         if stated == "no" and not any(name.startswith("strain") for name in outputs):
-            what = (
-                f"{' and '.join(outputs)} with the elastic part all the same; that of a {specimen} always includes it"
-            )
+            what = f"the elastic part in {' and '.join(outputs)} all the same; that of a {specimen} always includes it"
             conditions.record_assumption(what.replace(",", ";"))
     outputs = without_steps(conditions, frames.times, outputs, used)
     merged = {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
@@ -301,13 +299,17 @@ def _refuse_unknown_specimen(named: str, terms: Terms, location: str) -> None:
         raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
 
 
-def _elastic_strain(loading: Loading, temperature: float | Program, elastic: Elastic | None) -> float | None:
-    """Stress over modulus when the load is on, None where one of them is not known."""
-    if elastic is None or loading.quantity != "stress":
-        return None
+def _modulus(elastic: Elastic, temperature: float | Program) -> float:
+    """Young's modulus at the beginning, MPa."""
     start = temperature.values[0] if isinstance(temperature, Program) else temperature
-    program = loading.program()
-    return float(program.values[end_of_ramp(program.values)]) / float(elastic.at(float(start)).E)
+    return float(elastic.at(float(start)).E)
+
+
+def _elastic_of(modulus: float) -> Elastic:
+    """Elastic data of a modulus that a record showed."""
+    from creepkit.language.elastic import Elastic
+
+    return Elastic(modulus)
 
 
 def _lengths_by_default(specimen: str, geometry: Mapping[str, float]) -> dict[str, float]:
@@ -383,22 +385,12 @@ def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], l
 def _elastic(
     conditions: StatedConditions, frames: TableFrames | None = None, loading: Loading | None = None
 ) -> Elastic | None:
-    """The elastic data that are stated; else those of a loading ramp whose strain and stress were recorded."""
+    """The elastic data that are stated; of a test with imposed strain else those of its loading ramp."""
     modulus = conditions.take_number("modulus")
-    is_recorded = frames is not None and {"strain", "stress"} <= frames.values.keys()
-    if modulus is None and frames is not None and loading is not None and is_recorded:
-        strain, stress, is_held = frames.values["strain"], frames.values["stress"], loading.quantity != "strain"
-        if is_held:
-            stated = ("includes_elastic", "includes_loading", "loading_strain", "loading_time")
-            end = 0 if any(map(conditions.states, stated)) else end_of_ramp(stress)
-            if not end:
-                return None
-        else:
-            strain = loading.program().at(frames.times)
-            end = int(np.argmax(strain >= strain.max()))
-        found = modulus_of_ramp(strain, stress, end + 1, is_held)
-        if found is None and is_held:
+    if modulus is None and frames is not None and loading is not None and loading.quantity == "strain":
+        if not {"strain", "stress"} <= frames.values.keys():
             return None
+        found = modulus_of_ramp(loading.program().at(frames.times), frames.values["stress"])
         if found is None:
             raise conditions.missing_error(
                 "Young's modulus, and no loading ramp that shows it",

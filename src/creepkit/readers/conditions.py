@@ -118,6 +118,10 @@ class StatedConditions:
         """Take a number, if it was given."""
         return self._numbers.pop(quantity, None)
 
+    def number_of(self, quantity: str) -> StatedNumber | None:
+        """A number that nothing has taken yet, if it was given."""
+        return self._numbers.get(quantity)
+
     def take_text(self, key: str, default: str = "") -> str:
         """Take a text; the default stands in for a missing or empty one."""
         entry = self._texts.pop(key, None)

@@ -9,8 +9,11 @@ What a strain record holds of the loading: elastic and initial plastic strain, a
 Creep strain is zero when the load has been reached. A record of total strain is not, and its first frame after time
 zero is often not the end of loading. ISO 204 calls the strain at the end of loading the initial total extension; keys
 state it (`loading_strain`, `includes_loading`), and when loading ended (`loading_time`). Where a file states neither
-these nor `includes_elastic`, the first frames decide:
+these nor `includes_elastic`, the record of the load and the first frames decide:
 
+- a load that was raised in sight, over three frames or more, has loaded the test piece: strain that is straight over
+  the stress is elastic, with a modulus of its own, any other at the end of the ramp is subtracted, and frames before
+  the end are not used;
 - a strain at time zero that is the stress over the modulus is elastic; any other is subtracted, for part of it is
   plastic or the modulus is off, and creep has had no time yet;
 - a strain that jumps to about the stress over the modulus from less than half of it, and then stays while time
@@ -28,6 +31,7 @@ distance, midway between the frames around it, of straight lines through the fra
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -37,6 +41,7 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.readers.conditions import StatedConditions
 from creepkit.readers.frames import TableFrames
+from creepkit.readers.imposed import hold_begins
 from creepkit.readers.table import SourceText
 from creepkit.readers.vocabulary import unit_suffix
 from creepkit.records.quantities import TIME
@@ -58,15 +63,12 @@ CREEP_SHOWS = 0.01
 """Fraction of the stress that is lost within one frame of the ramp after its end, above which it bends the ramp."""
 
 
-FEWEST_RAMP_FRAMES = 3
+PRELOAD, SHORT_RAMP, SOFTEST = 0.02, 1e-3, 20e3
+"""Of the largest stress, a preload at most; of the duration, a ramp in which creep is none; MPa, of a modulus."""
 
 
-PRELOAD, STARTS_BELOW, RISES_BY = 0.02, 0.1, 0.01
-"""Of the largest stress: a preload at most, and that at the beginning of a ramp; of the stress, its rise in a ramp."""
-
-
-SOFTEST, STIFFEST = 3e3, 1e6
-"""MPa, of any modulus."""
+FEWEST_RAMP_FRAMES, RAMP_FROM = 3, 0.2
+"""Before the end of a ramp; part of the stress that is held at which a ramp that loading shows begins at most."""
 
 
 def as_plain_bar(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
@@ -103,10 +105,20 @@ def _with_strain(conditions: StatedConditions, frames: TableFrames, values: dict
             "an extension is a strain by its gauge length, which is not stated; write gauge_length_mm (or 'specimen: "
             "notched-bar' with its lengths)",
             "gauge_length_mm",
+            *_lengths_in(conditions.labels),
             location=frames.table.location(frames.table.columns_line),
         )
     values["strain"] = elongation / length
     return [f"strain = extension / gauge length {length:g} mm"]
+
+
+def _lengths_in(labels: Mapping[str, str]) -> list[float]:
+    """mm, of labels such as `Length: 50.00 mm`, which may be the gauge length."""
+    found = [re.fullmatch(r"([\d.,]+) ?mm", text) for name, text in labels.items() if _LENGTH_NAME.search(name)]
+    return [float(one[1].replace(",", ".")) for one in found if one]
+
+
+_LENGTH_NAME = re.compile("length|länge|longueur", re.IGNORECASE)
 
 
 def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict[str, Floats]) -> list[str]:
@@ -114,7 +126,16 @@ def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict
     column = values.pop("force", None)
     stated = conditions.take_number("force")
     area, how = _area(conditions)
-    if "stress" in values or (conditions.states_load("stress") and (column is None or area is None)):
+    nominal = conditions.number_of("stress")
+    held = hold_begins(frames.times, column) if column is not None else None
+    if "stress" not in values and nominal is not None and column is not None and held and held >= FEWEST_RAMP_FRAMES:
+        # A load that was raised in sight is recorded better than the one number that says what was held.
+        if area is None:
+            area, how = (
+                float(np.median(column[held:])) / nominal.value,
+                f" by which the load that was held is {nominal.value:g} MPa",
+            )
+    elif "stress" in values or conditions.states_load("stress"):
         return ["the load beside the stress not used"]
     if area is None:
         where = stated.location if stated is not None else frames.table.location(frames.table.columns_line)
@@ -159,26 +180,24 @@ def from_loading_on(conditions: StatedConditions, frames: TableFrames) -> TableF
     return replace(frames, values={**values, "time": values["time"] - start}, lines=frames.lines[before:])
 
 
-def end_of_ramp(stress: Floats) -> int:
-    """The frame with which a ramp from nearly no stress ends; 0 where a record does not begin with one.
-
-    stress : (frames,) MPa.
-    """
-    if stress.size < 3 or stress[0] > STARTS_BELOW * stress.max():
-        return 0
-    rises = np.diff(stress) > RISES_BY * np.maximum(stress[:-1], STARTS_BELOW * stress.max())
-    return int(np.argmin(rises)) if not rises.all() else 0
+def _frames_of_ramp(times: Floats, stress: Floats) -> int:
+    """The number of frames before a stress that was raised from nothing is held; 0 where the record shows no ramp."""
+    end = hold_begins(times, stress)
+    is_short = end is not None and times[end] - times[0] <= SHORT_RAMP * (times[-1] - times[0])
+    fewest = 1 if is_short else FEWEST_RAMP_FRAMES
+    is_raised = end is not None and end >= fewest and stress[0] <= RAMP_FROM * stress[end]
+    return int(end) if end is not None and is_raised else 0
 
 
-def modulus_of_ramp(strain: Floats, stress: Floats, end: int, is_held: bool = False) -> tuple[float, str] | None:
+def modulus_of_ramp(strain: Floats, stress: Floats) -> tuple[float, str] | None:
     """Young's modulus, MPa, of the frames of a loading ramp, and what is said of it; None where too few show it.
 
-    strain, stress : (frames,) of which what was imposed is without the noise of its record; MPa. end : frame behind the
-    ramp. is_held : whether the stress was, so that it does not tell whether creep bends the ramp. The line is fitted by
-    least squares; its 95 % interval is that of Student's t.
+    strain, stress : (frames,) of the program that was imposed, without the noise of its record, and MPa. The line is
+    fitted by least squares; its 95 % interval is that of Student's t.
     """
+    end = int(np.argmax(strain >= strain.max())) + 1
     low, high = (part * float(stress[end - 1]) for part in RAMP_RANGE)
-    if is_held or (stress.size > end and stress[end] < (1.0 - CREEP_SHOWS) * stress[end - 1]):
+    if stress.size > end and stress[end] < (1.0 - CREEP_SHOWS) * stress[end - 1]:
         high = CREEP_RANGE * float(stress[end - 1])
     kept = np.flatnonzero((stress[:end] >= low) & (stress[:end] <= high) & (np.diff(strain[:end], prepend=-1.0) > 0.0))
     if kept.size < FEWEST_RAMP_FRAMES:
@@ -187,7 +206,7 @@ def modulus_of_ramp(strain: Floats, stress: Floats, end: int, is_held: bool = Fa
 
     line = linregress(strain[kept], stress[kept])
     modulus, half = float(line.slope), float(t.ppf(0.975, kept.size - 2) * line.stderr)
-    if not SOFTEST < modulus < STIFFEST or half > 0.25 * modulus:
+    if not modulus > 0.0 or half > 0.25 * modulus:
         return None
     value, least, most = (f"{1e-3 * one:.4g}" for one in (modulus, modulus - half, modulus + half))
     return modulus, f"modulus {value} GPa of {kept.size} frames of the loading ramp (95 %: {least} to {most})"
@@ -224,23 +243,29 @@ SMALLEST_STRAIN, NOISE_FACTOR = 2e-5, 6.0
 class StrainRecord:
     """A strain record without what loading left in it.
 
-    strain, used : (frames,). includes_elastic : whether the strain still holds the elastic one.
+    strain, used : (frames,). includes_elastic : whether the strain still holds the elastic one. modulus : MPa, that the
+    loading ramp shows where none is stated.
     """
 
     strain: Floats
     used: Bools
     includes_elastic: bool
+    modulus: float | None = None
 
 
 def without_loading(
-    conditions: StatedConditions, frames: TableFrames, strain: Floats, used: Bools, elastic_strain: float | None
+    conditions: StatedConditions,
+    times: Floats,
+    strain: Floats,
+    used: Bools,
+    stress: Floats | None,
+    modulus: float | None,
 ) -> StrainRecord:
     """The strain as its model means it.
 
-    strain : (frames,). used : (frames,) which may be fitted. elastic_strain : stress over modulus when the load is on,
-    None where the modulus is not known.
+    times : (frames,) s. strain : (frames,). used : (frames,) which may be fitted. stress : (frames,) MPa that was
+    imposed, None where another load was; modulus : MPa at the beginning, None where it is not known.
     """
-    times = frames.times
     location = conditions.location_of("includes_loading", "loading_strain", "loading_time", "includes_elastic")
     total, end = conditions.take_number("loading_strain"), conditions.take_number("loading_time")
     includes_loading = conditions.take_choice("includes_loading", ("yes", "no"), required=False)
@@ -253,7 +278,9 @@ def without_loading(
     if total is not None:
         conditions.labels["loading_strain"] = f"{total.value:.6g}"
     if not (stated or includes_loading or total is not None):
-        return _decided(conditions, frames, strain, used, elastic_strain)
+        record = None if stress is None else _loaded_by_ramp(conditions, times, strain, used, stress, modulus)
+        elastic_strain = None if stress is None or modulus is None else float(stress[0]) / modulus
+        return record or _decided(conditions, times, strain, used, elastic_strain)
     elastic = conditions.take_choice("includes_elastic", ("yes", "no"), required=not includes_loading and total is None)
     first = int(np.argmax(used))
     if total is not None and not (includes_loading or stated):
@@ -277,21 +304,38 @@ def without_loading(
     return StrainRecord(strain - subtracted, used, includes_elastic=False)
 
 
+def _loaded_by_ramp(
+    conditions: StatedConditions, times: Floats, strain: Floats, used: Bools, stress: Floats, modulus: float | None
+) -> StrainRecord | None:
+    """What a recorded loading ramp says; None where there is none, or the strain does not rise with it.
+
+    A strain that is straight over the stress up to the end of the ramp is elastic, with the modulus that is stated or
+    else with that of the ramp; any other at its end is subtracted.
+    """
+    end = _frames_of_ramp(times, stress)
+    noise = noise_of_readings(strain[end : end + SEARCHED_FRAMES])
+    if not end or strain[end] - strain[0] < max(SMALLEST_STRAIN, NOISE_FACTOR * noise):
+        return None
+    used = used & (times >= times[end])
+    until = f"frames before the end of the loading ramp at {times[end]:g} s not used"
+    found = None if modulus is not None else modulus_of_ramp(strain[: end + 1], stress[: end + 1])
+    elastic = modulus if modulus is not None else found[0] if found is not None else None
+    if elastic is not None and _is_elastic(float(strain[end]), float(stress[end]) / elastic, ELASTIC_RANGE):
+        conditions.record_assumption(f"includes_elastic yes (the strain rises with the load) and {until}")
+        if found is not None:
+            conditions.record_assumption(found[1])
+        return StrainRecord(strain, used, True, None if found is None else found[0])
+    if end < FEWEST_RAMP_FRAMES and stress[end] < SOFTEST * (strain[end] - strain[0]):
+        return None
+    conditions.record_assumption(f"includes_elastic no (loading strain {strain[end]:.3g} subtracted) and {until}")
+    return StrainRecord(strain - strain[end], used, includes_elastic=False)
+
+
 def _decided(
-    conditions: StatedConditions, table: TableFrames, strain: Floats, used: Bools, elastic_strain: float | None
+    conditions: StatedConditions, times: Floats, strain: Floats, used: Bools, elastic_strain: float | None
 ) -> StrainRecord:
     """What the first frames say, where the file says nothing."""
-    frames, times = np.flatnonzero(used), table.times
-    if ramp := end_of_ramp(table.values["stress"]) if "stress" in table.values else 0:
-        at_end, stress = float(strain[ramp] - strain[0]), float(table.values["stress"][ramp])
-        if elastic_strain and _is_elastic(at_end, elastic_strain, PLATEAU_RANGE):
-            ratio = f"{at_end / elastic_strain:.2f} of stress over modulus"
-            conditions.record_assumption(f"includes_elastic yes (the strain at the end of the loading ramp is {ratio})")
-            return StrainRecord(strain, used, includes_elastic=True)
-        if SOFTEST * at_end < stress < STIFFEST * at_end:
-            what = f"includes_elastic no (loading strain {at_end:.3g} at the end of the loading ramp subtracted)"
-            conditions.record_assumption(f"{what} and frames before it not used")
-            return StrainRecord(strain - strain[ramp], used & (times >= times[ramp]), includes_elastic=False)
+    frames = np.flatnonzero(used)
     if frames.size > 2 and times[frames[0]] == 0.0:
         first = float(strain[frames[0]])
         if first > max(SMALLEST_STRAIN, NOISE_FACTOR * noise_of_readings(strain[frames[:SEARCHED_FRAMES]])):

@@ -246,10 +246,11 @@ class HeadOfTest:
                     self.put(quantity, text, row)
             elif cells:
                 value, *cells = cells
+                is_label = not (known.is_condition(plain) or known.misspelt(plain))  # nor nearly a condition
                 if cells and is_number(value, self.table.dialect) and unit_suffix(cells[0]):
-                    key, cells = _with_unit(key, cells[0], place), cells[1:]
-                # A key that is no condition, nor nearly one, is that of a label.
-                self.put(key if known.is_condition(plain) or known.misspelt(plain) else f"label {plain}", value, row)
+                    key, value = (key, f"{value} {cells[0]}") if is_label else (_with_unit(key, cells[0], place), value)
+                    cells = cells[1:]
+                self.put(f"label {plain}" if is_label else key, value, row)
             elif known.is_condition(key):
                 raise HistoryError(f"{place}: '{quoted(key)}' stands above the names of the columns without a value")
             else:
@@ -483,6 +484,10 @@ def _stated(
     return None
 
 
+_OF_AREA = ("area", "diameter", "width")
+"""What lengths of a cross-section begin with."""
+
+
 def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table: CellTable, known: Terms) -> bool:
     """Whether steps, programs, columns or another load leave nothing to state."""
     names, terms = [*entries, *table.columns], known
@@ -491,6 +496,8 @@ def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table
     if quantity not in terms.load_kinds:
         return False
     others = [(split_unit(name, terms.load_kinds) or ("", ""), name in entries) for name in names]
+    if quantity == "stress" and not any(name.startswith(_OF_AREA) for name in entries):
+        others = [(found, is_entry) for found, is_entry in others if found[0] != "force"]  # is none without an area
     forms = ("steps", "program", "1", *LENGTH.units)
     return any(
         load and (is_entry or load in terms.number_kinds) and (unit in forms or unit in terms.load_kinds[load].units)

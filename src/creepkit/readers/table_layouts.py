@@ -17,7 +17,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.ends_of_tests import kind_of_column
-from creepkit.readers.frames import unknown_text
+from creepkit.readers.frames import OF_UNIT, unknown_text
 from creepkit.readers.table import (
     CellTable,
     SourceText,
@@ -189,7 +189,19 @@ def _states_condition(table: CellTable, column: int, rows: Sequence[TableRow], k
     first = next(cells)
     if any(cell != first for cell in cells):
         return False
-    return not is_number(first, table.dialect) or known.is_condition(table.columns[column])
+    name = table.columns[column]
+    return not is_number(first, table.dialect) or (known.is_condition(name) and not _is_sensor(name, table, known))
+
+
+def _is_sensor(name: str, table: CellTable, known: Terms) -> bool:
+    """Whether a name such as `Temperature 1` is that of a sensor: a first level without a second one or steps."""
+    level = _FIRST_LEVEL.match(known.condition(name))
+    if level is None or "step" in map(known.quantity, table.columns):
+        return False
+    return not any(f"{known.condition(other)}_".startswith(f"{level[1]}_2_") for other in table.columns)
+
+
+_FIRST_LEVEL = re.compile(r"(.+)_1(?:_|$)")
 
 
 def _entries_of_columns(table: CellTable, columns: Sequence[int], row: TableRow, known: Terms) -> dict[str, SourceText]:
@@ -343,8 +355,16 @@ def _are_columns(headed: HeadedTable) -> bool:
         return True
     if any(names_tests(cell) or known.is_condition(cell) for cell in others):
         return False
+    if len({kind for cell in others for kind in _kinds_of_unit(cell)}) > 1:
+        return False
     spelled = {words_of(name) for name in known.column_kinds}
     return not any(get_close_matches(words_of(split_written_name(cell)[0]), spelled, 1, cutoff=0.75) for cell in others)
+
+
+def _kinds_of_unit(cell: str) -> list[str]:
+    """What the unit of a column is one of."""
+    suffix = unit_suffix(split_written_name(cell)[1])
+    return [name for name, kind in OF_UNIT.items() if suffix and suffix in kind.units]
 
 
 def _are_conditions(headed: HeadedTable) -> bool:

@@ -68,7 +68,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "temperature": (
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
-        *("probentemperatur", "ofen", "ofentemperatur", "température", "température d'essai", "four"),
+        *("probentemperatur", "ofen", "ofentemperatur", "température", "température d'essai", "four", "temp ctrl"),
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
@@ -82,7 +82,10 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("déformation de fluage", "allongement relatif", "deformation relative"),
     ),
     "loading_strain": ("anfangsdehnung",),
-    "force": ("load", "applied load", "axial load", "kraft", "prüfkraft", "last", "zugkraft", "effort", "force axiale"),
+    "force": (
+        *("load", "applied load", "axial load", "axial force", "tensile load", "tensile force", "load cell", "kraft"),
+        *("prüfkraft", "standardkraft", "last", "zugkraft", "effort", "force axiale"),
+    ),
     "elongation": (
         *(
             "extension",
@@ -94,6 +97,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
             "axial extension",
             "verlängerung",
         ),
+        *("tensile extension", "axial extensometer", "strain gauge extension", "extensometer extension"),
         *("längenänderung", "allongement"),
     ),
     "modulus": (
@@ -104,7 +108,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "strain_sd": ("standard deviation of strain", "strain standard deviation"),
     "diameter": (
         *("specimen diameter", "sample diameter", "initial diameter", "gauge diameter", "durchmesser"),
-        *("probendurchmesser", "probendurchmesser d0", "anfangsdurchmesser", "diamètre", "diamètre initial"),
+        *("probendurchmesser", "anfangsdurchmesser", "diamètre", "diamètre initial"),
     ),
     "gauge_length": (
         *("gage length", "initial gauge length", "original gauge length", "reference length", "messlänge"),
@@ -243,8 +247,15 @@ class NameTable:
         }
 
     def meaning(self, name: str) -> str | None:
-        """The quantity, or the key of a text, that a name without its unit means; None when it means none."""
+        """The quantity, or the key of a text, that a name without its unit means; None when it means none.
+
+        A name may have its symbol behind it, `Durchmesser d0`.
+        """
         meant = self.symbols.get(name) or self._plain_names.get(plain_name(name))
+        words, _, symbol = name.rpartition(" ")
+        if meant is None and symbol in self.symbols:
+            meant = self._plain_names.get(plain_name(words))
+            meant = meant if meant == self.symbols[symbol] else None
         return meant if meant in self.kinds or meant in self.texts else None
 
     def standard(self, text: str) -> str:
@@ -259,13 +270,15 @@ class NameTable:
         quantity = self.meaning(name)
         if quantity == "elongation" and unit_suffix(unit) in STRAIN.units:
             quantity = "strain"  # of its gauge length
+        elif quantity == "strain" and unit_suffix(unit) in LENGTH.units and "elongation" in self.kinds:
+            quantity = "elongation"
         if quantity is None or (unit and quantity not in self.kinds):
             last = re.split(r"[\s_\-()\[\],]+", text.strip(" )]"))[-1]
             return text if last in ("1", *CAPITALS_THAT_MATTER) else self._plain_keys.get(plain_name(text), text)
         return f"{quantity}_{unit_suffix(unit) or unit}" if unit else quantity
 
 
-_NUMBERING = r"names?|ids?|no|nr|n|num(?:ber|mer|[ée]ro)?|nom|code|bezeichnung|kennung|ref|r[ée]f[ée]rence|identif\w+"
+_NUMBERING = r"names?|ids?|no|nr|n|num(?:ber|mer|[ée]ro)?|nom|code|label|bezeichnung|kennung|r[ée]f[ée]rence|identif\w+"
 _OF_TESTS = re.compile(
     rf"(?:(?:{_NUMBERING}) )*(?:tests?|test piece|samples?|specimens?|proben?|pr[uü]fling|versuchs?|essai|[ée]prouvette"
     rf"|[ée]chantillon|rep[èe]re)(?: ?(?:{_NUMBERING}))*"

@@ -180,16 +180,6 @@ def test_nothing_in_a_note_or_a_title_becomes_code(exporter, tmp_path, gfortran)
     assert b"creep_" in (tmp_path / "law.o").read_bytes()
 
 
-@pytest.mark.parametrize("exporter", [AbaqusCreepSubroutine(), CalculixCreepSubroutine()])
-def test_names_that_are_long_or_those_of_routines_compile(exporter, tmp_path, gfortran):
-    clash, long, longer = parameters(f"foreign_law a_{80 * 'y'} a_{80 * 'y'}z")
-    source = law(clash * stress**long * longer, {clash: RATE, long: POWER, longer: POWER})
-    text = exporter.text(LawWithValues(source, {clash.name: 1e-16, long.name: 5, longer.name: 2}))
-    assert "! 'foreign_law' is called foreign_law_2 here" in text
-    assert max(len(line) for line in text.splitlines() if line[:1] != "!") <= 72
-    assert not compile_fortran(gfortran, text, tmp_path, "clash")[1]
-
-
 def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_path, gfortran):
     text = AbaqusCreepSubroutine().text(LawWithValues(LAWS["foreign saturating"], {"A": 1e-20, "r": 1e-3, "n": 4.0}))
     driver = """

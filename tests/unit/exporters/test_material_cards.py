@@ -1,7 +1,6 @@
 """Cards for other codes: read back by their grammars, the formulas of the codes' manuals give the law's own rate."""
 
 import re
-from dataclasses import replace
 from functools import cache
 from itertools import product
 
@@ -172,14 +171,6 @@ def test_the_header_tells_units_reference_intervals_and_new_names(name):
         "Norton (1929)",
     ):
         assert told in head
-
-
-def test_a_material_may_be_named_and_renaming_is_told():
-    source = replace(CASES["norton"], name="IN 625 / tube")
-    for name, label in (("abaqus-cards", "IN_625_tube"), ("code_aster", "IN_625")):
-        text = EXPORTERS[name].text(source)
-        assert f"'IN 625 / tube' is called {label} here" in text
-    assert "*MATERIAL, NAME=IN_625_tube" in EXPORTERS["abaqus-cards"].text(source)
 
 
 def test_elastic_moduli_follow_the_unit_of_stress():

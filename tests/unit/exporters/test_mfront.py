@@ -106,13 +106,6 @@ def test_the_first_increment_from_zero_strain_converges(m, tmp_path, gxx):
     assert iterations < 40
 
 
-def test_no_stress_leaves_the_material_as_it_is(tmp_path, gxx):
-    block = Block(gxx, tmp_path, COMBINED)
-    residual, jacobian = block(np.zeros(7), np.zeros(6), np.zeros(1), 10.0)
-    assert np.isfinite(jacobian).all()
-    np.testing.assert_allclose(residual, 0.0, atol=1e-30)
-
-
 # ---- the grammar ---------------------------------------------------------------------------------------------------
 
 DECLARATIONS = {

@@ -20,10 +20,10 @@ from creepkit.kernels.kernel_functions import (
     LogSinh,
     StableFunction,
 )
-from creepkit.kernels.log_form import COMPOSITE_FLOOR, FLOOR, log_form, with_exponential_differences
+from creepkit.kernels.log_form import FLOOR, log_form, with_exponential_differences
 from creepkit.language import parameters, strain, stress, time
 from helpers.compiled_functions import compiled_function
-from helpers.literature_laws import POWER, RATE, A, B, law, m, n, number, r, s_0, scale
+from helpers.literature_laws import POWER, RATE, A, B, law, m, n, number, r, scale
 
 x, y = sympy.symbols("x y", real=True)
 ln_A, ln_B = sympy.symbols("ln_A ln_B", real=True)
@@ -96,12 +96,6 @@ def test_sums_that_vanish_as_a_whole_are_paired() -> None:
     )
 
 
-def test_sums_that_do_not_vanish_stay_as_the_author_wrote_them() -> None:
-    total = y + (2 - y) * exp(-x)
-
-    assert with_exponential_differences(total) == total
-
-
 # ---- logarithms of terms -------------------------------------------------------------------------------------------
 
 
@@ -120,13 +114,6 @@ def test_functions_that_overflow_have_logarithms_of_their_own() -> None:
     ratio = stress * exp(-ln_B)
 
     assert found == ln_A + LogSinh(ratio) + ratio + LogRise(ratio) + LogRise(r * time)
-
-
-def test_a_negative_number_is_moved_into_a_sum() -> None:
-    term = -3 * A * (stress - s_0)
-    (found,) = log_form(law(term, {A: RATE, s_0: number(3000, 4000)})).terms
-
-    assert found.has(LogFloor(s_0 - stress, sympy.Float(COMPOSITE_FLOOR)))
 
 
 def test_a_branch_that_is_zero_does_not_hide_the_coefficient() -> None:

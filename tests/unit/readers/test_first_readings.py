@@ -45,10 +45,7 @@ def read(tmp_path):
 def test_a_strain_and_its_time_in_the_row_of_a_test_are_no_frames(read):
     """They are how far it went; where no remark says whether it broke then, that is asked for."""
     tests = read(SHEET + "E1;600;180;5,2;1200;rompu\nE2;650;120;3,3;900;arrêté avant rupture\n")
-    assert [(one.outputs, one.rupture_time, one.unruptured) for one in tests] == [
-        ({}, 1200 * 3600.0, False),
-        ({}, None, True),
-    ]
+    assert [(one.rupture_time, one.unruptured) for one in tests] == [(1200 * 3600.0, False), (None, True)]
     with pytest.raises(HistoryError, match=r"x.csv:2 \(and 1 more\): 'Temps \(h\)' .* ended = \"ruptured\" \(or ended"):
         read(SHEET.replace(";Observations", "") + "E1;600;180;5,2;1200\nE2;650;120;3,3;900\n")
 
@@ -64,15 +61,10 @@ def test_logarithms(read):
 
 def test_blocks_below_one_another(read):
     tests = read(BLOCKS)
-    assert [(one.name, one.condition, one.times.size) for one in tests] == [
-        ("A", "650 °C, 120 MPa", 3),
-        ("B", "650 °C, 140 MPa", 3),
-    ]
+    assert [f"{one.name}: {one.condition}" for one in tests] == ["A: 650 °C, 120 MPa", "B: 650 °C, 140 MPa"]
     pages = read(LISTING.format(4471, 120) + LISTING.format(4472, 150).replace(" LAB 3    RUN LISTING   PAGE 1\n", ""))
-    assert [(one.name, one.loading.steps[0][1], one.times[-1]) for one in pages] == [
-        ("4471", 120.0, 24 * 3600.0),
-        ("4472", 150.0, 24 * 3600.0),
-    ]
+    found = [f"{one.name}: {one.condition}, {one.times[-1] / 3600:g} h" for one in pages]
+    assert found == ["4471: 550 °C, 120 MPa, 24 h", "4472: 550 °C, 150 MPa, 24 h"]
 
 
 def test_one_answer_for_all_files_of_a_folder(tmp_path):
@@ -110,10 +102,7 @@ def test_a_preload_and_a_ramp_are_no_creep(read, frames_of_ramp):
 def test_tubes_of_several_diameters(read):
     """What their growth holds of the elastic part cannot be chosen, which is said."""
     tests = read(TUBES)
-    assert [(one.name, one.geometry["outer_diameter"], one.geometry["thickness"]) for one in tests] == [
-        ("T1", 9.5, 0.5),
-        ("T2", 11.2, 0.5),
-    ]
+    assert [(one.name, one.geometry["outer_diameter"]) for one in tests] == [("T1", 9.5), ("T2", 11.2)]
     assert "that of a tube always includes it" in tests[0].labels["assumed"]
     with pytest.raises(HistoryError, match='specimen = "tube" \\(or specimen = "open-tube"\\)'):
         read(TUBES.replace("# specimen: tube\n", ""))
