@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30061
+TESTS = 30060
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -24,12 +24,10 @@ LISTING = """ LAB 3    RUN LISTING   PAGE 1
  *** END OF TEST - UNLOADED
 """
 TUBES = (
-    "# specimen: tube\n# includes_elastic: no\nSpecimen,OD (mm),Wall thickness (mm),Pressure (MPa),T (C),Time (h),{}\n"
-)
-TUBES = TUBES.format("diameter_growth_mm") + "".join(
-    f"{name},{diameter},0.5,10,400,{time},{growth}\n"
-    for name, diameter in (("T1", 9.5), ("T2", 11.2))
-    for time, growth in ((0, 0.0), (10, 0.01), (100, 0.03))
+    "# specimen: tube\n# includes_elastic: no\n"
+    "Specimen,OD (mm),Wall thickness (mm),Pressure (MPa),T (C),Time (h),diameter_growth_mm\n"
+    + "".join(f"T1,9.5,0.5,10,400,{time},{time / 1e4}\n" for time in (0, 10, 100))
+    + "".join(f"T2,11.2,0.5,10,400,{time},{time / 1e4}\n" for time in (0, 10, 100))
 )
 
 
