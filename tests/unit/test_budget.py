@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1412,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 11473,
+    "inverse": 11468,
     "jobs": 251,
     "kernels": 1703,
     "language": 1506,
@@ -37,7 +37,7 @@ BUDGET = {
     "modules": 781,
     "quality": 1477,
     "readers": 5610,
-    "records": 1979,
+    "records": 1998,
     "registry": 615,
     "reports": 6354,
     "rupture_assessment": 1869,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30053
+TESTS = 30104
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
