@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1412,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 11473,
+    "inverse": 11468,
     "jobs": 251,
     "kernels": 1703,
     "language": 1506,
