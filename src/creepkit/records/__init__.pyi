@@ -7,7 +7,6 @@ from .camera_frames import SurfaceObservation as SurfaceObservation
 from .camera_frames import SurfacePoints as SurfacePoints
 from .camera_frames import SurfaceRegion as SurfaceRegion
 from .clock_alignment import ClockAlignment as ClockAlignment
-from .history import CUT_LABEL as CUT_LABEL
 from .history import EVERY_FRAME as EVERY_FRAME
 from .history import UNKNOWN_DURATION as UNKNOWN_DURATION
 from .history import History as History
