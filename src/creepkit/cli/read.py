@@ -51,7 +51,7 @@ def command(
     """
     import creepkit as ck
     from creepkit.quality import remark_flags
-    from creepkit.readers.questions import single_errors
+    from creepkit.readers.questions import merged
     from creepkit.readers.reading import summarise_tables
     from creepkit.reports import histories as report
 
@@ -97,7 +97,7 @@ def command(
     if plot is not None:
         report.histories_figure(found, plot)
         tell_written(plot, err=as_json)
-    for error in (one for several in unread for one in single_errors(several)):
+    for error in merged(unread):
         tell(f"not read: {error}", err=True)
     if unread:
         raise typer.Exit(1)
@@ -133,8 +133,7 @@ def _readable_tests(
 def _write(histories: list[History], folder: Path) -> list[Path]:
     """Write each history; what cannot stand in the name of a file becomes a line."""
     import creepkit as ck
-    from creepkit.files.file_names import file_stem
-    from creepkit.files.writing import check_folder_target, made_from
+    from creepkit.files.writing import check_folder_target, file_stem, made_from
     from creepkit.readers.history_csv import history_text
     from creepkit.reports.figures import make_folder
 
