@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1412,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 11468,
+    "inverse": 11181,
     "jobs": 251,
     "kernels": 1703,
     "language": 1494,
