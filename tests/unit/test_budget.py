@@ -15,9 +15,9 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 322,
-    "app": 617,
+    "app": 612,
     "cameras": 931,
-    "cli": 2364,
+    "cli": 2351,
     "core": 67,
     "dataset": 765,
     "discovery": 1442,
@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1412,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 11489,
+    "inverse": 11473,
     "jobs": 251,
     "kernels": 1703,
     "language": 1506,
@@ -39,9 +39,9 @@ BUDGET = {
     "readers": 5610,
     "records": 1979,
     "registry": 615,
-    "reports": 7256,
+    "reports": 6354,
     "rupture_assessment": 1869,
-    "sampling": 1042,
+    "sampling": 1037,
     "screening": 683,
     "specimens": 3592,
     "studies": 3056,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30061
+TESTS = 30053
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

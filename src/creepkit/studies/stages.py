@@ -231,7 +231,7 @@ def _best_candidate(study: StageInputs, ranking: Ranking, group: TestGroup) -> t
 
 def _confirmation_stage(study: StageInputs, group: TestGroup) -> Stage:
     """The best law of a group, simulated by the specimen itself for each of its tests."""
-    from creepkit.reports.confirmation_text import confirmation_to_json
+    from creepkit.reports.inference import confirmation_to_json
 
     need = stage_name("identification", group.name)
 

@@ -18,6 +18,7 @@ from creepkit.exporters.javascript import script_safe_json
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.laws.norton import NORTON
+from creepkit.records import is_logarithmic
 from helpers.planted_bars import SPL, bars
 
 
@@ -70,7 +71,9 @@ def test_specimens_are_described_by_their_records():
             continue
         one = shown[name]
         assert [o["name"] for o in one["outputs"]] == list(specimen.outputs)
-        assert [(o["title"], o["unit"]) for o in one["outputs"]] == [(o.long_name, o.unit) for o in specimen.outputs]
+        assert [(o["title"], o["unit"]) for o in one["outputs"]] == [
+            (o.long_name, "%" if is_logarithmic(o) else o.unit) for o in specimen.outputs
+        ]
         assert [(load["title"], load["unit"]) for load in one["loads"]] == [
             (load.long_name, load.unit) for load in specimen.loads
         ]
@@ -164,7 +167,6 @@ def test_a_law_alone_has_the_middle_of_its_bounds_and_no_intervals():
     assert (A["name"], A["unit"], A["scale"], A["low"], A["high"]) == ("A", "1/s", "log", 1e-40, 1e-5)
     assert (n["unit"], n["scale"], n["value"], n["title"]) == ("", "linear", 4.5, "stress exponent")
     assert [p["interval"] for p in data["parameters"]] == [None, None]
-    assert data["directions"] == []
     assert data["variables"] == ["stress"]
 
 
@@ -180,10 +182,7 @@ def planted_fit():
     return ck.identify(NORTON, tests, using="uniaxial")
 
 
-def test_a_fit_brings_its_values_intervals_and_likely_directions():
-    """The steps along the directions make the covariance of (ln A, n), and the longest is where they trade off."""
-    from creepkit.inverse.uncertainty.correlation import correlation
-
+def test_a_fit_brings_its_values_and_intervals():
     fit = planted_fit()
     data = law_data(fit)
     rows = {p["name"]: p for p in data["parameters"]}
@@ -194,12 +193,6 @@ def test_a_fit_brings_its_values_intervals_and_likely_directions():
         assert row["verdict"] in (
             *("determined", "poorly determined", "at its bound", "bounded on one side only", "not determined"),
         )
-    steps = np.array([[step[name] for name in fit.law.names] for step in data["directions"]])
-    known = correlation(fit)
-    np.testing.assert_allclose(steps.T @ steps, known.matrix * np.outer(known.sd, known.sd), rtol=1e-6)
-    lengths = np.linalg.norm(steps / known.sd, axis=1)
-    assert (np.diff(lengths) <= 0).all()
-    assert steps[0, 0] * steps[0, 1] < 0  # a larger exponent goes with a smaller coefficient
 
 
 class Elements(HTMLParser):

@@ -262,13 +262,10 @@ def test_a_few_tests_have_curves_and_rates_with_units(few, tmp_path):
     assert (tmp_path / "fit.png").stat().st_size > 10_000
 
 
-def test_84_tests_have_a_panel_for_each_temperature_and_fit_on_a_page(many):
+def test_84_tests_have_a_colour_scale_and_fit_on_a_page(many):
     figure = many.plot()
-    titles = [axes.get_title() for axes in figure.axes]
-    for celsius in (750, 780, 810, 840, 870, 900):
-        assert f"{celsius} °C, 40 to 200 MPa, 14 tests" in titles
     assert not figure.legends
-    assert any(axes.get_ylabel() == "stress, MPa" for axes in figure.axes)  # the colour bar
+    assert any(axes.get_ylabel() == "temperature, °C" for axes in figure.axes)  # the colour bar
     assert RESOLUTION * max(figure.get_size_inches()) < LARGEST_PIXELS
     dots = [line for axes in figure.axes for line in axes.lines if line.get_marker() == "."]
     assert len(dots) == 84
