@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30052
+TESTS = 29952
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
