@@ -37,7 +37,7 @@ BUDGET = {
     "modules": 781,
     "quality": 1470,
     "readers": 5574,
-    "records": 1977,
+    "records": 1996,
     "registry": 615,
     "reports": 6354,
     "rupture_assessment": 1804,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30052
+TESTS = 29951
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -15,8 +15,6 @@ from creepkit.inverse.uncertainty.correlation import Correlation
 from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
 from creepkit.laws.norton import NORTON
 from creepkit.presentation import function_named
-from creepkit.records import constant_stress
-from creepkit.specimens.run import Run
 from helpers import source_tree
 from helpers.log_rate_predictor import known_scatter, measured
 from helpers.source_tree import public_classes
@@ -53,14 +51,6 @@ def test_a_method_declares_what_the_function_that_it_names_returns() -> None:
 def test_every_class_that_prints_so_has_a_text() -> None:
     for name, module in public_classes(base="Presentable"):
         assert getattr(import_module(module), name)._text, name
-
-
-def test_a_derived_class_uses_the_entries_of_its_base() -> None:
-    class Longer(Run):
-        """A run of a specimen of another package."""
-
-    run = Longer("bar", np.array([0.0, 1.0]), {"strain": np.array([0.0, 0.01])}, constant_stress(50.0), 1000.0)
-    assert str(run) == "bar: complete; 2 frames to 1 s, where strain 0.01"
 
 
 AXIS = np.array([10.0, 100.0])
