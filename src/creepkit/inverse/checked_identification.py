@@ -79,7 +79,7 @@ def identify(
     return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 
-@takes_options(IdentificationSettings, weights="likelihood")
+@takes_options(IdentificationSettings, weights="automatic")
 @checked
 def select(
     laws: Sequence[CreepLaw | str],
@@ -99,11 +99,11 @@ def select(
         richer registered laws are tried where none explains the tests to their noise, at most `further_laws` of them.
     by : the criterion; the result is a set of laws with weights, and a verdict: "decisive" only where one law of those
         asked for explains the tests, has 95 % of the weight, and nothing that the tests allow stands against it.
-    using, through, settings, changes : as for identify(); weights are "likelihood".
+    using, through, settings, changes : as for identify(); weights are "automatic" or "likelihood".
     """
     predictor = resolve_predictors(using, histories)
     settings = (settings or IdentificationSettings()).changed(changes, predictor)
-    if changes.get("weights") not in (None, "likelihood"):
+    if changes.get("weights") not in (None, "automatic", "likelihood"):
         raise FitError(
             f"select() compares laws by their likelihood, found weights={changes['weights']!r}; leave weights out, or "
             "identify each law with them and rank() the results"

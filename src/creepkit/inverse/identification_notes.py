@@ -90,14 +90,12 @@ def data_digest(problem: LeastSquaresProblem) -> str:
     for array in (observations.values, observations.times, observations.present, observations.output_index):
         digest.update(np.ascontiguousarray(array).tobytes())
     names = [h.name for h in problem.histories]
-    weights = settings.weights if isinstance(settings.weights, str) else sorted(settings.weights.items())
     method = (
         names,
         observations.outputs,
         observations.transforms,
         settings.loss,
         settings.test_loss,
-        weights,
         settings.nuisances,
     )
     digest.update(repr(method).encode())

@@ -10,6 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import CreepkitError, FitError
+from creepkit.inverse.adequacy import SHAPE_MISFIT
 from creepkit.inverse.bound_penalties import check_bounds
 from creepkit.inverse.bounds import MOST_WIDENINGS, widened, widened_notes
 from creepkit.inverse.compared_tests import compared_tests, compares_rupture_times
@@ -113,10 +114,29 @@ def identify(
     start : an estimate to begin from instead of a global search.
     """
     how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
+    if settings is not None and settings.weights == "automatic":
+        how["settings"] = replace(settings, weights="likelihood" if settings.loss == "linear" else "noise")
+        return describing(identify(law, histories, using, through=through, **how))
     fit = identify_values(law, histories, using, through=through, **how)
     with single_threaded_blas():
         fit = with_samples(fit, through_for_law(through, law)) if needs_samples(fit) else fit
     return _without_one_test(fit)
+
+
+def describing(fit: Identification) -> Identification:
+    """An identification by likelihood, with values that describe the tests where these contradict the law.
+
+    Where it misses the shape of curves, by more noises than SHAPE_MISFIT, its likelihood is that of the misfit: values
+    are those of frames of equal weight.
+    """
+    contradicted = fit.adequacy is not None and fit.adequacy.rejects
+    if not contradicted or not fit.adequacy.discrepancy_in_noises > SHAPE_MISFIT or fit.predictor is None:
+        return fit
+    start, settings = StartingEstimate.from_identification(fit), replace(fit.settings, weights="noise")
+    values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
+    kept = {name: fit.provenance[name] for name in fit.provenance if name not in values.provenance}
+    notes = dict.fromkeys((*values.notes, *(note for note in fit.notes if "were not used" in note)))
+    return replace(values, notes=tuple(notes), provenance={**values.provenance, **kept})
 
 
 def _without_one_test(fit: Identification) -> Identification:

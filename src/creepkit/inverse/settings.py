@@ -19,7 +19,7 @@ from creepkit.limits import SEED, SOBOL_POINTS, STARTS, Limits
 from creepkit.options import Options, option
 from creepkit.records import Nuisance, Predictor, dimension_named
 
-Weighting = Literal["noise", "likelihood", "equal", "paper"]
+Weighting = Literal["automatic", "noise", "likelihood", "equal", "paper"]
 
 
 OutputWeights = Weighting | Mapping[str, float]
@@ -58,9 +58,10 @@ class IdentificationSettings(Options, title="settings of an identification", err
         both estimated.
     weights : of the values; noise, intervals and ranking are by one likelihood, with white noise and autocorrelation of
         every output (see inverse.variance_components). "likelihood": the values too, under the usual errors. "noise":
-        least squares of frames of equal weight, which describe tests best where no law explains them; select() and
-        screen() compare laws by "likelihood". {output: weight}: the sum of weight times relative squared error (see
-        inverse.goodness_of_fit); "equal" weights are Eq. (4) of the paper, "paper" its Eq. (S3) for measured
+        least squares of frames of equal weight, which describe tests best where no law explains them. "automatic", as
+        of select() and screen(): by likelihood, by which laws are compared, and where a law misses the shape of curves
+        values by "noise" (see inverse.identify.describing). {output: weight}: the sum of weight times relative squared
+        error (see inverse.goodness_of_fit); "equal" weights are Eq. (4) of the paper, "paper" its Eq. (S3) for measured
         histories, 0.99 on D_amp.
     test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its weight.
     further_laws : that select() tries at most where no candidate explains the tests: sums, and registered laws.

@@ -201,7 +201,7 @@ _log = logging.getLogger("creepkit.screening")
 class ScreeningOptions:
     """How the alloys of a plate are identified.
 
-    settings : of every identification; weights are "likelihood" whatever they say.
+    settings : of every identification; weights are "automatic" whatever they say.
     through : a surrogate in which laws of several terms are searched before the predictor gives values (see
         identify()).
     dense : the law whose misfit without sparsity is compared with the reduced one's (Fig. 7b), None for none.
@@ -263,7 +263,7 @@ def screen(
             laws=_distinct_laws(CANDIDATE_LAWS if laws is None else laws),
             predictor=CompositePredictor(predictors) if isinstance(predictors, dict) else predictors,
             surrogate=options.through,
-            settings=replace(options.settings, weights="likelihood"),
+            settings=replace(options.settings, weights="automatic"),
             dense_law=None if options.dense is None else resolve_law(options.dense),
             penalty=options.penalty,
             confirm=options.confirm,

@@ -18,8 +18,8 @@ def by_likelihood(asked: SearchOptions, changes: Mapping[str, Any]) -> bool:
 
     changes : fields of the settings that are stated.
     """
-    stated = changes.get("weights", "likelihood"), changes.get("loss", "linear")
-    return asked.global_search is None and asked.penalty is None and stated == ("likelihood", "linear")
+    linear, weights = changes.get("loss", "linear") == "linear", changes.get("weights", "automatic")
+    return asked.global_search is None and asked.penalty is None and linear and weights in ("automatic", "likelihood")
 
 
 def ranked_candidates(

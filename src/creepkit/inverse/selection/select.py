@@ -18,7 +18,7 @@ from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import identify, identify_values
+from creepkit.inverse.identify import describing, identify, identify_values
 from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
@@ -58,14 +58,15 @@ def select(
     by: Criterion = "bic",
     progress: IterationCallback | None = None,
 ) -> Ranking:
-    """Identify every candidate from the same histories by likelihood, and rank them.
+    """Identify every candidate from the same histories by likelihood, and rank them; see identify.describing.
 
     sums : also sums of two candidates: True, False, or None for sums of the best law where it does not explain the
         tests to their noise, and then richer registered laws, at most settings.further_laws of both together.
     by : "bic", "aicc", or "hold-out" (the last 30 % of each history predicted from a refit to the first 70 %).
     A law that cannot be identified is named in `failed`; FitError if none can.
     """
-    settings = replace(settings or IdentificationSettings(), weights="likelihood")
+    asked = settings or IdentificationSettings()
+    settings = replace(asked, weights="likelihood")
     if by not in CRITERIA:
         raise FitError(f"select(by={by!r}) is not known; allowed are {', '.join(CRITERIA)}")
     if not candidates:
@@ -88,8 +89,14 @@ def select(
         noise_model = fits[under_common_covariance(fits).reference_law].noise_model
         scores = [cross_validate(fit, by="time").predictive_deviance(noise_model) for fit in fits]
         ranking = ranking_from_scores(fits, np.array(scores), by, independent_frames=float("nan"), failed=failed)
-        return replace(challenged(ranking), further=tried_further)
-    return replace(rank(fits, by, failed), further=tried_further)
+        ranking = challenged(ranking)
+    else:
+        ranking = rank(fits, by, failed)
+    if asked.weights != "likelihood":
+        shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
+        laws = tuple(replace(one, fit=describing(one.fit)) if id(one) in shown else one for one in ranking.laws)
+        ranking = replace(ranking, laws=laws)
+    return replace(ranking, further=tried_further)
 
 
 def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLaw]:
