@@ -204,9 +204,14 @@ def _entry_addresses(law: CompiledLaw) -> tuple[int, int]:
 
 
 def _empty_record(rows: int, *shape: int) -> Floats:
-    """Zeros (rows, ...) for the core to write; SolveError, with the memory needed, where there is not enough."""
+    """Room (rows, ...) for the core to write; SolveError, with the memory needed, where there is not enough.
+
+    The core writes all of a row; of the first, where nothing has happened yet, some arrays stay zeros.
+    """
     try:
-        return np.zeros((rows, *shape))
+        record = np.empty((rows, *shape))
+        record[0] = 0.0
+        return record
     except MemoryError:
         size = 8 * rows * math.prod(shape) / 2**30
         raise SolveError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -158,7 +159,7 @@ class BulgeSettings(FiniteElementSettings):
         """Outputs of each frame from points of the top about the centre; see `camera_points`."""
         return observe_surface(points, operator)
 
-    @property
+    @cached_property
     def dimensions(self) -> tuple[Dimension, ...]:
         """The lengths of the dimple, unless its mesh is from elsewhere, and the window within which it is observed."""
         lengths = tuple(
