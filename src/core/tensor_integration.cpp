@@ -237,19 +237,3 @@ CREEPKIT_API int64_t creepkit_integrate_tensor_point(TensorIntegration* call) {
     TensorIntegrator(memory, *call).run();
     return 0;
 }
-
-// Single stages for Python: the vector, (7 + S,), the stress, (6,), and its tangent, (6, 6), that follow from a strain,
-// (6,), at the end of a stage with a weight in s from the vector `base`. 1; 0 without a solution, -1 without memory.
-CREEPKIT_API int64_t creepkit_tensor_response(const TensorIntegration* material, const double* strain,
-                                              const double* base, double time, double temperature, double weight,
-                                              double* vector, double* stress, double* tangent) {
-    if (material->states < 0 || material->states > MAX_STATES) return 0;
-    Workspace memory;
-    TensorPoint(memory, material->update, material->theta, material->states, material->modulus, material->ratio);
-    if (!memory.allocate()) return -1;
-    TensorPoint point(memory, material->update, material->theta, material->states, material->modulus,
-                      material->ratio);
-    point.row[TIME] = time;
-    point.row[TEMPERATURE] = temperature;
-    return point.constitutive_response(strain, base, base, weight, vector, stress, tangent);
-}

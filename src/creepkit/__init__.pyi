@@ -15,8 +15,8 @@ from .dataset.storage import read_dataset as read_dataset
 from .dataset.storage import write_dataset as write_dataset
 from .discovery.discover import discover as discover
 from .discovery.discover import group_by_temperature as group_by_temperature
+from .discovery.discover import moduli as moduli
 from .discovery.discover import temperature_study as temperature_study
-from .discovery.elastic_moduli import moduli as moduli
 from .experiments.design import design as design
 from .experiments.rig import Rig as Rig
 from .exporters.exporting import export as export
@@ -107,7 +107,7 @@ from .registry.reading import read_record as read_record
 from .reports.report import report as report
 from .rupture_assessment.assess import rupture as rupture
 from .rupture_assessment.assessment import RuptureSettings as RuptureSettings
-from .rupture_assessment.assessment_document import load_rupture_assessment as load_rupture_assessment
+from .rupture_assessment.assessment import load_rupture_assessment as load_rupture_assessment
 from .sampling.conditions import TimeGrid as TimeGrid
 from .screening.screen import ScreeningOptions as ScreeningOptions
 from .screening.screen import screen as screen

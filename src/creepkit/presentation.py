@@ -1,6 +1,6 @@
 """How records print, plot and save themselves although the modules that do so import the records.
 
-A method of a record says `return present("reports.search:search_figure", self, path)`: the module of that name, above
+A method of a record says `return present("reports.design:design_figure", self, path)`: the module of that name, above
 the record's, is imported when the method is first called. So records import nothing above them, and `fit.plot()`,
 `print(fit)` and `fit.profile("n")` work.
 """

@@ -9,8 +9,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.jobs.worker_pools import ParallelExecution
-from creepkit.records import Nuisance
-from creepkit.surrogates.parameter_gru import Training
 from helpers.cantilever import Cantilever
 from helpers.command_line import creepkit
 
@@ -48,27 +46,6 @@ def test_samples_of_a_cantilever_are_its_closed_form(beams):
         expected = beam_deflection(beams.values_of(row), beams.conditions_of(row), beams.times(row))
         np.testing.assert_allclose(beams.values[row, :, 0], expected, rtol=2e-6)
     assert set(str(beams).split()) >= {"force_1", "N", "height", "mm", "deflection"}
-
-
-@pytest.mark.nightly
-def test_a_network_of_the_cantilever_identifies_a_planted_law(beams):
-    training = Training(epochs=60, batch=32, rate=1e-2, schedule="cosine", clip=1.0)
-    recipe = ck.ParameterGru(16, 1, base="reference-stress", inputs=("load", "mean_load"), training=training)
-    model = ck.train(beams, recipe, seed=1)
-    assert model.nuisances == ("height",)
-    assert model.metadata.metrics["loss"] < 3e-3
-    truth, noise = {"A": 3e-16, "n": 4.2}, np.random.default_rng(0)
-    tests = []
-    for k, (first, second) in enumerate(((8.0, 11.0), (10.0, 14.0))):
-        loading = ck.load_steps("force", [(0, first), (6 * HOUR, second)])
-        run = ck.simulate(NORTON, BEAM, truth, loading=loading, times=np.arange(1, 11) * 1.2 * HOUR, name=f"beam {k}")
-        noisy = run.outputs["deflection"] + 0.002 * noise.normal(size=run.times.size)
-        tests.append(run.replace(outputs={"deflection": noisy}, used=run.used))
-    fit = ck.identify(NORTON, tests, model, starts=2, nuisances=[Nuisance("height", sd=0.002)])
-    found = {e.name: e.value for e in fit.estimates}
-    assert found["n"] == pytest.approx(truth["n"], abs=0.15)
-    stress = 60.0
-    assert found["A"] * stress ** found["n"] == pytest.approx(truth["A"] * stress ** truth["n"], rel=0.1)
 
 
 def test_samples_of_a_bar_in_relaxation_are_its_closed_form(tmp_path):

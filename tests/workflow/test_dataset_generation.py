@@ -2,12 +2,14 @@
 
 import os
 import re
+import resource
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -152,18 +154,6 @@ def test_a_generation_that_is_killed_goes_on_where_it_was(whole, tmp_path, worke
     assert left_behind(tmp_path) == ["generating.lock"]
 
 
-@pytest.mark.nightly
-def test_ctrl_c_ends_the_workers(tmp_path):
-    to = tmp_path / "a.h5"
-    first = started(to, seconds=0.1, workers=1)
-    wait_for(lambda: len(children(first.pid)) == 1 and to.with_name("a.h5.parts").exists())
-    workers = children(first.pid)
-    time.sleep(0.5)
-    first.send_signal(signal.SIGINT)
-    assert "KeyboardInterrupt" in first.communicate()[1]
-    assert not any(Path(f"/proc/{pid}").exists() for pid in workers)
-
-
 def test_two_generations_in_one_folder_do_not_do_the_work_twice(whole, tmp_path):
     to, parts = tmp_path / "a.h5", tmp_path / "a.h5.parts"
     parts.mkdir()
@@ -184,3 +174,68 @@ def test_a_dask_cluster_makes_the_same_data_set(whole, tmp_path):
         data = run(tmp_path / "a.h5", cluster=cluster.scheduler_address, workers=None)
     assert_same(data, whole)
     assert len(shards_of(tmp_path / "a.h5")) >= len(whole) // ROWS
+
+
+# ---- dataset generation files ----------------------------------------------------------------------------------------
+
+# Generations that meet damaged files, a full disk, or a wish that cannot be met: nothing is lost, and it is said.
+
+
+# ---- files that are in the way -------------------------------------------------------------------------------------
+
+
+def test_a_damaged_shard_is_made_again(whole, tmp_path, caplog):
+    to = tmp_path / "a.h5"
+    run_here(to, part=(1, 1))
+    path = shards_of(to)[1]
+    held = path.read_bytes()
+    with h5py.File(path) as file:
+        chunk = file["hold_outputs"].id.get_chunk_info(0)
+    place = chunk.byte_offset + chunk.size // 2
+    flipped = held[:place] + bytes([held[place] ^ 0xFF]) + held[place + 1 :]
+    for damaged in (held[: len(held) // 2], flipped, b"", b"no"):
+        path.write_bytes(damaged)
+        to.unlink(missing_ok=True)
+        caplog.clear()
+        assert_same(run_here(to), whole)
+        assert re.search(r"00001\.h5: .*; it is simulated again", caplog.text)
+
+
+def test_a_shard_of_another_data_set_is_not_counted(whole, tmp_path, caplog):
+    other = tmp_path / "other.h5"
+    run_here(other, seed=1, part=(1, 1))
+    (tmp_path / "a.h5.parts").mkdir()
+    (tmp_path / "a.h5.parts" / "00000.h5").write_bytes(shards_of(other)[0].read_bytes())
+    assert_same(run_here(tmp_path / "a.h5"), whole)
+    assert "a shard of another data set; it is simulated again" in caplog.text
+
+
+@pytest.mark.nightly
+def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
+    """A limit on the size of files stands for the room on the disk: the answer is EFBIG in the place of ENOSPC."""
+    to, other = tmp_path / "a.h5", tmp_path / "other.h5"
+    expected = run_here(other, samples=300)
+    shard, merged = max(path.stat().st_size for path in shards_of(other)), other.stat().st_size
+    assert merged > 1.6 * shard
+
+    def complaint(room):
+        _, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, most))
+        try:
+            with pytest.raises(DatasetError) as caught:
+                run_here(to, samples=300)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+        return str(caught.value)
+
+    assert re.search(r"0000\d\.h5: cannot be written: File too large; free some space", complaint(shard // 2))
+    assert shards_of(to) == []
+    assert re.search(r"a\.h5: cannot be written: File too large; free some space", complaint(3 * shard // 2))
+    made = {path: path.stat().st_mtime_ns for path in shards_of(to)}
+    assert len(made) * ROWS >= len(expected)
+    assert left_behind(tmp_path / "a.h5.parts") == ["generating.lock"]
+    assert_same(run_here(to, samples=300), expected)
+    assert made == {path: path.stat().st_mtime_ns for path in shards_of(to)}
+
+
+# ---- what cannot be asked for --------------------------------------------------------------------------------------

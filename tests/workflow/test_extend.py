@@ -125,15 +125,6 @@ def test_the_cantilever_is_used_by_name() -> None:
     assert space["fit"].values["A"] == pytest.approx(1e-16, rel=1e-2)
 
 
-def test_a_bar_by_a_formula_is_the_bar_that_ships() -> None:
-    given = dict(loading=ck.constant_stress(90.0, "stress"), times=np.geomspace(1e3, 1e5, 9))
-    values = {"A": 1e-16, "n": 4.5}
-    found = ck.simulate("norton", contributed("specimen")[0], values, **given)
-    np.testing.assert_allclose(
-        found.outputs["strain"], ck.simulate("norton", "uniaxial", values, **given).outputs["strain"], rtol=1e-6
-    )
-
-
 def test_three_specimens_are_identified_together() -> None:
     """Planted values lie in every interval, and the tests of others find the dimensions of a test piece."""
     Path("cantilever.py").write_text(examples("specimen")[-1])
@@ -219,11 +210,10 @@ def test_exporters_write_what_is_shown() -> None:
     assert table.text(source).splitlines() == ["# a note", "name,value,unit", "A,1e-16,1/s", "n,5.0,1"]
 
 
-NORTON = ("norton", {"A": 1e-16, "n": 5.0}, 1e-16 * 90.0**5)
 HARDENING = ("strain-hardening", {"A": 1e-16, "n": 4.4, "m": -0.35}, 1e-16 * 90.0**4.4 * 0.003**-0.35)
 
 
-@pytest.mark.parametrize(("name", "values", "rate"), [NORTON, HARDENING])
+@pytest.mark.parametrize(("name", "values", "rate"), [HARDENING])
 def test_the_function_of_octave_is_the_law(name: str, values: dict, rate: float) -> None:
     """Its lines are Python's but for the signs of operators, which stand for those of arrays."""
     text = contributed("exporter")[-1].text(LawWithValues(ck.law(name), values, notes=("a note",)))

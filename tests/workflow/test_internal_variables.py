@@ -76,23 +76,3 @@ def _refusal(law, target, values):
     except ck.errors.ExportError as error:
         return str(error)
     return "" if "hard" in text else "the internal variable is lost"
-
-
-def test_a_dimple_screens_candidates_that_rupture_at_once():
-    """Draws over the bounds burst anywhere; each ends as complete, burst or lost, without a warning on the way."""
-    law, dimple = ck.law("liu-murakami").fix(alpha=0.5), ck.specimen("bulge")
-    plan = ck.History(
-        name="plan", times=np.arange(600, 43200, 1200.0), outputs={}, temperature=1073.0, specimen="bulge",
-        loading=ck.PressureJump(P1=8, P2=8, Tj=7200), elastic=ck.Elastic(E=150e3),
-    )  # fmt: skip
-    draws = np.random.default_rng(0).uniform(size=(len(law.params), 256))
-    values = {}
-    for (name, param), share in zip(law.table.items(), draws, strict=True):
-        low, high = (param.to_internal(end) for end in param.bounds)
-        values[name] = np.array([param.from_internal(low + s * (high - low)) for s in share])
-    found = dimple.reduced_order_model().predict(law, law.to_internal(values), [plan])
-    counts = np.bincount(found.status[:, 0], minlength=3)
-    assert counts.sum() == 256
-    assert (counts[:2] > 20).all()
-    complete = found.status[:, 0] == 0
-    assert np.isfinite(found.values[complete]).all()

@@ -50,11 +50,12 @@ def norton_strain(n, stress, time):
 
 
 def shown_end(page):
-    """What the first panel says to those who cannot see it."""
+    """What the first panel says to those who cannot see it; a strain as a ratio."""
     text = page.locator(".panel svg").first.get_attribute("aria-label").rpartition(" ends at ")[2].rstrip(".")
-    head, _, power = text.partition("\u00b710")
+    number, _, unit = text.partition(" ")
+    head, _, power = number.partition("\u00b710")
     digits = str.maketrans("\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079", "-0123456789")
-    return float(head) * 10.0 ** int(power.translate(digits) or 0)
+    return (0.01 if unit == "%" else 1.0) * float(head) * 10.0 ** int(power.translate(digits) or 0)
 
 
 def settings_of_a_law(tab):

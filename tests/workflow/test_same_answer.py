@@ -55,30 +55,6 @@ def dimples(folder):
         ck.write_history(test, folder / f"{test.name}.csv")
 
 
-@pytest.fixture(scope="module", params=[curves, dimples])
-def tests_folder(request, tmp_path_factory):
-    """The folder of a kind of tests, and what predicts them: None, or the name of a surrogate."""
-    folder = tmp_path_factory.mktemp(request.param.__name__)
-    request.param(folder)
-    return folder, "dimple" if request.param is dimples else None
-
-
-@pytest.fixture(scope="module")
-def bars_folder(tmp_path_factory):
-    """Bars alone, for options that go the same way whatever the tests are."""
-    folder = tmp_path_factory.mktemp("bars")
-    curves(folder)
-    return folder, None
-
-
-def predictor(name):
-    return None if name is None else ck.surrogate(name)
-
-
-def surrogate_words(name):
-    return () if name is None else ("--surrogate", name)
-
-
 def isothermal(folder):
     """The tests at the lowest temperature, the spoilt one among them."""
     return ck.select_tests(ck.read_histories(folder), temperature=TEMPERATURES[0])
@@ -97,89 +73,63 @@ NUISANCES = [Nuisance("offset"), Nuisance("rate", sd=0.2)]
 ONE_TEMPERATURE = ("--only", "temperature=1023")
 
 
-@pytest.mark.parametrize(
-    ("words", "options", "excluded"),
-    [
-        ((), {}, True),
-        (
-            ("--seed", "3", "--frames", "12", "--starts", "2", "--suspect-frames", "keep", "--nuisance", "rate=0:0.2"),
-            {"seed": 3, "frames": 12, "starts": 2, "suspect_frames": "keep", "nuisances": NUISANCES},
-            False,
-        ),
-    ],
-)
-def test_identify(tests_folder, tmp_path, words, options, excluded):
-    folder, surrogate = tests_folder
-    fit = ck.identify("norton", isothermal(folder), predictor(surrogate), **options)
-    command(
-        "identify", folder, "--law", "norton", "--to", tmp_path, *ONE_TEMPERATURE, *surrogate_words(surrogate), *words
-    )
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bars")
+    curves(folder)
+    return folder
+
+
+@pytest.mark.parametrize("case", ["bars", "bars with other options", "dimples"])
+def test_identify(folder, tmp_path, case):
+    words, options, using = (), {}, None
+    if case == "bars with other options":
+        words = ("--seed", 3, "--frames", 12, "--starts", 2, "--suspect-frames", "keep", "--nuisance", "rate=0:0.2")
+        options = {"seed": 3, "frames": 12, "starts": 2, "suspect_frames": "keep", "nuisances": NUISANCES}
+    elif case == "dimples":
+        folder, words, using = tmp_path / "dimples", ("--surrogate", "dimple"), ck.surrogate("dimple")
+        folder.mkdir()
+        dimples(folder)
+    fit = ck.identify("norton", isothermal(folder), using, **options)
+    command("identify", folder, "--law", "norton", "--to", tmp_path, *ONE_TEMPERATURE, *words)
     assert same(ck.load(tmp_path / "norton.json"), fit)
-    assert any("suspect frames were left out: 1 of" in note for note in fit.notes) == excluded
+    assert any("suspect frames were left out: 1 of" in note for note in fit.notes) == (not options)
 
 
-def test_select(tests_folder, tmp_path):
-    selected(tests_folder, tmp_path, (), {})
-
-
-def test_select_with_other_options(bars_folder, tmp_path):
-    selected(bars_folder, tmp_path, ("--no-sums", "--seed", "2"), {"sums": False, "seed": 2})
-
-
-def selected(tests_folder, tmp_path, words, options):
-    """Compare a selection by Python with one by these words."""
-    folder, surrogate = tests_folder
+def test_select(folder, tmp_path):
     tests, laws = ck.read_histories(folder), ("norton", "strain-hardening")
     candidates = [ck.with_arrhenius(ck.law(name), tests) for name in laws]
-    ranking = ck.select(candidates, tests, predictor(surrogate), **QUICK, **options)
+    ranking = ck.select(candidates, tests, **QUICK, sums=False, seed=2)
     named = [word for name in laws for word in ("--law", name)]
-    result = command(
-        "identify", folder, *named, "--to", tmp_path, "--json", *surrogate_words(surrogate), *QUICK_WORDS, *words
-    )
-    answer = json.loads(result.stdout)
+    words = ("--to", tmp_path, "--json", *QUICK_WORDS, "--no-sums", "--seed", "2")
+    answer = json.loads(command("identify", folder, *named, *words).stdout)
     assert answer["verdict"] == ranking.verdict
     assert [law["weight"] for law in answer["laws"]] == [ranked.weight for ranked in ranking.laws]
     for ranked in ranking.laws:
         assert same(ck.load(tmp_path / f"{ranked.fit.law.name.replace('*', '-')}.json"), ranked.fit)
 
 
-def test_screen(tests_folder, tmp_path):
-    folder, surrogate = tests_folder
+def test_screen(folder, tmp_path):
     settings = ck.IdentificationSettings(starts=1, sobol_points=64, frames=14)
     options = ck.ScreeningOptions(settings=settings, dense=None, confirm=False)
     tests = [test.replace(alloy="A") for test in ck.read_histories(folder)]
     (tmp_path / "tests").mkdir()
     for test in tests:
         ck.write_history(test, tmp_path / "tests" / f"{test.name}.csv")
-    plate = ck.screen(tests, ["norton"], predictor(surrogate), options=options, workers=1)
+    plate = ck.screen(tests, ["norton"], options=options, workers=1)
     words = ("--law", "norton", "--dense", "none", "--no-confirm", "--workers", "1", *QUICK_WORDS)
-    command(
-        "identify", tmp_path / "tests", "--by", "alloy", "--to", tmp_path / "out", *words, *surrogate_words(surrogate)
-    )
+    command("identify", tmp_path / "tests", "--by", "alloy", "--to", tmp_path / "out", *words)
     (result,) = plate.results
     assert same(ck.load(tmp_path / "out" / "fits" / "A.json"), result.best)
     assert any("suspect frames were left out: 1 of" in note for note in result.notes)
 
 
-def test_discover(tests_folder, tmp_path):
-    discovered(tests_folder, tmp_path, (), {})
-
-
-def test_discover_with_other_options(bars_folder, tmp_path):
-    words = ("--seed", "5", "--suspect-frames", "keep")
-    discovered(bars_folder, tmp_path, words, {"seed": 5, "suspect_frames": "keep"})
-
-
-def discovered(tests_folder, tmp_path, words, changes):
-    """Compare a study of temperature by Python with one by these words."""
-    folder, surrogate = tests_folder
-    settings = ck.IdentificationSettings(**QUICK, **changes)
+def test_discover(folder, tmp_path):
+    settings = ck.IdentificationSettings(**QUICK, seed=5, suspect_frames="keep")
     forms = {"A": ["arrhenius"], "n": ["constant", "linear"]}
-    study = ck.temperature_study(
-        "norton", ck.read_histories(folder), predictor(surrogate), settings=settings, forms=forms
-    )
-    form_words = ("--form", "A=arrhenius", "--form", "n=constant,linear")
-    command("discover", folder, "--to", tmp_path, *QUICK_WORDS, *form_words, *surrogate_words(surrogate), *words)
+    study = ck.temperature_study("norton", ck.read_histories(folder), settings=settings, forms=forms)
+    words = ("--form", "A=arrhenius", "--form", "n=constant,linear", "--seed", "5", "--suspect-frames", "keep")
+    command("discover", folder, "--to", tmp_path, *QUICK_WORDS, *words)
     study.temperature_law.save(tmp_path / "python.json")
     documents = [json.loads((tmp_path / name).read_text()) for name in ("temperature.json", "python.json")]
     assert _without_dates(documents[0]) == _without_dates(documents[1])

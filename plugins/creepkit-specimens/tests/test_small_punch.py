@@ -161,7 +161,7 @@ def test_derivatives_are_those_of_differences_in_the_same_steps() -> None:
         compare(theta.size + k, lambda s, key=key: deflections(theta, **{key: nuisances[key] + s}), step)
 
 
-@pytest.mark.parametrize("n", [3.0, 5.0, 8.0])
+@pytest.mark.parametrize("n", [3.0, 8.0])
 def test_its_life_is_that_of_a_bar_at_the_stress_of_the_code_of_practice(n: float) -> None:
     """A bar under a dead force lives 1/(n rate), N. J. Hoff, J. Appl. Mech. 20 (1953) 105, by Norton's law.
 
@@ -186,29 +186,8 @@ def test_the_stated_growth_is_that_of_the_membrane() -> None:
     assert SmallPunch().reference_stress(plan) == pytest.approx([158.3], rel=1e-3)
 
 
-@pytest.mark.parametrize("n", [3.0, 5.0, 8.0])
+@pytest.mark.parametrize("n", [3.0, 8.0])
 def test_it_grows_as_it_says(n: float) -> None:
     """From a strain of 0.01 to one of 0.15 at the reference stress, to two fifths; 1.38 times as much with n = 3."""
     first, last = crept(SmallPunch(), n, 300.0, [1e4, 1.5e5]).outputs["deflection"]
     assert (last - first) / (0.14 / 0.3351) == pytest.approx(1.0, abs=0.4)
-
-
-def test_planted_values_are_found_again_with_the_thickness() -> None:
-    """From data of a finer mesh and smaller steps, within three standard deviations and 1 % for the mesh's error."""
-    planted, random, disc = {"A": 3e-17, "n": 4.6}, np.random.default_rng(77), SmallPunch()
-    tests, thicknesses = [], (0.505, 0.495)
-    for k, force in enumerate((240.0, 380.0)):
-        piece = disc.refined().replace(thickness=thicknesses[k])
-        run = ck.simulate(
-            "norton", piece, planted, loading=ck.constant_load("force", force), elastic=E, temperature=1000.0,
-            times=np.geomspace(300.0, 1e5, 15),
-        )  # fmt: skip
-        noisy = run.outputs["deflection"] + random.normal(0.0, 2e-3, run.times.size)
-        geometry = {name: value for name, value in run.geometry.items() if name != "thickness"}
-        tests.append(run.replace(name=f"disc {k}", outputs={"deflection": noisy}, geometry=geometry))
-    fit = ck.identify("norton", tests, disc, nuisances=[ck.Nuisance("thickness", sd=0.01)], starts=1)
-    for estimate in fit.estimates:
-        half = 0.5 * (np.log(estimate.high) - np.log(estimate.low))
-        assert abs(np.log(estimate.value / planted[estimate.name])) <= 1.5 * half + 0.01, estimate
-    for estimate, known in zip(fit.nuisances, thicknesses, strict=True):
-        assert abs(estimate.value - known) <= 3.0 * estimate.sd + 1e-3

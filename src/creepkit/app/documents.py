@@ -22,12 +22,10 @@ from creepkit.app.contents import (
 )
 from creepkit.app.models import model_of
 from creepkit.errors import CreepkitError
+from creepkit.exporters.documents import expression_mathml, latex_unit, law_equations
 from creepkit.exporters.javascript import law_expression
-from creepkit.exporters.latex import latex_unit
-from creepkit.exporters.mathml import expression_mathml, law_equations
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.minimum_rates import measured_minimum_rate
-from creepkit.inverse.uncertainty.correlation import correlation
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import LatexLawPrinter, latex_equations
 from creepkit.language.symbols import POINT_VARIABLES
@@ -35,8 +33,10 @@ from creepkit.records import (
     History,
     LawWithValues,
     Load,
+    Output,
     Program,
     Specimen,
+    is_logarithmic,
     loads_of,
     outputs_of,
     outputs_of_test,
@@ -111,9 +111,7 @@ def law_data(source: CreepLaw | Identification | LawWithValues) -> dict[str, Any
     """Return a law as a page needs it, in plain JSON values; those of a law alone are the middles of its bounds.
 
     `source` is a JavaScript expression (see `exporters.javascript.law_expression`). `interval` is that of 95 %,
-    `verdict` says whether the tests determine a parameter, and `directions` are those in which parameters are uncertain
-    together, the least certain first: steps of one standard deviation on the scale of each parameter (its logarithm
-    where the scale is log). They are null, or empty, without an identification.
+    `verdict` says whether the tests determine a parameter; both are null without an identification.
     """
     fit = source if isinstance(source, Identification) else None
     law, values = (source, source.center()) if isinstance(source, CreepLaw) else (source.law, dict(source.values))
@@ -123,7 +121,6 @@ def law_data(source: CreepLaw | Identification | LawWithValues) -> dict[str, Any
         "equations": [*law_equations(law)],
         "variables": [symbol.name for symbol in POINT_VARIABLES if law.uses(symbol)],
         "parameters": _parameters(law, values, fit),
-        "directions": [] if fit is None else _directions(fit),
         "source": law_expression(LawWithValues(law, values)),
     }
 
@@ -151,19 +148,6 @@ def _parameters(law: CreepLaw, values: Mapping[str, float], fit: Identification 
     return rows
 
 
-def _directions(fit: Identification) -> list[dict[str, float]]:
-    """One standard deviation along each principal direction of the covariance, the longest first.
-
-    Directions are those of the correlation, so that the units of the parameters do not matter.
-    """
-    found = correlation(fit)
-    if not (np.isfinite(found.matrix).all() and np.isfinite(found.sd).all()):
-        return []
-    lengths, vectors = np.linalg.eigh(found.matrix)
-    steps: Floats = found.sd[:, None] * vectors * np.sqrt(np.maximum(lengths, 0.0))
-    return [dict(zip(fit.law.names, column.tolist(), strict=True)) for column in steps.T[::-1]]
-
-
 def judged_text(fit: Identification) -> str:
     """What the identification found of the misfit, which it takes otherwise than the page does; "" for nothing."""
     sentences = []
@@ -187,7 +171,7 @@ def rate_point(fit: Identification | None) -> dict[str, Any]:
     if fit is None:
         return {"strain": RATE_STRAIN, "time": RATE_TIME, "stress": [0.1 * USUAL_STRESS, 5.0 * USUAL_STRESS]}
     low, high = fit.ranges["stress"]
-    return {"strain": fit.reference.strain, "time": fit.reference.time, "stress": [low / 2.0, high * 2.0]}
+    return {"strain": fit.reference.strain, "time": fit.reference.time, "stress": [low / 1.25, high * 1.25]}
 
 
 def _covariance(fit: Identification) -> list[list[float]] | None:
@@ -218,7 +202,7 @@ def specimen_document(specimen: Specimen) -> dict[str, Any]:
         "name": specimen.name,
         "title": specimen.title,
         "outputs": [
-            {"name": str(output), "title": output.long_name, "unit": output.unit}
+            {"name": str(output), "title": output.long_name, **_shown_unit(output)}
             for output in outputs_of(specimen)
             if output in specimen.outputs
         ],
@@ -226,6 +210,11 @@ def specimen_document(specimen: Specimen) -> dict[str, Any]:
         "modulus": {"needed": "modulus" in conditions, "low": low, "high": high, "value": modulus},
         "runtime": KINDS.get(type(specimen)),
     }
+
+
+def _shown_unit(output: Output) -> dict[str, Any]:
+    """The unit of an output on a page, and how many of it one of creepkit's is."""
+    return {"unit": "%", "factor": 100.0} if is_logarithmic(output) else {"unit": output.unit, "factor": 1.0}
 
 
 def _load_document(specimen: Specimen, load: Load, conditions: Mapping[str, tuple[float, float]]) -> dict[str, Any]:

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from creepkit.cli.command_options import OutputPath
-from creepkit.cli.shared import Json, Seed
+from creepkit.cli.shared import Json, Seed, read_results, show
 from creepkit.experiments.design_task import GoalOptions
 from creepkit.experiments.rig import Rig, changed_rigs, rigs_of
-from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
-
-if TYPE_CHECKING:
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.reports.terminal import ProgressBar, tell
 
 
 def command(
@@ -37,20 +33,12 @@ def command(
 ) -> None:
     """What is not said of the rig is a little more than what it did. Ctrl-C ends the work with the best so far."""
     import creepkit as ck
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.ranking_document import read_fit_or_ranking
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.reports.design import design_to_json
 
     histories = ck.read_histories(tests)
-    found = [read_fit_or_ranking(path) for path in fits]
-    laws = [fit for one in found for fit in ((one,) if isinstance(one, Identification) else one.fits)]
-    identified = [fit.with_histories(histories) for fit in laws]
-    source: Identification | list[Identification] | ModelAverage = identified
-    if len(found) == 1 and not isinstance(found[0], Identification):
-        source = ModelAverage(tuple(identified), found[0].weights)
-    elif len(identified) == 1:
-        source = identified[0]
+    found = [read_results(path, histories) for path in fits]
+    identified: list[Any] = [fit for one in found for fit in getattr(one, "fits", (one,))]
+    source: Any = found[0] if len(found) == 1 else identified
     predictor = identified[0].predictor
     assert predictor is not None
     asked = GoalOptions().changed(goal)
@@ -59,12 +47,6 @@ def command(
             source, rig=changed_rigs(rigs_of(identified[0].histories, predictor), rig), goal=asked.quantity,
             budget=asked.budget, seed=seed, progress=progress.tick,
         )  # fmt: skip
-    if as_json:
-        print_json(design_to_json(result))
-    else:
-        tell(result)
-    if plot is not None and result.tests:
-        result.plot(plot)
-        tell_written(plot, err=as_json)
-    elif plot is not None:
+    show(result, design_to_json, as_json=as_json, plot=plot if result.tests else None)
+    if plot is not None and not result.tests:
         tell(f"there is no test to draw: {plot} is not written", err=True)

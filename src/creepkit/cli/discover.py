@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from creepkit.cli.command_options import OutputPath
-from creepkit.cli.shared import Json, Only, Reader, selected
+from creepkit.cli.shared import Json, Only, Reader, selected, show
 from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.errors import FitError
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.options import Option
 from creepkit.records import Predictor
-from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
+from creepkit.reports.terminal import ProgressBar, tell
 
 if TYPE_CHECKING:
     from creepkit.discovery.temperature_law import TemperatureLaw
@@ -47,6 +48,7 @@ def command(
     folder.
     """
     import creepkit as ck
+    from creepkit.reports.temperature_law import temperature_law_to_json
 
     with ProgressBar() as progress:
         if all(name.endswith(".json") for name in files):
@@ -70,11 +72,4 @@ def command(
     found.plot(written[1])
     for language, path in zip(("latex", "python"), written[2:], strict=True):
         ck.export(found.valued, language, to=path)
-    if as_json:
-        from creepkit.reports.temperature_law import temperature_law_to_json
-
-        print_json(temperature_law_to_json(found, written))
-        return
-    tell(found)
-    for path in written:
-        tell_written(path)
+    show(found, partial(temperature_law_to_json, written=written), as_json=as_json, written=written)

@@ -18,7 +18,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.limits import STRAIN
 from creepkit.options import Option
 from creepkit.records import Predictor
-from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell
+from creepkit.reports.terminal import ProgressBar, print_json, tell
 from creepkit.studies.candidates import by_likelihood, ranked_candidates
 
 if TYPE_CHECKING:
@@ -161,15 +161,14 @@ def _screen(
 def _confirm(fits: list[Identification], histories: list[History], surrogate: Predictor | None, as_json: bool) -> None:
     """Simulate identified laws for each test; surrogate : what they were identified through."""
     import creepkit as ck
-    from creepkit.reports.confirmation_text import CONFIRMATION_COLUMNS, confirmation_rows, confirmation_to_json
+    from creepkit.reports.inference import confirmation_to_json
 
     for fit in fits:
         found = ck.confirm(fit if surrogate is None else replace(fit, predictor=surrogate), histories)
         if as_json:
             print_json(confirmation_to_json(found))
         else:
-            print_table(f"{found.law} by {found.predictor_name}", CONFIRMATION_COLUMNS, confirmation_rows(found))
-            tell(found.verdict)
+            tell(found)
 
 
 def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:

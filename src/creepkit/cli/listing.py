@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from creepkit.cli.shared import Json
 from creepkit.errors import PluginError, nearest
-from creepkit.reports.catalogue import print_law, print_laws, print_plugins, print_specimen, print_specimens
-from creepkit.reports.terminal import print_json, print_table
+from creepkit.reports import catalogue
+from creepkit.reports.terminal import print_json
 
 KINDS = {"laws": "law", "specimens": "specimen", "targets": "", "readers": "", "cameras": "", "plugins": ""}
 
@@ -30,21 +30,21 @@ def command(
     if name is not None and not KINDS[chosen]:
         raise PluginError(f"only a law or a specimen is shown in full; leave '{name}' out")
     if chosen == "plugins":
-        print_plugins(registry.plugins(), registry.conflicts(), as_json)
-    elif chosen == "laws" and name is None:
-        print_laws(registry.laws(), registry.conflicts(), as_json)
-    elif chosen == "laws":
-        law = registry.law(name or "")
-        print_law(law, registry.laws()[law.name], as_json)
-    elif chosen == "specimens" and name is None:
-        print_specimens(registry.specimens(), as_json)
-    elif chosen == "specimens":
-        registry.specimen(name or "")  # which says what is wrong with a name
-        print_specimen(registry.specimens()[name or ""], as_json)
-    else:
-        found = getattr(registry, "exporters" if chosen == "targets" else chosen)()
-        rows = [(key, getattr(entry.value, "title", ""), str(entry.provenance)) for key, entry in found.items()]
+        plugins, conflicts = registry.plugins(), registry.conflicts()
         if as_json:
-            print_json([{"name": key, "title": title, "provenance": source} for key, title, source in rows])
+            print_json({"plugins": [*map(catalogue.plugin_to_json, plugins)], "clashes": conflicts})
         else:
-            print_table("", ("name", "what it is", "from"), rows)
+            catalogue.print_plugins(plugins, conflicts)
+        return
+    found = getattr(registry, "exporters" if chosen == "targets" else chosen)()
+    single = None
+    if name is not None:  # which says what is wrong with it
+        single = found[(registry.law(name) if chosen == "laws" else registry.specimen(name)).name]
+    if as_json:
+        written = {"laws": catalogue.law_to_json, "specimens": catalogue.specimen_to_json}
+        document: Any = written.get(chosen, catalogue.registered_to_json)
+        print_json([*map(document, found.values())] if single is None else document(single))
+    elif single is not None:
+        (catalogue.print_law if chosen == "laws" else catalogue.print_specimen)(single)
+    else:
+        catalogue.print_registered(chosen, found, registry.conflicts() if chosen == "laws" else ())

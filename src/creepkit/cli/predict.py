@@ -11,10 +11,10 @@ from creepkit.api.options import ForecastOptions, PlannedTestOptions
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.planned_test import Command as Command
 from creepkit.cli.planned_test import described_test
-from creepkit.cli.shared import Json, Tests
+from creepkit.cli.shared import Json, Tests, show
 from creepkit.errors import FitError
 from creepkit.options import Option
-from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
+from creepkit.reports.terminal import ProgressBar
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -65,13 +65,7 @@ def command(
         forecast = ck.forecast(
             source, histories, targets=target, tolerances=tolerance or {}, progress=progress.tick, **how
         )  # fmt: skip
-    if plot is not None:
-        forecast.plot(plot)
-        tell_written(plot, err=True)
-    if as_json:
-        print_json(forecast_to_json(forecast))
-    else:
-        tell(forecast)
+    show(forecast, forecast_to_json, as_json=as_json, plot=plot)
 
 
 def _temperature_of(source: Identification | ModelAverage) -> float:

@@ -35,9 +35,7 @@ def command(
         float | None, Option(help="J/mol, to put a factor on the creep rate as a step of temperature.", limits=ENERGY)
     ] = None,
     to: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Each test as CSV, in s, MPa, mm and K; of a data set pictures."),
-        OutputPath("folder"),
+        Path | None, typer.Option(metavar="FOLDER", help="Each test as CSV, in s, MPa, mm and K."), OutputPath("folder")
     ] = None,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the outputs over time."), OutputPath("picture")
@@ -53,13 +51,12 @@ def command(
     """
     import creepkit as ck
     from creepkit.quality import remark_flags
-    from creepkit.readers.questions import single_errors
+    from creepkit.readers.questions import merged
     from creepkit.readers.reading import summarise_tables
     from creepkit.reports import histories as report
-    from creepkit.reports.data_quality import data_quality_to_json
 
     if len(files) == 1 and files[0].suffix.lower() in (".h5", ".hdf5") and reader is None:
-        _describe_data_set(files[0], to, as_json)
+        _describe_data_set(files[0], as_json)
         return
     records = _records(files, reader)
     if records:
@@ -82,7 +79,7 @@ def command(
     remarked = tuple(remark_flags([history for history in found if not history.outputs]))
     quality = replace(quality, flags=(*quality.flags, *remarked), tests=len(found if remarked else framed))
     if as_json:
-        document = {**report.histories_to_json(found, tables), "quality": data_quality_to_json(quality)}
+        document = {**report.histories_to_json(found, tables), "quality": report.data_quality_to_json(quality)}
         print_json({**document, "not read": [str(error) for error in unread]} if unread else document)
     else:
         without = len(found) - len(framed)
@@ -100,13 +97,13 @@ def command(
     if plot is not None:
         report.histories_figure(found, plot)
         tell_written(plot, err=as_json)
-    for error in (one for several in unread for one in single_errors(several)):
+    for error in merged(unread):
         tell(f"not read: {error}", err=True)
     if unread:
         raise typer.Exit(1)
 
 
-def _describe_data_set(file: Path, to: Path | None, as_json: bool) -> None:
+def _describe_data_set(file: Path, as_json: bool) -> None:
     import creepkit as ck
     from creepkit.dataset.dataset import summary
 
@@ -115,11 +112,6 @@ def _describe_data_set(file: Path, to: Path | None, as_json: bool) -> None:
         print_json(summary(data))
     else:
         tell(data)
-    if to is not None:
-        from creepkit.reports.dataset import write_dataset_figures
-
-        for path in write_dataset_figures(data, to, 0):
-            tell_written(path, err=as_json)
 
 
 def _readable_tests(
@@ -141,8 +133,7 @@ def _readable_tests(
 def _write(histories: list[History], folder: Path) -> list[Path]:
     """Write each history; what cannot stand in the name of a file becomes a line."""
     import creepkit as ck
-    from creepkit.files.file_names import file_stem
-    from creepkit.files.writing import check_folder_target, made_from
+    from creepkit.files.writing import check_folder_target, file_stem, made_from
     from creepkit.readers.history_csv import history_text
     from creepkit.reports.figures import make_folder
 

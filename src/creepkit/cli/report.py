@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from creepkit.cli.command_options import OutputPath
-from creepkit.cli.shared import is_file_name, is_law_name, law_source
+from creepkit.cli.shared import is_file_name, is_law_name, law_source, read_results
 from creepkit.errors import FitError, ReportError
 from creepkit.options import Option
-from creepkit.reports.terminal import tell_written
+from creepkit.reports.terminal import ProgressBar, tell_written
 
 if TYPE_CHECKING:
     from creepkit.app.contents import PageSource
@@ -27,7 +27,8 @@ def command(
     results: Annotated[
         list[str],
         typer.Argument(
-            metavar="RESULT.json...", help="Identifications, rankings, rupture assessments; with --app one, or a law."
+            metavar="RESULT.json...",
+            help="Identifications, rankings, rupture assessments; with --app one, a law, or tests.",
         ),
     ],
     *,
@@ -43,15 +44,14 @@ def command(
     """One file, complete without scripts: findings, curves, tests, laws tried, data, files to download, methods.
 
     It prints, and opens anywhere. Identifications of the same tests are ranked. With --app, curves are computed in the
-    browser while sliders move, and measured tests are laid over.
+    browser while sliders move, and measured tests are laid over; of tests alone the three laws that suit them are
+    fitted first.
     """
     import creepkit as ck
 
     histories = list(ck.read_histories(tests)) if tests else []
     if app:
-        if len(results) > 1:
-            raise FitError(f"{len(results)} laws or results are named; name one, and tests by --tests")
-        source = _page_source(results[0])
+        source = _page_source(results, histories)
         path = ck.interactive_page(source, to or Path("page.html"), tests=histories, specimen=specimen, title=title)
         if sys.stdout.isatty():
             webbrowser.open(path.resolve().as_uri())
@@ -66,7 +66,35 @@ def command(
     tell_written(path, err=True)
 
 
-def _page_source(name: str) -> PageSource:
+MOST_FITTED = 3
+"""Laws that are fitted to tests for a page of sliders."""
+
+
+def _page_source(names: list[str], histories: list[History]) -> PageSource:
+    """A law by its name, fitted to tests where there are some; what a file holds; or the best laws of measured tests.
+
+    histories : given by --tests; measured files in the place of results are added to them.
+    """
+    import creepkit as ck
+    from creepkit.inverse.candidate_laws import LawChanges
+    from creepkit.inverse.candidates import candidates
+
+    laws = [name for name in names if is_law_name(name)]
+    if len(names) > 1 and (laws or any(name.endswith(".json") for name in names)):
+        raise FitError(f"{len(names)} laws or results are named; name one, and tests by --tests")
+    if not laws and not names[0].endswith(".json"):
+        histories += ck.read_histories(names)
+    elif not (laws and histories):
+        return _named_source(names[0])
+    tried = [ck.law(name) for name in laws] or candidates(histories)[:MOST_FITTED]
+    fitted = LawChanges().applied(tried, histories)
+    with ProgressBar() as progress:
+        if len(fitted) == 1:
+            return ck.identify(fitted[0], histories, progress=progress.tick)
+        return ck.select(fitted, histories, sums=False, progress=progress.tick)
+
+
+def _named_source(name: str) -> PageSource:
     """A law by its name, or what a file holds."""
     from creepkit.exporters.law_files import VALUED_LAW
     from creepkit.files.json_documents import read_json
@@ -84,18 +112,10 @@ def _read(path: Path, histories: list[History]) -> Identification | ModelAverage
     import creepkit as ck
     from creepkit.files.json_documents import read_json
     from creepkit.files.reading import FileKind
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.ranking_document import read_fit_or_ranking
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-    from creepkit.rupture_assessment.assessment_document import ASSESSMENT
+    from creepkit.rupture_assessment.assessment import ASSESSMENT
 
     advice = "give an identification, a ranking.json or a rupture assessment that creepkit wrote"
     data = read_json(path, FileKind("a result", ReportError, advice))
     if isinstance(data, dict) and data.get("format") == ASSESSMENT.name:
         return ck.load_rupture_assessment(path)
-    found = read_fit_or_ranking(path)
-    if not histories:
-        return found
-    if isinstance(found, Identification):
-        return found.with_histories(histories)
-    return ModelAverage(tuple(fit.with_histories(histories) for fit in found.fits), found.weights)
+    return read_results(path, histories)

@@ -8,11 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from creepkit.cli.command_options import OutputPath, parsed_number
-from creepkit.cli.shared import Files, Json, Only, selected
+from creepkit.cli.shared import Files, Json, Only, selected, show
 from creepkit.errors import FitError
 from creepkit.options import Option
 from creepkit.records import ZERO_CELSIUS
-from creepkit.reports.terminal import print_json, tell, tell_written
 from creepkit.rupture_assessment.assessment import RuptureQuestion, RuptureSettings
 
 
@@ -50,12 +49,4 @@ def command(
         **question,
     )
     written = [] if to is None else [assessment.save(to)]
-    if plot is not None:
-        assessment.plot(plot)
-        written.append(plot)
-    for path in written:
-        tell_written(path, err=True)
-    if as_json:
-        print_json(rupture_to_json(assessment))
-    else:
-        tell(assessment)
+    show(assessment, rupture_to_json, as_json=as_json, plot=plot, written=written)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +14,7 @@ from creepkit.options import Option
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.language import CreepLaw
     from creepkit.records import History, LawWithValues
 
@@ -84,6 +85,39 @@ def merged_values(source: Any, given: Mapping[str, float] | None) -> dict[str, f
     if own is None:
         return dict(given or {})
     return {**own, **given} if given else None
+
+
+def show(
+    result: Any, to_json: Callable[[Any], Any], *, as_json: bool, plot: Path | None = None, written: Sequence[Path] = ()
+) -> None:
+    """Draw a result where a picture is asked for, and print it, as text or as what `to_json` makes of it.
+
+    written : further files that were.
+    """
+    from creepkit.reports.terminal import print_json, tell, tell_written
+
+    if plot is not None:
+        result.plot(plot)
+    for path in (*written, *([] if plot is None else [plot])):
+        tell_written(path, err=True)
+    if as_json:
+        print_json(to_json(result))
+    else:
+        tell(result)
+
+
+def read_results(path: Path, histories: Sequence[History]) -> Identification | ModelAverage:
+    """A saved identification or ranking, with the tests that it was made from where they are given."""
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.ranking_document import read_fit_or_ranking
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+
+    found = read_fit_or_ranking(path)
+    if not histories:
+        return found
+    if isinstance(found, Identification):
+        return found.with_histories(histories)
+    return ModelAverage(tuple(fit.with_histories(histories) for fit in found.fits), found.weights)
 
 
 def selected(histories: Sequence[History], only: Mapping[str, Sequence[str]] | None) -> list[History]:

@@ -70,7 +70,7 @@ def generate(
     piece = ck.specimen(specimen)
     design = resolve_design(law, piece, **changes)
     if dry_run:
-        print_acceptance(design, seed, to, as_json)
+        print_acceptance(design, seed, as_json)
         return
     if to is None:
         raise DatasetError("--to FILE is missing: name the HDF5 file to write, such as --to combined.h5")
@@ -100,8 +100,8 @@ def train(
 ) -> None:
     """Train the paper's network on a data set.
 
-    Interrupted at any moment, the same command goes on where it was. Curves of the training, predicted against true
-    outputs, and the worst samples are drawn.
+    Interrupted at any moment, the same command goes on where it was. Curves of the training, and predicted against
+    true outputs are drawn.
     """
     import creepkit as ck
     from creepkit.dataset.storage import read_dataset
@@ -126,7 +126,7 @@ def sweep(
     to: Annotated[
         Path,
         typer.Option(help="Folder; a file for each training, those that are there are not redone."),
-        OutputPath("folder", ("sweep.png",)),
+        OutputPath("folder"),
     ],
     sizes: Annotated[dict[str, Any], NetworkSizes],
     network: Annotated[dict[str, Any], ParameterGru, ("target", "base", "inputs")],
@@ -143,7 +143,7 @@ def sweep(
     Interrupted at any moment, the same command goes on where it was.
     """
     from creepkit.dataset.storage import read_dataset
-    from creepkit.reports.surrogate import size_study_figure, size_study_rows
+    from creepkit.reports.surrogate import size_study_rows
     from creepkit.surrogates.training import size_study
 
     _set_threads(threads)
@@ -154,12 +154,10 @@ def sweep(
             read_dataset(data, accepted_only=True), recipe, asked, to=to, seed=seed, device=device,
             progress=progress.tick,
         )  # fmt: skip
-    size_study_figure(trainings, to / "sweep.png")
     if as_json:
-        print_json({"trainings": [vars(e) for e in trainings], "picture": str(to / "sweep.png")})
-        return
-    print_table("", *size_study_rows(trainings))
-    tell_written(to / "sweep.png")
+        print_json({"trainings": [vars(e) for e in trainings]})
+    else:
+        print_table("", *size_study_rows(trainings))
 
 
 def reduce(

@@ -76,7 +76,7 @@ class ConfirmedTest:
 
 
 @dataclass(frozen=True)
-class Confirmation(Presentable, text="reports.confirmation_text:confirmation_text"):
+class Confirmation(Presentable, text="reports.inference:confirmation_text"):
     """The result of confirm(). law, predictor_name : what was simulated, and by what."""
 
     law: str

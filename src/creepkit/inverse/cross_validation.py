@@ -76,7 +76,7 @@ class Fold:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CrossValidation(Presentable, text="reports.confirmation_text:cross_validation_text"):
+class CrossValidation(Presentable, text="reports.inference:cross_validation_text"):
     """The result of cross_validate(): the fit to all histories, and its folds."""
 
     fit: Identification = field(repr=False)

@@ -19,14 +19,6 @@ def held_temperatures(history: History) -> list[float]:
     return held or [history.mean_temperature]
 
 
-def temperature_range(history: History) -> tuple[float, float]:
-    """K, the coldest and the hottest at which a test is held; of one that only ramps, the ends of its program."""
-    if is_isothermal(history) or temperature_holds(history):
-        held = held_temperatures(history)
-        return min(held), max(held)
-    return float(history.followed_temperatures.min()), float(history.followed_temperatures.max())
-
-
 def is_isothermal(history: History) -> bool:
     """Whether one temperature is held all the time."""
     return float(np.ptp(history.temperature_program().values)) <= 2 * HELD_TEMPERATURE

@@ -139,6 +139,10 @@ class Identification(
         """(parameters,) rows of pandas: value, ends of the 95 % interval, unit and verdict."""
         return present("reports.dataframes:to_dataframe", self)
 
+    def to_arviz(self, *, draws: int = 1000, seed: int = 0) -> Any:
+        """Draws from the posterior as an xarray Dataset, which arviz takes: one chain, with units of the parameters."""
+        return self.sample(draws=draws, seed=seed).to_arviz()
+
     @property
     def headline(self) -> str:
         """How well the law describes the tests, then whether it could be the true one, in one sentence."""

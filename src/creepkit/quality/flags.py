@@ -27,7 +27,6 @@ FlagKind = Literal[
     "rate change",
     "unreadable",
     "few points",
-    "cut",
     "motion",
     "residual",
     "fit",
@@ -81,7 +80,7 @@ class QualityFlag:
 
 
 @dataclass(frozen=True)
-class DataQuality(Presentable, text="reports.data_quality:data_quality_text"):
+class DataQuality(Presentable, text="reports.histories:data_quality_text"):
     """What is suspect in histories: flags, test by test, then those of several tests; it is iterated over as a list.
 
     tests : number of histories that were checked.

@@ -9,8 +9,11 @@ What a strain record holds of the loading: elastic and initial plastic strain, a
 Creep strain is zero when the load has been reached. A record of total strain is not, and its first frame after time
 zero is often not the end of loading. ISO 204 calls the strain at the end of loading the initial total extension; keys
 state it (`loading_strain`, `includes_loading`), and when loading ended (`loading_time`). Where a file states neither
-these nor `includes_elastic`, the first frames decide:
+these nor `includes_elastic`, the record of the load and the first frames decide:
 
+- a load that was raised in sight, over three frames or more, has loaded the test piece: strain that is straight over
+  the stress is elastic, with a modulus of its own, any other at the end of the ramp is subtracted, and frames before
+  the end are not used;
 - a strain at time zero that is the stress over the modulus is elastic; any other is subtracted, for part of it is
   plastic or the modulus is off, and creep has had no time yet;
 - a strain that jumps to about the stress over the modulus from less than half of it, and then stays while time
@@ -28,6 +31,7 @@ distance, midway between the frames around it, of straight lines through the fra
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -35,10 +39,11 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import HistoryError
-from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.conditions import StatedConditions
 from creepkit.readers.frames import TableFrames
+from creepkit.readers.imposed import hold_begins
 from creepkit.readers.table import SourceText
+from creepkit.readers.vocabulary import unit_suffix
 from creepkit.records.quantities import TIME
 from creepkit.records.recorded_programs import noise_of_readings
 from creepkit.records.units import time_text
@@ -58,7 +63,12 @@ CREEP_SHOWS = 0.01
 """Fraction of the stress that is lost within one frame of the ramp after its end, above which it bends the ramp."""
 
 
-FEWEST_RAMP_FRAMES = 3
+PRELOAD, SHORT_RAMP, SOFTEST = 0.02, 1e-3, 20e3
+"""Of the largest stress, a preload at most; of the duration, a ramp in which creep is none; MPa, of a modulus."""
+
+
+FEWEST_RAMP_FRAMES, RAMP_FROM = 3, 0.2
+"""Before the end of a ramp; part of the stress that is held at which a ramp that loading shows begins at most."""
 
 
 def as_plain_bar(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
@@ -95,10 +105,20 @@ def _with_strain(conditions: StatedConditions, frames: TableFrames, values: dict
             "an extension is a strain by its gauge length, which is not stated; write gauge_length_mm (or 'specimen: "
             "notched-bar' with its lengths)",
             "gauge_length_mm",
+            *_lengths_in(conditions.labels),
             location=frames.table.location(frames.table.columns_line),
         )
     values["strain"] = elongation / length
     return [f"strain = extension / gauge length {length:g} mm"]
+
+
+def _lengths_in(labels: Mapping[str, str]) -> list[float]:
+    """mm, of labels such as `Length: 50.00 mm`, which may be the gauge length."""
+    found = [re.fullmatch(r"([\d.,]+) ?mm", text) for name, text in labels.items() if _LENGTH_NAME.search(name)]
+    return [float(one[1].replace(",", ".")) for one in found if one]
+
+
+_LENGTH_NAME = re.compile("length|länge|longueur", re.IGNORECASE)
 
 
 def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict[str, Floats]) -> list[str]:
@@ -106,7 +126,16 @@ def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict
     column = values.pop("force", None)
     stated = conditions.take_number("force")
     area, how = _area(conditions)
-    if "stress" in values or conditions.states_load("stress"):
+    nominal = conditions.number_of("stress")
+    held = hold_begins(frames.times, column) if column is not None else None
+    if "stress" not in values and nominal is not None and column is not None and held and held >= FEWEST_RAMP_FRAMES:
+        # A load that was raised in sight is recorded better than the one number that says what was held.
+        if area is None:
+            area, how = (
+                float(np.median(column[held:])) / nominal.value,
+                f" by which the load that was held is {nominal.value:g} MPa",
+            )
+    elif "stress" in values or conditions.states_load("stress"):
         return ["the load beside the stress not used"]
     if area is None:
         where = stated.location if stated is not None else frames.table.location(frames.table.columns_line)
@@ -135,6 +164,29 @@ def _area(conditions: StatedConditions) -> tuple[float | None, str]:
     if "width" in lengths and thickness is not None:
         return lengths["width"] * thickness, f" of {lengths['width']:g} mm x {thickness:g} mm"
     return None, ""
+
+
+def from_loading_on(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
+    """The frames from the last one on in which a bar bears its preload alone; time counts from there."""
+    stress = frames.values.get("stress")
+    if stress is None or any(conditions.states(f"stress_{form}") for form in ("steps", "program", "1")):
+        return frames
+    before = int(np.argmax(stress > PRELOAD * stress.max())) - 1
+    if before < 1 or stress.size - before < 3:
+        return frames
+    start, values = float(frames.times[before]), {name: one[before:] for name, one in frames.values.items()}
+    what = f"time counts from the end of a preload of {stress[before]:.3g} MPa at {time_text(start)}"
+    conditions.record_assumption(what)
+    return replace(frames, values={**values, "time": values["time"] - start}, lines=frames.lines[before:])
+
+
+def _frames_of_ramp(times: Floats, stress: Floats) -> int:
+    """The number of frames before a stress that was raised from nothing is held; 0 where the record shows no ramp."""
+    end = hold_begins(times, stress)
+    is_short = end is not None and times[end] - times[0] <= SHORT_RAMP * (times[-1] - times[0])
+    fewest = 1 if is_short else FEWEST_RAMP_FRAMES
+    is_raised = end is not None and end >= fewest and stress[0] <= RAMP_FROM * stress[end]
+    return int(end) if end is not None and is_raised else 0
 
 
 def modulus_of_ramp(strain: Floats, stress: Floats) -> tuple[float, str] | None:
@@ -191,21 +243,28 @@ SMALLEST_STRAIN, NOISE_FACTOR = 2e-5, 6.0
 class StrainRecord:
     """A strain record without what loading left in it.
 
-    strain, used : (frames,). includes_elastic : whether the strain still holds the elastic one.
+    strain, used : (frames,). includes_elastic : whether the strain still holds the elastic one. modulus : MPa, that the
+    loading ramp shows where none is stated.
     """
 
     strain: Floats
     used: Bools
     includes_elastic: bool
+    modulus: float | None = None
 
 
 def without_loading(
-    conditions: StatedConditions, times: Floats, strain: Floats, used: Bools, elastic_strain: float | None
+    conditions: StatedConditions,
+    times: Floats,
+    strain: Floats,
+    used: Bools,
+    stress: Floats | None,
+    modulus: float | None,
 ) -> StrainRecord:
     """The strain as its model means it.
 
-    times : (frames,) s. strain : (frames,). used : (frames,) which may be fitted. elastic_strain : stress over modulus
-    at the beginning, None where the modulus is not known.
+    times : (frames,) s. strain : (frames,). used : (frames,) which may be fitted. stress : (frames,) MPa that was
+    imposed, None where another load was; modulus : MPa at the beginning, None where it is not known.
     """
     location = conditions.location_of("includes_loading", "loading_strain", "loading_time", "includes_elastic")
     total, end = conditions.take_number("loading_strain"), conditions.take_number("loading_time")
@@ -219,7 +278,9 @@ def without_loading(
     if total is not None:
         conditions.labels["loading_strain"] = f"{total.value:.6g}"
     if not (stated or includes_loading or total is not None):
-        return _decided(conditions, times, strain, used, elastic_strain)
+        record = None if stress is None else _loaded_by_ramp(conditions, times, strain, used, stress, modulus)
+        elastic_strain = None if stress is None or modulus is None else float(stress[0]) / modulus
+        return record or _decided(conditions, times, strain, used, elastic_strain)
     elastic = conditions.take_choice("includes_elastic", ("yes", "no"), required=not includes_loading and total is None)
     first = int(np.argmax(used))
     if total is not None and not (includes_loading or stated):
@@ -241,6 +302,33 @@ def without_loading(
     subtracted = strain[first] if total is None else total.value
     conditions.record_assumption(f"loading strain {subtracted:.3g} subtracted")
     return StrainRecord(strain - subtracted, used, includes_elastic=False)
+
+
+def _loaded_by_ramp(
+    conditions: StatedConditions, times: Floats, strain: Floats, used: Bools, stress: Floats, modulus: float | None
+) -> StrainRecord | None:
+    """What a recorded loading ramp says; None where there is none, or the strain does not rise with it.
+
+    A strain that is straight over the stress up to the end of the ramp is elastic, with the modulus that is stated or
+    else with that of the ramp; any other at its end is subtracted.
+    """
+    end = _frames_of_ramp(times, stress)
+    noise = noise_of_readings(strain[end : end + SEARCHED_FRAMES])
+    if not end or strain[end] - strain[0] < max(SMALLEST_STRAIN, NOISE_FACTOR * noise):
+        return None
+    used = used & (times >= times[end])
+    until = f"frames before the end of the loading ramp at {times[end]:g} s not used"
+    found = None if modulus is not None else modulus_of_ramp(strain[: end + 1], stress[: end + 1])
+    elastic = modulus if modulus is not None else found[0] if found is not None else None
+    if elastic is not None and _is_elastic(float(strain[end]), float(stress[end]) / elastic, ELASTIC_RANGE):
+        conditions.record_assumption(f"includes_elastic yes (the strain rises with the load) and {until}")
+        if found is not None:
+            conditions.record_assumption(found[1])
+        return StrainRecord(strain, used, True, None if found is None else found[0])
+    if end < FEWEST_RAMP_FRAMES and stress[end] < SOFTEST * (strain[end] - strain[0]):
+        return None
+    conditions.record_assumption(f"includes_elastic no (loading strain {strain[end]:.3g} subtracted) and {until}")
+    return StrainRecord(strain - strain[end], used, includes_elastic=False)
 
 
 def _decided(

@@ -13,12 +13,11 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError
-from creepkit.readers.column_names import NameTable, split_unit, split_written_name
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.table import CellTable, some_of
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms
-from creepkit.records.quantities import QuantityKind
+from creepkit.readers.vocabulary import HeaderVocabulary, NameTable, Terms, split_unit, split_written_name, unit_suffix
+from creepkit.records.quantities import FORCE, LENGTH, STRAIN, STRESS, TEMPERATURE, QuantityKind
 
 NOISE_OF_ZERO = 0.01
 """Of the largest reading of a load: a reading that is less below zero is one of none."""
@@ -111,6 +110,12 @@ def unknown_text(quantity: str) -> str:
     return f"{quantity} unknown (empty cell)"
 
 
+OF_UNIT: Mapping[str, QuantityKind] = {
+    **{"force": FORCE, "elongation": LENGTH, "strain": STRAIN, "stress": STRESS, "temperature": TEMPERATURE}
+}
+"""What a column without a name that is known may hold, by its unit."""
+
+
 UNUSED = "unused"
 """What an answer says of a column that stays unread."""
 
@@ -136,7 +141,10 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
             ]
             what = f"'{written}' and '{others[0]}' seem to be several sensors of the {sensor}; which counts?"
             raise column_question(table, what, *counts[:3])
-        if sensor and sensor not in {(split_unit(other, kinds) or ("",))[0] for other in table.columns}:
+        present = {(split_unit(other, kinds) or ("",))[0] for other in table.columns}
+        if sensor == "temperature" and sensor not in present and unit_suffix(unit) in kinds[sensor].units:
+            return sensor, unit_suffix(unit) or ""
+        if sensor and sensor not in present:
             what = f"'{written}' seems to be a sensor of the {sensor}; is it?"
             raise column_question(table, what, {written: measured}, {written: UNUSED})
         if kind_of_column(written) in (*FIRM, "remark"):
@@ -146,7 +154,11 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
         meant = f"column '{written}' is not understood; " + (
             f"did you mean '{near[0]}'?" if near else "what does it hold?"
         )
-        raise column_question(table, meant, *({written: f"{one} ({unit})"} for one in near), {written: UNUSED})
+        likely = [name for name, one in OF_UNIT.items() if unit_suffix(unit) in one.units and name not in near]
+        likely = [] if unit_suffix(unit) in (None, "") else [name for name in likely if name not in present]
+        raise column_question(
+            table, meant, *({written: f"{one} ({unit})"} for one in (*near, *likely)), {written: UNUSED}
+        )
     quantity, suffix = result
     kinds[quantity].unit(suffix, location, written)
     return result

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from markupsafe import Markup
 
-from creepkit.exporters.mathml import expression_mathml, law_equations
+from creepkit.exporters.documents import expression_mathml, law_equations
 from creepkit.inverse.adequacy import SHAPE_MISFIT, UNDETECTED_SCATTER
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.inverse.perturbation import combined_change_text
@@ -411,42 +411,18 @@ def held_quantities(fit: Identification) -> str:
 
 
 def reference_sentences(fit: Identification) -> list[str]:
-    """Rate and exponent amid the tests, one sentence each, without full stops."""
-    r, state = fit.reference, _state(fit)
-    at = f"{number(r.stress)} MPa and {celsius_text(r.temperature, digits=0)}"
-    formula = _interval(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
-    held = held_quantities(fit)
+    """Where the rate amid the tests is taken, and the exponent of the law's formula where that is another."""
+    r, state, held = fit.reference, _state(fit), held_quantities(fit)
+    lines = []
     if state is not None:
-        hours = tuple(v / SECONDS_PER_HOUR for v in state.time)
-        lines = [
-            f"amid the tests, under a constant true stress of {at}, a bar reaches a logarithmic creep strain of "
-            f"{number(r.strain, 2)} after {_interval(hours)} h, and creeps there at a rate of "
-            f"{_interval(state.rate)} 1/s (95 % intervals in brackets)",
-            "the stress exponent at constant strain, d ln rate / d ln stress of bars compared when each has this "
-            f"strain, is {_interval(state.exponent)}: the one to compare with exponents of measured creep rates",
-        ]
-        if held != "strain":
-            lines.append(
-                f"the derivative of the law's formula at constant {held} is {formula}, which no test at one strain "
-                "shows"
-            )
-        return lines
-    rate = _interval(tuple(map(float, fit.rate(r.stress, warn=False))))
-    if not held:
-        return [
-            f"amid the tests, at {at}, the creep rate is {rate} 1/s and the stress exponent, d ln rate / d ln stress, "
-            f"is {formula} (95 % intervals in brackets)"
-        ]
-    state_text = f"a strain of {number(r.strain, 2)} and {number(r.time / SECONDS_PER_HOUR, 3)} h"
-    # Of a law of stress, temperature and strain the derivative at constant strain is what bars at one strain show.
-    other = "" if held == "strain" else "; bars compared at one strain show another exponent where their times differ"
-    if fit.law.states:
-        other = "; bars compared at one strain show another exponent, as their internal variables differ there"
-    initial = " with internal variables as at the beginning" if fit.law.states else ""
-    return [
-        f"at {at}, {state_text}{initial}, the law's formula has a creep rate of {rate} 1/s and, at constant {held}, "
-        f"the stress exponent d ln rate / d ln stress of {formula} (95 % intervals in brackets){other}"
-    ]
+        hours = _interval(tuple(v / SECONDS_PER_HOUR for v in state.time))
+        at = f"{number(r.stress)} MPa and {celsius_text(r.temperature, digits=0)}"
+        lines.append(f"a bar under a true stress of {at} reaches {100 * r.strain:.2g} % strain after {hours} h")
+    if held and (held != "strain" or state is None):
+        formula = _interval(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
+        lines.append(f"at constant {held} the law's formula has the stress exponent {formula}")
+        lines += [] if held == "strain" else ["tests compared at one strain show another exponent"]
+    return lines
 
 
 def _interval(values: tuple[float, ...]) -> str:
@@ -474,13 +450,10 @@ def constant_load_sentence(fit: Identification) -> str:
         return ""
     growth = fit.ranges["strain"][1]
     scatter = fit.noise_model.rate
-    beside = f"rates of single tests scatter by {100 * scatter:.2g} % (one standard deviation) beside it"
-    if 0 < scatter <= UNDETECTED_SCATTER:
-        beside = "no scatter of rates between tests was detected beside it"
-    if not scatter > 0:
-        beside = "the scatter of rates between tests is not known beside it"
+    beside = f"rates of single tests scatter by {100 * scatter:.2g} % (one standard deviation)"
+    if scatter <= UNDETECTED_SCATTER:
+        beside = f"scatter of rates between tests {'was not detected' if scatter > 0 else 'is not known'}"
     return (
-        f"under a constant load the true stress rises with strain, here by up to {100 * growth:.2g} %, so that the "
-        "stress exponent comes from the curvature of single curves as well as from the comparison of tests: its "
-        f"interval holds only if the form of the law is right, and {beside}"
+        f"under a constant load the true stress rises with strain, here by up to {100 * growth:.2g} %: the interval of "
+        f"the stress exponent rests on the form of the law too; {beside}"
     )

@@ -1,4 +1,4 @@
-"""Colours and groups of tests by their conditions: a colour each for a few tests, a colour scale for many."""
+"""Colours of tests by their conditions: a colour each for a few tests, a colour scale for many."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.held_levels import held_temperatures, is_isothermal, temperature_holds, temperature_range
+from creepkit.inverse.held_levels import held_temperatures, is_isothermal, temperature_holds
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_stresses
 from creepkit.records import ZERO_CELSIUS, History, Predictor
 from creepkit.reports.figures import logarithmic_labels
@@ -17,14 +17,6 @@ from creepkit.reports.figures import logarithmic_labels
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-MOST_GROUPS = 12
-"""Panels of groups of tests at most."""
-
-
-MOST_IN_GROUP = 16
-"""Tests of a group from which it is split, while there are panels left."""
 
 
 USED_SHARE = 0.86
@@ -143,49 +135,3 @@ def distinct_colours(count: int) -> list[Any]:
     from matplotlib import colormaps
 
     return [colormaps["tab10"](k % 10) for k in range(count)]
-
-
-def condition_groups(histories: Sequence[History], predictor: Predictor | None) -> list[tuple[str, list[int]]]:
-    """Title and positions of the tests of each group: of one temperature, and of neighbouring stresses where many.
-
-    Tests with steps of temperature are grouped by their coldest and hottest level. Temperatures that differ little are
-    one; of more than MOST_GROUPS groups, neighbours are joined.
-    """
-    temperatures = np.array([temperature_range(h) for h in histories]) - ZERO_CELSIUS
-    stresses = mean_stresses(histories, predictor)
-    groups: list[list[int]] = []
-    for k in np.lexsort((temperatures[:, 1], temperatures[:, 0])):
-        alike = (g for g in groups if np.abs(temperatures[k] - temperatures[g[0]]).max() <= ISOTHERMAL_RANGE)
-        group = next(alike, None)
-        if group is None:
-            groups.append([int(k)])
-        else:
-            group.append(int(k))
-    if len(groups) > MOST_GROUPS:
-        sizes = np.cumsum([len(g) for g in groups])
-        panel = (sizes - 1) * MOST_GROUPS // sizes[-1]
-        groups = [[k for g, p in zip(groups, panel, strict=True) if p == i for k in g] for i in np.unique(panel)]
-    while len(groups) < MOST_GROUPS and max(map(len, groups)) > MOST_IN_GROUP:
-        position = max(range(len(groups)), key=lambda i: len(groups[i]))
-        members = sorted(groups[position], key=lambda k: stresses[k])
-        middle = _split(stresses[members])
-        groups[position : position + 1] = [members[:middle], members[middle:]]
-    return [(_group_title(temperatures[g], stresses[g]), g) for g in groups]
-
-
-def _split(stresses: Floats) -> int:
-    """Where sorted stresses (tests,) are split into halves; tests of one stress stay together if they can."""
-    middle = stresses.size // 2
-    boundaries = np.flatnonzero(np.diff(stresses) > 0) + 1
-    return int(boundaries[np.abs(boundaries - middle).argmin()]) if boundaries.size else middle
-
-
-def _group_title(temperatures: Floats, stresses: Floats) -> str:
-    """temperatures : (tests, 2) the coldest and the hottest of each, °C; stresses : (tests,) MPa."""
-    tests = f"{stresses.size} test{'s' if stresses.size > 1 else ''}"
-    return f"{_range_text(temperatures, '.0f')} °C, {_range_text(stresses, '.3g')} MPa, {tests}"
-
-
-def _range_text(values: Floats, number: str) -> str:
-    low, high = format(values.min(), number), format(values.max(), number)
-    return low if low == high else f"{low} to {high}"

@@ -9,6 +9,7 @@ from creepkit.errors import ReportError
 from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
+from creepkit.inverse.uncertainty.importance_sampling import PosteriorSamples
 from creepkit.records import History, output_unit
 
 if TYPE_CHECKING:
@@ -24,6 +25,20 @@ def to_dataframe(record: object) -> DataFrame:
     rows, index = _rows(record)
     frame = DataFrame(rows)
     return frame.set_index(index) if index else frame
+
+
+def to_arviz(samples: PosteriorSamples) -> Any:
+    """Posterior samples as an xarray Dataset of one chain, which `arviz.summary` and `arviz.plot_pair` take.
+
+    ReportError where xarray, which comes with arviz, is not installed.
+    """
+    try:
+        from xarray import Dataset
+    except ImportError:
+        raise ReportError("samples for arviz need it installed: pip install 'creepkit[notebook]'") from None
+    table, draws = samples.coordinates.law.table, samples.values
+    known = {name: {"long_name": p.meaning, "units": p.unit} for name, p in table.items()}
+    return Dataset({name: (("chain", "draw"), draws[name][None, :], known[name]) for name in draws})
 
 
 @singledispatch

@@ -1,11 +1,12 @@
-"""Matplotlib figures that need no display, their axes, and the one way in which they are written to files."""
+"""Figures that need no display, the panels and axes that all of them share, and how they are written to files."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,22 @@ def panels_of(width: float, height: float, *shape: int, **options: Any) -> tuple
     """The same with panels: one, or rows and columns of them, as matplotlib's subplots() has them."""
     figure = empty_figure(width, height)
     return figure, figure.subplots(*shape, **options)
+
+
+def panel_grid(
+    count: int, most_columns: int, width: float, height: float, *, part: Any = None, **options: Any
+) -> tuple[Figure, list[Axes]]:
+    """A figure, or a part of one, with panels of a width and height in inches, and these; no empty frames.
+
+    most_columns : side by side. options : as matplotlib's subplots() has them.
+    """
+    columns = max(1, min(most_columns, count))
+    rows = max(1, -(-count // columns))
+    figure = empty_figure(width * columns, height * rows) if part is None else part
+    panels = list(figure.subplots(rows, columns, squeeze=False, **options).flat)
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    return figure, panels[:count]
 
 
 def make_folder(folder: Path, error_type: type[CreepkitError] = FitError) -> None:
@@ -130,6 +147,70 @@ def set_range(
     axis.set_ticks(list(labels))
     ends = min(float(labels[0]), low), max(float(labels[-1]), high)
     (axes.set_xlim if which == "x" else axes.set_ylim)(*ends)
+
+
+def span(
+    axes: Axes,
+    which: str,
+    *values: Any,
+    logarithmic: bool = False,
+    margin: float = 1.0,
+    zero: bool = False,
+    most: int = 6,
+) -> None:
+    """Ranges of axes that show all of these values that can be drawn, arrays of any shape; which : "x", "y" or "xy".
+
+    margin : factor by which the range goes beyond them to either side. zero : whether it begins at zero or below.
+    """
+    known = np.concatenate([np.zeros(int(zero)), *(np.ravel(np.asarray(one, float)) for one in values)])
+    known = known[np.isfinite(known) & ((known > 0) | (not logarithmic))]
+    if known.size:
+        low, high = float(known.min()), float(known.max())
+        for axis in which:
+            set_range(axes, axis, low / margin, high * margin, logarithmic=logarithmic, most=most)  # type: ignore[arg-type]
+
+
+MOST_NAMED = 12
+"""Curves that a panel names."""
+
+
+class Course(NamedTuple):
+    """What is drawn over time. times, values : (points,). hollow : (points,) which are not used, None where all are."""
+
+    name: str
+    times: Any
+    values: Any
+    hollow: Any = None
+
+
+def over_time(panels: Mapping[str, Sequence[Course]], path: str | Path | None = None, time: str = "time, h") -> Figure:
+    """A panel for each {label of its axis: what is drawn in it}, one below the other; time : label of their axis."""
+    figure, every = panel_grid(len(panels), 1, 7.0, 2.6, sharex=True)
+    for axes, (label, courses) in zip(every, panels.items(), strict=True):
+        for k, one in enumerate(courses):
+            style: Any = {"lw": 1.0, "marker": "." if one.hollow is not None else "", "ms": 3}
+            (line,) = axes.plot(one.times, one.values, label=one.name if k < MOST_NAMED else None, **style)
+            if one.hollow is not None:
+                axes.plot(one.times[one.hollow], one.values[one.hollow], "o", mfc="none", color=line.get_color())
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.25)
+        if len(courses) > 1:
+            place_legend_right(axes)
+    every[-1].set_xlabel(time)
+    return save_figure(figure, path)
+
+
+def draw_parity(axes: Axes, *values: Any, logarithmic: bool = False, margin: float = 1.0, factor: float = 0.0) -> None:
+    """Equal axes over measured and predicted values, and the line on which they agree; factor : a band about it."""
+    span(axes, "xy", *values, logarithmic=logarithmic, margin=margin)
+    ends = np.array(axes.get_xlim())
+    axes.set_ylim(*ends)
+    axes.plot(ends, ends, "k-", lw=1.0, alpha=0.7)
+    if factor:
+        axes.fill_between(
+            ends, ends / factor, ends * factor, color="black", alpha=0.08, lw=0, label=f"factor of {factor:g}"
+        )
+    axes.set_xlim(*ends)
 
 
 def logarithmic_labels(low: float, high: float, most: int = MOST_LABELS) -> Floats:

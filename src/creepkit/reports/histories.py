@@ -1,28 +1,32 @@
-"""Measured tests as they were understood: text, data, and a plot of every output over time."""
+"""Measured tests as they were understood, and what is suspect in them: text, data, and every output over time."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.readers.reading import TableSummary
-from creepkit.records import SECONDS_PER_HOUR, History, output_unit
-from creepkit.reports.blocks import aligned
-from creepkit.reports.figures import empty_figure, save_figure
+from creepkit.records import SECONDS_PER_HOUR, History, load_unit, output_named, output_unit
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, aligned, as_text, plural
+from creepkit.reports.figures import Course, over_time
 from creepkit.reports.json_values import fields_to_json
-from creepkit.reports.load_programs import program_text
+from creepkit.reports.load_programs import kind_of_test, program_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from creepkit.quality.flags import DataQuality
+    from creepkit.specimens.run import Run
 
-MOST_NAMED, MOST_VALUES = 12, 4
-"""Tests that a plot names, and values of a label that are told."""
+
+MOST_VALUES = 4
+"""Of a label that are told."""
 
 
 def tables_text(tables: Sequence[TableSummary]) -> str:
@@ -42,13 +46,41 @@ def tables_text(tables: Sequence[TableSummary]) -> str:
 
 
 def histories_text(histories: Sequence[History]) -> str:
-    """A paragraph for one test; for several a row each, then what was assumed of all, and their labels."""
+    """A paragraph for one test; for several a row each, then what holds for all or some of them."""
     if len(histories) < 2:
         return "\n".join(line for history in histories for line in _lines(history))
-    lines = aligned(("test: specimen, conditions", "end", "frames", "outputs"), [*map(_row, histories)])
+    table = _table(histories)
+    return "\n".join([*aligned(table.columns, table.rows), *_remarks(histories)])
+
+
+def history_blocks(histories: Sequence[History], more: str = "") -> list[Block]:
+    """The same for pages; more : what the caption says of tests that are not listed."""
+    caption = f"{plural(len(histories), 'test')} as measured{more}"
+    return [replace(_table(histories), caption=caption), Items(_remarks(histories))]
+
+
+def _table(histories: Sequence[History]) -> Table:
+    return Table("", ("test: specimen, conditions", "end", "frames", "outputs"), [*map(_row, histories)])
+
+
+def _remarks(histories: Sequence[History]) -> list[str]:
+    """What is prescribed, what strains are, lengths, what was assumed, and labels, with the number of tests each."""
+    total = len(histories)
+    remarks = [f"{text} ({_count_text(n, total)})" for text, n in Counter(map(kind_of_test, histories)).items()]
     measures = Counter(_strain_text(history) for history in histories if "strain" in history.outputs)
-    lines += [f"{text} ({_count_text(count, len(histories))})" for text, count in measures.items()]
-    return "\n".join([*lines, *filter(None, (assumptions_text(histories), _labels_text(histories)))])
+    remarks += [f"{text} ({_count_text(n, total)})" for text, n in measures.items()]
+    values: dict[str, Counter[str]] = {}
+    for history in histories:
+        lengths = {name.replace("_", " "): f"{length:g} mm" for name, length in history.geometry.items()}
+        labels = {f"label {key}": value for key, value in history.labels.items() if key != "assumed"}
+        for key, value in {**lengths, **labels}.items():
+            values.setdefault(key, Counter())[value] += 1
+    remarks += filter(None, assumptions_text(histories).splitlines())
+    for key, counts in values.items():
+        shown = [f"{value} ({_count_text(count, total)})" for value, count in counts.most_common(MOST_VALUES)]
+        more = f" and {len(counts) - MOST_VALUES} more" if len(counts) > MOST_VALUES else ""
+        remarks.append(f"{key}: {'; '.join(shown)}{more}")
+    return remarks
 
 
 def _row(history: History) -> tuple[str, ...]:
@@ -84,21 +116,6 @@ def assumptions_text(histories: Sequence[History]) -> str:
         f"assumed: {texts[0]}{' or the like' * (len(set(texts)) > 1)} ({_count_text(len(texts), len(histories))})"
         for texts in groups.values()
     )
-
-
-def _labels_text(histories: Sequence[History]) -> str:
-    """One line for each label, with its values and how many tests have each."""
-    labels: dict[str, Counter[str]] = {}
-    for history in histories:
-        for key, value in history.labels.items():
-            if key != "assumed":
-                labels.setdefault(key, Counter())[value] += 1
-    lines = []
-    for key, values in labels.items():
-        shown = [f"{value} ({_count_text(count, len(histories))})" for value, count in values.most_common(MOST_VALUES)]
-        more = f" and {len(values) - MOST_VALUES} more" if len(values) > MOST_VALUES else ""
-        lines.append(f"label {key}: {'; '.join(shown)}{more}")
-    return "\n".join(lines)
 
 
 def _lines(history: History) -> list[str]:
@@ -174,26 +191,52 @@ def histories_to_json(histories: Sequence[History], tables: Sequence[TableSummar
     }
 
 
+# ---- data quality ----------------------------------------------------------------------------------------------------
+
+
+def data_quality_text(quality: DataQuality) -> str:
+    """One line for each flag; one line that says so when there are none."""
+    return as_text(quality_blocks(quality))
+
+
+def quality_blocks(quality: DataQuality, most: int | None = None) -> list[Block]:
+    """How many flags there are, and each; most : that are listed."""
+    if not quality.flags:
+        return [Paragraph(f"nothing suspect in {plural(quality.tests, 'test')}")]
+    head = f"{plural(len(quality.flags), 'flag')} in {plural(quality.tests, 'test')}; nothing was dropped"
+    return [Paragraph(head), Items([str(flag) for flag in quality.flags[:most]])]
+
+
+def data_quality_to_json(quality: DataQuality) -> dict[str, Any]:
+    """The flags with all their numbers, for JSON: times in s, steps of temperature in K, jumps in the output's unit."""
+    names = "tests kind frames reason time earliest latest rate_factors factor_errors temperature_steps jumps proposal"
+    return {"tests": quality.tests, "flags": [fields_to_json(flag, names) for flag in quality.flags]}
+
+
+# ---- over time -------------------------------------------------------------------------------------------------------
+
+
 def histories_figure(histories: Sequence[History], path: str | Path | None = None) -> Figure:
     """A panel for each output, over time; frames that are not used are drawn hollow."""
-    names = list(dict.fromkeys(name for history in histories for name in history.outputs)) or [""]
-    figure = empty_figure(7.0, 1.0 + 2.8 * len(names))
-    for axes, name in zip(figure.subplots(len(names), 1, squeeze=False)[:, 0], names, strict=True):
-        for number, history in enumerate(history for history in histories if name in history.outputs):
-            hours, used = history.times / SECONDS_PER_HOUR, np.asarray(history.used)
-            (line,) = axes.plot(
-                hours,
-                history.outputs[name],
-                lw=1.0,
-                marker=".",
-                ms=3,
-                label=history.name if number < MOST_NAMED else None,
-            )
-            axes.plot(hours[~used], history.outputs[name][~used], "o", mfc="none", color=line.get_color())
-            axes.set_ylabel(", ".join(part for part in (name, output_unit(name, history.specimen)) if part))
-        axes.set_xlabel("time, h")
-        if axes.lines:
-            axes.legend(fontsize="small")
-    if path is not None:
-        save_figure(figure, path)
-    return figure
+    panels: dict[str, list[Course]] = {}
+    for history in histories:
+        hours, unused = history.times / SECONDS_PER_HOUR, ~np.asarray(history.used)
+        for name, values in history.outputs.items():
+            label = ", ".join(filter(None, (name, output_unit(name, history.specimen))))
+            panels.setdefault(label, []).append(Course(history.name, hours, values, unused))
+    return over_time(panels or {"": []}, path)
+
+
+def run_figure(run: Run, path: str | Path | None = None) -> Figure:
+    """Outputs and load of a simulated test over time; outputs of one quantity that grow with creep as one."""
+    hours, panels = run.times / SECONDS_PER_HOUR, dict[str, list[Course]]()
+    for name, values in run.outputs.items():
+        output = output_named(name, run.specimen)
+        panels.setdefault(f"{output.quantity if output.grows else name}, {output.unit}".rstrip(", "), []).append(
+            Course(output.long_name, hours, values)
+        )
+    program = run.loading.program()
+    knots = np.unique([*program.times[program.times < run.end_time], 0.0, run.end_time])
+    label = ", ".join(filter(None, (run.loading.quantity, load_unit(run))))
+    panels[label] = [Course(run.reason and f"ended: {run.reason}", knots / SECONDS_PER_HOUR, program.at(knots))]
+    return over_time(panels, path)

@@ -26,6 +26,7 @@ from creepkit.reports.answer import (
     chosen_text,
     constant_load_sentence,
     equations,
+    key_figures,
     reference_sentences,
     symbols_of,
     unit_text,
@@ -38,7 +39,6 @@ from creepkit.reports.judged_readings import LAW_RATE_MEANING, OWN_RATE_CHI_SQUA
 from creepkit.reports.rate_panels import rupture_rows
 
 if TYPE_CHECKING:
-    from creepkit.inverse.goodness_of_fit import TestFit
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.nuisance_parameters import NuisanceEstimate
     from creepkit.inverse.selection.ranking import Ranking
@@ -49,10 +49,6 @@ if TYPE_CHECKING:
 
 MOST_NAMED = 12
 """Tests, or temperatures, that are named in a sentence."""
-
-
-MOST_LISTED = 40
-"""Tests without curves in their table: with more, those whose values lie farthest from the law."""
 
 
 MOST_CORRELATED = 12
@@ -68,6 +64,7 @@ REJECTED = (
 def identification_text(fit: Identification) -> str:
     """Everything: the law, its values with 95 % intervals, the verdict, the tests, noise and nuisance parameters."""
     head: list[Block] = [Paragraph(fit.law.title or fit.law.name), Paragraph(fit.headline)]
+    head.append(Items([one.line for one in key_figures(fit)]))
     formulas = [Formula(one) for one in equations(fit.law)]
     return as_text([*head, *formulas, *value_blocks(fit), *blocks_of_tests(fit, None), *noise_blocks(fit)])
 
@@ -169,46 +166,35 @@ def interval_basis(fit: Identification) -> list[str]:
     That they hold only with the form of the law is not said of a law that the tests reject: none of its values does.
     """
     conditional = "" if rejected(fit) else constant_load_sentence(fit)
-    return [_usual_errors(fit), _weights(fit.settings), *([conditional] if conditional else [])]
+    return [*_usual_errors(fit), _weights(fit.settings), *([conditional] if conditional else [])]
 
 
-def _usual_errors(fit: Identification) -> str:
+def _usual_errors(fit: Identification) -> list[str]:
     """Which errors of tests the intervals include, of which size, and how wide they are without."""
     included = {one.kind: one.amount for one in fit.unmodelled if one.included}
     if not included:
-        return "the intervals take the temperatures, loads and dimensions of the tests as exactly known"
+        return ["the intervals take the temperatures, loads and dimensions of the tests as exactly known"]
     errors = ", ".join(f"{kind} {amount}" for kind, amount in included.items())
     begin = f"the intervals include errors of the tests that nobody measured (one standard deviation: {errors})"
     if rejected(fit) or not fit.estimates:
-        return begin
-    stress = fit.reference.stress
-    with_errors, without = (
-        float(one.rate(stress, warn=False)[2] / one.rate(stress, warn=False)[0]) for one in (fit, fit.by_tests_alone)
-    )
-    return (
-        f"{begin}: the rate amid the tests is known to a factor of {with_errors:.3g}, and if all of these were exact "
-        f'(usual_errors="none") to {without:.3g}'
-    )
+        return [begin]
+    rates = [one.rate(fit.reference.stress, warn=False) for one in (fit, fit.by_tests_alone)]
+    with_errors, without = (float(high / value) for value, _, high in rates)
+    exact = f'{without:.3g} if these were exact (usual_errors="none")'
+    return [begin, f"the rate amid the tests is known to a factor of {with_errors:.3g}; {exact}"]
+
+
+WEIGHTS = {
+    "likelihood": 'the intervals rest on the likelihood (weights "likelihood"): readings count by their noise',
+    "noise": 'the intervals rest on readings of equal weight (weights "noise") and all the scatter that was estimated',
+}
+"""{weights of a fit: what its intervals rest on}."""
 
 
 def _weights(settings: IdentificationSettings) -> str:
-    if settings.weights == "likelihood":
-        return (
-            'the intervals rest on the likelihood (weights "likelihood"): readings count by their estimated noise, so '
-            "that the shape of every curve counts beside the comparison of tests; readings of equal weight "
-            '(weights "noise") give other values and, as a rule, wider intervals'
-        )
-    if settings.weights == "noise":
-        return (
-            'the intervals rest on readings of equal weight (weights "noise") and all the scatter that was estimated, '
-            'with what the law cannot follow; the likelihood (weights "likelihood", the default) gives other values '
-            "and, as a rule, narrower intervals"
-        )
-    weights = settings.weights if isinstance(settings.weights, str) else f"{dict(settings.weights)}"
-    return (
-        f"the intervals rest on weights of the outputs ({weights}), whose relative squared errors are summed, and the "
-        "scatter that was estimated"
-    )
+    stated = settings.weights if isinstance(settings.weights, str) else f"{dict(settings.weights)}"
+    usual = f"the intervals rest on weights of the outputs ({stated}), whose relative squared errors are summed"
+    return WEIGHTS.get(stated, usual)
 
 
 # ---- tests -----------------------------------------------------------------------------------------------------------
@@ -219,7 +205,9 @@ def blocks_of_tests(fit: Identification, figures: PageFigures | None, *, of: str
 
     of : the material, " of CMSX-4".
     """
-    blocks = [*_single_value_blocks(fit), _table_of_tests(fit)]
+    contradicting = None if fit.adequacy is None else fit.adequacy.contradicting
+    blocks: list[Block] = [] if contradicting is None else [Paragraph(str(contradicting), "warning")]
+    blocks.append(_table_of_tests(fit))
     blocks += [Paragraph(text, "note") for text in (*_sums(fit), *_without_misfit(fit))]
     worst = worst_tests(fit)[:most]
     if figures is not None and fit.histories and fit.predictor is not None and worst:
@@ -239,8 +227,9 @@ def worst_tests(fit: Identification) -> list[int]:
 
 
 def _table_of_tests(fit: Identification) -> Table:
+    """Of each test its misfits, and its minimum rate and life beside those by the law; empty columns are left out."""
     rows = []
-    compared, readings, ruptures = compared_values(fit), judged_readings(fit), bool(rupture_rows(fit))
+    compared, readings = compared_values(fit), judged_readings(fit)
     for k, test in enumerate(fit.tests):
         first = test.outputs[0] if test.outputs else None
         unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
@@ -255,20 +244,24 @@ def _table_of_tests(fit: Identification) -> Table:
                 "–" if first is None else f"{number(first.offset, 2)}{unit}",
                 number(test.rate_factor, 3),
                 number(test.weight, 2),
-                *((_end_cells(test.rupture if test.rupture and test.rupture.used else None)[:2]) if ruptures else ()),
+                *_rate_cells(None if first is not None else test.minimum_rate),
+                *_end_cells(test.rupture if first is None or (test.rupture and test.rupture.used) else None),
             )
         )
     columns = [
         *("test", "condition", "values", "χ², own rate", "misfit, law's rate", "squared error", "offset"),
-        *("rate × law", "weight", *(("lasted, h", "by the law, h") if ruptures else ())),
+        *("rate × law", "weight", "minimum rate, 1/s", "by the law", "law / measured"),
+        *("lasted, h", "by the law, h", "law / measured"),
     ]
     caption = (
         f"{OWN_RATE_CHI_SQUARE}. Beside it the {LAW_RATE_MEANING}. Relative squared error and offset of the first "
         "output with the law's rate; a dash: no value is predicted at some readings, as after a rupture. Weight in the "
         "fit: 1 as any other, less for one far from the others"
     )
-    if ruptures:
+    if any(t.minimum_rate or t.rupture for t in fit.tests):
         caption += f". Lives: > marks tests that were stopped; 95 % intervals of a single test{_if_the_law_holds(fit)}"
+    if any(t.rupture and not t.rupture.used for t in fit.tests):
+        caption += "; the law was identified without the ends of some tests"
     return Table(caption, columns, rows, numeric=tuple(range(2, len(columns))))
 
 
@@ -339,35 +332,6 @@ def logarithmic_output(fit: Identification) -> str:
 # ---- tests without curves --------------------------------------------------------------------------------------------
 
 
-def _single_value_blocks(fit: Identification) -> list[Block]:
-    """A table of the tests without curves, and a warning first where their values contradict one another by the law."""
-    tests = [test for test in fit.tests if not test.outputs and (test.minimum_rate or test.rupture)]
-    if not tests:
-        return []
-    contradicting = None if fit.adequacy is None else fit.adequacy.contradicting
-    farthest = sorted(tests, key=_distance, reverse=True)[:MOST_LISTED]
-    listed = [test for test in tests if any(test is one for one in farthest)]
-    rates, ends = any(t.minimum_rate for t in listed), any(t.rupture for t in listed)
-    rows = [
-        (
-            *(test.name, test.condition),
-            *(_rate_cells(test.minimum_rate) if rates else ()),
-            *(_end_cells(test.rupture) if ends else ()),
-        )
-        for test in listed
-    ]
-    columns = ["test", "condition"]
-    columns += ["minimum rate, 1/s", "by the law", "law / measured"] if rates else []
-    columns += ["lasted, h", "by the law, h", "law / measured"] if ends else []
-    caption = "tests without curves, measured and predicted by the law alone; > marks tests that were stopped before"
-    if any(t.rupture and not t.rupture.used for t in listed):
-        caption += "; the law was identified without their ends"
-    if len(listed) < len(tests):
-        caption += f"; the {len(listed)} of {len(tests)} that lie farthest from the law"
-    table = Table(caption, columns, rows, numeric=tuple(range(2, len(columns))))
-    return [*([] if contradicting is None else [Paragraph(str(contradicting), "warning")]), table]
-
-
 def _rate_cells(rate: SingleValue | None) -> tuple[str, str, str]:
     if rate is None:
         return ("", "", "")
@@ -386,14 +350,6 @@ def _end_cells(end: SingleValue | None) -> tuple[str, str, str]:
 
 def _ratio(ratio: float) -> str:
     return number(ratio, 3) if math.isfinite(ratio) else "–"
-
-
-def _distance(test: TestFit) -> float:
-    """The largest |ln| of predicted over measured of a test."""
-    values = [test.minimum_rate] if test.minimum_rate else []
-    values += [test.rupture] if test.rupture and test.rupture.used and not test.rupture.censored else []
-    ratios = [one.ratio for one in values]
-    return max((abs(math.log(r)) if math.isfinite(r) and r > 0 else math.inf for r in ratios), default=0.0)
 
 
 # ---- noise and nuisance parameters -----------------------------------------------------------------------------------
@@ -457,25 +413,23 @@ def rate_estimated(fit: Identification) -> bool:
     return bool(rates) and rates[0].sd is None and len(fit.tests) >= MINIMUM_TESTS
 
 
-def rate_scatter_sentence(fit: Identification) -> str:
-    """How much the creep rates of single tests scatter, and whether that was estimated, given, assumed or left out."""
+def rate_scatter_sentence(fit: Identification, percent: str = "", tests: str = "") -> str:
+    """How much the creep rates of single tests scatter, and whether that was estimated, given, assumed or left out.
+
+    percent, tests : how much, and how many tests there are, where these are not those of this identification alone.
+    """
     rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
     if not rates:
         return "No scatter of creep rates between tests was allowed: every test follows the law's own rate."
-    return scatter_text(fit, f"{number(100 * fit.noise_model.rate, 3)} %", plural(len(fit.tests), "test"))
-
-
-def scatter_text(fit: Identification, percent: str, tests: str) -> str:
-    """The sentence where scatter was allowed; percent : how much. tests : how many there are, where they show none."""
-    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
-    size = f"{percent} about the law (one standard deviation of their logarithm)"
+    size = f"{percent or f'{number(100 * fit.noise_model.rate, 3)} %'} about the law (one standard deviation of their "
+    size += "logarithm)"
     if rates[0].sd is not None:
         return f"The creep rates of single tests have a Gaussian prior: they scatter by {size}, as was given."
     if rate_estimated(fit):
         if fit.noise_model.rate <= UNDETECTED_SCATTER:
             return "No scatter of the creep rates of single tests about the law was detected."
         return f"The creep rates of single tests scatter by {size}, as was estimated."
-    cannot = f"{tests} cannot show it"
+    cannot = f"{tests or plural(len(fit.tests), 'test')} cannot show it"
     return f"How the creep rates of single tests scatter is not known, for {cannot}: the intervals hold for these."
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
-from creepkit.reports.condition_colours import condition_groups, stress_scale, temperature_scale
-from creepkit.reports.figures import empty_figure, save_figure, set_range, shortened, wrapped
+from creepkit.reports.condition_colours import stress_scale, temperature_scale
+from creepkit.reports.figures import empty_figure, save_figure, set_range, shortened, span, wrapped
 from creepkit.reports.judged_readings import JudgedReadings, judged_readings
 from creepkit.reports.prediction_bands import (
     FittedCurves,
@@ -53,20 +53,9 @@ MOST_LABELLED = 16
 """Tests whose stress stands beside their curve, where colours are temperatures."""
 
 
-MOST_IN_ONE_PANEL = 24
-"""Tests."""
-
-
-COLUMNS = (3, 4, 5)
-"""Panels of groups of tests side by side, whichever leaves the fewest places empty."""
-
-
 def identification_figure(fit: Identification, path: str | Path | None = None) -> Figure:
-    """Draw the tests over time with bands, creep rates over stress, and times to rupture.
-
-    More tests than MOST_IN_ONE_PANEL have a panel for each group of conditions.
-    """
-    figure = summary_figure(fit) if len(fit.histories) <= MOST_IN_ONE_PANEL else _many_tests(fit, fitted_curves(fit))
+    """Draw the tests over time with bands, creep rates over stress, and times to rupture."""
+    figure = summary_figure(fit)
     figure.suptitle(wrapped(fit.headline, float(figure.get_size_inches()[0])), fontsize=10)
     return save_figure(figure, path)
 
@@ -93,7 +82,7 @@ def summary_figure(fit: Identification) -> Figure:
         upper, lower = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
         output, tests = max(leading.items(), key=lambda pair: len(pair[1]))
         axes = upper.subplots()
-        _draw_curves([axes], fit, curves, output, [tests], scale.colours)
+        _draw_curves(axes, fit, curves, output, tests, scale.colours)
         axes.set_title("measured (dots) and by the law (lines, 95 % band)", fontsize=9)
         if np.ptp(scale.values) > 0:
             scale.add_bar(upper, [axes])
@@ -119,53 +108,6 @@ def _label_stresses(
             axes.annotate(
                 f"{stresses[k]:.3g}", place, (2, -3), textcoords="offset points", fontsize=7, color=colours[k]
             )
-
-
-def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
-    leading, has_ruptures = leading_outputs(fit), bool(rupture_rows(fit))
-    by_stress, by_temperature = stress_scale(fit.histories, fit.predictor), temperature_scale(fit.histories)
-    by_condition = by_temperature if np.ptp(by_temperature.values) > ISOTHERMAL_RANGE else by_stress
-    groups = {
-        output: [
-            (title, [tests[k] for k in members])
-            for title, members in condition_groups([fit.histories[k] for k in tests], fit.predictor)
-        ]
-        for output, tests in leading.items()
-    }
-    most = max((len(g) for g in groups.values()), default=1)
-    columns = min(COLUMNS, key=lambda count: (-most % count, -(-most // count))) if most > COLUMNS[0] else most
-    row_counts = [-(-len(g) // columns) for g in groups.values()]
-    width = 15.0
-    figure = empty_figure(width, 2.9 * sum(row_counts) + 5.2)
-    heights = [*(2.9 * n + 0.3 for n in row_counts), 4.6]
-    parts = figure.subfigures(len(groups) + 1, 1, height_ratios=heights, squeeze=False)[:, 0]
-    for part, (output, of_output), rows in zip(parts, groups.items(), row_counts, strict=False):
-        panels = part.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
-        used = list(panels.flat)[: len(of_output)]
-        _draw_curves(used, fit, curves, output, [tests for _, tests in of_output], by_stress.colours)
-        for axes, (title, _) in zip(used, of_output, strict=True):
-            axes.set_title(title, fontsize=9)
-        for k, axes in enumerate(panels.flat):
-            if k >= len(of_output):
-                axes.set_visible(False)
-                continue
-            axes.tick_params(labelbottom=k + columns >= len(of_output))
-            axes.set(xlabel="time, h" if k + columns >= len(of_output) else "")
-            axes.set(ylabel=axis_label(output) if k % columns == 0 else "")
-        part.suptitle(_curve_title(fit).replace("\n", " "), fontsize=9)
-        by_stress.add_bar(part, used)
-    panels = np.atleast_1d(parts[-1].subplots(1, 1 + has_ruptures))
-    draw_rates(panels[0], fit, curves.prediction)
-    if has_ruptures:
-        draw_ruptures(panels[1], fit, by_condition.colours)
-    return figure
-
-
-def _curve_title(fit: Identification) -> str:
-    """What is drawn, and what the bands include."""
-    included = "the law and the nuisances of tests" if fit.nuisances else "the law"
-    scatter = f", rates of tests differ by {100 * fit.noise_model.rate:.0f} %" if fit.noise_model.rate >= 0.005 else ""
-    return f"measured (dots), identified (lines) with 95 % band\nof {included}; not in it: noise{scatter}"
 
 
 def draw_curve(axes: Axes, curve: TestCurve, colour: Any, style: str = "-", dots: Any = None) -> None:
@@ -196,22 +138,14 @@ def _drawn_end(curve: TestCurve) -> float:
 
 
 def _draw_curves(
-    panels: Sequence[Axes],
-    fit: Identification,
-    curves: FittedCurves,
-    output: str,
-    groups: Sequence[Sequence[int]],
-    colours: Sequence[Any],
+    axes: Axes, fit: Identification, curves: FittedCurves, output: str, tests: Sequence[int], colours: Sequence[Any]
 ) -> None:
-    """The tests of each group in its panel; all panels have the same axes."""
-    drawn = []
-    for axes, tests in zip(panels, groups, strict=True):
-        for k in tests:
-            drawn.append(curve_of_test(fit, curves, k, output))
-            draw_curve(axes, drawn[-1], colours[k], line_style(fit.tests[k].weight), dots=colours[k])
-    set_curve_ranges(panels, drawn, output)
-    for axes in panels:
-        axes.set(xlabel="time, h", ylabel=axis_label(output))
+    """An output of tests in one panel."""
+    drawn = [curve_of_test(fit, curves, k, output) for k in tests]
+    for k, curve in zip(tests, drawn, strict=True):
+        draw_curve(axes, curve, colours[k], line_style(fit.tests[k].weight), dots=colours[k])
+    set_curve_ranges(axes, drawn, output)
+    axes.set(xlabel="time, h", ylabel=axis_label(output))
 
 
 def _drawn_values(curve: TestCurve) -> Floats:
@@ -219,18 +153,16 @@ def _drawn_values(curve: TestCurve) -> Floats:
     return curve.identified[curve.identified <= _drawn_end(curve)] if curve.logarithmic else curve.identified
 
 
-def set_curve_ranges(panels: Sequence[Axes], drawn: Sequence[TestCurve], output: str) -> None:
-    """The same axes for all panels, from the measured and identified values of what is drawn of an output."""
+def set_curve_ranges(axes: Axes, drawn: Sequence[TestCurve], output: str) -> None:
+    """Axes from the measured and identified values of what is drawn of an output."""
     values = np.concatenate([v for c in drawn for v in (c.measured, _drawn_values(c))])
-    values = values[np.isfinite(values)]
-    largest = float(values.max(initial=0.0))
-    for axes in panels:
-        if is_logarithmic(output) and largest > 0:
-            lowest = max(float(values[values > 0].min()), SHOWN_STRAIN_RATIO * largest)
-            set_range(axes, "y", lowest, 1.1 * largest, logarithmic=True)
-        else:
-            set_range(axes, "y", min(float(values.min(initial=0.0)), 0.0), max(largest, 0.0))
-        set_time_range(axes, np.concatenate([c.hours for c in drawn]), output)
+    largest = float(np.nanmax(values, initial=0.0))
+    if is_logarithmic(output) and largest > 0:
+        shown = values[values >= SHOWN_STRAIN_RATIO * largest]
+        span(axes, "y", shown, 1.1 * largest, logarithmic=True, most=8)
+    else:
+        span(axes, "y", values, zero=True, most=8)
+    set_time_range(axes, np.concatenate([c.hours for c in drawn]), output)
 
 
 # ---- tests one by one ------------------------------------------------------------------------------------------------
@@ -253,7 +185,7 @@ def small_multiples(fit: Identification, tests: Sequence[int]) -> Figure:
         above, below = figure.add_subplot(cell[0]), figure.add_subplot(cell[1])
         curve = curve_of_test(fit, curves, k, output)
         draw_curve(above, curve, colours[k], dots="0.25")
-        set_curve_ranges([above], [curve], output)
+        set_curve_ranges(above, [curve], output)
         draw_residuals(below, fit, curves, output, [k], colours)
         above.set_title(f"{shortened(fit.tests[k].name)}: {fit.histories[k].condition}", fontsize=8)
         above.set_ylabel(axis_label(output), fontsize=8)

@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.instruments.clock_alignment import UNIX_TIME
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
-from creepkit.reports.figures import panels_of, save_figure
+from creepkit.reports.figures import Course, over_time
 from creepkit.reports.json_values import fields_to_json
 
 if TYPE_CHECKING:
@@ -75,22 +75,12 @@ def _channel_text(channel: Channel) -> str:
 
 def record_figure(record: InstrumentRecord, path: str | Path | None = None) -> Figure:
     """Every channel over time, one panel for each quantity."""
-    quantities = list(dict.fromkeys(channel.quantity for channel in record.channels.values()))
-    figure, panels = panels_of(
-        7.0, 1.0 + 2.2 * max(len(quantities), 1), max(len(quantities), 1), 1, sharex=True, squeeze=False
-    )
-    panels = panels[:, 0]
-    for axes, quantity in zip(panels, quantities, strict=False):
-        shift = ZERO_CELSIUS if quantity == "temperature" else 0.0
-        for name, channel in record.channels.items():
-            if channel.quantity == quantity:
-                axes.plot(record.times, channel.values - shift, lw=0.8, label=name)
-        unit = UNITS.get(quantity, "")
-        axes.set_ylabel(f"{quantity}, {unit}" if unit else quantity)
-        if sum(channel.quantity == quantity for channel in record.channels.values()) <= 6:
-            axes.legend(fontsize=7)
-    panels[-1].set_xlabel("time of the record, s")
-    return save_figure(figure, path)
+    panels: dict[str, list[Course]] = {}
+    for name, channel in record.channels.items():
+        shift = ZERO_CELSIUS if channel.quantity == "temperature" else 0.0
+        label = ", ".join(filter(None, (channel.quantity, UNITS.get(channel.quantity, ""))))
+        panels.setdefault(label, []).append(Course(name, record.times, channel.values - shift))
+    return over_time(panels or {"": []}, path, "time of the record, s")
 
 
 def alignment_text(alignment: ClockAlignment) -> str:

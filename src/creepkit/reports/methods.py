@@ -17,17 +17,17 @@ from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
 from creepkit.records import is_logarithmic, kind_and_start, output_unit
 from creepkit.reports.blocks import number, plural, printable, sentence, typeset
 from creepkit.reports.design import order_text
-from creepkit.reports.identification import rate_estimated, rate_scatter_sentence, scatter_text
+from creepkit.reports.identification import rate_estimated, rate_scatter_sentence
 from creepkit.reports.methods_tests import (
     CITATIONS,
     MOST_NAMED,
     References,
-    by_material,
     compared_tests,
     laws,
     listed,
     loading,
     models,
+    of_all,
 )
 
 if TYPE_CHECKING:
@@ -45,14 +45,11 @@ def identification_methods(
     alone = len(found) == 1
     ranked = [one for one in found if one.ranking is not None]
     return [
-        [*compared_tests(found), *by_material(found, loading), *laws(found, references)],
-        by_material(found, lambda one: models(one.fit)),
+        [*compared_tests(found), *of_all(found, loading), *laws(found, references)],
+        of_all(found, lambda one: models(one.fit)),
+        [*of_all(found, lambda one: _estimation(one, contents, references, numbers=alone)), *_scatter(found)],
         [
-            *by_material(found, lambda one: _estimation(one, contents, references, numbers=alone)),
-            *([] if alone else _scatter_over_materials([one.fit for one in found])),
-        ],
-        [
-            *by_material(ranked, lambda one: ranking_sentences(one, references, numbers=alone)),
+            *of_all(ranked, lambda one: ranking_sentences(one, references, numbers=alone)),
             *adequacy_sentences(found, references),
         ],
     ]
@@ -71,7 +68,6 @@ def _estimation(found: GroupFindings, contents: ReportContents, references: Refe
         "The bounds of the search are those of the table of symbols.",
         *_weights(fit, references),
         *_offsets(fit, numbers=numbers),
-        rate_scatter_sentence(fit) if numbers else "",
         *_autocorrelation(fit, numbers=numbers),
         _explicit_nuisances(fit),
         _noise_priors(fit, numbers=numbers),
@@ -218,25 +214,13 @@ def _noise_priors(fit: Identification, *, numbers: bool) -> str:
     )
 
 
-def _scatter_over_materials(fits: Sequence[Identification]) -> list[str]:
-    """The same of several materials, one sentence with the range for all of whom it is alike."""
-    groups: dict[str, list[Identification]] = {}
-    for fit in fits:
-        if any(n.kind == "rate" and not n.is_simulated for n in fit.settings.nuisances):
-            groups.setdefault(scatter_text(fit, "", ""), []).append(fit)
-        else:
-            groups.setdefault(rate_scatter_sentence(fit), [])
-    sentences = []
-    for text, alike in groups.items():
-        if not alike:
-            sentences.append(text)
-            continue
-        low, high = (number(100 * f(fit.noise_model.rate for fit in alike), 3) for f in (min, max))
-        counts = sorted({len(fit.tests) for fit in alike})
-        tests = plural(counts[0], "test") if len(counts) == 1 else f"{counts[0]} to {counts[-1]} tests"
-        of = "" if len(groups) == 1 else f"Of {plural(len(alike), 'material')}: "
-        sentences.append(of + scatter_text(alike[0], f"{low} %" if low == high else f"{low} to {high} %", tests))
-    return sentences
+def _scatter(found: Sequence[GroupFindings]) -> list[str]:
+    """How rates of tests scatter, with the range over all materials."""
+    ends = [f(100 * one.fit.noise_model.rate for one in found) for f in (min, max)]
+    counts = [f(len(one.fit.tests) for one in found) for f in (min, max)]
+    percent = " to ".join(dict.fromkeys(number(end, 3) for end in ends))
+    tests = plural(counts[0], "test") if counts[0] == counts[1] else f"{counts[0]} to {counts[1]} tests"
+    return of_all(found, lambda one: [rate_scatter_sentence(one.fit, f"{percent} %", tests)])
 
 
 def _explicit_nuisances(fit: Identification) -> str:

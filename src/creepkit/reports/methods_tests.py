@@ -25,25 +25,12 @@ if TYPE_CHECKING:
 
 
 MOST_NAMED = 6
-"""Materials that a sentence names; of more it says how many."""
+"""Nuisance parameters that a sentence names; of more it says their kinds."""
 
 
-def by_material(found: Sequence[GroupFindings], sentences_of: Callable[[GroupFindings], Sequence[str]]) -> list[str]:
-    """The sentences on each material: each once where it is that of all, else after the names of its materials."""
-    names: dict[str, list[str]] = {}
-    for one in found:
-        for text in filter(None, sentences_of(one)):
-            names.setdefault(text, []).append(printable(one.name, 80))
-    shared = [text for text, who in names.items() if len(who) == len(found)]
-    groups: dict[tuple[str, ...], list[str]] = {}
-    for text, who in names.items():
-        if len(who) < len(found):
-            groups.setdefault(tuple(who), []).append(text)
-    own = [
-        " ".join([f"Of {listed(who) if len(who) <= MOST_NAMED else plural(len(who), 'material')}:", *sentences])
-        for who, sentences in groups.items()
-    ]
-    return [*shared, *own]
+def of_all(found: Sequence[GroupFindings], sentences_of: Callable[[GroupFindings], Sequence[str]]) -> list[str]:
+    """The sentences on all materials, each once."""
+    return [*dict.fromkeys(text for one in found for text in sentences_of(one) if text)]
 
 
 def laws_of(found: Sequence[GroupFindings]) -> dict[str, CreepLaw]:

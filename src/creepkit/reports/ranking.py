@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +18,15 @@ from creepkit.records import is_logarithmic
 from creepkit.reports.answer import titled_law, unit_text, value_cells
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
-from creepkit.reports.figures import empty_figure, logarithmic_labels, power_of_ten, save_figure, shortened, wrapped
+from creepkit.reports.figures import (
+    empty_figure,
+    logarithmic_labels,
+    panel_grid,
+    power_of_ten,
+    save_figure,
+    shortened,
+    wrapped,
+)
 from creepkit.reports.identification import rejected, scatter_of_rates, verdict_given_law
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
 from creepkit.reports.json_values import fields_to_json
@@ -241,7 +248,7 @@ MOST_LAWS_DRAWN = 5
 
 
 MOST_TEST_NAMES = 24
-"""Above this many tests the columns of the misfits are numbered by condition instead of named."""
+"""Columns of the misfits that are named."""
 
 
 SHOWN_QUANTILE = 0.97
@@ -273,26 +280,18 @@ def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
     The misfit is that of `misfits`; the title is the verdict.
     """
     credible = [r for r in ranking.laws if r.weight > CREDIBLE_WEIGHT][:MOST_LAWS_DRAWN]
-    with_tests = all(r.fit.histories and r.fit.predictor is not None for r in credible)
-    curves = [fitted_curves(r.fit) for r in credible] if with_tests and len(credible) > 1 else []
+    with_tests = len(credible) > 1 and all(r.fit.histories and r.fit.predictor is not None for r in credible)
+    curves = [fitted_curves(r.fit) for r in credible] if with_tests else []
     shown = _tests_to_draw([r.fit for r in credible], curves) if curves else []
-    columns = min(3, len(shown))
-    rows = -(-len(shown) // 3)
-    misfits_height = 2.0 + 0.42 * len(ranking.laws)
-    width = 12.5
-    figure = empty_figure(width, misfits_height + 3.0 * rows + 0.7)
-    heights = [misfits_height, 3.0 * rows] if shown else [misfits_height]
+    heights, width = [2.0 + 0.42 * len(ranking.laws), *([3.0 * -(-len(shown) // 3)] if shown else [])], 12.5
+    figure = empty_figure(width, sum(heights) + 0.7)
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     _draw_misfits(parts[0], ranking)
     if shown:
-        panels = list(parts[1].subplots(rows, columns, squeeze=False).flat)
-        for axes, test in zip(panels, shown, strict=False):
+        for axes, test in zip(panel_grid(len(shown), 3, 0.0, 0.0, part=parts[1])[1], shown, strict=True):
             _draw_test(axes, credible, curves, test)
-        for axes in panels[len(shown) :]:
-            axes.set_visible(False)
         _name_laws(parts[1], credible, every_test=len(shown) == len(ranking.best.tests))
-    title = ranking.verdict
-    figure.suptitle(wrapped(title, width), fontsize=10)
+    figure.suptitle(wrapped(ranking.verdict, width), fontsize=10)
     return save_figure(figure, path)
 
 
@@ -333,7 +332,7 @@ def _draw_misfits(part: Any, ranking: Ranking) -> None:
     image = heat.imshow(
         np.where(values > 0, values, np.nan), norm=LogNorm(labels[0], labels[-1]), cmap="YlOrRd", aspect="auto"
     )
-    heat.set_yticks(range(len(ranking.laws)), [_law_name(r) for r in ranking.laws], fontsize=8)
+    heat.set_yticks(range(len(ranking.laws)), [r.fit.law.name for r in ranking.laws], fontsize=8)
     _label_tests(heat, ranking.best, order)
     if len(order) <= MOST_NUMBERS:
         middle = float(np.sqrt(labels[0] * labels[-1]))
@@ -367,10 +366,6 @@ def _number(value: float) -> str:
     return f"{value:.2g}" if value < 100 else f"{value:.0f}" if value < 9999.5 else power_of_ten(float(f"{value:.0e}"))
 
 
-def _law_name(ranked: RankedLaw) -> str:
-    return ranked.fit.law.name
-
-
 def _law_colours(ranking: Ranking) -> list[Any]:
     """Those of the curves; grey for laws whose curves are not drawn."""
     colours = distinct_colours(MOST_LAWS_DRAWN)
@@ -380,33 +375,18 @@ def _law_colours(ranking: Ranking) -> list[Any]:
 
 
 def _columns(fit: Identification) -> list[int]:
-    """The tests from the coldest to the hottest, of one temperature (or without histories) P2 before P10."""
-    names = [_natural_order(test.name) for test in fit.tests]
-    celsius = np.round(temperatures_celsius(fit.histories)) if fit.histories else np.zeros(len(names))
-    return sorted(range(len(names)), key=lambda k: (float(celsius[k]), names[k]))
-
-
-def _natural_order(name: str) -> list[tuple[int, int, str]]:
-    """A key by which numbers within names count as numbers; other text goes before them where both begin alike."""
-    return [(1, int(part), "") if part.isdecimal() else (0, 0, part) for part in re.split(r"(\d+)", name) if part]
+    """The tests from the coldest to the hottest, of one temperature, or without histories, in their order."""
+    celsius = np.round(temperatures_celsius(fit.histories)) if fit.histories else np.zeros(len(fit.tests))
+    return [int(k) for k in np.argsort(celsius, kind="stable")]
 
 
 def _label_tests(axes: Axes, fit: Identification, order: Sequence[int]) -> None:
-    """Names of the tests; of many, the temperature of each run of equal ones."""
-    if len(order) <= MOST_TEST_NAMES or not fit.histories:
-        step = -(-len(order) // MOST_TEST_NAMES)
-        names = [shortened(fit.tests[k].name) for k in order[::step]]
-        axes.set_xticks(range(0, len(order), step), names, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
-        return
-    celsius = np.round(temperatures_celsius(fit.histories))[list(order)]
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(celsius) > 0) + 1, [celsius.size]])
-    for edge in edges[1:-1]:
-        axes.axvline(edge - 0.5, color="black", lw=0.8)
-    centres = 0.5 * (edges[:-1] + edges[1:]) - 0.5
-    step = -(-centres.size // MOST_TEST_NAMES)
-    names = [f"{celsius[edge]:.0f}" for edge in edges[:-1:step]]
-    axes.set_xticks(list(centres[::step]), names, fontsize=8)
-    axes.set_xlabel(f"{len(order)} tests, by temperature, °C", fontsize=9)
+    """Names of the tests, of many those of some."""
+    step = -(-len(order) // MOST_TEST_NAMES)
+    names = [shortened(fit.tests[k].name) for k in order[::step]]
+    axes.set_xticks(range(0, len(order), step), names, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
+    if step > 1:
+        axes.set_xlabel(f"{len(order)} tests, from the coldest to the hottest", fontsize=9)
 
 
 # ---- curves ----------------------------------------------------------------------------------------------------------
@@ -437,7 +417,7 @@ def _draw_test(axes: Axes, laws: Sequence[RankedLaw], curves: Sequence[FittedCur
     drawn = [curve_of_test(r.fit, c, test, output) for r, c in zip(laws, curves, strict=True)]
     for k, (curve, colour) in enumerate(zip(drawn, distinct_colours(len(laws)), strict=True)):
         draw_curve(axes, curve, colour, "-" if k == 0 else "--", dots="0.35" if k == 0 else None)
-    set_curve_ranges([axes], drawn, output)
+    set_curve_ranges(axes, drawn, output)
     axes.set(xlabel="time, h", ylabel=axis_label(output))
     title = f"{shortened(history.name, 48)}: {shortened(program_text(history), 96)}"
     axes.set_title(wrapped(title, PANEL_WIDTH), fontsize=8.5)
@@ -450,6 +430,6 @@ def _name_laws(part: Any, laws: Sequence[RankedLaw], every_test: bool) -> None:
     labels = ["measured"]
     for k, (ranked, colour) in enumerate(zip(laws, distinct_colours(len(laws)), strict=True)):
         handles.append(Line2D([], [], color=colour, ls="-" if k == 0 else "--"))
-        labels.append(f"{_law_name(ranked)}, weight {ranked.weight:.3f}")
+        labels.append(f"{ranked.fit.law.name}, weight {ranked.weight:.3f}")
     title = "credible laws with their 95 % bands" + ("" if every_test else "; the tests in which they differ most")
     part.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, title=title, title_fontsize=8)

@@ -10,12 +10,12 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
-from creepkit.reports.figures import empty_figure, save_figure, set_range, wrapped
+from creepkit.reports.figures import draw_parity, empty_figure, save_figure, span, wrapped
 from creepkit.reports.json_values import fields_to_json
 from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
-from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 from creepkit.rupture_assessment.methods import METHODS, THERMAL, Conditions
+from creepkit.rupture_assessment.rupture_fit import power_of_ten
 from creepkit.rupture_assessment.strength import LONGEST_EXTRAPOLATION, bound_curves, mixed
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from creepkit.reports.svg import PageFigures
     from creepkit.rupture_assessment.assessment import RuptureAssessment
     from creepkit.rupture_assessment.checks import AssessmentCheck
+    from creepkit.rupture_assessment.observed_tests import RuptureTests
     from creepkit.rupture_assessment.rupture_fit import RuptureFit
 
 
@@ -115,8 +116,6 @@ def _range(values: Any) -> str:
 
 
 def _constants(fit: RuptureFit) -> Table:
-    from creepkit.rupture_assessment.methods import METHODS
-
     given = "".join(f", {name} = {value:.6g} given" for name, value in fit.fixed.items())
     rows = [(p.name, f"{p.value:.5g}", f"{p.low:.5g} to {p.high:.5g}", p.unit) for p in fit.parameters]
     caption = f"{fit.name}: {METHODS[fit.method].equation}{given}"
@@ -259,52 +258,34 @@ def rupture_figure(assessment: RuptureAssessment, path: str | Path | None = None
     return save_figure(figure, path)
 
 
-def _shown_isotherms(assessment: RuptureAssessment) -> tuple[float, ...]:
-    all_of_them = assessment.tests.isotherms
-    step = -(-len(all_of_them) // MOST_ISOTHERMS)
-    return all_of_them[::step]
-
-
 def _colours(assessment: RuptureAssessment) -> dict[float, Any]:
+    """{isotherm, K: its colour}."""
     from matplotlib import colormaps
 
     isotherms = assessment.tests.isotherms
     return {T: colormaps["plasma"](0.78 * k / max(len(isotherms) - 1, 1)) for k, T in enumerate(isotherms)}
 
 
-def _colour_of(temperature: float, colours: dict[float, Any]) -> Any:
-    return colours[min(colours, key=lambda T: abs(T - temperature))]
+def _draw_tests(axes: Axes, tests: RuptureTests, x: Floats, y: Floats, colours: dict[float, Any], size: float) -> None:
+    """The tests in the colours of their isotherms, run-outs as arrows; x, y : (tests,) their places."""
+    nearest = [min(colours, key=lambda T: abs(T - one)) for one in tests.temperature]
+    for k, (T, censored) in enumerate(zip(nearest, tests.censored, strict=True)):
+        marker, ms, edge = (RUN_OUT, 9.0, colours[T]) if censored else ("o", size, "white")
+        axes.plot(x[k], y[k], ls="", marker=marker, ms=ms, color=colours[T], mec=edge, mew=0.4, zorder=5)
 
 
 def _draw_isotherms(axes: Axes, assessment: RuptureAssessment, colours: dict[float, Any]) -> None:
     tests = assessment.tests
     longest = 10.0 ** float(tests.log_time.max())
-    end = max(3.0 * LONGEST_EXTRAPOLATION * longest, LONGEST_HOURS)
-    start = 10.0 ** float(tests.log_time.min()) / 2.0
-    low, high = 0.6 * float(tests.stress.min()), 1.3 * float(tests.stress.max())
-    for T in _shown_isotherms(assessment):
-        near = np.abs(tests.temperature - T) <= 5.0
-        _draw_isotherm(axes, assessment, T, (low, high), (start, end), colours[T])
-        for censored, marker in ((False, "o"), (True, RUN_OUT)):
-            chosen = near & (tests.censored == censored)
-            axes.plot(
-                10.0 ** tests.log_time[chosen],
-                tests.stress[chosen],
-                ls="",
-                marker=marker,
-                ms=9 if censored else 4,
-                color=colours[T],
-                mec="white" if not censored else colours[T],
-                mew=0.4,
-                zorder=5,
-            )
-    axes.axvspan(LONGEST_EXTRAPOLATION * longest, 2 * end, color="#d9d9d9", alpha=0.6, lw=0, zorder=0)
-    set_range(axes, "x", start, end, logarithmic=True)
-    set_range(axes, "y", low, high, logarithmic=True)
-    axes.set_xlim(start, end)
-    axes.set_ylim(low, high)
-    axes.set_xlabel("time to rupture, h")
-    axes.set_ylabel("stress, MPa")
+    hours = 10.0 ** float(tests.log_time.min()) / 2.0, max(3.0 * LONGEST_EXTRAPOLATION * longest, LONGEST_HOURS)
+    stresses = 0.6 * float(tests.stress.min()), 1.3 * float(tests.stress.max())
+    for T in tests.isotherms[:: -(-len(tests.isotherms) // MOST_ISOTHERMS)]:
+        _draw_isotherm(axes, assessment, T, stresses, hours, colours[T])
+    _draw_tests(axes, tests, 10.0**tests.log_time, tests.stress, colours, 4.0)
+    axes.axvspan(LONGEST_EXTRAPOLATION * longest, 2 * hours[1], color="#d9d9d9", alpha=0.6, lw=0, zorder=0)
+    span(axes, "x", hours, logarithmic=True, most=8)
+    span(axes, "y", stresses, logarithmic=True, most=8)
+    axes.set(xlim=hours, ylim=stresses, xlabel="time to rupture, h", ylabel="stress, MPa")
     per_cent = f"{100 * assessment.settings.level:g} %"
     axes.plot([], [], "o", color="0.3", ms=4, label="test that broke")
     axes.plot([], [], ls="", marker=RUN_OUT, color="0.3", ms=9, label="run-out")
@@ -324,15 +305,14 @@ def _draw_isotherm(
 ) -> None:
     tests, models = assessment.tests, assessment.models()
     limit = float(assessment.tensile(np.array([temperature]))[0])
+    needs = [METHODS[m.method].needs for m, _ in models if hasattr(m, "method")]
+    if "tensile_strength" in needs and not np.isfinite(limit):
+        return
     stress = np.geomspace(stresses[0], min(stresses[1], 0.99 * limit if np.isfinite(limit) else np.inf), POINTS)
     at = _points(stress, temperature, limit)
-    if any(
-        METHODS[m.method].needs == "tensile_strength" for m, _ in models if hasattr(m, "method")
-    ) and not np.isfinite(limit):
-        return
     curves = bound_curves(models, at, assessment.settings.level)
     for of, alpha in (("test", 0.13), ("mean", 0.35)):
-        low, high = (np.clip(10.0**curve, *_wide(hours)) for (kind, _), curve in curves.items() if kind == of)
+        low, high = (np.clip(10.0**v, 1e-3 * hours[0], 1e3 * hours[1]) for (kind, _), v in curves.items() if kind == of)
         axes.fill_betweenx(stress, low, high, color=colour, alpha=alpha, lw=0)
     times = 10.0 ** mixed(models, at, "mean").quantile(0.5)
     near = np.abs(tests.temperature - temperature) <= 5.0
@@ -341,21 +321,11 @@ def _draw_isotherm(
     axes.plot(np.where(tested, times, np.nan), stress, color=colour, lw=1.8)
     shown = np.flatnonzero(tested & (times > hours[0]) & (times < 0.8 * hours[1]))
     if shown.size:  # above the isotherm at the highest stress tested, where bands are narrow
-        axes.annotate(
-            celsius_text(temperature, digits=0),
-            (times[shown[-1]], stress[shown[-1]]),
-            xytext=(7, 3),
-            textcoords="offset points",
-            fontsize=8,
-            fontweight="bold",
-            color=colour,
-            bbox={"boxstyle": "square,pad=0.1", "color": "white", "alpha": 0.8, "lw": 0},
-            zorder=6,
+        place, box = (times[shown[-1]], stress[shown[-1]]), {"boxstyle": "square,pad=0.1", "color": "white", "lw": 0}
+        label = axes.annotate(
+            celsius_text(temperature, digits=0), place, (7, 3), textcoords="offset points", fontsize=8
         )
-
-
-def _wide(hours: tuple[float, float]) -> tuple[float, float]:
-    return 1e-3 * hours[0], 1e3 * hours[1]
+        label.set(fontweight="bold", color=colour, zorder=6, bbox={**box, "alpha": 0.8})
 
 
 def _points(stress: Floats, temperature: float, limit: float) -> Conditions:
@@ -366,27 +336,23 @@ def _points(stress: Floats, temperature: float, limit: float) -> Conditions:
 def _draw_master_curve(axes: Axes, assessment: RuptureAssessment, colours: dict[float, Any]) -> None:
     """Stress over the time-temperature parameter of the best fit; of Wilshire's the normalised stress."""
     fit, tests = assessment.best, assessment.tests
-    at = conditions_of(tests, assessment.tensile)
+    at, T = conditions_of(tests, assessment.tensile), float(tests.temperature.mean())
+    normalised, limit = fit.method == "wilshire", float(assessment.tensile(np.array([T]))[0])
     value, label = _parameter(assessment, at, tests.log_time)
-    normalised = fit.method == "wilshire"
-    stress = at.stress / at.tensile_strength if normalised else at.stress
-    for T in tests.isotherms:
-        near = np.abs(tests.temperature - T) <= 5.0
-        for censored, marker in ((False, "o"), (True, RUN_OUT)):
-            chosen = near & (tests.censored == censored)
-            axes.plot(value[chosen], stress[chosen], ls="", marker=marker, ms=8 if censored else 3.5, color=colours[T])
-    T = float(tests.temperature.mean())
-    limit = float(assessment.tensile(np.array([T]))[0])
-    grid = np.geomspace(tests.stress.min(), tests.stress.max(), POINTS)
-    if normalised:
-        grid = np.geomspace(stress.min(), stress.max(), POINTS) * limit
-    line, _ = _parameter(assessment, _points(grid, T, limit), fit.location(_points(grid, T, limit)))
-    axes.plot(line, grid / limit if normalised else grid, color="black", lw=1.2)
-    low, high = float(stress.min()), float(stress.max())
-    set_range(axes, "y", 0.95 * low, 1.05 * high, logarithmic=True, most=6)
-    axes.set_xlabel(label, fontsize=8)
-    axes.set_ylabel("stress / tensile strength" if normalised else "stress, MPa", fontsize=8)
-    axes.set_title(f"{fit.name}: master curve", fontsize=9)
+    scale = at.tensile_strength if normalised else np.ones_like(at.stress)
+    stress, unit = at.stress / scale, limit if normalised else 1.0
+    _draw_tests(axes, tests, value, stress, colours, 3.5)
+    grid = np.geomspace(stress.min(), stress.max(), POINTS)
+    points = _points(grid * unit, T, limit)
+    axes.plot(_parameter(assessment, points, fit.location(points))[0], grid, color="black", lw=1.2)
+    span(axes, "y", stress, logarithmic=True, margin=1.05)
+    _dress(axes, label, "stress / tensile strength" if normalised else "stress, MPa", f"{fit.name}: master curve")
+
+
+def _dress(axes: Axes, x: str, y: str, title: str) -> None:
+    axes.set_xlabel(x, fontsize=8)
+    axes.set_ylabel(y, fontsize=8)
+    axes.set_title(title, fontsize=9)
     axes.tick_params(labelsize=7)
 
 
@@ -397,9 +363,8 @@ def _parameter(assessment: RuptureAssessment, at: Conditions, log_time: Floats) 
     if fit.method == "larson-miller":
         return at.temperature * (values["C"] + log_time) / 1000.0, f"T ({values['C']:.2f} + log t) / 1000, K, h"
     if fit.method in ("orr-sherby-dorn", "wilshire"):
-        return log_time - values["Q"] / (
-            THERMAL * at.temperature
-        ), f"log t - {values['Q'] / 1000:.0f} kJ/mol / (R T ln 10), h"
+        label = f"log t - {values['Q'] / 1000:.0f} kJ/mol / (R T ln 10), h"
+        return log_time - values["Q"] / (THERMAL * at.temperature), label
     if fit.method == "manson-haferd":
         t_a, T_a = values["log10 t_a"], values["T_a"]
         return (log_time - t_a) / (at.temperature - T_a), f"(log t - {t_a:.2f}) / (T - {T_a:.0f} K), h"
@@ -408,29 +373,7 @@ def _parameter(assessment: RuptureAssessment, at: Conditions, log_time: Floats) 
 
 def _draw_predicted(axes: Axes, assessment: RuptureAssessment, colours: dict[float, Any]) -> None:
     fit, tests = assessment.best, assessment.tests
-    predicted = fit.location(conditions_of(tests, assessment.tensile))
-    for censored, marker in ((False, "o"), (True, RUN_OUT)):
-        for k in np.flatnonzero(tests.censored == censored):
-            colour = _colour_of(tests.temperature[k], colours)
-            axes.plot(
-                10.0 ** tests.log_time[k],
-                10.0 ** predicted[k],
-                ls="",
-                marker=marker,
-                ms=8 if censored else 3.5,
-                color=colour,
-            )
-    both = np.concatenate([tests.log_time, predicted])
-    low, high = 10.0 ** (both.min() - 0.25), 10.0 ** (both.max() + 0.25)
-    line = np.array([low, high])
-    axes.plot(line, line, color="black", lw=1.0)
-    for factor in (BAND_FACTOR, 1.0 / BAND_FACTOR):
-        axes.plot(line, factor * line, ":", color="black", lw=0.8)
-    for which in ("x", "y"):
-        set_range(axes, which, low, high, logarithmic=True, most=6)
-    axes.set_xlim(low, high)
-    axes.set_ylim(low, high)
-    axes.set_xlabel("measured, h (dotted: a factor of 2)", fontsize=8)
-    axes.set_ylabel("predicted, h", fontsize=8)
-    axes.set_title(f"{fit.name}: predicted against measured", fontsize=9)
-    axes.tick_params(labelsize=7)
+    measured, predicted = 10.0**tests.log_time, 10.0 ** fit.location(conditions_of(tests, assessment.tensile))
+    draw_parity(axes, measured, predicted, logarithmic=True, margin=1.8, factor=BAND_FACTOR)
+    _draw_tests(axes, tests, measured, predicted, colours, 3.5)
+    _dress(axes, "measured, h (grey: a factor of 2)", "predicted, h", f"{fit.name}: predicted against measured")

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.frame_noise import usable_frames
-from creepkit.records import SECONDS_PER_HOUR, growing_output, output_named, specimen_of
+from creepkit.records import growing_output, output_named, specimen_of
 from creepkit.reports.blocks import aligned
-from creepkit.reports.figures import empty_figure, make_folder, panels_of, place_legend_below, save_figure, set_range
+from creepkit.reports.figures import draw_parity, make_folder, panel_grid, panels_of, save_figure
 from creepkit.reports.terminal import print_json, print_table, tell
 from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
-from creepkit.screening.results import AlloyResult, PredictedOutputs, mean_chi_square, mean_relative_squared_error
+from creepkit.screening.results import AlloyResult, mean_chi_square, mean_relative_squared_error
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from creepkit.records import History
@@ -112,64 +111,75 @@ MIN_LOG_RATIO = 5.0
 """Ratio of the ends of an axis below which it is linear."""
 
 
-class LegendLabels:
-    """Labels for a legend, each given out once."""
-
-    def __init__(self) -> None:
-        self._used: set[str] = set()
-
-    def first_use(self, name: str) -> str | None:
-        """The name the first time, None from then on."""
-        if name in self._used:
-            return None
-        self._used.add(name)
-        return name
+Pairs: TypeAlias = Mapping[str, list[tuple[Floats, Floats]]]
+"""{title of a series: measured and identified values, (frames,) each, of every test that has them}."""
 
 
-def class_colours(plate: ScreeningResult) -> Mapping[str, str]:
-    """{class: colour}."""
-    return {name: f"C{k % 10}" for k, name in enumerate(plate.by_class())}
+def plot_screening(plate: ScreeningResult, folder: Path) -> list[Path]:
+    """Write laws.png, parity.png and, with a dense law, misfit.png; their paths."""
+    if not plate.identified:
+        raise FitError("no alloy of this plate has a law, so there is nothing to draw; see Plate.failed")
+    first = plate.histories[plate.identified[0].alloy][0].specimen  # one quantity on the axes: tests of one specimen
+    pairs = {
+        one.alloy: found
+        for one in plate.identified
+        if plate.histories[one.alloy][0].specimen == first and (found := _pairs(plate, one))
+    }
+    figures = {"laws.png": _plot_law_fractions(plate)}
+    if any(one.dense_fit is not None for one in plate.identified):
+        figures["misfit.png"] = _plot_misfits(plate)
+    if pairs:
+        figures["parity.png"] = _plot_parity(plate, pairs)
+    make_folder(folder, FitError)
+    for name, figure in figures.items():
+        save_figure(figure, folder / name, FitError)
+    return [folder / name for name in figures]
 
 
-def plot_misfits(plate: ScreeningResult, results: list[AlloyResult]) -> Figure:
+def _draw_by_class(
+    plate: ScreeningResult, figure: Figure, draw: Callable[[AlloyResult, Any, str | None], None]
+) -> None:
+    """Draw the alloys, each in the colour of its class, which the legend names; draw : of alloy, colour and label."""
+    for k, (name, members) in enumerate(plate.by_class().items()):
+        for number, result in enumerate(members):
+            draw(result, f"C{k % 10}", None if number else name)
+    figure.legend(loc="outside lower center", ncols=6, fontsize=8, markerscale=2)
+
+
+def _plot_misfits(plate: ScreeningResult) -> Figure:
     """Misfit of the reduced law against that of the dense one (Fig. 7b): Eq. (4), and in units of noise."""
-    figure = empty_figure(8.6, 4.6)
-    colours, labels = class_colours(plate), LegendLabels()
-    for axes, (title, measure) in zip(figure.subplots(1, 2), MISFIT_MEASURES, strict=True):
-        points = [(measure(a.dense_fit), measure(a.reduced_fit)) for a in results if a.dense_fit is not None]
-        for (x, y), result in zip(points, results, strict=True):
-            name = plate.class_of(result.alloy)
-            axes.plot(x, y, "o", ms=5, color=colours[name], alpha=0.75, label=labels.first_use(name))
-        values = np.array(points)[np.isfinite(points).all(axis=1)]
-        _finish_misfit(axes, (values.min() / 1.2, values.max() * 1.2) if values.size else (0.1, 10.0))
+    figure, panels = panel_grid(2, 2, 4.3, 4.6)
+    fits = {one.alloy: (one.dense_fit, one.reduced_fit) for one in plate.identified if one.dense_fit is not None}
+    for axes, (title, measure) in zip(panels, MISFIT_MEASURES, strict=True):
+        values = np.array([[measure(one) for one in pair] for pair in fits.values()])
+        finite = values[np.isfinite(values)]
+        logarithmic = bool(finite.size and finite.max() >= MIN_LOG_RATIO * finite.min())
+        draw_parity(axes, values, logarithmic=logarithmic, margin=1.2 if logarithmic else 1.0)
+        axes.set(xlabel="law without sparsity", ylabel="reduced law")
         axes.set_title(title, fontsize=10)
-    figure.legend(loc="outside lower center", ncols=6, fontsize=8)
+
+    def draw(result: AlloyResult, colour: Any, label: str | None) -> None:
+        for axes, (_, measure) in zip(panels, MISFIT_MEASURES, strict=True):
+            own = label if axes is panels[0] else None
+            if result.alloy in fits:
+                axes.plot(*map(measure, fits[result.alloy]), "o", ms=5, alpha=0.75, color=colour, label=own)
+
+    _draw_by_class(plate, figure, draw)
     return figure
 
 
-def _finish_misfit(axes: Axes, limits: tuple[float, float]) -> None:
-    """Equal axes, logarithmic where they span much."""
-    logarithmic = limits[1] >= MIN_LOG_RATIO * limits[0]
-    set_range(axes, "x", *limits, logarithmic=logarithmic, most=6)
-    set_range(axes, "y", *limits, logarithmic=logarithmic, most=6)
-    axes.plot(axes.get_xlim(), axes.get_xlim(), "k-", lw=0.7, alpha=0.6, scalex=False, scaley=False)
-    axes.set(xlabel="law without sparsity", ylabel="reduced law")
-
-
-def plot_law_fractions(plate: ScreeningResult) -> Figure:
+def _plot_law_fractions(plate: ScreeningResult) -> Figure:
     """Share of each law by class (Fig. 7c): full colour where decisive, hatched what is shared out between laws."""
     figure, axes = panels_of(7.2, 4.4)
     classes = plate.by_class()
     bottom, positions = np.zeros(len(classes)), range(len(classes))
     for k, law in enumerate(sorted({w.fit.law.name for a in plate.identified for w in a.laws})):
-        decisive_fractions, undecided_fractions = (
-            np.array([_law_fraction(m, law, d) for m in classes.values()]) for d in (True, False)
-        )
-        axes.bar(positions, decisive_fractions, bottom=bottom, color=f"C{k}", label=law, width=0.6)
-        bars = axes.bar(positions, undecided_fractions, bottom=bottom + decisive_fractions, color=f"C{k}", width=0.6)
-        for bar in bars:
-            bar.set(alpha=0.45, hatch="///", edgecolor="white", linewidth=0)
-        bottom += decisive_fractions + undecided_fractions
+        for decisive in (True, False):
+            share = np.array([_law_fraction(members, law, decisive) for members in classes.values()])
+            style: Any = {} if decisive else {"alpha": 0.45, "hatch": "///", "edgecolor": "white", "linewidth": 0}
+            label = law if decisive else None
+            axes.bar(positions, share, bottom=bottom, color=f"C{k}", width=0.6, label=label, **style)
+            bottom += share
     axes.set_xticks(positions, [f"{name}\n{len(m)} alloy{'s' if len(m) > 1 else ''}" for name, m in classes.items()])
     axes.set(ylim=(0, 1), xlim=(-0.6, max(len(classes), 3) - 0.4), ylabel="share of alloys")
     axes.set_title("identified laws by class; hatched: shared out by weight where not decisive", fontsize=10)
@@ -183,89 +193,9 @@ def _law_fraction(members: tuple[AlloyResult, ...], law: str, decisive: bool) ->
     return sum(weights) / len(members)
 
 
-MAX_CLASSES = 4
-"""Classes that are shown."""
-
-
-def plot_histories(plate: ScreeningResult, results: list[AlloyResult]) -> Figure:
-    """A panel a class: the first test of its first alloy, at three radii."""
-    shown_results: dict[str, AlloyResult] = {}
-    for name in plate.by_class():
-        members = [a for a in results if plate.class_of(a.alloy) == name]
-        if members and len(shown_results) < MAX_CLASSES:
-            shown_results[name] = next((a for a in members if a.decisive), members[0])
-    figure, panels = panels_of(3.6 * max(len(shown_results), 2), 3.9, 1, len(shown_results), squeeze=False)
-    panels = panels[0]
-    for axes, (name, result) in zip(panels, shown_results.items(), strict=True):
-        test = plate.histories[result.alloy][0]
-        _plot_series(axes, test, result.predicted[test.name])
-        axes.set_title(f"{result.alloy}, {name}: {result.best.law.name}", fontsize=9)
-    panels[0].set_ylabel(_quantity_label(plate.histories[results[0].alloy]))
-    place_legend_below(figure, panels[0], title="measured (dots), identified (lines)")
-    return figure
-
-
-def _plot_series(axes: Axes, test: History, predicted: PredictedOutputs) -> None:
-    measured, hours = plotted_series(test, test.outputs), test.times / SECONDS_PER_HOUR
-    for k, (title, values) in enumerate(plotted_series(test, predicted).items()):
-        if title in measured:
-            axes.plot(hours[test.used], measured[title][test.used], ".", ms=2, color=f"C{k}", alpha=0.4)
-            axes.plot(hours, values, "-", lw=1.2, color=f"C{k}", label=title)
-    drawn = np.concatenate([np.zeros(1), *(line.get_ydata() for line in axes.lines)])
-    set_range(axes, "y", 0.0, float(np.nanmax(drawn, initial=1e-9)))
-    set_range(axes, "x", 0.0, float(test.times[-1]) / SECONDS_PER_HOUR, most=6)
-    axes.set(xlabel="time, h")
-
-
-def plot_screening(plate: ScreeningResult, folder: Path) -> list[Path]:
-    """Write histories.png and parity.png, misfit.png (with a dense law) and laws.png; their paths."""
-    if not plate.identified:
-        raise FitError("no alloy of this plate has a law, so there is nothing to draw; see Plate.failed")
-    first = plate.histories[plate.identified[0].alloy][0].specimen  # one quantity on the axes: tests of one specimen
-    shown = [a for a in plate.identified if plate.histories[a.alloy][0].specimen == first]
-    dense_results = [a for a in plate.identified if a.dense_fit is not None]
-    figures = {"laws.png": plot_law_fractions(plate)}
-    if any(_pairs(plate, result) for result in shown):
-        figures["parity.png"] = _plot_parity(plate, shown)
-        figures["histories.png"] = plot_histories(plate, shown)
-    if dense_results:
-        figures["misfit.png"] = plot_misfits(plate, dense_results)
-    make_folder(folder, FitError)
-    for name, figure in sorted(figures.items()):
-        save_figure(figure, folder / name, FitError)
-    return [folder / name for name in sorted(figures)]
-
-
-def _plot_parity(plate: ScreeningResult, results: list[AlloyResult]) -> Figure:
-    """Identified against measured, of each series that is drawn, and their difference (Fig. 7a, of all alloys)."""
-    pairs = {result.alloy: _pairs(plate, result) for result in results}
-    titles = list(dict.fromkeys(title for series in pairs.values() for title in series))
-    figure, panels = panels_of(
-        3.7 * max(len(titles), 2), 5.6, 2, len(titles), height_ratios=(2.2, 1.0), sharex="col", squeeze=False
-    )
-    colours, labels = class_colours(plate), LegendLabels()
-    quantity = _quantity_label(plate.histories[results[0].alloy])
-    for k, ((upper, lower), title) in enumerate(zip(panels.T, titles, strict=True)):
-        errors, axis_limit = [np.zeros(0)], 0.0
-        for result in results:
-            name = plate.class_of(result.alloy)
-            for measured, predicted in pairs[result.alloy].get(title, ()):
-                upper.plot(measured, predicted, ".", ms=2, color=colours[name], alpha=0.6, label=labels.first_use(name))
-                lower.plot(measured, predicted - measured, ".", ms=1.5, color=colours[name], alpha=0.5)
-                errors.append(predicted - measured)
-                axis_limit = max(axis_limit, float(measured.max()), float(predicted.max()))
-        _finish_parity(upper, lower, title, np.concatenate(errors), 1.05 * axis_limit or 1.0)
-        lower.set(xlabel=f"measured {quantity}")
-        if k == 0:
-            upper.set_ylabel(f"identified {quantity}")
-            lower.set_ylabel("difference")
-    figure.legend(loc="outside lower center", ncols=6, fontsize=8, markerscale=4)
-    return figure
-
-
-def _pairs(plate: ScreeningResult, result: AlloyResult) -> dict[str, list[tuple[Any, Any]]]:
-    """{title: measured and identified values (frames,) of each test that has them}, where both are numbers."""
-    pairs: dict[str, list[tuple[Any, Any]]] = {}
+def _pairs(plate: ScreeningResult, result: AlloyResult) -> Pairs:
+    """The series of an alloy where both values are numbers."""
+    pairs: dict[str, list[tuple[Floats, Floats]]] = {}
     for test in plate.histories[result.alloy]:
         predicted, measured = (plotted_series(test, o) for o in (result.predicted.get(test.name, {}), test.outputs))
         used = usable_frames(test, growing_output(test))
@@ -276,14 +206,26 @@ def _pairs(plate: ScreeningResult, result: AlloyResult) -> dict[str, list[tuple[
     return dict(sorted(pairs.items()))
 
 
-def _finish_parity(upper: Axes, lower: Axes, title: str, errors: Any, axis_limit: float) -> None:
-    set_range(upper, "y", 0.0, axis_limit, most=6)
-    set_range(upper, "x", 0.0, axis_limit, most=6)
-    upper.plot([0, axis_limit], [0, axis_limit], "k-", lw=0.7, alpha=0.6)
-    lower.axhline(0, color="black", lw=0.7, alpha=0.6)
-    rms = f", rms {float(np.sqrt(np.mean(errors**2))):.2g}" if errors.size else ": not observed"
-    upper.set_title(f"{title}{rms}", fontsize=10)
-    lower.grid(alpha=0.25)
+def _plot_parity(plate: ScreeningResult, pairs: Mapping[str, Pairs]) -> Figure:
+    """Identified against measured, of each series that is drawn (Fig. 7a, of all alloys); pairs : by alloy."""
+    titles = list(dict.fromkeys(title for series in pairs.values() for title in series))
+    quantity = _quantity_label(plate.histories[next(iter(pairs))])
+    figure, panels = panel_grid(len(titles), 4, 3.7, 4.0)
+    for axes, title in zip(panels, titles, strict=True):
+        values = [pair for series in pairs.values() for pair in series.get(title, ())]
+        errors = np.concatenate([identified - measured for measured, identified in values])
+        draw_parity(axes, np.zeros(1), *(one for pair in values for one in pair))
+        axes.set(xlabel=f"measured {quantity}", ylabel=f"identified {quantity}")
+        axes.set_title(f"{title}, rms {float(np.sqrt(np.mean(errors**2))):.2g}", fontsize=10)
+
+    def draw(result: AlloyResult, colour: Any, label: str | None) -> None:
+        for title, values in pairs.get(result.alloy, {}).items():
+            for pair in values:
+                panels[titles.index(title)].plot(*pair, ".", ms=2, alpha=0.6, color=colour, label=label)
+                label = None
+
+    _draw_by_class(plate, figure, draw)
+    return figure
 
 
 def print_screening(plate: ScreeningResult, written: list[Path], as_json: bool) -> None:

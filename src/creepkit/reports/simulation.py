@@ -1,4 +1,4 @@
-"""Text and plots of simulated tests: outputs over time, deformed section."""
+"""Text of simulated tests, and the deformed section of a test piece."""
 
 from __future__ import annotations
 
@@ -9,26 +9,19 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
-from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline, shape_functions
-from creepkit.records import Output, Status, output_named
-from creepkit.reports.figures import panels_of, save_figure, set_range
+from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline
+from creepkit.records import Status
+from creepkit.records.units import time_text
+from creepkit.reports.figures import panels_of, save_figure
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from creepkit.specimens.bulge.run import BulgeRun
     from creepkit.specimens.run import Run
 
 
-SUBDIVISIONS = 6
-"""Facets along the side of an element: its curved sides look smooth."""
-
-
 _LABELS = {"stress": "von Mises stress, MPa", "creep strain": "equivalent creep strain"}
-
-
-_GREY = "0.45"
 
 
 def run_text(run: Run) -> str:
@@ -38,121 +31,45 @@ def run_text(run: Run) -> str:
     return f"{run.name}: {how}; {run.times.size} frames to {run.times[-1]:g} s, where {last}"
 
 
+TRIANGLES = np.array([[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 6], [4, 6, 7]])
+"""Of an element of eight nodes, by these."""
+
+
 def section_figure(run: BulgeRun, time: float | None, name: str, path: str | Path | None = None) -> Figure:
     """The deformed section, both halves, coloured by a field, over the outline at rest; true to scale.
 
     time : s, by default that of the last frame.
     """
-    from matplotlib.tri import Triangulation
+    from matplotlib.collections import LineCollection
 
     time = float(run.times[-1]) if time is None else float(time)
-    field = run.field(name, time)
-    body = run.test.model
+    field, body = run.field(name, time), run.test.model
     moved = body.nodes + run._at(run.simulation.displacements, time)
+    values = _at_nodes(field.values.reshape(-1, 4), body.elements, len(moved))
+    triangles, free = body.elements[:, TRIANGLES].reshape(-1, 3), outline(body.elements)
+    sides = body.elements[free[:, 0, None], SIDES[free[:, 1]]]
+    sides = sides[(body.nodes[sides][:, :, 0] > 1e-9).any(axis=1)]  # without those on the axis
     figure, axes = panels_of(9.0, 3.1)
-    places, facets = _facets(moved[body.elements])
-    values = _at_facets(field.values.reshape(-1, 4), body.elements)
-    for side in (1.0, -1.0):
-        half = Triangulation(side * places[:, 0], places[:, 1], facets)
-        coloured = axes.tripcolor(half, values, shading="gouraud", cmap="viridis", rasterized=True)
-        coloured.set_clim(field.values.min(), field.values.max())
-        _draw_outline(axes, body.nodes, body.elements, side, color=_GREY, lw=0.8, ls=(0, (4, 3)))
-        _draw_outline(axes, moved, body.elements, side, color="black", lw=0.9)
+    for half in ([1.0, 1.0], [-1.0, 1.0]):
+        r, z = (moved * half).T
+        coloured = axes.tripcolor(r, z, triangles, values, shading="gouraud", cmap="viridis", rasterized=True)
+        axes.add_collection(LineCollection(list(body.nodes[sides] * half), color="0.45", lw=0.8, ls=(0, (4, 3))))
+        axes.add_collection(LineCollection(list(moved[sides] * half), color="black", lw=0.9))
     figure.colorbar(coloured, ax=axes, label=_LABELS.get(name, name), shrink=0.8, pad=0.01, aspect=18)
     pressure = float(run.test.load_history.pressure.at(time))
     axes.set(aspect="equal", xlabel="r, mm", ylabel="z, mm")
-    axes.set_title(f"{run.name}: {_duration(time)}, {pressure:.3g} MPa (dashed: at rest)", fontsize=10)
+    axes.set_title(f"{run.name}: {time_text(time)}, {pressure:.3g} MPa (dashed: at rest)", fontsize=10)
     axes.spines[["top", "right"]].set_visible(False)
     return save_figure(figure, path, SolveError)
 
 
-def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
-    """Outputs and pressure over time, one below the other; outputs of one quantity that grow with creep as one."""
-    groups: dict[tuple[str, bool], list[Output]] = {}
-    for name in run.outputs:
-        output = output_named(name, run.specimen)
-        groups.setdefault((output.quantity, output.grows), []).append(output)
-    figure, panels = panels_of(
-        6.4,
-        3.0 + 1.2 * len(groups),
-        len(groups) + 1,
-        1,
-        sharex=True,
-        height_ratios=(2.0, *[1.0] * (len(groups) - 1), 0.8),
-    )
-    hours = run.times / 3600.0
-    for axes, group in zip(panels, groups.values(), strict=False):
-        for k, output in enumerate(group):
-            axes.plot(hours, run.outputs[output], lw=1.5, color=f"C{k}", label=output.long_name)
-        axes.set_ylabel(group[0].label if len(group) == 1 else f"{group[0].quantity}, {group[0].unit}")
-        if len(group) > 1:
-            axes.legend(fontsize=8, frameon=False)
-    program = run.test.load_history.pressure
-    inside = program.times[program.times < run.end_time]
-    knots = np.unique(np.concatenate([inside, [0.0, run.end_time]]))
-    panels[-1].plot(knots / 3600.0, program.at(knots), lw=1.5, color="tab:red")
-    panels[-1].set(ylabel="pressure, MPa", xlabel="time, h")
-    for axes in panels:
-        values = np.concatenate([line.get_ydata() for line in axes.lines])
-        values = values[np.isfinite(values)]
-        low = 0.0 if axes in (panels[0], panels[-1]) else float(values.min(initial=np.inf))
-        set_range(
-            axes,
-            "y",
-            min(low, float(values.max(initial=0.0))),
-            (1.1 if axes is panels[-1] else 1.0) * float(values.max(initial=1e-9)),
-            most=5,
-        )
-    set_range(panels[-1], "x", 0.0, float(knots[-1]) / 3600.0)
-    ended = f", ended at {_duration(run.end_time)}: {run.reason}" if run.reason else ""
-    figure.suptitle(f"{run.name}{ended}", fontsize=10)
-    figure.align_ylabels(panels)
-    return save_figure(figure, path, SolveError)
+def _at_nodes(values: Floats, elements: Ints, count: int) -> Floats:
+    """(count,) values at the nodes, of those at the four points of each element, (elements, 4).
 
-
-def _facets(nodes: Floats) -> tuple[Floats, Ints]:
-    """Corners (corners, 2) and triangles (triangles, 3) of elements (elements, 8, 2) cut into small pieces."""
-    side = SUBDIVISIONS + 1
-    corners = np.einsum("pa,eai->epi", shape_functions(_grid()), nodes).reshape(-1, 2)
-    first = np.add.outer(side * np.arange(SUBDIVISIONS), np.arange(SUBDIVISIONS)).ravel()
-    one = np.stack([first, first + 1, first + side + 1], axis=1)
-    other = np.stack([first, first + side + 1, first + side], axis=1)
-    pieces = np.concatenate([one, other])
-    return corners, (side**2 * np.arange(len(nodes))[:, None, None] + pieces).reshape(-1, 3)
-
-
-def _at_facets(values: Floats, elements: Ints) -> Floats:
-    """Values (elements, 4 points) at the corners of the facets.
-
-    Bilinear through the points of an element, then the mean of the elements that meet at a node, then quadratic
-    between the nodes; never beyond what the points hold.
+    Bilinear through the points of an element, then the mean of the elements that meet at a node; never beyond what the
+    points hold.
     """
-    nodes = np.vstack([CORNERS, 0.5 * (CORNERS + np.roll(CORNERS, -1, axis=0))])
-    scaled, signs = nodes / np.abs(GAUSS_POINTS[0, 0]), np.sign(GAUSS_POINTS)
-    own_values = values @ (0.25 * np.prod(1.0 + scaled[:, None] * signs, axis=2)).T
-    count = np.bincount(elements.ravel())
-    mean = np.bincount(elements.ravel(), weights=own_values.ravel()) / np.maximum(count, 1)
-    smooth = mean[elements] @ shape_functions(_grid()).T
-    return np.clip(smooth, values.min(), values.max()).ravel()
-
-
-def _grid() -> Floats:
-    """(places, 2) local coordinates of the corners of the facets."""
-    ticks = np.linspace(-1.0, 1.0, SUBDIVISIONS + 1)
-    return np.stack([a.ravel() for a in np.meshgrid(ticks, ticks)], axis=1)
-
-
-def _draw_outline(axes: Axes, nodes: Floats, elements: Ints, side: float, **style: object) -> None:
-    """The sides that belong to one element only, but for those on the axis."""
-    from matplotlib.collections import LineCollection
-
-    ticks = np.linspace(-1.0, 1.0, SUBDIVISIONS + 1)[:, None]
-    weights = np.hstack([0.5 * ticks * (ticks - 1.0), 1.0 - ticks**2, 0.5 * ticks * (ticks + 1.0)])
-    chosen = outline(elements)
-    ends = nodes[elements[chosen[:, 0, None], SIDES[chosen[:, 1]]]]
-    curves = np.einsum("pa,eai->epi", weights, ends[(ends[:, :, 0] > 1e-9).any(axis=1)])
-    axes.add_collection(LineCollection(list(curves * [side, 1.0]), **style))  # type: ignore[arg-type]
-
-
-def _duration(time: float) -> str:
-    return f"{time / 3600:.4g} h" if time >= 3600 else f"{time:.4g} s"
+    places = np.vstack([CORNERS, 0.5 * (CORNERS + np.roll(CORNERS, -1, axis=0))]) / np.abs(GAUSS_POINTS[0, 0])
+    own = values @ (0.25 * np.prod(1.0 + places[:, None] * np.sign(GAUSS_POINTS), axis=2)).T
+    total, meeting = (np.bincount(elements.ravel(), weights, count) for weights in (own.ravel(), None))
+    return np.clip(total / np.maximum(meeting, 1), values.min(), values.max())

@@ -13,18 +13,16 @@ from creepkit.arrays import Floats
 from creepkit.discovery.regression import INFINITE_FREEDOM
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_quantile
-from creepkit.language import Param
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import equations, unit_text, value_cells
 from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, Verbatim, as_text
-from creepkit.reports.figures import panels_of, place_legend_right, save_figure, set_range
+from creepkit.reports.figures import panel_grid, place_legend_right, save_figure, span
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.discovery.combinations import FormWeight
-    from creepkit.discovery.discover import TemperatureStudy
-    from creepkit.discovery.elastic_moduli import ModulusEstimates
+    from creepkit.discovery.discover import ModulusEstimates, TemperatureStudy
     from creepkit.discovery.regression import FormCombination
     from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.reports.svg import PageFigures
@@ -44,76 +42,52 @@ def plot_temperature_law(temperature_law: TemperatureLaw, path: str | Path | Non
     """
     coordinates = Coordinates(temperature_law.isothermal_law, temperature_law.isothermal_estimates.reference)
     names = temperature_law.isothermal_law.names
-    columns = min(MAX_PANELS_PER_ROW, len(names))
-    rows = -(-len(names) // columns)
-    figure, panels = panels_of(5.2 * columns, 3.7 * rows, rows, columns, squeeze=False)
-    for k, name in enumerate(names):
-        _plot_parameter(panels.flat[k], temperature_law, coordinates, k)
-        panels.flat[k].set_title(_panel_title(temperature_law, coordinates, k, name), fontsize=9)
-    for unused in list(panels.flat)[len(names) :]:
-        unused.set_visible(False)
-    figure.suptitle(
-        f"{temperature_law.law.title or temperature_law.law.name}, judged by the {temperature_law.criterion_data}",
-        fontsize=10,
-    )
+    figure, panels = panel_grid(len(names), MAX_PANELS_PER_ROW, 5.2, 3.7)
+    for k, (name, axes) in enumerate(zip(names, panels, strict=True)):
+        _plot_parameter(axes, temperature_law, coordinates, k)
+        axes.set_title(_panel_title(temperature_law, coordinates, k, name), fontsize=9)
+    title = temperature_law.law.title or temperature_law.law.name
+    figure.suptitle(f"{title}, judged by the {temperature_law.criterion_data}", fontsize=10)
     return save_figure(figure, path)
 
 
 def _plot_parameter(axes: Any, temperature_law: TemperatureLaw, coordinates: Coordinates, k: int) -> None:
-    estimates, name = temperature_law.isothermal_estimates, temperature_law.isothermal_law.names[k]
-    is_rate_coefficient = k in coordinates.coefficients
-    scale = (
-        1 / np.log(10.0) if is_rate_coefficient or temperature_law.isothermal_law.table[name].scale == "log" else 1.0
-    )
+    law, estimates = temperature_law.isothermal_law, temperature_law.isothermal_estimates
+    name, is_rate = law.names[k], k in coordinates.coefficients
+    scale = 1 / np.log(10.0) if is_rate or law.table[name].scale == "log" else 1.0
 
     def shown_of(theta: Floats) -> Floats:
-        return np.asarray((coordinates.u(theta) if is_rate_coefficient else theta)[..., k] * scale)
+        return np.asarray((coordinates.u(theta) if is_rate else theta)[..., k] * scale)
 
-    values, half_widths = (
-        shown_of(estimates.theta),
-        interval_quantile(INFINITE_FREEDOM) * _standard_deviations(shown_of, estimates.theta, estimates.covariance),
-    )
-    low, high = (
-        (-np.inf, np.inf) if is_rate_coefficient else _plotted_bounds(temperature_law.isothermal_law.table[name], scale)
-    )
+    values = shown_of(estimates.theta)
+    pairs = zip(estimates.theta, estimates.covariance, strict=True)
+    deviations = np.array([delta_method(shown_of, *pair)[1] for pair in pairs], float)
+    half_widths = interval_quantile(INFINITE_FREEDOM) * deviations
+    bounds = [law.table[name].to_internal(b) * scale for b in law.table[name].bounds]
+    low, high = (-np.inf, np.inf) if is_rate else bounds  # beyond which no interval goes
     error_bars = np.maximum([np.minimum(half_widths, values - low), np.minimum(half_widths, high - values)], 0.0)
     axes.errorbar(estimates.temperatures, values, error_bars, fmt="o", ms=4, color="0.25", capsize=2, lw=1)
-    plotted_values = [values]
-    T = np.linspace(*temperature_law.temperature_range, 60)
-    drawn_forms: set[str] = set()
+    T, drawn = np.linspace(*temperature_law.temperature_range, 60), {"": values}
     for candidate in temperature_law.candidates:
         form = candidate.forms[name]
-        if form in drawn_forms or (candidate.weight < MIN_WEIGHT_SHOWN and drawn_forms):
+        if form in drawn or (candidate.weight < MIN_WEIGHT_SHOWN and len(drawn) > 1):
             continue
-        drawn_forms.add(form)
-        curve = shown_of(candidate.theta(T))
-        plotted_values.append(curve)
-        axes.plot(
-            T,
-            curve,
-            lw=1.8 if len(drawn_forms) == 1 else 1.0,
-            label=f"{form} {_form_weight(temperature_law, k, form):.2f}",
-        )
-        if len(drawn_forms) == 1:
-            half_width = _curve_standard_deviations(shown_of, candidate, T) * interval_quantile(
-                candidate.degrees_of_freedom
-            )
-            axes.fill_between(T, curve - half_width, curve + half_width, color="C0", alpha=0.15, lw=0)
-    lowest, highest = float(np.min(np.concatenate(plotted_values))), float(np.max(np.concatenate(plotted_values)))
-    margin = max(
-        0.15 * (highest - lowest),
-        min(1.2 * float(np.median(half_widths)), highest - lowest),
-        0.02 * abs(highest) + 1e-9,
-    )
-    set_range(axes, "x", *_with_margin(temperature_law.temperature_range), most=6)
-    set_range(axes, "y", lowest - margin, highest + margin)
+        first, curve = len(drawn) == 1, shown_of(candidate.theta(T))
+        drawn[form] = curve
+        axes.plot(T, curve, lw=1.8 if first else 1.0, label=f"{form} {_form_weight(temperature_law, k, form):.2f}")
+        if first:
+            quantile = interval_quantile(candidate.degrees_of_freedom)
+            half = quantile * _curve_standard_deviations(shown_of, candidate, T)
+            axes.fill_between(T, curve - half, curve + half, color="C0", alpha=0.15, lw=0)
+    every = np.concatenate([*drawn.values()])
+    lowest, highest = float(every.min()), float(every.max())
+    widths = min(1.2 * float(np.median(half_widths)), highest - lowest)
+    margin = max(0.15 * (highest - lowest), widths, 0.02 * abs(highest) + 1e-9)
+    beyond = 0.03 * float(np.ptp(T))
+    span(axes, "x", T[0] - beyond, T[-1] + beyond)
+    span(axes, "y", lowest - margin, highest + margin, most=8)
     axes.set(xlabel="temperature, K")
     place_legend_right(axes, "form, weight", size=7)
-
-
-def _with_margin(ends: tuple[float, float]) -> tuple[float, float]:
-    margin = 0.03 * (ends[1] - ends[0])
-    return ends[0] - margin, ends[1] + margin
 
 
 def _form_weight(temperature_law: TemperatureLaw, k: int, form: str) -> float:
@@ -127,21 +101,6 @@ def _panel_title(temperature_law: TemperatureLaw, coordinates: Coordinates, k: i
         return f"log10 of the rate of {name} (1/s) at {reference.stress:.3g} MPa, {reference.time:.3g} s"
     unit = "" if param.unit == "1" else f", {param.unit}"
     return f"{'log10 of ' if param.scale == 'log' else ''}{name}: {param.meaning}{unit}"
-
-
-def _plotted_bounds(param: Param, scale: float) -> tuple[float, float]:
-    """The bounds as they are drawn, beyond which no interval goes."""
-    low, high = (param.to_internal(b) * scale for b in param.bounds)
-    return low, high
-
-
-def _standard_deviations(function: Callable[[Floats], Floats], theta: Floats, covariance: Floats) -> Floats:
-    """(temperatures,) standard deviations of a function of theta at each point."""
-    deviations = [
-        delta_method(function, row, covariance_of_row)[1]
-        for row, covariance_of_row in zip(theta, covariance, strict=True)
-    ]
-    return np.array(deviations, float)
 
 
 def _curve_standard_deviations(function: Callable[[Floats], Floats], candidate: FormCombination, T: Floats) -> Floats:

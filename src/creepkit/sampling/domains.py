@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from creepkit.errors import DatasetError, nearest
 from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.language import CreepLaw, temperature
 from creepkit.language.law_codec import law_from_json, law_to_json
-from creepkit.presentation import Presentable, present
+from creepkit.presentation import Presentable
 from creepkit.records import Specimen
 from creepkit.sampling.coefficients import (
     draw_stress_scales,
@@ -39,25 +38,19 @@ from creepkit.sampling.conditions import (
     specimen_conditions,
 )
 from creepkit.sampling.criteria import Criterion, DrawCriterion, conditioned_criteria, paper_criteria
-from creepkit.sampling.draws import (
+from creepkit.sampling.rates import (
     SELECTION_DIMENSIONS,
     Draws,
-    active_terms,
-    additive_recurrence_step,
-    ln_term_fractions,
-    sobol_rows,
-)
-from creepkit.sampling.rates import (
     RateEvaluationPoints,
     ReferenceStress,
+    active_terms,
+    additive_recurrence_step,
     author_parameters,
+    ln_term_fractions,
     mean_ln_rate,
     reference_stress_of,
+    sobol_rows,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 CODEC = RecordCodec(
     values={CreepLaw: ValueCodec(law_to_json, law_from_json)},
@@ -225,10 +218,6 @@ class Acceptance(Presentable, text="reports.dataset:acceptance_text"):
         """
         in_range = (self.log10_strains >= self.useful_strains[:, 0]) & (self.log10_strains <= self.useful_strains[:, 1])
         return np.asarray(self.kept & in_range)
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw the sampled rates, with the useful ones and criteria 1 and 2 marked; write them to `path` if given."""
-        return present("reports.dataset:acceptance_figure", self, path)
 
 
 def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0) -> Acceptance:

@@ -21,7 +21,7 @@ from typing import ClassVar, Literal
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, FitError, HistoryError
-from creepkit.files.file_names import hashed_stem
+from creepkit.files.writing import hashed_stem
 from creepkit.inverse.composite_predictor import CompositePredictor, predictor_for_law, underlying_specimen
 from creepkit.inverse.confirmation import Confirmation, confirm, outside_domain
 from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash, single_threaded

@@ -40,9 +40,8 @@ from creepkit.records import (
 )
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid, specimen_conditions
-from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.network_evaluation import SampleArrays, Weights
-from creepkit.surrogates.parameter_gru import ParameterGru, SurrogateMetadata
+from creepkit.surrogates.parameter_gru import ApplicabilityDomain, ParameterGru, SurrogateMetadata
 from creepkit.surrogates.parameter_inputs import (
     LawInputs,
     LoadHistoryInputs,
@@ -363,7 +362,7 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
         specimen_stress = getattr(self.specimen, "reference_stress", None)
         if specimen_stress is not None:
             return np.asarray(specimen_stress(history))
-        levels = np.unique(history.loading.program().values)
+        levels = np.unique(history.load_levels)
         return np.asarray(levels[levels > 0])
 
     @property

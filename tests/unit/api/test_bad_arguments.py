@@ -8,7 +8,6 @@ from __future__ import annotations
 import importlib
 import inspect
 import signal
-import timeit
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -228,16 +227,3 @@ def test_a_rate_is_of_a_state_of_a_material(source: str, state: dict[str, Any]) 
                 quantity(stress=stress, temperature=1000.0, warn=False)
     with pytest.raises(CreepkitError, match="temperature"):
         ck.rate_at(80.0, **state)
-
-
-def test_a_generator_is_as_good_as_a_list() -> None:
-    histories = _histories()
-    fit = ck.identify("norton", (h for h in histories), starts=1, sobol_points=8)
-    assert fit.values == _fit().values
-    assert [q.name for q in ck.rank(f for f in [fit]).laws[0].fit.histories] == [h.name for h in histories]
-    assert ck.select_tests(iter(histories)) == histories
-
-
-def test_a_check_takes_microseconds() -> None:
-    reached = min(timeit.repeat(lambda: ck.State(0.0, ck.stress), number=100, repeat=5)) / 100
-    assert reached < 1e-3

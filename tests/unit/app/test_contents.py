@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,12 +10,15 @@ import pytest
 
 import creepkit as ck
 from creepkit.app.contents import MOST_TESTS, page_contents
-from creepkit.app.documents import MOST_FRAMES, contents_document
+from creepkit.app.documents import MOST_FRAMES, contents_document, law_data
 from creepkit.app.page import page_fragment, page_html, shared_scripts
-from creepkit.errors import ExportError, FitError
+from creepkit.app.runtime_files import runtime_script
+from creepkit.errors import CreepkitError, ExportError, FitError
 from creepkit.exporters.javascript import script_safe_json
 from creepkit.inverse.defect_correction import NumericalError
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.language import CreepLaw, Param, parameters, stress
+from creepkit.laws.norton import NORTON
+from creepkit.records import is_logarithmic
 from helpers.planted_bars import SPL, bars
 
 
@@ -59,18 +63,6 @@ def test_an_identification_brings_its_tests_intervals_and_covariance(fit, histor
     assert shown["tests"][0]["noise"]["strain"] == pytest.approx(2e-5)
 
 
-def test_a_ranking_brings_its_laws_by_weight(fit, histories):
-    other = ck.identify("norton", histories, starts=1)
-    shown = document(ModelAverage((other, fit), (0.1, 0.9)), histories)
-    assert [law["name"] for law in shown["laws"]] == ["strain-hardening", "norton"]
-    assert [law["weight"] for law in shown["laws"]] == [0.9, 0.1]
-
-
-def test_a_law_with_values_begins_there():
-    shown = document(ck.law_with_values("norton", {"A": 2e-17, "n": 5.5}))
-    assert [p["value"] for p in shown["laws"][0]["parameters"]] == [2e-17, 5.5]
-
-
 def test_specimens_are_described_by_their_records():
     shown = {one["name"]: one for one in document("norton")["specimens"]}
     for name, specimen in ck.available("specimens").items():
@@ -79,7 +71,9 @@ def test_specimens_are_described_by_their_records():
             continue
         one = shown[name]
         assert [o["name"] for o in one["outputs"]] == list(specimen.outputs)
-        assert [(o["title"], o["unit"]) for o in one["outputs"]] == [(o.long_name, o.unit) for o in specimen.outputs]
+        assert [(o["title"], o["unit"]) for o in one["outputs"]] == [
+            (o.long_name, "%" if is_logarithmic(o) else o.unit) for o in specimen.outputs
+        ]
         assert [(load["title"], load["unit"]) for load in one["loads"]] == [
             (load.long_name, load.unit) for load in specimen.loads
         ]
@@ -133,12 +127,6 @@ def test_a_law_without_temperature_over_several_temperatures_is_warned_of(histor
     assert document(ck.with_arrhenius(ck.law("norton"), hot), hot)["laws"][0]["warning"] == ""
 
 
-def test_a_page_that_is_too_large_is_one_sentence(monkeypatch, tmp_path):
-    monkeypatch.setattr("creepkit.app.page.LARGEST_PAGE", 1000)
-    with pytest.raises(ExportError, match=r"the page would have 0\.4 MB, allowed is 0\.001 MB; give fewer tests"):
-        ck.interactive_page("norton", tmp_path / "page.html")
-
-
 def test_a_test_without_stated_minimum_rate_shows_that_of_its_readings():
     """Strain in proportion to time has one slope."""
     times = np.linspace(3600.0, 360000.0, 50)
@@ -166,3 +154,79 @@ def test_it_is_said_where_the_identification_was_corrected_and_the_curves_are_no
     error = NumericalError("coarse", "fine", {"strain": 4e-5}, noises=2.0, shift=0.3)
     (law,) = document(replace(fit, numerical_error=error))["laws"]
     assert "up to 2 times the noise; the curves and misfits here are not" in law["judged"]
+
+
+# ---- model data ------------------------------------------------------------------------------------------------------
+
+# What a page knows of a law: plain JSON with names, bounds, equations and code, that ends no script element.
+
+
+def test_a_law_alone_has_the_middle_of_its_bounds_and_no_intervals():
+    data = law_data(NORTON)
+    A, n = data["parameters"]
+    assert (A["name"], A["unit"], A["scale"], A["low"], A["high"]) == ("A", "1/s", "log", 1e-40, 1e-5)
+    assert (n["unit"], n["scale"], n["value"], n["title"]) == ("", "linear", 4.5, "stress exponent")
+    assert [p["interval"] for p in data["parameters"]] == [None, None]
+    assert data["variables"] == ["stress"]
+
+
+def planted_fit():
+    """Norton with A = 1e-16, n = 5 from two exact tests."""
+    tests = [
+        ck.simulate(
+            NORTON, "uniaxial", {"A": 1e-16, "n": 5.0}, loading=ck.constant_stress(s), times=np.linspace(0, 1e4, 12),
+            temperature=1073.0, name=f"{s} MPa",
+        )
+        for s in (60.0, 90.0, 120.0)
+    ]  # fmt: skip
+    return ck.identify(NORTON, tests, using="uniaxial")
+
+
+def test_a_fit_brings_its_values_and_intervals():
+    fit = planted_fit()
+    data = law_data(fit)
+    rows = {p["name"]: p for p in data["parameters"]}
+    assert rows["n"]["value"] == pytest.approx(5.0, rel=1e-2)
+    for row in rows.values():
+        low, high = row["interval"]
+        assert low <= row["value"] <= high
+        assert row["verdict"] in (
+            *("determined", "poorly determined", "at its bound", "bounded on one side only", "not determined"),
+        )
+
+
+class Elements(HTMLParser):
+    """Names of the elements of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.names = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.names.append(tag)
+
+
+def test_nothing_of_a_hostile_law_leaves_its_script_element():
+    words = parameters("k __proto__")
+    law = CreepLaw(
+        "</script><b>",
+        {"</script><i>": words[0] * stress ** words[1]},
+        {words[0]: Param("</script><u>", (1e-9, 1.0), "</script>", "log"), words[1]: Param("<!--", (1, 8))},
+        title="</script><img src=x onerror=alert(1)>",
+        references=("</script><s>",),
+    )
+    data = law_data(law)
+    page = f"<p></p><script>x = {script_safe_json(data)};</script><script>y = {data['source']};</script><em></em>"
+    assert Elements(page).names == ["p", "script", "script", "em"]
+
+
+def test_a_page_without_the_core_in_webassembly_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setattr("creepkit.app.runtime_files.CORE_NAME", "missing.wasm")
+    runtime_script.cache_clear()
+    with pytest.raises(
+        CreepkitError, match=r"missing\.wasm, which is missing; run 'pip install ziglang' and 'make core'"
+    ):
+        ck.interactive_page("norton", tmp_path / "page.html")
+    assert not list(tmp_path.iterdir())

@@ -2,13 +2,15 @@
 
 import json
 import os
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import creepkit as ck
 from creepkit.cli.app import COMMANDS
-from creepkit.cli.command_options import parsed_integer, parsed_number
+from creepkit.cli.asking import put_questions
+from creepkit.errors import HistoryError
 from helpers.command_line import answers, creepkit, one_line
 
 FALLING = """
@@ -30,28 +32,6 @@ LAW = CreepLaw(
 @hookimpl
 def creepkit_laws():
     return [LAW]
-"""
-
-BRITTLE = """
-from creepkit.language import CreepLaw, Param, State, hookimpl, parameters, states, stress
-
-(A,), (w,) = parameters("A"), states("w")
-RATE = A * stress / (1 - w)
-COEFFICIENT = Param("rate coefficient", unit="1/s", bounds=(1e-20, 1e-5), scale="log")
-
-
-@hookimpl
-def creepkit_laws():
-    return [CreepLaw("brittle", {"creep": RATE}, {A: COEFFICIENT}, states={w: State(0, RATE, "damage", limit=0.9)})]
-"""
-
-COMMAND = """
-from creepkit.language import hookimpl
-
-
-@hookimpl
-def creepkit_commands(app):
-    app.command("greet")(lambda: None)
 """
 
 
@@ -92,10 +72,6 @@ def test_what_is_meant_is_said_for_what_there_is_not() -> None:
     assert answers(UNKNOWN.items()) == []
 
 
-def test_version() -> None:
-    assert creepkit("--version").stdout.startswith("creepkit 0.")
-
-
 def test_debug_lets_the_traceback_through() -> None:
     quiet, loud = creepkit("list", "laws", "nortn"), creepkit("--debug", "list", "laws", "nortn")
 
@@ -105,32 +81,6 @@ def test_debug_lets_the_traceback_through() -> None:
 
 
 # ---- laws ----------------------------------------------------------------------------------------------------------
-
-
-def test_laws_are_listed_with_their_parameters() -> None:
-    result = creepkit("list", "laws")
-
-    assert result.exit_code == 0
-    assert "norton" in result.stdout
-    assert "A n_0 n_inf C tau_d tau_r" in result.stdout
-
-
-def test_laws_as_json_hold_what_table_1_says() -> None:
-    laws = {law["name"]: law for law in json.loads(creepkit("list", "laws", "--json").stdout)}
-
-    m = laws["strain-hardening"]["parameters"]["m"]
-    assert (m["bounds"], m["off"]) == ([-1, 0], 0)
-    assert laws["combined"]["parameters"]["A_1"]["bounds"] == [1e-40, 1e-5]
-    assert laws["norton"]["provenance"].startswith("plugin 'norton' (creepkit ")
-
-
-def test_one_law_in_full() -> None:
-    shown = creepkit("list", "laws", "norton").stdout
-
-    assert "A*stress**n" in shown
-    assert r"A \sigma_e^{n}" in shown
-    assert "Norton (1929)" in shown
-    assert json.loads(creepkit("list", "laws", "norton", "--json").stdout)["terms"] == {"power law": "A*stress**n"}
 
 
 # ---- plugins -------------------------------------------------------------------------------------------------------
@@ -143,22 +93,6 @@ def test_a_plugin_file_joins_the_laws() -> None:
 
     assert result.exit_code == 0
     assert f"from plugin 'mine' ({Path('mine.py').resolve()})" in result.stdout
-
-
-def test_a_state_as_json_says_where_the_material_ends() -> None:
-    Path("brittle.py").write_text(BRITTLE)
-
-    law = json.loads(creepkit("--plugin", "brittle.py", "list", "laws", "brittle", "--json").stdout)
-
-    rate = "A*stress/(1 - w)"
-    assert law["states"] == {"w": {"meaning": "damage", "unit": "1", "rate": rate, "initial": 0.0, "limit": 0.9}}
-
-
-def test_a_plugin_file_that_is_asked_for_must_work() -> None:
-    Path("mine.py").write_text("A = (\n")
-
-    assert f"({Path('mine.py').resolve()}, line 1)" in one_line(creepkit("--plugin", "mine.py", "list", "laws"))
-    assert "plugin file none.py does not exist" in one_line(creepkit("--plugin", "none.py", "list", "laws"))
 
 
 def test_plugins_are_listed_broken_ones_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,12 +124,6 @@ def test_a_law_that_breaks_a_promise_fails_the_check() -> None:
     assert result.exit_code == 1
     assert "stress" in result.stdout
     assert result.stderr == "creepkit: 1 of 1 laws failed the check\n"
-
-
-def test_a_file_without_laws_cannot_be_checked() -> None:
-    Path("commands.py").write_text(COMMAND)
-
-    assert "offers no law" in one_line(creepkit("check", "commands.py"))
 
 
 def test_a_file_that_has_the_name_of_a_law_is_not_executed() -> None:
@@ -238,49 +166,6 @@ def test_a_dimple_is_simulated_with_all_it_needs_in_the_head() -> None:
     assert run.geometry == same.geometry
     assert run.outputs["amplitude"].tolist() == same.outputs["amplitude"].tolist()
     assert Path("section.png").stat().st_size > 20_000
-
-
-def test_the_cameras_of_a_dimple_take_a_frame_every_150_s() -> None:
-    lines = creepkit(f"{DIMPLE} --pressure 8").stdout.splitlines()
-
-    assert "# pressure_1_MPa: 8.0" in lines
-    assert [line.split(",")[0] for line in lines[-2:]] == ["7050.0", "7200.0"]
-
-
-def test_more_pressures_are_a_program_of_ramps() -> None:
-    lines = creepkit(f"{DIMPLE} --pressure 8 --pressure 3600:10 --pressure 5000:0").stdout.splitlines()
-
-    assert (
-        "# pressure_program: 0.0 s 0.0 MPa; 5.0 s 8.0 MPa; 3600.0 s 8.0 MPa; 3605.0 s 10.0 MPa; 5000.0 s 10.0 MPa; "
-        "5005.0 s 0.0 MPa"
-    ) in lines
-
-
-def test_a_burst_is_told_and_the_history_ends_there() -> None:
-    result = creepkit(f"{DIMPLE} --pressure 8 --to run.csv".replace("5e-13", "1e-9"))
-
-    assert result.exit_code == 0
-    assert " h: the surface reached the deflection limit; the history ends there\n" in result.stderr
-    (run,) = ck.read_histories("run.csv")
-    assert run.times[-1] < run.rupture_time < 7200
-    assert run.labels["ended"] == "the surface reached the deflection limit"
-
-
-def test_a_bar_with_a_modulus_has_its_elastic_strain() -> None:
-    creepkit(f"{NORTON} --stress 100 --control stress --modulus-gpa 100 --points 3 --to bar.csv")
-
-    (run,) = ck.read_histories("bar.csv")
-    assert run.outputs["strain"].tolist() == pytest.approx([1e-3, 1e-3 + 5e-7 * 3600, 1e-3 + 5e-7 * 7200], rel=1e-6)
-    assert run.includes_elastic
-
-
-def test_specimens_are_listed_with_their_outputs() -> None:
-    listed = {one["name"]: one for one in json.loads(creepkit("list", "specimens", "--json").stdout)}
-
-    assert {"uniaxial", "relaxation", "point", "bulge"} <= listed.keys()
-    assert listed["relaxation"]["outputs"] == ["stress"]
-    assert listed["relaxation"]["nuisances"] == ["temperature", "modulus"]
-    assert "strain strain_11" in creepkit("list", "specimens").stdout
 
 
 def test_a_bar_relaxes() -> None:
@@ -369,10 +254,108 @@ def test_a_file_that_cannot_be_written_is_said_before_the_simulation(monkeypatch
     assert answers((f"{DIMPLE} --pressure 8 {words}", said) for words, said in UNWRITABLE) == []
 
 
-@pytest.mark.parametrize("text", ["٣", "1_0", "２"])
-def test_digits_of_other_scripts_are_no_numbers(text: str):
-    assert parsed_number(" 1e3 ") == 1000.0
-    assert parsed_integer("-3") == -3
-    for parsed in (parsed_number, parsed_integer):
-        with pytest.raises(ValueError, match=text):
-            parsed(text)
+# ---- names before work -----------------------------------------------------------------------------------------------
+
+# Options that name things, and temperatures that no solid has, are refused before the work.
+
+
+BARS = sorted(str(path) for path in ck.example_data("planted creep curves").glob("*.csv"))
+
+
+@pytest.fixture
+def no_identification(monkeypatch):
+    def refuse(*arguments, **options):
+        raise AssertionError("an identification began")
+
+    monkeypatch.setattr("creepkit.discovery.discover.identify", refuse)
+
+
+def test_forms_and_parameters_of_a_temperature_study(no_identification, tmp_path):
+    table = {
+        "--form n=lin": "no temperature form 'lin': did you mean 'linear'",
+        "--form m=linear": "'m'",
+        "--prior A.arrhenus=10": "did you mean 'arrhenius'",
+        "--prior B.arrhenius=10": "'B'",
+    }
+    line = f"discover {' '.join(BARS)} --law norton --to {tmp_path / 'd'}"
+    assert answers((f"{line} {words}", said) for words, said in table.items()) == []
+
+
+# ---- read with bad files ---------------------------------------------------------------------------------------------
+
+# `creepkit read` of a folder with a file that cannot be read: the others are shown, then its error.
+
+
+GOOD = "# stress_MPa: 150\n# temperature_C: 600\nTime (h),Creep strain (%)\n" + "".join(
+    f"{h},{0.01 * h**0.6:.5f}\n" for h in range(1, 20)
+)
+
+
+def test_the_good_files_are_shown_and_the_errors_come_last(tmp_path):
+    (tmp_path / "good.csv").write_text(GOOD)
+    (tmp_path / "other.csv").write_text(GOOD.replace("150", "170"))
+    (tmp_path / "spoilt.csv").write_text("# Ofenplatz: 3\n" + GOOD)
+    result = creepkit("read", str(tmp_path))
+    assert result.exit_code == 1
+    assert "good: uniaxial, 150 MPa" in result.output
+    assert "other: uniaxial, 170 MPa" in result.output
+    assert "unknown key 'Ofenplatz'" in result.output
+
+
+# ---- reduced model ---------------------------------------------------------------------------------------------------
+
+# `creepkit surrogate reduce`: what it says.
+
+
+def test_a_model_is_trained_and_described():
+    said = creepkit("surrogate reduce --geometry apex_thickness=0.52")
+    assert said.exit_code == 0, said.output
+    assert "modes" in said.output
+    assert "amplitude" in said.output
+
+
+# ---- asking ----------------------------------------------------------------------------------------------------------
+
+# `creepkit read --ask`: questions one after another, answers beside the data, nothing changed in the files.
+
+
+TABLE = "Temp (C);Stress (MPa);tr (h);Status\n600;320;4454;A\n600;260;23220;B\n650;320;233;A\n"
+CURVE = "# stress_MPa: 120\n# temperature_C: 600\nZeit (h);Dehnung (%);Kanal 7;W\n0;0;4;1\n10;0.1;4;1\n20;0.18;4;2\n"
+
+
+def typing(*answers):
+    left = list(answers)
+    return lambda prompt: left.pop(0), left
+
+
+def test_questions_are_answered_one_after_another(tmp_path, capsys):
+    (tmp_path / "a.csv").write_text(CURVE, encoding="utf-8")
+    (tmp_path / "rates.csv").write_text(TABLE, encoding="utf-8")
+    answer, left = typing("1", "unused", "9", "")
+    (file,) = put_questions(partial(ck.read_histories, tmp_path), answer)
+    assert (file.name, left) == ("tests.toml", [])
+    assert "'9' is none of these" in capsys.readouterr().out
+    tests = {one.name: one for one in ck.read_histories(tmp_path)}
+    assert [tests[name].unruptured for name in ("rates 2", "rates 3", "rates 4")] == [False, True, False]
+    assert tests["a"].outputs["strain"][-1] == pytest.approx(0.0018)
+    assert (tmp_path / "rates.csv").read_text(encoding="utf-8") == TABLE
+
+
+def test_without_a_terminal_each_question_is_a_line(tmp_path, capsys):
+    (tmp_path / "a.csv").write_text(CURVE, encoding="utf-8")
+    (tmp_path / "rates.csv").write_text(TABLE, encoding="utf-8")
+    with pytest.raises(HistoryError, match=r"3 questions open; answer them in tests.toml"):
+        put_questions(partial(ck.read_histories, tmp_path), None)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 3
+    assert 'tests.toml beside it: ["rates.csv"] ended = {B = "stopped", A = "ruptured"}' in lines[2]
+
+
+def test_a_specimen_and_lengths_that_nobody_stated_are_asked_for(tmp_path):
+    head = "# pressure_MPa: 8\n# temperature_C: 800\ntime_s,amplitude_mm\n"
+    (tmp_path / "d.csv").write_text(f"{head}60,0.08\n300,0.09\n900,0.1\n", encoding="utf-8")
+    answer, left = typing("", "0.48", "", "", "", "", "")
+    put_questions(partial(ck.read_histories, tmp_path), answer)
+    (test,) = ck.read_histories(tmp_path)
+    assert (test.specimen, test.geometry["apex_thickness"], test.geometry["cavity_radius"]) == ("bulge", 0.48, 7.5)
+    assert (left, "by default" in test.labels.get("assumed", "")) == ([], False)

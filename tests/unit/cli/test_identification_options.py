@@ -8,11 +8,17 @@ import pytest
 
 import creepkit as ck
 from creepkit.cli.command_options import given_value
-from creepkit.cli.shared import selected
+from creepkit.cli.identified_folder import check_identified_folder, write_ranking
+from creepkit.cli.shared import is_file_name, selected
 from creepkit.errors import FitError, HistoryError, LawError
 from creepkit.inverse.candidate_laws import LawChanges
+from creepkit.inverse.ranking_document import load_ranking
+from creepkit.inverse.selection import rank
+from creepkit.inverse.settings import IdentificationSettings, default_nuisances
 from creepkit.options import options_of
+from creepkit.records import Nuisance
 from helpers.command_line import creepkit, one_line
+from helpers.rupture_tests import BAR
 
 
 def change_laws(laws, fix, bound):
@@ -48,13 +54,6 @@ def test_a_wrong_change_of_a_law_is_one_sentence(fix: list[str] | None, bound: l
     with pytest.raises(FitError) as raised:
         change_laws([NORTON, HARDENING], fix, bound)
     assert message in str(raised.value)
-
-
-def test_bounds_and_fixed_values_must_make_sense() -> None:
-    with pytest.raises(LawError, match="bounds are reversed or empty"):
-        change_laws([NORTON], None, ["n=8:1"])
-    with pytest.raises(LawError, match="cannot fix n = 9; allowed are 1 to 8"):
-        change_laws([NORTON], ["n=9"], ["n=1:8"])
 
 
 def test_only_takes_labels() -> None:
@@ -95,3 +94,142 @@ def test_options_for_measured_tests_are_refused_with_identifications() -> None:
     assert "--only, --fix, --bound and --surrogate are for tests" in one_line(
         creepkit("discover", "fit.json", "--fix", "n=5")
     )
+
+
+# ---- identify options ------------------------------------------------------------------------------------------------
+
+# Options of `creepkit identify`, from text.
+
+
+OPTIONS = {one.name: one for one in options_of(IdentificationSettings)}
+
+
+def parse_nuisances(texts):
+    return given_value(OPTIONS["nuisances"], texts, FitError)
+
+
+def parse_weights(text):
+    return given_value(OPTIONS["weights"], text, FitError)
+
+
+def test_weights():
+    assert parse_weights("noise") == "noise"
+    assert parse_weights("paper") == "paper"
+    assert parse_weights("amplitude=0.99, width=0.005") == {"amplitude": 0.99, "width": 0.005}
+    with pytest.raises(
+        FitError, match="--weights amplitude is not known; write noise.likelihood.equal.paper.NAME=NUMBER,..., such as"
+    ):
+        parse_weights("amplitude")
+
+
+def test_nuisances_are_added_to_the_usual_two():
+    assert parse_nuisances(None) is None
+    offset, rate = Nuisance("offset"), Nuisance("rate")
+    thickness = Nuisance("thickness", mean=0.4935, sd=0.027)
+    assert parse_nuisances(["thickness=0.4935:0.027"]) == default_nuisances(thickness) == (offset, rate, thickness)
+    assert parse_nuisances(["temperature", "rate=0:0.2"]) == (offset, Nuisance("temperature"), Nuisance("rate", sd=0.2))
+    assert parse_nuisances(["thickness=0.4935:0.027", "rate=none"]) == (offset, thickness)
+    assert parse_nuisances(["rate=none", "offset=none"]) == ()
+
+
+def test_nuisances_that_cannot_be_read_are_refused():
+    with pytest.raises(FitError, match="--nuisance ofset=3: nuisance 'ofset' is not known; did you mean 'offset'"):
+        parse_nuisances(["ofset=3"])
+    with pytest.raises(FitError, match="nuisance 'thicknes' is not known; did you mean 'thickness'"):
+        parse_nuisances(["thicknes=0.5"])
+    with pytest.raises(
+        FitError, match="--nuisance rat=none: 'rat' is no default nuisance that could be left out; did you mean 'rate'"
+    ):
+        parse_nuisances(["rat=none"])
+    with pytest.raises(FitError, match="--nuisance thickness=thin is not known; write KIND"):
+        parse_nuisances(["thickness=thin"])
+    with pytest.raises(FitError, match="--nuisance rate step=0:1: nuisance 'rate step': start is 0 s; say when"):
+        parse_nuisances(["rate step=0:1"])
+    with pytest.raises(FitError, match="--nuisance temperature=nan is not known; write KIND"):
+        parse_nuisances(["temperature=nan"])
+
+
+# ---- identified folder -----------------------------------------------------------------------------------------------
+
+# The folder of `creepkit identify` holds one run: a later one replaces it.
+
+
+@pytest.fixture(scope="module")
+def rankings():
+    times, rng = np.geomspace(3.6e3, 3.6e5, 12), np.random.default_rng(3)
+    tests = [
+        ck.History(
+            f"bar {s:g}", times, {"strain": 1e-18 * s**5 * times + rng.normal(0.0, 2e-6, 12)},
+            ck.constant_stress(s, "stress"), 1073.15,
+        )
+        for s in (80.0, 100.0, 120.0)
+    ]  # fmt: skip
+    how = {"using": BAR, "starts": 1, "nuisances": [ck.Nuisance("rate", sd=0.1)]}
+    norton, hardening = (ck.identify(name, tests, **how) for name in ("norton", "strain-hardening"))
+    return rank([norton], challenge=False), rank([hardening], challenge=False)
+
+
+def _names(folder):
+    return sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+
+
+def _run(ranking, folder):
+    check_identified_folder(folder, [one.fit.law for one in ranking.laws])
+    return write_ranking(ranking, folder)
+
+
+def test_a_later_run_leaves_nothing_of_the_former_one_and_what_is_not_its(rankings, tmp_path):
+    _run(rankings[0], tmp_path)
+    (tmp_path / "notes.txt").write_text("mine")
+    ck.export(rankings[0].best, "c", to=tmp_path / "norton.c")  # of creepkit, and of another command
+    written = _run(rankings[1], tmp_path)
+    assert _names(tmp_path) == sorted([*(path.name for path in written), "notes.txt", "norton.c"])
+    assert [fit.law.name for fit in load_ranking(tmp_path / "ranking.json").fits] == ["strain-hardening"]
+
+
+def test_a_changed_file_of_the_former_run_is_neither_removed_nor_mixed_with_another_run(rankings, tmp_path):
+    _run(rankings[0], tmp_path)
+    (tmp_path / "norton.tex").write_text("edited by hand")
+    before = _names(tmp_path)
+    with pytest.raises(FitError, match=r"norton\.tex: .*creepkit did not write it as it is now"):
+        _run(rankings[1], tmp_path)
+    assert _names(tmp_path) == before
+    assert (tmp_path / "norton.tex").read_text() == "edited by hand"
+
+
+# ---- law sources -----------------------------------------------------------------------------------------------------
+
+# Laws as `simulate` and `export` name them: a registered law first, then a file that holds one with its values.
+
+
+TEST = ("--stress", "100", "--end-h", "10", "--points", "5", "--temperature-c", "20")
+
+
+def test_a_file_of_a_law_with_values_is_simulated_as_its_values_are(tmp_path):
+    file = tmp_path / "valued.json"
+    ck.export("norton", "json", {"A": 1e-16, "n": 4.0}, to=file)
+    assert creepkit("simulate", str(file), *TEST, "--to", str(tmp_path / "own.csv")).exit_code == 0
+    times = np.linspace(0.0, 36000.0, 5)
+    creep = -np.log(1 - 4 * 1e-16 * 100.0**4 * times) / 4  # under constant load, true strain by Norton's law
+    (own,) = ck.read_histories(tmp_path / "own.csv")
+    assert np.allclose(own.outputs["strain"], creep, rtol=1e-4)
+    changed = creepkit("simulate", str(file), "--set", "n=5", *TEST)
+    named = creepkit("simulate", "norton", "--set", "A=1e-16", "--set", "n=5", *TEST)
+    assert changed.exit_code == 0
+    assert [line for line in changed.stdout.splitlines() if not line.startswith("#")] == [
+        line for line in named.stdout.splitlines() if not line.startswith("#")
+    ]
+
+
+def test_names_of_laws_come_before_files_and_a_file_without_a_suffix_needs_its_path(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "norton+strain-hardening").write_text("{}")
+    named = {"norton": False, "norton+strain-hardening": False, "./norton": True, "fit.json": True, "unknown": False}
+    assert {word: is_file_name(word) for word in named} == named
+    for name in ("norton", "mine"):
+        ck.export("norton", "json", {"A": 1e-16, "n": 4.0}, to=f"{name}.json")
+        (tmp_path / f"{name}.json").rename(name)
+    assert "'norton' needs a value for A, n" in one_line(creepkit("simulate", "norton", *TEST))
+    assert creepkit("simulate", "./norton", *TEST).exit_code == 0
+    for command in (("simulate", "mine", *TEST), ("export", "mine", "--to", "latex")):
+        assert "for the file of that name write ./mine" in one_line(creepkit(*command))

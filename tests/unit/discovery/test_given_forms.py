@@ -65,21 +65,6 @@ def test_the_law_of_an_expression_is_the_expression():
         assert rate == pytest.approx(expected, rel=1e-9)
 
 
-def test_an_expression_of_one_parameter_is_no_form_of_another():
-    own = candidates(["constant"], ["arrhenius", sympy.Symbol("n") + sympy.Symbol("b") * (T - T_REF)])
-    assert [form.name for form in own["A"]] == ["arrhenius"]
-
-
-def test_features_of_a_library_are_forms_each_and_together():
-    own = candidates([pysindy.PolynomialLibrary(degree=2)])["n"]
-    assert sorted(form.parameter_count for form in own) == [2, 2, 3]
-    together = max(own, key=lambda form: form.parameter_count)
-    found = regress(points(BENT, SHARP), [candidates(["constant"])["A"][0], together])
-    assert evaluate_forms(found.candidate_forms, found.values, NINE)[:, 1] == pytest.approx(BENT[:, 1], abs=1e-6)
-    sine = candidates([pysindy.FourierLibrary(n_frequencies=1, include_cos=False)])["n"]
-    assert sine[0].basis_values(NINE, ())[:, 1] == pytest.approx(np.sin(NINE / 1e3) - np.sin(T_REF / 1e3), abs=1e-9)
-
-
 def test_an_optimizer_drops_the_terms_that_are_not_there():
     """A parabola about T_ref has no slope there; the others of the polynomial are zero but for noise."""
     form = [(T - T_REF) / 100, ((T - T_REF) / 100) ** 2, ((T - T_REF) / 100) ** 3]

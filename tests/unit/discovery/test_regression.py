@@ -5,11 +5,10 @@ import pytest
 
 from creepkit import registry
 from creepkit.discovery.combinations import CHI_SQUARE_95, rank_combinations, squared_mahalanobis
-from creepkit.discovery.forms import candidate_form, candidate_forms, evaluate_forms
+from creepkit.discovery.forms import candidate_forms, evaluate_forms
 from creepkit.discovery.regression import regress
 from creepkit.errors import FitError
 from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution
-from creepkit.language import TemperatureForm, arrhenius
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
 from helpers.temperature_estimates import NINE, T_REF, arrhenius_line, conditioned, points
@@ -134,33 +133,6 @@ def test_prior_odds_decide_what_the_points_do_not():
     assert rank_combinations(given, libraries()).best.forms["A"] == "arrhenius"
     with pytest.raises(FitError, match="odds of 'linear' are 0; they must be above zero"):
         candidate_forms(NORTON, "n", False, T_REF, NINE, ("linear",), {"linear": 0.0})
-
-
-def test_scatter_beyond_the_covariances_widens_them():
-    given = points(PLANTED, conditioned(0.05, 0.15), seed=11)
-    tight = points(given.theta, given.covariance[0] / 25.0)
-    assert rank_combinations(given, libraries()).overdispersion < 3.0
-    assert rank_combinations(tight, libraries()).overdispersion == pytest.approx(25.0 * combine_chi(given), rel=0.05)
-
-
-def combine_chi(given):
-    tried = rank_combinations(given, libraries()).combinations
-    return min(one.chi_square / (one.rows - one.parameter_count) for one in tried)
-
-
-def test_a_form_with_a_number_of_its_own_is_an_offset():
-    fixed = TemperatureForm("fixed", lambda s, p: (s * arrhenius(T_REF, Q=Q).expression, {}), "planted", T_REF)
-    made = candidate_form("fixed", NORTON, "A", fixed, True)
-    assert made.parameter_names == ("A",)
-    found = regress(points(PLANTED, conditioned(0.05, 0.1)), [made, library("n", "linear")])
-    assert found.values["A"] == pytest.approx(LN_A, rel=1e-9)
-
-
-def test_forms_that_span_the_same_are_one():
-    names = [one.name for one in candidate_forms(NORTON, "A", True, T_REF, NINE)]
-    assert "arrhenius" in names
-    assert "activated" not in names
-    assert {"linear", "inverse"}.isdisjoint(names)
 
 
 def test_a_combination_that_fails_is_recorded_and_the_others_go_on():

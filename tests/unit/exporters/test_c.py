@@ -2,19 +2,22 @@
 
 import ctypes
 import math
+import re
 
 import numpy as np
 import pytest
+import sympy
 
 from creepkit.exporters.c import CExporter
-from creepkit.language import stress
+from creepkit.exporters.javascript import JavaScriptExporter, law_expression
+from creepkit.language import CreepLaw, Param, State, parameters, states, stress
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
-from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import LawWithValues, Units
+from creepkit.records import LawWithValues
 from helpers.compilers import shared_library
-from helpers.export_cases import LAWS, disagreements, labelled_values
+from helpers.export_cases import LAWS, case, disagreements, labelled_values
+from helpers.javascript import run_in_node
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 
@@ -82,39 +85,7 @@ def test_every_law_agrees_with_50_digits(tmp_path, gcc):
 # ---- what the text holds -------------------------------------------------------------------------------------------
 
 
-def test_a_file_has_the_authors_numbers_and_says_how_to_call_it():
-    text = CExporter().text(LawWithValues(NORTON, {"A": 1.2e-16, "n": 5.2}, ["n = 5.2 +- 0.1 (95 %)"]))
-    for line in (
-        " * Stress in MPa, time in s, rates in 1/s. stress is a ratio to 1 MPa, time to 1 s, rates are per s.",
-        " * Note: n = 5.2 +- 0.1 (95 %)",
-        " *   double norton_rate(double stress);",
-        " *   double norton_log_rate(double stress, double slopes[1]);",
-        "static const double A = 1.2e-16; /* 1/s, rate coefficient */",
-        "static const double n = 5.2; /* stress exponent */",
-        "double norton_rate(double stress)",
-    ):
-        assert line in text.splitlines()
-    assert [line for line in text.splitlines() if line.startswith("#")] == ["#include <math.h>"]
-
-
 # ---- what the compiled file does -----------------------------------------------------------------------------------
-
-
-def test_units_are_converted_on_entry_and_on_exit(tmp_path, gcc):
-    """With stress in Pa and time in h, rates are per hour and slopes per Pa and per hour."""
-    law = LAWS["foreign Kachanov-Rabotnov"] + TIME_HARDENING
-    values = law.center()
-    units = Units("Pa", "h")
-    sources = [LawWithValues(law, values, name="native"), LawWithValues(law, values, name="converted", units=units)]
-    library = compile_c(gcc, tmp_path, sources)
-    plain, other = (Compiled(library, name, law) for name in ("native", "converted"))
-    point = np.array([120.0, 0.01, 7.2e4, 1000.0, 90.0, 40.0, 0.3])
-    scales = np.array([1e6, 1.0, 1 / 3600, 1.0, 1e6, 1e6, 1.0])
-    rows, log = plain.rows(point)
-    found, found_log = other.rows(point * scales)
-    np.testing.assert_allclose(found[:, 0], 3600 * rows[:, 0], rtol=1e-13)
-    np.testing.assert_allclose(found[:, 1:], 3600 * rows[:, 1:] / scales, rtol=1e-13)
-    assert found_log == pytest.approx(log + math.log(3600), rel=1e-14)
 
 
 def test_internal_variables_start_and_end_as_the_law_says(tmp_path, gcc):
@@ -124,21 +95,160 @@ def test_internal_variables_start_and_end_as_the_law_says(tmp_path, gcc):
     assert ctypes.c_double.in_dll(library, "damage_limit").value == 0.99
 
 
-def test_virgin_and_unloaded_material_has_finite_numbers(tmp_path, gcc):
-    library = compile_c(gcc, tmp_path, [LawWithValues(COMBINED, COMBINED.center())])
-    law = Compiled(library, "combined", COMBINED)
-    for point in ([100.0, 0.0, 0.0], [0.0, 0.01, 1.0], [0.0, 0.0, 0.0]):
-        rows, log = law.rows(point + [0.0] * 3)
-        assert np.isfinite(rows).all()
-        assert math.isfinite(log)
+# ---- javascript ------------------------------------------------------------------------------------------------------
+
+# The exported JavaScript runs in node without a module beside it and agrees with 50 digits: rates and derivatives.
 
 
-def test_beyond_doubles_the_rate_is_infinite_and_its_logarithm_is_not(tmp_path, gcc):
-    """ln A sinh(x)^n = ln A + n (x - ln 2) for large x."""
-    law = LAWS["registered hyperbolic-sine"]
-    library = compile_c(gcc, tmp_path, [LawWithValues(law, {"A": 1e-5, "n": 8.0, "B": 1.0})])
-    found = Compiled(library, "hyperbolic_sine", law)
-    assert found.rate([2000.0]) == math.inf
-    log, slopes = found.log_rate([2000.0])
-    assert log == pytest.approx(math.log(1e-5) + 8 * (2000 - math.log(2)), rel=1e-14)
-    assert slopes == [pytest.approx(8.0)]
+COEFFICIENT = Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0)
+
+EVALUATE = """
+async function main(cases) {
+  return Promise.all(cases.map(async ({ file, sets, points, width }) => {
+    const { law, kernel } = await import(file);
+    const size = 1 + law.states.length;
+    return points.map((point, k) => {
+      const { rates, terms, update } = kernel(sets[k]);
+      const found = { rates: new Float64Array(size), terms: new Float64Array(law.terms.length),
+                      update: new Float64Array(size * (1 + width)) };
+      rates(point, found.rates);
+      terms(point, found.terms);
+      update(point, found.update);
+      return found;
+    });
+  }));
+}
+"""
+
+CALL = """
+async function main({ file, calls }) {
+  const module = await import(file);
+  return calls.map(([name, ...given]) => {
+    try { return module[name](...given); } catch (error) { return String(error); }
+  });
+}
+"""
+
+
+def called(folder, source, *calls):
+    """What functions of an exported module return: calls are (name, arguments ...)."""
+    text = JavaScriptExporter().text(source)
+    return run_in_node(folder, CALL, {"file": "./law.mjs", "calls": calls}, {"law.mjs": text})
+
+
+def test_every_law_in_javascript_agrees_with_50_digits(tmp_path):
+    cases, files = [], {}
+    for name in LAWS:
+        judged, file = case(name), f"{case(name).labels[0]}.mjs"
+        files[file] = JavaScriptExporter().text(LawWithValues(judged.law, judged.sets[0]))
+        sets, points = [[*values.values()] for values in judged.sets], judged.drawn.points
+        cases.append({"file": f"./{file}", "sets": sets, "points": points.tolist(), "width": points.shape[1]})
+    results = dict(zip(LAWS, run_in_node(tmp_path, EVALUATE, cases, files), strict=True))
+
+    def evaluate(name, judged):
+        parts = ("rates", "terms", "update")
+        rates, terms, update = (np.array([each[part] for each in results[name]], float) for part in parts)
+        samples, size, width = len(rates), rates.shape[1], judged.drawn.points.shape[1]
+        slopes = update[:, size:].reshape(samples, size, width)
+        with np.errstate(over="ignore", invalid="ignore"):  # a rate that no double holds is judged by its logarithm
+            slopes[:, 0] *= rates[:, :1]
+        np.testing.assert_allclose(terms.sum(axis=1), rates[:, 0], rtol=1e-12, err_msg=name)
+        np.testing.assert_allclose(update[:, 1:size], rates[:, 1:], rtol=1e-12, err_msg=name)
+        return np.concatenate([rates[:, :, None], slopes], axis=2), update[:, 0]
+
+    assert disagreements(evaluate) == []
+
+
+# ---- what the module does ------------------------------------------------------------------------------------------
+
+
+def test_values_are_the_defaults_and_can_be_changed(tmp_path):
+    source = LawWithValues(NORTON, {"A": 1e-16, "n": 5.2})
+    found = called(
+        tmp_path, source,
+        ("rate", {"stress": 80}), ("rate", {"stress": 80}, {"n": 4}), ("terms", {"stress": 80}, {"A": 0}),
+    )  # fmt: skip
+    assert found[:2] == [pytest.approx(1e-16 * 80**5.2, rel=1e-13), pytest.approx(1e-16 * 80**4, rel=1e-13)]
+    assert found[2] == {"power law": 0.0}
+
+
+def test_wrong_names_and_missing_variables_are_one_sentence(tmp_path):
+    source = LawWithValues(NORTON, {"A": 1e-16, "n": 5.2})
+    found = called(tmp_path, source, ("rate", {"stress": 80}, {"m": 4}), ("rate", {"strain": 0.1}), ("rate", {"T": 1}))
+    assert found == [
+        "RangeError: no parameter 'm'; allowed are A, n",
+        "RangeError: the law needs a stress",
+        "RangeError: no variable 'T'; allowed are stress, strain, time, temperature, principal_stress, mean_stress",
+    ]
+
+
+def test_the_error_function_has_its_digits(tmp_path):
+    """Values of DLMF 7.2 to 15 digits, from Python's math, on both sides of where the series ends."""
+    (A,) = parameters("A")
+    law = CreepLaw("error", {"x": A * (1 + sympy.erf(stress - 10)) / 2}, {A: COEFFICIENT})
+    places = [-3.5, -2.0, -0.3, 0.0, 1e-8, 0.7, 1.9, 2.9, 3.1, 5.9, 6.5]
+    found = called(tmp_path, LawWithValues(law, {"A": 1e-5}), *(("rate", {"stress": 10 + x}) for x in places))
+    expected = [1e-5 * (1 + math.erf((10 + x) - 10)) / 2 for x in places]
+    assert found == [pytest.approx(value, rel=1e-10, abs=2e-21) for value in expected]
+
+
+# ---- what the text holds -------------------------------------------------------------------------------------------
+
+
+def test_a_module_needs_nothing_but_itself():
+    text = JavaScriptExporter().text(LawWithValues(COMBINED, COMBINED.center()))
+    assert not re.search(r"\b(import|require|eval|Function|document|window)\b\s*\(", text)
+    assert text.endswith("export { law, rate, terms, stateRates, kernel };\n")
+
+
+HOSTILE = (
+    "</script><script>alert(1)</script>", "<!-- <script>", "*/ broken /*", "line\n*/ two", "\x00\u2028alert(1)//",
+    "back\\", "`${alert(1)}`", "'quotes\"",
+)  # fmt: skip
+
+
+def hostile_law():
+    """A law whose names are words of the language, or of an object, and whose texts try to end what they stand in."""
+    words = parameters("await __proto__ constructor point out kernel Math é λ x0 toString")
+    (state,) = states("prototype")
+    return CreepLaw(
+        "</script> `${1}` 'law'",
+        {"</script> __proto__": words[0] * sympy.exp(-stress / sum(words[1:]))},
+        {words[0]: COEFFICIENT, **{w: Param("</script> */ number", (1, 8)) for w in words[1:]}},
+        states={state: State(0.0, words[0] * stress, "</script> */")},
+        title="</script><b>",
+    )
+
+
+def test_hostile_names_are_renamed_openly_and_hostile_texts_stay_texts(tmp_path):
+    law = hostile_law()
+    values = dict.fromkeys(law.names, 2.0) | {"await": 1e-9}
+    source = LawWithValues(law, values, HOSTILE)
+    found = called(
+        tmp_path, source, ("rate", {"stress": 10.0, "prototype": 0.1}), ("terms", {"stress": 10.0}),
+        ("stateRates", {"stress": 10.0}),
+    )  # fmt: skip
+    expected = 1e-9 * math.exp(-10.0 / 20.0)
+    assert found[0] == pytest.approx(expected)
+    assert found[1] == {"</script> __proto__": pytest.approx(expected)}
+    assert found[2] == {"prototype": pytest.approx(1e-8)}
+    text = JavaScriptExporter().text(source)
+    for name in ("await", "point", "kernel", "Math"):
+        assert f"// '{name}' is called {name}_2 here" in text
+    assert "// 'λ' is called" in text
+    for each in (text, law_expression(source)):
+        assert "</script" not in each.lower()
+        assert "<!--" not in each
+
+
+def test_the_expression_for_a_page_keeps_what_is_switched_off(tmp_path):
+    source = LawWithValues(COMBINED, {**COMBINED.center(), "A_1": 0.0})
+    program = """
+    const { law, rate } = (0, eval)(await readFile("law.txt", "utf8"));
+    async function main(point) { return [rate(point), rate(point, { A_1: 1e-9 }), law.parameters.length]; }
+    """
+    point = {"stress": 100.0, "time": 100.0, "strain": 0.01}
+    found = run_in_node(tmp_path, program, point, {"law.txt": law_expression(source)})
+    added = 1e-9 * math.sinh(100.0 / source.values["B"]) ** source.values["n_1"]
+    assert found[1] - found[0] == pytest.approx(added, rel=1e-10)
+    assert found[2] == len(COMBINED.params)

@@ -1,15 +1,22 @@
 """Sheets for people: Markdown, MathML and LaTeX hold the law, its values in the units asked for, notes and sources."""
 
-import html.entities
+import itertools
+import json
+import math
 import re
 import xml.etree.ElementTree as ET
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from creepkit.errors import ExportError
-from creepkit.exporters.latex import LatexExporter, MarkdownExporter
-from creepkit.exporters.mathml import MATHML_NAMESPACE, MathmlExporter, MathmlPrinter
-from creepkit.language import arrhenius, stress
+from creepkit import available
+from creepkit.errors import CreepkitError, ExportError, LawError
+from creepkit.exporters import documents
+from creepkit.exporters.documents import LatexExporter, MarkdownExporter, MathmlExporter, MathmlPrinter, latex_number
+from creepkit.exporters.exporting import export
+from creepkit.exporters.law_files import JsonExporter, read_valued_law
+from creepkit.language import CreepLaw, Param, State, activated, arrhenius, linear, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
@@ -26,7 +33,7 @@ SHEETS = [MarkdownExporter(), MathmlExporter(), LatexExporter()]
 def page(law, **more):
     """The page of MathML, parsed, and its <math> elements."""
     root = ET.fromstring(MathmlExporter().text(LawWithValues(law, law.center(), NOTES, **more)))
-    return root, root.findall(f".//{{{MATHML_NAMESPACE}}}math")
+    return root, root.findall(f".//{{{documents.MATHML_NAMESPACE}}}math")
 
 
 def flat(element) -> str:
@@ -49,25 +56,15 @@ def check_mathml(law):
     assert root.tag == "{http://www.w3.org/1999/xhtml}html"
     assert len(found) == 1 + len(law.states) + 2 * (len(law.params) + len(law.states)) + len(law.constraints)
     for element in (e for one in found for e in one.iter()):
-        tag = element.tag.removeprefix(f"{{{MATHML_NAMESPACE}}}")
+        tag = element.tag.removeprefix(f"{{{documents.MATHML_NAMESPACE}}}")
         assert tag[0] == "m"
         assert tag not in ARITY or len(element) == ARITY[tag]
         assert bool((element.text or "").strip()) == (tag in ("mi", "mn", "mo", "mtext")) or not len(element)
 
 
-@pytest.mark.parametrize("name", ["combined", "two regimes", "Liu-Murakami", "combined with temperature"])
-def test_mathml_names_no_character_that_xml_does_not_know(name):
-    law = LAWS[name]
-    text = MathmlExporter().text(LawWithValues(law, law.center(), NOTES))
-    assert {*re.findall(r"&(\w+);", text)} <= {"amp", "lt", "gt", "quot", "apos"}
-    assert not any(
-        f"&{known}" in text for known in html.entities.html5 if known in ("InvisibleTimes;", "ExponentialE;")
-    )
-
-
 def test_mathml_reads_as_the_equation():
     _, (rate, *_) = page(COMBINED)
-    first, second, third = rate.findall(f".//{{{MATHML_NAMESPACE}}}mtr")
+    first, second, third = rate.findall(f".//{{{documents.MATHML_NAMESPACE}}}mtr")
     assert flat(first) == "ε˙cr=A1sinh(σeB)n1"
     assert flat(second) == "+A2εcrm1σen2"
     assert flat(third) == "+A3σen3tm2"
@@ -81,40 +78,7 @@ def test_mathml_writes_arrhenius_factors_and_limits_as_papers_do():
     assert MathmlPrinter().doprint(stress < 3).count("&lt;") == 1
 
 
-def test_mathml_tells_values_and_text_as_text():
-    root, _ = page(NORTON)
-    rows = [["".join(cell.itertext()) for cell in row] for row in root.iter("{http://www.w3.org/1999/xhtml}tr")]
-    assert rows == [
-        ["Symbol", "Meaning", "Value", "Unit"],
-        ["A", "rate coefficient", "3.16228×10−23", "1/s"],
-        ["n", "stress exponent", "4.5", ""],
-    ]
-    items = [item.text for item in root.iter("{http://www.w3.org/1999/xhtml}li")]
-    assert items[:3] == ["n = 4.5 [4.4, 4.6]", "valid from 700 to 900 C", "and below 200 MPa"]
-    assert "a | b & <c> `d` $e$ _f_ *g*" in items
-
-
 # ---- Markdown ------------------------------------------------------------------------------------------------------
-
-
-def test_markdown_has_one_table_whose_rows_have_four_cells():
-    for law in LAWS.values():
-        check_markdown(law)
-
-
-def check_markdown(law):
-    text = MarkdownExporter().text(LawWithValues(law, law.center(), NOTES))
-    assert text.count("$$") == 2
-    before, equation, after = text.split("$$")
-    assert before.startswith("# ")
-    assert equation.count("{") == equation.count("}")
-    assert equation.count("&=") == 1 + len(law.states)
-    assert equation.count(r"&\quad +") == len(law.terms) - 1
-    table = [line for line in after.splitlines() if line.startswith("|")]
-    assert all(len(re.split(r"(?<!\\)\|", line)) == 6 for line in table)
-    assert len(table) == 2 + len(law.params) + len(law.states)
-    told = [line.replace("\\", "") for line in after.splitlines() if line.startswith("- ")]
-    assert told[-len(law.references) :] == [f"- {reference}" for reference in law.references]
 
 
 def test_markdown_makes_nothing_of_notes():
@@ -151,11 +115,6 @@ def test_latex_converts_the_coefficient_without_reference_temperature_too():
 
 
 @pytest.mark.parametrize("exporter", SHEETS, ids=lambda e: e.name)
-def test_native_units_leave_values_as_they_are(exporter):
-    assert "1.2" in exporter.text(ARRHENIUS)
-
-
-@pytest.mark.parametrize("exporter", SHEETS, ids=lambda e: e.name)
 def test_a_law_that_no_numbers_convert_is_refused(exporter):
     law = EQUATIONS["exponent of time with temperature"]
     with pytest.raises(
@@ -164,8 +123,146 @@ def test_a_law_that_no_numbers_convert_is_refused(exporter):
         exporter.text(LawWithValues(law, law.center() | {"m_T": 9e-6}, units=Units("Pa", "h")))
 
 
-def test_a_law_that_fails_says_when():
-    law = EQUATIONS["Kachanov-Rabotnov"]
-    assert "The material has failed when omega reaches 0.99." in MarkdownExporter().text(
-        LawWithValues(law, law.center())
-    )
+# ---- law files -------------------------------------------------------------------------------------------------------
+
+# Exporters: the JSON document comes back, LaTeX holds together, and files are written whole or not at all.
+
+
+A, n, k_max = parameters("A n k_max")
+(omega,) = states("omega")
+DAMAGE = CreepLaw(
+    name="damage",
+    title="Power law with damage",
+    terms={"creep": A * (stress / (1 - omega)) ** n},
+    params={A: Param("rate coefficient & more", (1e-40, 1e-5), "1/s", "log", 0.0), n: Param("50 % exponent_x", (1, 8))},
+    states={omega: State(0.05, A * stress**n, meaning="damage", limit=0.99)},
+)
+FILE_LAWS = [
+    NORTON,
+    COMBINED,
+    DRIFTING_EXPONENT,
+    DAMAGE,
+    COMBINED.times(arrhenius()),
+    NORTON.with_temperature(n=linear(), A=activated(1100.0)).times(arrhenius()),
+    NORTON.times(arrhenius(Q=4e5)),
+]
+FILE_NOTES = ("intervals: n = 4.5 +- 0.1 (95 %)", "valid from 700 to 900 C\nand 20 to 200 MPa")
+
+
+def text_of(law, values, exporter, notes=(), **more):
+    return exporter.text(LawWithValues(law, values, notes, **more))
+
+
+def test_values_are_checked():
+    with pytest.raises(LawError, match="needs a value for n"):
+        LawWithValues(NORTON, {"A": 1e-16})
+    with pytest.raises(LawError, match="'five' is not a number"):
+        LawWithValues(NORTON, {"A": 1e-16, "n": "five"})
+
+
+FOR_PEOPLE = [available("exporters")[name] for name in ("latex", "markdown", "mathml", "json", "python")]
+
+
+def test_what_has_no_limits_writes_every_law_with_its_notes():
+    for law, exporter in itertools.product(FILE_LAWS, FOR_PEOPLE):
+        text = text_of(law, law.center(), exporter, FILE_NOTES)
+        assert text.endswith("\n"), (law.name, exporter.name)
+        assert "valid from 700 to 900 C" in text, (law.name, exporter.name)
+
+
+# ---- JSON ----------------------------------------------------------------------------------------------------------
+
+
+def test_json_comes_back_equal():
+    registered = [one.value for one in default_registry().laws().values()]
+    for law in (*FILE_LAWS, *registered):
+        values = {name: value * 1.0000000000000002 for name, value in law.center().items()}
+        covered = {"stress": (20.0, 80.0), "temperature": (1000.0, 1100.0)}
+        source = LawWithValues(law, values, FILE_NOTES, ranges=covered)
+        back = read_valued_law(JsonExporter().text(source))
+        assert back == source, law.name
+
+
+def _json(**changes):
+    document = json.loads(text_of(NORTON, {"A": 1e-16, "n": 5}, JsonExporter()))
+    return json.dumps({**document, **changes})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "mine.json, line 1: not JSON"),
+        ("[]", "not a law that creepkit wrote"),
+        (_json(version=1), "in version 1 of the format; this one reads version 3: export the law again"),
+        (_json(ranges={"temperature": [1100, 900]}), "ranges.temperature is 1100 to 900; the lower number comes first"),
+        (_json(script="import os"), "unknown key 'script'; known: gas_constant, law"),
+        (_json(values=[1]), "values is a list, where an object is needed"),
+        (_json(values={"A": True, "n": 1}), "values.A is True, where a number is needed"),
+        (_json(values={"A": 1e-16}), "needs a value for n"),
+        (_json(values={"A": 1e-16, "n": float("inf")}), "Infinity is no number of JSON"),
+        (_json(notes="text"), "notes is 'text', where a list is needed"),
+        (_json(law={}), "mine.json: this is not a law that creepkit wrote"),
+        (_json(gas_constant=8.31), "'gas_constant' is 8.31; creepkit reads 8.314462618 alone"),
+        (_json(units={"stress": "Pa", "time": "s", "temperature": "K", "energy": "J/mol"}), "'units' is .*'Pa'"),
+    ],
+)
+def test_a_bad_document_is_one_sentence(text, message):
+    with pytest.raises(CreepkitError, match=message) as error:
+        read_valued_law(text, "mine.json")
+    assert "\n" not in str(error.value)
+
+
+@given(st.text() | st.recursive(st.none() | st.integers() | st.floats() | st.text(), st.lists).map(json.dumps))
+@settings(max_examples=100, deadline=None)
+def test_any_text_is_a_document_or_an_error(text):
+    with pytest.raises(CreepkitError):
+        read_valued_law(text)
+
+
+# ---- LaTeX ---------------------------------------------------------------------------------------------------------
+
+
+def test_latex_escapes_text():
+    text = text_of(DAMAGE, {"A": 1e-16, "n": 5}, LatexExporter())
+    assert r"& rate coefficient \& more &" in text
+    assert r"50 \% exponent\_x" in text
+    assert r"$\omega(0)$ & damage & $0.05$" in text
+
+
+def test_both_forms_of_arrhenius_are_printed():
+    """A_inf = A exp(Q/(R T_ref)); with the paper's 8.31 it would differ by 2.4 %."""
+    text = text_of(NORTON.times(arrhenius(1073.15)), {"A": 1e-8, "n": 5, "Q": 4e5}, LatexExporter())
+    factor = r"\exp\!\left[-\frac{Q}{R}\left(\frac{1}{T} - \frac{1}{1073.15\,\mathrm{K}}\right)\right]"
+    assert rf"A \sigma_e^{{n}} {factor}" in text
+    assert r"A_{\infty} \sigma_e^{n} \exp\!\left[-\frac{Q}{R T}\right]" in text
+    shown = re.search(r"= ([\d.]+) \\times 10\^\{(.+?)\} \\; \\mathrm\{s\}\^\{-1\}", text)
+    expected = 1e-8 * math.exp(4e5 / (8.314462618 * 1073.15))
+    assert float(shown[1]) * 10 ** int(shown[2]) == pytest.approx(expected, rel=1e-5)
+    assert "R = 8.314462618 J/(mol K)" in text
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(4.5, "4.5"), (8.0, "8"), (0.0, "0"), (-0.475, "-0.475"), (1e-23, r"1 \times 10^{-23}"), (475000.0, "475000")],
+)
+def test_numbers_in_latex(value, shown):
+    assert latex_number(value) == shown
+
+
+# ---- files ---------------------------------------------------------------------------------------------------------
+
+VALUED = LawWithValues(NORTON, {"A": 1e-16, "n": 5}, FILE_NOTES)
+
+
+def test_a_refused_export_leaves_the_old_file(tmp_path):
+    path = tmp_path / "norton.json"
+    path.write_text("old")
+    with pytest.raises(ExportError, match="JSON holds a law in MPa and s"):
+        export(VALUED.replace(units=Units("Pa")), "json", to=path, force=True)
+    assert path.read_text() == "old"
+
+
+def test_latex_tells_references_and_keeps_each_comment_a_comment():
+    text = LatexExporter().text(VALUED.replace(notes=("one\u2028\\input{two}",)))
+    assert f"% Source: {NORTON.references[0]}" in text
+    assert "\n% \\input{two}" in text

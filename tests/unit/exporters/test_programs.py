@@ -1,23 +1,34 @@
 """What holds in every language: names, units, notes, virgin material, large rates, and what is switched off."""
 
+import ast
+import importlib.util
+import itertools
 import math
 import re
 import warnings
 
+import mpmath
 import numpy as np
 import pytest
 import sympy
 
+import creepkit as ck
 from creepkit.errors import ExportError
 from creepkit.exporters.law_files import JsonExporter, read_valued_law
+from creepkit.exporters.python import NumpyExporter, PythonExporter
+from creepkit.exporters.unit_conversion import coefficient_unit, convert_values, degree
 from creepkit.kernels import lower
-from creepkit.language import CreepLaw, Param, State, parameters, stress
+from creepkit.kernels.multiprecision import MultiprecisionLaw
+from creepkit.language import CreepLaw, Param, State, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import LawWithValues, Units
-from helpers.export_cases import LAWS, TOLERANCE, renamed
+from creepkit.registry import default_registry
+from helpers.export_cases import LAWS, TOLERANCE, disagreements, renamed
 from helpers.exported_programs import LANGUAGES, program_text, rates
+from helpers.literature_laws import EQUATIONS
 
 PROGRAMS = ("c", "javascript", "python", "numpy", "abaqus", "calculix", "mfront")
 GROUPS = (
@@ -96,13 +107,6 @@ def test_kernels_take_every_name_texts_hold_them_and_json_gives_the_law_back():
             assert not re.search(r"[\x00-\x09\x0b-\x1f]", program_text(target, source))
 
 
-def test_names_of_arguments_can_be_fixed():
-    law = law_of(symbols("self values bounds forms"), [])
-    fixed = law.fix(self=2.0, values=3.0)
-    assert fixed.names == ("c", "bounds", "forms")
-    assert law.with_bounds(self=(2.0, 3.0)).table["self"].bounds == (2.0, 3.0)
-
-
 @pytest.mark.parametrize("language", ["c", "javascript", "python", "numpy"])
 def test_units_are_converted_on_entry_and_rates_on_exit(language, tmp_path):
     """With stress in Pa and time in h, rates are per hour: 3600 of those per second."""
@@ -168,3 +172,159 @@ def test_what_is_off_is_left_out_and_told_and_a_law_that_is_off_or_has_no_code_i
             program_text(target, LawWithValues(NORTON, {"A": 0.0, "n": 5.0}))
         with pytest.raises(ExportError, match="cannot be written as .*law 'gamma', term 'x': the function gamma"):
             program_text(target, LawWithValues(gamma, {"A": 1e-9}))
+
+
+# ---- unit conversion -------------------------------------------------------------------------------------------------
+
+# Degrees of rates, units of rate coefficients and converted values, against the factor by which rates change.
+
+
+x, y, power, a = sympy.symbols("x y n a", positive=True)
+SCALED = [
+    3 * x**power * y**-2,
+    (x**2 + a * x * y) ** power,
+    sympy.exp(x / y) * x,
+    x ** (power + sympy.exp(-x / y)),
+    sympy.Piecewise((x, x > y), (2 * y, True)),
+    sympy.Heaviside(x - y) * x * y,
+    sympy.Max(x - y, 0) ** power,
+    sympy.Integer(4),
+]
+UNITS = Units("Pa", "h")
+
+
+def test_a_rate_changes_by_that_power_of_the_factor_and_others_have_none():
+    at = {x: 1.3, y: 0.7, power: 3.2, a: 2.0}
+    for expression in SCALED:
+        found = degree(expression, {x: 1, y: 1})
+        assert found is not None, expression
+        ratio = expression.subs({x: 1.7 * x, y: 1.7 * y}, simultaneous=True).subs(at) / expression.subs(at)
+        assert float(ratio) == pytest.approx(1.7 ** float(found.subs(at)), rel=1e-12), expression
+    for expression in (x + x**2, sympy.exp(x), 1 + x, power**x, sympy.sin(x * y)):
+        assert degree(expression, {x: 1, y: 1}) is None, expression
+
+
+@pytest.mark.parametrize(
+    ("law", "name", "unit"),
+    [
+        (ck.law("norton"), "A", "MPa^-n s^-1"),
+        (ck.law("time-hardening"), "A", "MPa^-n s^-(m + 1)"),
+        (ck.law("combined"), "A_3", "MPa^-n_3 s^-(m_2 + 1)"),
+        (ck.law("norton").fix(n=4.0), "A", "MPa^-4 s^-1"),
+        (ck.law("norton").times(ck.arrhenius()), "A", "MPa^-n s^-1"),
+        (ck.law("hyperbolic-sine"), "A", ""),  # sinh of a stress over a stress: 1/s
+        (ck.law("norton").with_temperature(n=ck.linear()), "A", ""),  # none: the exponent differs with temperature
+    ],
+)
+def test_the_unit_of_a_rate_coefficient(law, name, unit):
+    assert coefficient_unit(law, name) == unit
+    if name == "A" and unit == "MPa^-n s^-1":
+        head = " ".join(ck.export(LawWithValues(law, law.center()), "abaqus").replace("!", " ").split())
+        assert f"({unit} for stress in MPa and time in s)" in head
+
+
+def test_converted_values_give_the_same_rates():
+    """At 300 MPa, above the threshold of laws that have one, and at 40 MPa."""
+    laws = {**{name: one.value for name, one in default_registry().laws().items()}, **EQUATIONS}
+    bad, converted = [], 0
+    for name, law in laws.items():
+        source = LawWithValues(law, law.center(), units=UNITS)
+        try:
+            values = convert_values(source).values
+        except ExportError:
+            continue
+        exact, converted = MultiprecisionLaw(law), converted + 1
+        states = [state.initial + 0.1 for state in law.states.values()]
+        for s, strain, time in ((300.0, 1e-3, 7.2e4), (40.0, 0.02, 3.6e6)):
+            native = [s, strain, time, 1073.0, s, s / 3, *states]
+            other = [1e6 * s, strain, time / 3600, 1073.0, 1e6 * s, 1e6 * s / 3, *states]
+            pairs = zip(
+                exact.term_and_state_rates(native, [*source.values.values()]),
+                exact.term_and_state_rates(other, [values[power] for power in law.names]),
+                strict=True,
+            )
+            bad += [f"{name}: {b} for {a}" for a, b in pairs if abs(b - 3600 * a) > 1e-10 * mpmath.mpf(3600) * abs(a)]
+    assert not bad, "\n".join(bad)
+    assert converted > 20
+
+
+# ---- python ----------------------------------------------------------------------------------------------------------
+
+# The exported Python modules, of numbers and of arrays, run alone and agree with the law in 50 digits.
+
+
+A, n, C = parameters("A n C")
+(omega,) = states("omega")
+
+
+def module(law, folder, values=None, notes=(), exporter=None, **more):
+    """The exported module, loaded; of one number at a time unless another exporter is given."""
+    source = LawWithValues(law, values or law.center(), notes, **more)
+    path = folder / "exported_law.py"
+    path.write_text((exporter or PythonExporter()).text(source), encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("exported_law", path)
+    loaded = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(loaded)
+    return loaded
+
+
+def test_every_law_agrees_with_50_digits_wherever_its_rate_is_representable(tmp_path):
+    """A rate beyond doubles must raise."""
+
+    def evaluate(name, judged):
+        law = LAWS[name]
+        loaded, other = module(law, tmp_path, judged.sets[0]), renamed((tmp_path / "exported_law.py").read_text())
+        rows = np.array([[[float(row[0])] for row in rows] for rows in judged.truth.rows])
+        for k, values in enumerate(judged.sets):
+            given = {other.get(symbol, symbol): value for symbol, value in (judged.named(k) | values).items()}
+            if judged.truth.rows[k][0][0] > 1.7e308:
+                with pytest.raises(OverflowError):
+                    loaded.rate(**given)
+                continue
+            rows[k, 0, 0] = loaded.rate(**given)
+            rows[k, 1:, 0] = [*loaded.state_rates(**given).values()] if law.states else []
+        return rows, judged.logs(rows[:, 0, 0])
+
+    assert disagreements(evaluate) == []
+
+
+def test_every_law_agrees_with_50_digits_in_whole_arrays(tmp_path):
+    def evaluate(name, judged):
+        loaded = module(LAWS[name], tmp_path, judged.sets[0], exporter=NumpyExporter())
+        other = renamed((tmp_path / "exported_law.py").read_text())
+        rows = [judged.named(k) | values for k, values in enumerate(judged.sets)]
+        given = {other.get(symbol, symbol): np.array([row[symbol] for row in rows]) for symbol in rows[0]}
+        grown = loaded.state_rates(**given).values() if judged.law.states else []
+        columns = [np.broadcast_to(column, len(rows)) for column in (loaded.rate(**given), *grown)]
+        return np.stack(columns, axis=1)[:, :, None], judged.logs(columns[0])
+
+    assert disagreements(evaluate) == []
+
+
+def test_modules_need_math_or_numpy_alone():
+    """The error function, which NumPy lacks, comes from the standard library."""
+    for law, exporter in itertools.product(LAWS.values(), (PythonExporter(), NumpyExporter())):
+        text = exporter.text(LawWithValues(law, law.center()))
+        imports = [node for node in ast.walk(ast.parse(text)) if isinstance(node, (ast.Import, ast.ImportFrom))]
+        modules = {getattr(node, "module", None) or node.names[0].name for node in imports}
+        needed = {"math"} if exporter.name == "python" else {"numpy"} | ({"math"} if "erf" in text else set())
+        assert modules == needed, (law.name, exporter.name)
+
+
+def test_what_the_law_uses_must_be_given_and_the_rest_may_be(tmp_path):
+    loaded = module(STRAIN_HARDENING, tmp_path)
+    with pytest.raises(TypeError, match="strain"):
+        loaded.rate(100)
+    assert loaded.rate(100, strain=0.01, time=5.0, temperature=900.0) == loaded.rate(100, strain=0.01)
+
+
+def test_branches_are_taken_lazily(tmp_path):
+    A_, B_ = parameters("A B")
+    guarded = CreepLaw(
+        "guarded",
+        {"x": A_ * (1 + sympy.Piecewise((1 / (stress - B_), stress > B_), (0, True)))},
+        {A_: COEFFICIENT, B_: Param("threshold", (1, 10), "MPa")},
+    )
+    loaded = module(guarded, tmp_path, {"A": 1e-9, "B": 5.0})
+    assert loaded.rate(5.0) == pytest.approx(1e-9, rel=1e-13)
+    assert loaded.rate(7.0) == pytest.approx(1.5e-9, rel=1e-13)

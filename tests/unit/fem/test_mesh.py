@@ -1,5 +1,7 @@
 """The eight-node element, strips of it, and what is said of meshes, against polynomials and closed forms."""
 
+from __future__ import annotations
+
 import re
 
 import numpy as np
@@ -8,18 +10,19 @@ import pytest
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import (
     CORNERS,
-    GAUSS_POINTS,
     Mesh,
     discretize,
     geometry_derivative,
-    half_bandwidth,
-    outline,
     shape_functions,
     shape_gradients,
     strip_mesh,
-    strip_nodes,
 )
-from helpers.fem_cases import mesh_quality
+from creepkit.fem.section import Section
+from creepkit.fem.simulation import LoadHistory, Simulation, simulate
+from creepkit.fem.solver import SolverSettings
+from creepkit.laws.norton import NORTON
+from creepkit.records import Program, Status
+from helpers.fem_cases import lowered, mesh_quality
 
 MIDDLES = 0.5 * (CORNERS + np.roll(CORNERS, -1, axis=0))
 NODES = np.vstack([CORNERS, MIDDLES])
@@ -57,13 +60,6 @@ def test_shape_gradients_are_the_differences_of_the_values():
         np.testing.assert_allclose(shape_gradients(PLACES)[:, :, k], slope, atol=1e-9)
 
 
-def test_points_are_those_of_gauss_near_the_corner_of_their_number():
-    for i, j in [(0, 0), (1, 0), (3, 2), (2, 2), (3, 3)]:
-        exact = (2 / (i + 1) if i % 2 == 0 else 0) * (2 / (j + 1) if j % 2 == 0 else 0)
-        assert (GAUSS_POINTS[:, 0] ** i * GAUSS_POINTS[:, 1] ** j).sum() == pytest.approx(exact, abs=1e-15)
-    assert (np.sign(GAUSS_POINTS) == CORNERS).all()
-
-
 def test_a_linear_field_has_its_gradient_at_every_point_of_a_curved_mesh():
     mesh = ring(5, 3)
     at = discretize(mesh)
@@ -72,17 +68,6 @@ def test_a_linear_field_has_its_gradient_at_every_point_of_a_curved_mesh():
     np.testing.assert_allclose((at.by_height * values).sum(axis=2), -5.0, atol=1e-12)
     there = 2.0 + 3.0 * at.points[:, :, 0] - 5.0 * at.points[:, :, 1]
     np.testing.assert_allclose((at.over_radius * values).sum(axis=2), there / at.points[:, :, 0], atol=1e-12)
-
-
-def test_area_and_volume_of_a_ring_converge_with_the_fourth_order():
-    area, first_moment = 0.75 * np.pi, 3 * 0.75 * np.pi + 7 / 3  # of r; the centroid of the quarter is 28/(9 pi) off
-    errors = []
-    for n in (2, 4, 8):
-        at = discretize(ring(n, n))
-        errors.append([(at.weights / at.points[:, :, 0]).sum() / area - 1, at.weights.sum() / first_moment - 1])
-    orders = np.log2(np.abs(np.array(errors[:-1]) / errors[1:]))
-    assert (orders > 3.7).all()
-    assert np.abs(errors[-1]).max() < 1e-5
 
 
 def test_geometry_change_is_the_derivative_of_what_the_mesh_becomes():
@@ -96,15 +81,6 @@ def test_geometry_change_is_the_derivative_of_what_the_mesh_becomes():
     slopes = np.stack([at.by_radius, at.by_height], axis=3)
     moved = (np.stack([ahead.by_radius, ahead.by_height], 3) - np.stack([behind.by_radius, behind.by_height], 3)) / 2e-6
     np.testing.assert_allclose(-np.einsum("epaj,epji->epai", slopes, change.gradient), moved, atol=1e-6)
-
-
-@pytest.mark.parametrize(("columns", "layers"), [(1, 1), (5, 3), (12, 4)])
-def test_a_strip_is_numbered_across(columns, layers):
-    mesh = ring(columns, layers)
-    assert len(mesh.elements) == columns * layers
-    assert len(mesh.nodes) == (columns + 1) * (2 * layers + 1) + columns * (layers + 1)
-    assert set(mesh.elements.ravel()) == set(range(len(mesh.nodes)))
-    assert half_bandwidth(mesh.elements) == 6 * layers + 9
 
 
 def test_sides_of_a_strip_lie_on_its_lines_with_the_solid_to_their_left():
@@ -121,18 +97,6 @@ def test_sides_of_a_strip_lie_on_its_lines_with_the_solid_to_their_left():
     np.testing.assert_allclose(body.nodes[body.first][:, 0], 3.0, atol=1e-15)
     np.testing.assert_allclose(body.nodes[body.last][:, 1], 0.0, atol=1e-15)
     np.testing.assert_allclose(body.nodes[body.last][:, 0], [4, 4.1, 4.2, 4.6, 5.0], rtol=1e-14)
-
-
-def test_nodes_of_a_strip_are_linear_in_its_sides():
-    rng, breaks = np.random.default_rng(3), np.array([0, 0.3, 1.0])
-    a, b, c, d = rng.normal(size=(4, 7, 2))
-    both = strip_nodes(a + 2 * c, b + 2 * d, breaks)
-    np.testing.assert_allclose(both, strip_nodes(a, b, breaks) + 2 * strip_nodes(c, d, breaks), atol=1e-14)
-
-
-def test_the_outline_of_a_strip_are_its_four_sides():
-    mesh = ring(5, 3)
-    assert len(outline(mesh.elements)) == 2 * (5 + 3)
 
 
 def test_quality_is_one_of_a_rectangle_and_the_sine_of_a_parallelogram():
@@ -161,3 +125,94 @@ def test_a_middle_node_beyond_a_quarter_of_its_side_is_refused():
     nodes[4] = [2.4, -1.0]
     with pytest.raises(SolveError, match="element 0 of the mesh, near r = 3 mm, z = 0 mm, is inverted"):
         discretize(Mesh(nodes, [np.arange(8)], np.zeros((8, 2), bool), [], []))
+
+
+# ---- section ---------------------------------------------------------------------------------------------------------
+
+# Sections: meshes with named sides and points, joined, held and loaded; forces, planes and moved sides in the core.
+
+
+E, NU = 1e5, 0.3
+STILL = {"A": 1e-40, "n": 1.0}
+BAR = Section.rectangle((0.0, 0.0), (2.0, 3.0), 3, 2)
+
+
+def simulated(section: Section, observed, *, load: float = 0.0, motion: float = 0.0, values=STILL, end=1.0, poisson=NU):
+    """A complete simulation under a constant load or motion from time zero."""
+    kernel, theta = lowered(NORTON), NORTON.to_internal(values)[0]
+    constant = Program.constant
+    history = LoadHistory(constant(load), constant(1000.0), constant(E), end, poisson, constant(motion))
+    settings = SolverSettings(tolerance=1e-4, newton=1e-9, deflection_limit=np.inf, least=1e-6)
+    made = simulate(kernel, theta, section.model(np.asarray(observed)), history, settings=settings)
+    assert made.status is Status.COMPLETE
+    return made
+
+
+def top_of(section: Section, made: Simulation) -> np.ndarray:
+    """u_z of the nodes of the top in the end, mm."""
+    return made.displacements[-1, np.unique(section.sides["top"]), 1]
+
+
+def test_a_rectangle_has_its_sides_and_corners() -> None:
+    for name, (axis, value) in {"bottom": (1, 0.0), "top": (1, 3.0), "left": (0, 0.0), "right": (0, 2.0)}.items():
+        assert (BAR.nodes[np.unique(BAR.sides[name]), axis] == value).all()
+    assert [len(BAR.sides[name]) for name in ("bottom", "top", "left", "right")] == [3, 3, 2, 2]
+    np.testing.assert_array_equal(BAR.nodes[BAR.points["top_right"]], (2.0, 3.0))
+    np.testing.assert_array_equal(BAR.nodes[BAR.points["bottom_left"]], (0.0, 0.0))
+
+
+def test_a_dead_force_stretches_a_bar_as_hooke_says() -> None:
+    """The force is Kirchhoff stress times area over stretch, whether the face is a plane or not."""
+    force = 1e-3 * E * 4.0 * np.pi
+    for face in (lambda s: s, lambda s: s.plane("top")):
+        bar = face(BAR.hold("bottom", z=True)).pull("top", force)
+        strain = np.log1p(top_of(bar, simulated(bar, [], load=1.0)) / 3.0)
+        np.testing.assert_allclose(strain * np.exp(-strain), 1e-3, rtol=1e-6)
+
+
+def test_a_plane_has_one_displacement() -> None:
+    """A force on the outer half of a face alone; the free face bends, the plane does not."""
+    section = BAR.hold("bottom", z=True).with_side("rim", lambda r, z: (z > 2.999) & (r > 1.3))
+    free, plane = section.pull("rim", 1e4), section.plane("top").pull("rim", 1e4)
+    assert np.ptp(top_of(free, simulated(free, [], load=1.0))) > 1e-3
+    found = top_of(plane, simulated(plane, [], load=1.0))
+    assert np.ptp(found) == 0.0
+    # the force does the same work on the mean of the face whatever its place: as an even one
+    even = section.plane("top").pull("top", 1e4)
+    np.testing.assert_allclose(found, top_of(even, simulated(even, [], load=1.0)), rtol=1e-9)
+
+
+def test_a_moved_side_needs_the_force_that_moves_it() -> None:
+    """Hooke's law for a bar in logarithmic strain, and the same force moves it as far."""
+    bar = BAR.hold("bottom", z=True)
+    made = simulated(bar.move("top"), [], motion=0.01)
+    strain = np.log1p(0.01 / 3.0)
+    assert 2 * np.pi * made.reactions[-1] == pytest.approx(E * strain * 4.0 * np.pi * np.exp(-strain), rel=1e-7)
+    back = bar.plane("top").pull("top")
+    again = simulated(back, [], load=2 * np.pi * float(made.reactions[-1]))
+    np.testing.assert_allclose(top_of(back, again), 0.01, rtol=1e-6)
+
+
+def test_observed_displacements_do_not_change_a_simulation() -> None:
+    """Which are observed decides what errors are measured by, so the steps, but no equation."""
+    bar, values = BAR.hold("bottom", z=True).pull("top"), {"A": 1e-12, "n": 3.0}
+    ends = [
+        simulated(bar, observed, load=500.0, values=values, end=1e4).displacements[-1]
+        for observed in ([], [2 * BAR.points["top_left"] + 1], [2 * BAR.points["bottom_right"]])
+    ]
+    for end in ends[1:]:
+        np.testing.assert_allclose(end, ends[0], rtol=1e-4, atol=1e-9)
+
+
+def test_joined_sections_are_one_body() -> None:
+    """A bar of two blocks strains as one of one block, and the inner side is no side any more."""
+    lower = Section.rectangle((0.0, 0.0), (2.0, 1.0), 3, 1)
+    upper = Section.rectangle((0.0, 1.0), (2.0, 3.0), 3, 2)
+    both = lower.joined(upper)
+    assert len(both.nodes) == len(lower.nodes) + len(upper.nodes) - 7
+    assert set(both.sides) == {"bottom", "left", "right", "top"}
+    assert len(both.sides["right"]) == 3
+    for each in (both, BAR):
+        bar = each.hold("bottom", z=True).pull("top", 1e3)
+        strain = np.log1p(top_of(bar, simulated(bar, [], load=1.0)) / 3.0)
+        np.testing.assert_allclose(strain * np.exp(-strain), 1e3 / (E * 4.0 * np.pi), rtol=1e-7)

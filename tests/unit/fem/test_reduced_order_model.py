@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from itertools import product
 
 import numpy as np
@@ -18,7 +17,6 @@ from creepkit.fem.solver import SolverSettings, StageConditions, assemble
 from creepkit.language import CreepLaw, mean_stress, parameters, stress
 from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
-from creepkit.specimens import reduced_order_training
 from creepkit.specimens.reduced_order_training import power_law_runs, trained_basis
 from helpers.fem_cases import FREE, STILL, block, full_basis, left_of, lowered, mesh_of
 from helpers.literature_laws import RATE, damage, number, omega
@@ -202,28 +200,6 @@ def test_a_trained_model_is_near_its_finite_elements(tmp_path, monkeypatch) -> N
     times = np.linspace(10.0, 9e3, 40)
     exact, found = (run.at(run.displacements, times) for run in runs)
     assert np.abs(found - exact).max() < 5e-3 * np.abs(exact).max()
-
-
-def test_a_kept_basis_that_was_changed_is_trained_and_written_anew(tmp_path, monkeypatch) -> None:
-    """A changed byte of a mode leaves a readable file of finite numbers; its checksum tells."""
-    monkeypatch.setenv("CREEPKIT_CACHE", str(tmp_path))
-    monkeypatch.setattr(reduced_order_training, "snapshots", lambda *_: None)
-    monkeypatch.setattr(reduced_order_training, "power_law_runs", lambda *_: [])
-    trained = []
-    monkeypatch.setattr(reduced_order_training, "train", lambda *_: trained.append(few()) or trained[-1])
-
-    def trainings() -> int:
-        reduced_order_training._in_memory().clear()
-        trained_basis([TUBE], SolverSettings(), modes=4, points=8)
-        return len(trained)
-
-    monkeypatch.setattr(reduced_order_training, "_in_memory", cache(dict))
-    assert [trainings(), trainings()] == [1, 1]
-    (path,) = tmp_path.glob("reduced_bases/*.safetensors")
-    content, modes = path.read_bytes(), trained[0].modes.tobytes()
-    assert modes in content
-    path.write_bytes(content.replace(modes, modes[:-8] + np.float64(0.5).tobytes()))
-    assert [trainings(), trainings()] == [2, 2]
 
 
 def test_gradients_of_modes_are_those_of_a_linear_field() -> None:

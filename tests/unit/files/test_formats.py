@@ -3,16 +3,24 @@
 import importlib.util
 import json
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import h5py
 import jsonschema
+import numpy as np
 import pytest
 
 import creepkit as ck
 from creepkit.cli.shared import read_law_file
+from creepkit.errors import CreepkitError, FitError, HistoryError, SolveError, printable, quoted
+from creepkit.fem.mesh_files import read_input_deck, read_mesh
+from creepkit.files.hdf5_files import open_hdf5
+from creepkit.files.reading import VARIABLE, FileKind, raised, read_bytes
 from creepkit.language.law_codec import law_from_json
+from creepkit.records import histories_in
 from creepkit.studies.lock import read_lock
+from helpers.mistakes import said_otherwise
 from helpers.paths import ROOT
 
 FORMATS = ROOT / "tests" / "data" / "formats"
@@ -31,49 +39,30 @@ def problems(name: str, data) -> list[str]:
     ]
 
 
-def test_there_are_files_of_this_version() -> None:
-    assert ck.__version__ in VERSIONS
-
-
 @pytest.mark.parametrize("version", VERSIONS)
-def test_tests_are_read(version) -> None:
-    histories = ck.read_histories(FORMATS / version)
+def test_files_of_every_version_are_read(version: str) -> None:
+    folder = FORMATS / version
+    histories = ck.read_histories(folder)
     assert len(histories) == 6
     assert {history.times.size for history in histories} == {6}
     assert {round(history.temperature, 2) for history in histories} == {1023.15, 1073.15, 1123.15}
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-def test_documents_are_read(version) -> None:
-    fit = ck.load(FORMATS / version / "identification.json")
-    assert fit.law.name == "norton"
-    assert fit.values["n"] == pytest.approx(5.0, rel=1e-3)  # planted
+    fit, source = ck.load(folder / "identification.json"), read_law_file(folder / "valued_law.json")
+    for one in (fit, source):
+        assert one.law.name == "norton"
+        assert one.values["n"] == pytest.approx(5.0, rel=1e-3)  # planted
     assert fit.values["A"] == pytest.approx(1e-18, rel=0.05)
-    assert ck.load_ranking(FORMATS / version / "ranking.json").rate(stress=80.0)[0] > 0
-    found = json.loads((FORMATS / version / "temperature_law.json").read_text(encoding="utf-8"))  # for other programs
+    assert ck.load_ranking(folder / "ranking.json").rate(stress=80.0)[0] > 0
+    found = json.loads((folder / "temperature_law.json").read_text(encoding="utf-8"))  # for other programs
     assert law_from_json(found["law"]).name.startswith("norton")
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-def test_laws_with_values_are_exported_again(version) -> None:
-    source = read_law_file(FORMATS / version / "valued_law.json")
-    assert source.law.name == "norton"
-    assert source.values["n"] == pytest.approx(5.0, rel=1e-3)
-
-
-def test_a_document_of_a_later_version_is_refused(tmp_path) -> None:
-    document = json.loads((FORMATS / ck.__version__ / "identification.json").read_text(encoding="utf-8"))
-    (tmp_path / "fit.json").write_text(json.dumps({**document, "version": document["version"] + 1}))
-    with pytest.raises(ck.errors.CreepkitError, match="version"):
-        ck.load(tmp_path / "fit.json")
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-def test_plates_and_locks_are_of_a_version_that_is_read(version) -> None:
-    with h5py.File(FORMATS / version / "plate.h5") as file:
+    with h5py.File(folder / "plate.h5") as file:
         assert (file.attrs["format"], file["alloys/0000"].attrs["law"]) == ("creepkit-plate", "norton")
-    lock = read_lock(FORMATS / version / "study.lock")
-    assert {stage.state for stage in lock.stages.values()} == {"done"}
+    assert {stage.state for stage in read_lock(folder / "study.lock").stages.values()} == {"done"}
+    data = ck.read_dataset(folder / "data_set.h5")
+    assert (data.law.name, data.status.size) == ("norton", 16)  # rejected samples among them
+    assert ck.surrogate(folder / "surrogate.safetensors").metadata.law.name == "norton"
+    assessment = ck.load_rupture_assessment(folder / "rupture_assessment.json")
+    assert {one.fit.method for one in assessment.ranked} == {"larson-miller"}
+    assert len(assessment.tests) == 8
 
 
 def test_every_kind_of_file_is_made_by_the_program_that_is_to_make_the_next_version(tmp_path) -> None:
@@ -98,32 +87,19 @@ def test_the_schemas_are_current() -> None:
     )
 
 
-def test_written_documents_follow_the_schemas() -> None:
-    document = json.loads((FORMATS / ck.__version__ / "identification.json").read_text(encoding="utf-8"))
-    assert problems("identification", document) == []
-    assert problems("law", document["law"]) == []
-    assert problems("identification", {**document, "colour": 1})
-    assert problems("law", {**document["law"], "version": 1})
-
-
-@pytest.mark.parametrize("name", ["ranking", "valued-law", "rupture-assessment"])
-def test_documents_follow_the_schemas_of_their_kind(name: str) -> None:
-    path = FORMATS / ck.__version__ / f"{name.replace('-', '_')}.json"
-    document = json.loads(path.read_text(encoding="utf-8"))
-    assert problems(name, document) == []
-    assert problems(name, {**document, "colour": 1})
-    assert problems(name, {key: value for key, value in document.items() if key != "version"})
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-def test_data_sets_surrogates_and_rupture_assessments_are_read(version: str) -> None:
-    data = ck.read_dataset(FORMATS / version / "data_set.h5")
-    assert (data.law.name, data.status.size) == ("norton", 16)  # rejected samples among them
-    surrogate = ck.surrogate(FORMATS / version / "surrogate.safetensors")
-    assert surrogate.metadata.law.name == "norton"
-    assessment = ck.load_rupture_assessment(FORMATS / version / "rupture_assessment.json")
-    assert {one.fit.method for one in assessment.ranked} == {"larson-miller"}
-    assert len(assessment.tests) == 8
+def test_written_documents_follow_the_schemas_and_those_of_a_later_version_are_refused(tmp_path) -> None:
+    for name in ("identification", "ranking", "valued-law", "rupture-assessment"):
+        path = FORMATS / ck.__version__ / f"{name.replace('-', '_')}.json"
+        document = json.loads(path.read_text(encoding="utf-8"))
+        assert problems(name, document) == []
+        assert problems(name, {**document, "colour": 1})
+        assert problems(name, {key: value for key, value in document.items() if key != "version"})
+        if name == "identification":
+            assert problems("law", document["law"]) == []
+            assert problems("law", {**document["law"], "version": 1})
+            (tmp_path / "fit.json").write_text(json.dumps({**document, "version": document["version"] + 1}))
+            with pytest.raises(CreepkitError, match="version"):
+                ck.load(tmp_path / "fit.json")
 
 
 @pytest.mark.parametrize(
@@ -131,3 +107,126 @@ def test_data_sets_surrogates_and_rupture_assessments_are_read(version: str) -> 
 )
 def test_studies_follow_the_schema(path: Path) -> None:
     assert problems("study", tomllib.loads(path.read_text(encoding="utf-8"))) == []
+
+
+# ---- hostile files ---------------------------------------------------------------------------------------------------
+
+# Files that are made to harm: one sentence with the file's name for each, and nothing else opened.
+
+
+NOTE = FileKind("a note", FitError, "give a note", maximum_bytes=100)
+
+
+def read_hdf5(path):
+    with open_hdf5(path, FileKind("a note", FitError, "give a note")) as file:
+        return {name: file[name][()] for name in file}
+
+
+def test_messages_are_printable_and_quotes_short():
+    text = "a\x1b[31m\n\u202eb\x00\ud800"
+    assert printable(text) == "a\\u001b[31m\\u000a\\u202eb\\u0000\\ud800"
+    assert str(FitError(f"x: {text}")).isprintable()
+    assert printable(printable(text)) == printable(text)
+    assert len(quoted("9" * 20_000)) == 40
+    long = str(FitError("file: " + "9" * 20_000 + "; write less"))
+    assert len(long) <= 2000
+    assert (long[:6], long[-12:]) == ("file: ", "; write less")
+
+
+def test_limits_are_raised_by_the_environment(tmp_path, monkeypatch):
+    path = tmp_path / "note"
+    path.write_bytes(b"x" * 250)
+    with pytest.raises(FitError, match="CREEPKIT_LIMITS=3 in the environment allows more"):
+        read_bytes(path, NOTE)
+    monkeypatch.setenv(VARIABLE, "3")
+    assert len(read_bytes(path, NOTE)) == 250
+    for wrong in ("0.5", "nan", "many", "9" * 5000, "-1"):
+        monkeypatch.setenv(VARIABLE, wrong)
+        with pytest.raises(CreepkitError, match="CREEPKIT_LIMITS is '.{1,40}'; write a number from 1 to 1e"):
+            raised(100)
+
+
+def test_nothing_outside_an_hdf5_file_is_read(tmp_path):
+    outside, secret = tmp_path / "secret", b"a line of another file"
+    outside.write_bytes(secret)
+    with h5py.File(tmp_path / "other.h5", "w") as other:
+        other["x"] = np.frombuffer(secret, dtype="u1")
+    layout = h5py.VirtualLayout((len(secret),), dtype="u1")
+    layout[:] = h5py.VirtualSource("other.h5", "x", (len(secret),))
+    raw = {"dtype": "u1", "external": [(str(outside), 0, len(secret))]}
+    for number, write in enumerate((
+        lambda file: file.update(x=h5py.ExternalLink("other.h5", "/x")),
+        lambda file: file.update(x=h5py.SoftLink("/y")),
+        lambda file: file.create_dataset("x", (len(secret),), **raw),
+        lambda file: file.create_virtual_dataset("x", layout),
+    )):  # fmt: skip
+        path = tmp_path / f"x{number}.h5"
+        with h5py.File(path, "w") as file:
+            write(file)
+        with pytest.raises(FitError, match="h5: 'x' is a link to elsewhere, which is not followed"):
+            read_hdf5(path)
+
+
+def test_an_hdf5_file_is_bounded_as_it_unpacks(tmp_path, monkeypatch):
+    path = tmp_path / "x.h5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("x", (10**9,), dtype="f8", chunks=(10**6,), compression="gzip")
+    with pytest.raises(FitError, match="its arrays have more than 100 MB unpacked; give a note, or if it is right"):
+        read_hdf5(path)
+    with h5py.File(path, "w") as file:
+        file.create_dataset("x", data=np.zeros(10_000), chunks=(10_000,), compression="gzip")
+    assert read_hdf5(path)["x"].shape == (10_000,)
+
+
+def test_decks_are_bounded(tmp_path):
+    path = tmp_path / "x.inp"
+    for lines, problem in (
+        ("*NSET,NSET=A,GENERATE\n1,1000000000000,1", "more than 10000000 numbers"),
+        ("*NSET,NSET=A,GENERATE\n1", "GENERATE needs first, last and step"),
+        ("*NSET,NSET=A\n" + "9" * 5000, "write a whole number"),
+        ("*NSET,NSET=A\n\u00b2", "there is no node set"),
+        ("*NODE" + ",\n" * 20_000, "no such|needs|id|node|mesh|element"),
+    ):
+        path.write_text(f"*NODE\n1,0,0\n{lines}\n", encoding="utf-8")
+        assert said_otherwise([(partial(read_input_deck, path), problem)], SolveError) == []
+    path = tmp_path / "x.csv"
+    path.write_text('id,r_mm,z_mm\n"' + "1" * 200_000 + '",0,0\n', encoding="utf-8")
+    with pytest.raises(SolveError, match="x.csv:2: no line of a CSV table"):
+        read_mesh(path, path, path)
+
+
+def test_meshes_are_bounded_before_memory_is_taken():
+    corners = ((1.0, 0.0), (2.0, 1.0))
+    for columns, layers in ((10**9, 1), (1, 10**9), (10**5, 10**5)):
+        with pytest.raises(SolveError, match="at most 1000000 are made"):
+            ck.Section.rectangle(*corners, columns, layers)
+    with pytest.raises(SolveError, match="allowed are whole numbers from 1 on"):
+        ck.Section.rectangle(*corners, float("inf"), 1)
+
+
+class FailingReader:
+    """A reader of a plugin that raises what it is given."""
+
+    name, title = "failing", "fails"
+
+    def __init__(self, error: BaseException) -> None:
+        self.error = error
+
+    def accepts(self, path: Path) -> bool:
+        return True
+
+    def read(self, path: Path) -> list[ck.History]:
+        raise self.error
+
+
+def test_whatever_a_reader_raises_names_file_and_reader(tmp_path):
+    path = tmp_path / "x.dat"
+    path.write_bytes(b"x")
+    errors = (OSError(5, "Input/output error"), ValueError("bad\n\x1b[31m value " + "9" * 9000), RecursionError())
+    for error in (*errors, MemoryError(), UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid"), SystemExit(3)):
+        with pytest.raises(HistoryError) as caught:
+            histories_in(FailingReader(error), path)
+        message = str(caught.value)
+        assert message.startswith(f"{path}: read() of reader 'failing' ")
+        assert message.isprintable()
+        assert len(message) < 1000

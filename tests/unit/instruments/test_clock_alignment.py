@@ -139,9 +139,3 @@ def test_frames_without_load_tell_the_first_loading_from_a_later_step() -> None:
         ck.align_clocks(record, "P", frames[part], apex[part], drift=0.0)
     found = ck.align_clocks(record, "P", frames[part], apex[part], drift=0.0, unloaded=range(9))
     assert found.lag_interval[0] <= 3.0 <= found.lag_interval[1]
-
-
-def test_a_test_piece_each_needs_a_channel_each() -> None:
-    record, frames, rows = several(0.0, 2, 4.0, 1)
-    with pytest.raises(HistoryError, match="3 channels and displacements of 2 test pieces"):
-        ck.align_clocks(record, ["P"] * 3, frames, rows)

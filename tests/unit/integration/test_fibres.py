@@ -48,7 +48,7 @@ def norton(n, rate=1e-8):
     return of("norton", A=rate / 60.0**n, n=n)
 
 
-@pytest.mark.parametrize("n", [1.0, 2.0, 3.0, 5.0, 7.0])
+@pytest.mark.parametrize("n", [1.0, 3.0, 7.0])
 def test_steady_curvature_rate_of_a_rectangle(n):
     """k' = A (M/I_n)^n, I_n = b h^(2 + 1/n) / (2^(1 + 1/n) (2 + 1/n)): Boyle and Spence (1983), chapter 3."""
     law, theta = norton(n)
@@ -58,15 +58,6 @@ def test_steady_curvature_rate_of_a_rectangle(n):
     assert found.status is Status.COMPLETE
     assert np.diff(found.recorded[:, 1])[0] / 1e6 == pytest.approx(1e-8 / 60**n * (MOMENT / second) ** n, rel=3e-5)
     assert np.abs(found.recorded[:, 0]).max() < 1e-9 * found.recorded[-1, 1]
-
-
-def test_linear_creep_spreads_no_stress():
-    """Under Norton with n = 1 stresses stay elastic, and the curvature grows by A E of the elastic one a second."""
-    law, theta = norton(1.0)
-    times = np.geomspace(1, 1e6, 9)
-    found = integrate_fibres(law, theta, bent(FibreModel.section(*rectangle(3)), times))
-
-    np.testing.assert_allclose(found.recorded[:, 1], 1e-8 / 60 * MOMENT / INERTIA * times, rtol=1e-9)
 
 
 @pytest.mark.parametrize("tableau", [SDIRK2, SDIRK4])

@@ -9,7 +9,6 @@ import pytest
 
 from creepkit.integration import IntegrationSettings, PointTest, integrate
 from creepkit.integration.core_structures import DIVERGED, REACHED_END, STATE_LIMIT, STRAIN_LIMIT, TOO_MANY_STEPS
-from creepkit.integration.time_discretisation import SDIRK2
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Param, State, parameters, stress
 from creepkit.laws.combined import COMBINED
@@ -162,15 +161,6 @@ def test_answers_do_not_depend_on_when_they_are_asked_for() -> None:
         assert dense[k] == pytest.approx(alone, rel=1e-4)
 
 
-def test_the_two_tableaux_agree() -> None:
-    times = np.linspace(1e3, 1e5, 20)
-    fine = run(COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-9)).strain
-    coarse = run(
-        COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-5), tableau=SDIRK2
-    ).strain
-    np.testing.assert_allclose(coarse, fine, rtol=2e-4)
-
-
 def test_the_cap_on_steps_keeps_the_history_so_far() -> None:
     times = np.linspace(0, 1e5, 100)
     result = run(
@@ -189,16 +179,6 @@ def test_a_candidate_that_is_not_a_number_ends_as_not_converged() -> None:
     result = integrate(kernel, theta, [PointTest(Program.constant(100.0), ROOM, np.array([10.0]))])
     assert result.status[:2, 0].tolist() == [Status.NOT_CONVERGED] * 2
     assert result.terminations[2, 0] == REACHED_END
-
-
-def test_no_times_and_time_zero() -> None:
-    kernel = lower(NORTON, "compiled")
-    theta = NORTON.to_internal({"A": 1e-15, "n": 4.0})
-    empty = PointTest(Program.constant(100.0), ROOM, np.zeros(0))
-    start = PointTest(Program.constant(100.0), ROOM, np.zeros(1))
-    result = integrate(kernel, theta, [empty, start], jacobian=True)
-    assert result.strain.tolist() == [[0.0]]
-    assert result.status.tolist() == [[Status.COMPLETE] * 2]
 
 
 def test_derivatives_without_output_times() -> None:

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import ctypes
-
 import numpy as np
 import pytest
 
-from creepkit.core import address, function
-from creepkit.integration.core_structures import tableau_structure
-from creepkit.integration.time_discretisation import SDIRK2, SDIRK4, Tableau
-from creepkit.kernels import lower
-from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from helpers.implicit_stage import SOLVED
+from creepkit.integration.time_discretisation import SDIRK2, SDIRK4, Tableau, merge_programs
+from creepkit.records import Program
 
 TABLEAUX = pytest.mark.parametrize("tableau", [SDIRK2, SDIRK4], ids=["SDIRK2", "SDIRK4"])
 
@@ -70,37 +64,25 @@ def test_the_method_is_stiffly_accurate_and_l_stable(tableau: Tableau) -> None:
     assert abs(1 + far * tableau.a[-1] @ np.linalg.solve(identity - far * tableau.a, one)) < 1e-7
 
 
-def in_equal_steps(theta: np.ndarray, tableau: Tableau, steps: int, segment: list[float], start: float) -> np.ndarray:
-    """Strain at the end of a segment and at 0.3 of the first step, from `start`; strain hardening."""
-    out, program = np.zeros(2), np.array(segment)
-    flag = function("creepkit_integrate_in_equal_steps")(
-        ctypes.c_void_p(lower(STRAIN_HARDENING, "compiled").update.address),
-        address(theta),
-        ctypes.byref(tableau_structure(tableau)),
-        address(program),
-        ctypes.c_double(start),
-        ctypes.c_int64(steps),
-        ctypes.c_double(1e-9),
-        ctypes.c_double(0.3),
-        address(out),
-    )
-    assert flag == SOLVED
-    return out
+# ---- segments --------------------------------------------------------------------------------------------------------
+
+# Segments: every breakpoint of stress and temperature is a boundary, and jumps keep both their sides.
 
 
-@TABLEAUX
-def test_measured_order_of_step_and_dense_output(tableau: Tableau) -> None:
-    """p' = A s^n p^m under constant true stress from p(0) = p0: p^(1-m) is a straight line in time."""
-    A, n, m, stress, start, length = 1e-12, 3.0, -0.6, 100.0, 0.2, 2e5
-    theta = STRAIN_HARDENING.to_internal({"A": A, "n": n, "m": m})[0]
+def test_jumps_and_ramps_are_merged() -> None:
+    stress = Program(np.array([0.0, 10.0, 10.0, 30.0]), np.array([50.0, 50.0, 80.0, 100.0]))
+    temperature = Program(np.array([0.0, 20.0, 20.0]), np.array([900.0, 900.0, 950.0]))
+    expected = [
+        [0, 10, 50, 50, 900, 900],
+        [10, 20, 80, 90, 900, 900],
+        [20, 30, 90, 100, 950, 950],
+        [30, 40, 100, 100, 950, 950],
+    ]
+    np.testing.assert_allclose(merge_programs(stress, temperature, end=40.0), expected)
 
-    def exact(times: np.ndarray) -> np.ndarray:
-        return np.asarray((start ** (1 - m) + (1 - m) * A * stress**n * times) ** (1 / (1 - m)))
 
-    errors = []
-    for steps in (16, 32):
-        found = in_equal_steps(theta, tableau, steps, [0.0, length, stress, stress, 1000.0, 1000.0], start)
-        errors.append(np.abs(found - exact(length * np.array([1.0, 0.3 / steps]))))
-    slope, dense_slope = np.log2(errors[0] / errors[1])
-    assert slope == pytest.approx(tableau.order, abs=0.2)
-    assert dense_slope == pytest.approx(tableau.dense_order + 1, abs=0.35)
+def test_what_comes_after_the_end_is_left_out() -> None:
+    stress = Program.steps([(0.0, 50.0), (100.0, 70.0)])
+    np.testing.assert_allclose(merge_programs(stress, Program.constant(900.0), end=60.0), [[0, 60, 50, 50, 900, 900]])
+    np.testing.assert_allclose(merge_programs(stress, Program.constant(900.0), end=100.0), [[0, 100, 50, 50, 900, 900]])
+    assert merge_programs(stress, Program.constant(900.0), end=0.0).shape == (0, 6)

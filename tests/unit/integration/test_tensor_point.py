@@ -19,7 +19,6 @@ from creepkit.language import CreepLaw, State, arrhenius, mean_stress, principal
 from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
 from helpers.kachanov_law import A, C, damage, kachanov, n, v
-from helpers.tensor_response import constitutive_response
 
 STEEL = (150e3, 0.3)
 DAMAGING = kachanov(0.6 * principal_stress + 0.4 * mean_stress, 0.9)
@@ -33,23 +32,6 @@ def run(law, values, controls, times, temperature=300.0, settings=None, tableau=
     return integrate_tensor_point(
         kernel, theta, STEEL, controls, temperature, times, settings=settings, tableau=tableau
     )
-
-
-@pytest.mark.parametrize("weight", [1.0, 30.0, 1e3], ids=["elastic", "half crept", "crept"])
-def test_the_tangent_is_the_derivative_of_stress(weight: float) -> None:
-    """Central differences of strain, for a law of all four: von Mises, principal, mean stress and a state."""
-    kernel = lower(DAMAGING, "compiled")
-    theta = DAMAGING.to_internal({"A": 1e-14, "n": 4.0, "C": 1e-13, "v": 3.5})[0]
-    base = np.array([1e-4, -6e-5, -4e-5, 3e-5, 0.0, 1e-5, 2e-4, 0.1])
-    strain = np.array([1.2e-3, 3e-4, -2e-4, 4e-4, 2e-4, -3e-4])
-
-    def answer(change: np.ndarray):
-        return constitutive_response(kernel, theta, STEEL, strain + change, base, 1e3, 300.0, weight)
-
-    found = answer(np.zeros(6)).tangent
-    for j, step in enumerate(1e-7 * np.eye(6)):
-        difference = (answer(step).stress - answer(-step).stress) / 2e-7
-        np.testing.assert_allclose(found[:, j], difference, atol=1e-6 * np.abs(found).max())
 
 
 @pytest.mark.parametrize("tableau", [SDIRK2, SDIRK4], ids=["SDIRK2", "SDIRK4"])
@@ -130,13 +112,6 @@ def test_outputs_at_a_jump_show_what_holds_from_then_on() -> None:
     np.testing.assert_allclose(
         result.strain[:, 1], -0.5 * result.creep_strain[:, 0] - 0.3 * result.stress[:, 0] / 150e3
     )
-
-
-def test_without_load_nothing_happens() -> None:
-    result = run(DAMAGING, {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5}, {"13": prescribed_strain(0.0)}, [1e3])
-    assert result.status == Status.COMPLETE
-    assert not result.stress.any()
-    assert not result.strain.any()
 
 
 class TestEnds:

@@ -30,23 +30,17 @@ def drawn(law, seed=3):
     return theta
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
-def test_map_inverts(law):
-    coordinates = Coordinates(law, REFERENCE)
-    theta = drawn(law)
-    np.testing.assert_allclose(coordinates.theta(coordinates.u(theta)), theta, rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
-def test_jacobian_equals_central_differences(law):
-    coordinates = Coordinates(law, REFERENCE)
-    u = coordinates.u(drawn(law))
-    exact = coordinates.jacobian(u)
-    for k in range(u.size):
-        step = np.zeros(u.size)
-        step[k] = 1e-6 * max(1.0, abs(u[k]))
-        difference = (coordinates.theta(u + step) - coordinates.theta(u - step)) / (2 * step[k])
-        np.testing.assert_allclose(exact[:, k], difference, rtol=2e-6, atol=1e-7)
+def test_the_map_inverts_and_its_jacobian_equals_central_differences():
+    for law in LAWS:
+        coordinates, theta = Coordinates(law, REFERENCE), drawn(law)
+        u = coordinates.u(theta)
+        np.testing.assert_allclose(coordinates.theta(u), theta, rtol=1e-12, atol=1e-12, err_msg=law.name)
+        exact = coordinates.jacobian(u)
+        for k in range(u.size):
+            step = np.zeros(u.size)
+            step[k] = 1e-6 * max(1.0, abs(u[k]))
+            difference = (coordinates.theta(u + step) - coordinates.theta(u - step)) / (2 * step[k])
+            np.testing.assert_allclose(exact[:, k], difference, rtol=2e-6, atol=1e-7, err_msg=law.name)
 
 
 def test_coordinate_is_the_log_rate_of_its_term_at_the_reference():
@@ -101,6 +95,6 @@ def test_that_of_a_drifting_exponent_is_n_at_the_reference_time():
     assert u[local.position] == pytest.approx(n, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["norton", "strain-hardening", "time-hardening"])
-def test_a_power_law_keeps_its_exponent(name):
-    assert local_exponents(ck.law(name)) == ()
+def test_a_power_law_keeps_its_exponent():
+    names = ("norton", "strain-hardening", "time-hardening")
+    assert [name for name in names if local_exponents(ck.law(name)) != ()] == []

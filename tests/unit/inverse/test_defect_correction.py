@@ -6,13 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.defect_correction import (
     correct_defect,
     difference_of_predictors,
     shift_of_values,
     with_cheaper_predictor,
-    with_correction_at_frames,
 )
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
 from creepkit.inverse.identify import identify
@@ -144,28 +142,6 @@ def test_the_curves_of_a_report_are_the_corrected_ones(fits):
         assert np.abs(fit.predict().of(k)[:, 0] - test["amplitude"].offset - amplitude).max() > 0.015
 
 
-def test_what_was_found_is_reported(fits):
-    found, plain = fits["corrected"].numerical_error, fits["plain"]
-    assert plain.numerical_error is None
-    assert fits["exact"].numerical_error is None
-    share = np.concatenate([h.times / h.times[-1] for h in BARS])
-    assert found.size["amplitude"] == pytest.approx(np.sqrt(((0.02 * np.sin(2.5 * share)) ** 2).mean()), rel=1e-6)
-    assert found.size["width"] == pytest.approx(0.0, abs=1e-12)
-    assert found.noises == pytest.approx(found.size["amplitude"] / NOISE["amplitude"])
-    assert found.remaining["amplitude"] == pytest.approx(0.1 * found.size["amplitude"])
-    assert found.incomplete == ()
-    assert found.sentence in fits["corrected"].notes
-    assert "at the optimum coarse differs from two outputs by 0.01" in found.sentence
-    assert fits["corrected"].noise_model["amplitude"].drift > 0
-
-
-def test_measured_and_predicted_frames_agree_after_the_correction(fits):
-    """The misfit that is reported is that of the corrected prediction."""
-    for test in fits["corrected"].tests:
-        assert test["amplitude"].errors.relative_rms_error < 1e-3
-    assert max(t["amplitude"].errors.relative_rms_error for t in fits["plain"].tests) > 0.01
-
-
 def test_a_loaded_identification_builds_the_corrected_problem_again(fits):
     fit = fits["corrected"]
     again = identification_from_json(identification_to_json(replace(fit, predictor=None)))
@@ -209,28 +185,6 @@ def test_a_test_that_the_exact_predictor_does_not_finish_is_not_corrected():
     assert error.incomplete == (BARS[0].name,)
     assert not corrected.correction[0].any()
     assert np.abs(corrected.correction[1:]).max() == pytest.approx(0.02, rel=0.01)
-
-
-def test_of_several_predictors_those_are_refined_that_can_be():
-    both = CompositePredictor({"uniaxial": Refinable(), "other": EXACT})
-    tests = [h.replace(specimen="other") if k == 2 else h for k, h in enumerate(measured())]
-    problem, x = problem_of(both, tests)
-    corrected, _ = correct_defect(problem, x)
-    assert np.abs(corrected.correction[:2]).max() == pytest.approx(0.02, rel=0.01)
-    assert np.abs(corrected.correction[2]).max() < 1e-12
-
-
-def test_at_all_frames_the_correction_is_interpolated_in_time():
-    """Of 24 frames 12 are compared; between them the smooth error is interpolated to a tenth of itself."""
-    settings = replace(SETTINGS, frames=12)
-    problem = LeastSquaresProblem.from_histories(NORTON, measured(), Refinable(), settings)
-    x = problem.coordinates.u(THETA)
-    corrected, _ = correct_defect(problem, x)
-    plain = Coarse().predict(NORTON, THETA[None], BARS)
-    found = with_correction_at_frames(corrected, BARS, plain)
-    exact = EXACT.predict(NORTON, THETA[None], BARS)
-    assert np.nanmax(np.abs(found.values - exact.values)) < 0.1 * 0.02
-    assert with_correction_at_frames(problem, BARS, plain) is plain
 
 
 def test_a_cheaper_predictor_agrees_where_it_is_corrected():

@@ -55,12 +55,6 @@ def test_the_specimen_takes_the_place_of_the_surrogate(tests: list[History]) -> 
     )
 
 
-def test_on_the_way_it_is_left_out(tests: list[History]) -> None:
-    found = identify(NORTON, tests, BARS, through=Narrow(), settings=settings())
-    assert found.values == identify(NORTON, tests, BARS, settings=settings()).values
-    assert found.notes[-1] == "identified without 'narrow' on the way: law 'norton' is none of its laws"
-
-
 def test_a_law_that_it_knows_is_left_to_it(tests: list[History]) -> None:
     surrogate = Narrow(unknown=())
     found = identify(NORTON, tests, surrogate, through=surrogate, settings=settings())
@@ -78,13 +72,6 @@ def test_a_mixed_list_is_ranked_on_the_same_data(tests: list[History]) -> None:
     assert fits["norton"].provenance["specimen"] == "uniaxial"
     assert fits["strain-hardening"].provenance["specimen"] == "narrow"
     assert "in the place of 'narrow'" in fits["norton"].notes[-1]
-
-
-def test_select_through_it_takes_the_specimen_for_the_others(tests: list[History]) -> None:
-    found = select([NORTON, HARDENING], tests, BARS, through=Narrow(), settings=settings(frames=12))
-    assert not found.failed
-    assert found.best.law.name == "norton"
-    assert found.best.values["n"] == pytest.approx(TRUTH["n"], rel=0.05)
 
 
 def test_it_confirms_nothing_of_a_law_that_it_does_not_know(tests: list[History]) -> None:

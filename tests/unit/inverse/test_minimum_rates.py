@@ -2,20 +2,22 @@
 
 import numpy as np
 import pytest
+from scipy.stats import binom, ttest_1samp
 
 import creepkit as ck
-from creepkit.errors import FitError
-from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, followed_duration
-from creepkit.inverse.cross_validation import cross_validate
-from creepkit.inverse.minimum_rates import with_minimum_rates
+from creepkit.inverse.identified_values import minimum_rates_of
+from creepkit.inverse.identify import identify
+from creepkit.inverse.minimum_rates import apparent_exponent, least_slope, with_minimum_rates
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.single_values import SIGNIFICANCE, SingleValue, contradicting_values
 from creepkit.laws.norton import NORTON
 from creepkit.records import UNKNOWN_DURATION, History, Nuisance, constant_stress
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.literature_laws import EQUATIONS
 from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, rate_table, whole_life_table
+from helpers.steady_rate_predictor import Steady, planted
 
 BAR = Uniaxial()
 KACHANOV = EQUATIONS["Kachanov-Rabotnov"]
@@ -76,12 +78,6 @@ def test_derivatives_are_those_of_the_rate():
     np.testing.assert_allclose(jacobian, (moved[: theta.size] - moved[theta.size :]) / 2e-4, rtol=1e-3)
     _, rough = minimum_rate(law, values, test)
     np.testing.assert_allclose(rough, jacobian, rtol=0.02)
-
-
-def test_a_test_of_unknown_duration_is_followed_to_a_strain_at_its_rate():
-    assert followed_duration(stated(rate=1e-9)) == STRAIN_OF_UNKNOWN_DURATION / 1e-9
-    assert followed_duration(stated(duration=3e6)) == 3e6
-    assert followed_duration(stated(duration=3e6, rupture_time=3e6)) == 3e6
 
 
 # ---- identification -----------------------------------------------------------------------------------------------
@@ -161,18 +157,6 @@ def test_a_run_out_moves_nothing_that_it_does_not_contradict(whole_life):
     assert not (residuals.present & problem.observations.rupture_mask)[censored].any()
 
 
-def test_a_condition_is_held_out_of_a_table():
-    tests = whole_life_table(np.random.default_rng(3), lives=False)[2:6]
-    fit = ck.identify(NORTON, tests, starts=1)
-    validation = cross_validate(fit, by="condition")
-    held = [values["minimum rate"] for values in validation.single_values.values()]
-    assert len(held) == len(tests)
-    assert sum(one.low <= one.measured <= one.high for one in held) >= 3
-    assert "minimum rate predicted over measured" in str(validation)
-    with pytest.raises(FitError, match="these tests have none; take by='test'"):
-        cross_validate(fit, by="time")
-
-
 def curve(stress, factor=1.0):
     times = np.geomspace(1e3, 3e5, 12)
     return History(f"curve {stress:g}", times, {"strain": factor * 1e-16 * stress**4 * times},
@@ -239,3 +223,122 @@ def test_rates_of_unknown_duration_do_not_judge_hardening():
 
 
 # ---- bad input ----------------------------------------------------------------------------------------------------
+
+
+# ---- measured minimum rates ------------------------------------------------------------------------------------------
+
+# Minimum creep rates of measured curves: closed forms, brute force over a curve with noise, and a known exponent.
+
+
+END = 1e6
+
+
+def measured_curve(t: np.ndarray) -> np.ndarray:
+    """Primary, secondary and tertiary creep."""
+    return 4e-3 * (t / END) ** (1 / 3) + 5e-3 * (t / END) + 1e-2 * (t / END) ** 4
+
+
+def test_the_least_slope_is_that_of_the_curve_at_its_inflection() -> None:
+    times = np.linspace(0.0, END, 400)[1:]
+    fine = np.linspace(0.0, END, 100_001)[1:]
+    exact = np.min(np.diff(measured_curve(fine)) / np.diff(fine))
+    found = least_slope(times, measured_curve(times), np.zeros(times.size))
+    assert found == pytest.approx(exact, rel=0.03)
+    assert found >= exact * (1 - 1e-6)  # a chord of a curve is never below its least slope
+
+
+def test_noise_does_not_lower_it_by_more_than_it_is_allowed_to() -> None:
+    times = np.linspace(0.0, END, 120)[1:]
+    noise = 1e-4
+    fine = np.linspace(0.0, END, 100_001)[1:]
+    exact = np.min(np.diff(measured_curve(fine)) / np.diff(fine))
+    rng = np.random.default_rng(0)
+    found = [
+        least_slope(times, measured_curve(times) + noise * rng.normal(size=times.size), np.full(times.size, noise))
+        for _ in range(20)
+    ]
+    assert np.median(found) == pytest.approx(exact, rel=0.1)
+    assert np.abs(np.log(found) - np.log(exact)).max() < 0.25
+
+
+def test_a_slope_that_noise_hides_is_not_known() -> None:
+    times = np.linspace(0.0, END, 30)[1:]
+    assert np.isnan(least_slope(times, 1e-6 * times / END, np.full(times.size, 1e-4)))
+
+
+def test_of_steady_creep_measured_and_predicted_rates_are_that_of_the_law() -> None:
+    values = {"A": 1e-16, "n": 5.2}
+    tests = planted(NORTON, values, [(s, 1050.0) for s in (30.0, 50.0, 80.0)], seed=5, noise=1e-6)
+    fit = identify(NORTON, tests, Steady(), settings=IdentificationSettings(starts=2, sobol_points=16, frames=40))
+    rates = minimum_rates_of(fit)
+    assert [r.stress for r in rates] == [30.0, 50.0, 80.0]
+    for one in rates:
+        exact = values["A"] * one.stress ** values["n"]
+        assert one.measured == pytest.approx(exact, rel=0.01)
+        assert one.predicted == pytest.approx(float(fit.rate(one.stress, 1050.0)[0]), rel=1e-6)
+        assert one.low < one.predicted < one.high
+
+
+def test_the_apparent_exponent_is_that_of_a_power_law_at_each_temperature() -> None:
+    stresses = np.array([50.0, 80.0, 120.0, 60.0, 90.0])
+    temperatures = np.array([900.0, 900.0, 900.0, 1000.0, 1000.0])
+    rates = 1e-18 * stresses**6.5 * np.where(temperatures > 950.0, 40.0, 1.0)
+    assert apparent_exponent(stresses, rates, temperatures) == pytest.approx(6.5, rel=1e-9)
+    assert np.isnan(apparent_exponent(np.full(3, 50.0), rates[:3], temperatures[:3]))
+
+
+# ---- single values ---------------------------------------------------------------------------------------------------
+
+# The F test of minimum rates against rupture times: a t test where nothing varies, and its level by brute force.
+
+
+def bars_at(stresses, temperatures):
+    return [
+        History(f"t{k}", np.array([1e6]), {}, constant_stress(float(s), "load"), float(T))
+        for k, (s, T) in enumerate(zip(stresses, temperatures, strict=True))
+    ]
+
+
+def values(rate_ratios, time_ratios, **further):
+    return [
+        (SingleValue(1.0, t, 0.1, 10.0, **further), SingleValue(1.0, r, 0.1, 10.0))
+        for r, t in zip(rate_ratios, time_ratios, strict=True)
+    ]
+
+
+def test_of_tests_alike_it_is_students():
+    """Rates twice the measured, times right: ln of the product is 0.69 and scatters."""
+    rng = np.random.default_rng(0)
+    tests = bars_at([100.0] * 12, [900.0] * 12)
+    rates, times = 2.0 * np.exp(0.3 * rng.standard_normal(12)), np.exp(0.3 * rng.standard_normal(12))
+    found = contradicting_values(tests, values(rates, times))
+    assert found.p_value == pytest.approx(ttest_1samp(np.log(rates * times), 0.0).pvalue, rel=1e-9)
+    assert found.rate_ratio == pytest.approx(np.exp(np.log(rates).mean()))
+    assert found.scatter == pytest.approx(np.exp(np.log(rates * times).std(ddof=1)))
+    assert contradicting_values(tests, values(rates, 0.5 * times)) is None
+
+
+def test_a_trend_over_stress_shows():
+    rng, stresses = np.random.default_rng(1), np.geomspace(50.0, 300.0, 15)
+    tests = bars_at(stresses, np.tile([850.0, 900.0, 950.0], 5))
+    trend = (stresses / stresses.prod() ** (1 / 15)) ** 0.8
+    noise = np.exp(0.1 * rng.standard_normal((2, 15)))
+    assert contradicting_values(tests, values(noise[0], noise[1])) is None
+    found = contradicting_values(tests, values(trend * noise[0], noise[1]))
+    assert "their ratio changes with stress or temperature" in str(found)
+
+
+def test_a_factor_on_the_rate_of_a_test_is_no_contradiction():
+    """It moves rate and time of a test against one another; ends that were not used, and run-outs, say nothing."""
+    tests, factors = bars_at(np.geomspace(50, 300, 10), [900.0] * 10), np.exp(np.linspace(1.0, 3.0, 10))
+    scatter = np.exp(0.1 * np.random.default_rng(2).standard_normal(10))
+    assert contradicting_values(tests, values(factors * scatter, 1.0 / factors)) is None
+    assert contradicting_values(tests, values(100.0 * factors, factors, used=False)) is None
+
+
+def test_its_level():
+    """1000 draws of right laws: no more are rejected than SIGNIFICANCE says."""
+    rng, tests = np.random.default_rng(3), bars_at(np.geomspace(50, 300, 12), np.tile([850.0, 900.0, 950.0], 4))
+    draws = np.exp(0.3 * rng.standard_normal((1000, 2, 12)))
+    rejected = sum(contradicting_values(tests, values(*draw)) is not None for draw in draws)
+    assert binom.ppf(0.001, 1000, SIGNIFICANCE) <= rejected <= binom.ppf(0.999, 1000, SIGNIFICANCE)

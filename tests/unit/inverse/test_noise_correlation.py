@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from creepkit.inverse.identify import identify
-from creepkit.inverse.iterative_estimation import linearised
-from creepkit.inverse.judging import Judge
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.observation_vector import thinned_history
@@ -66,20 +64,6 @@ def test_intervals_hold_where_the_correlation_is_stated() -> None:
     assert np.median(widths) == pytest.approx(1.96 * sd, rel=0.25)
     independent = least_squares(measured(0.9, 0), 0.0)[1]
     assert sd < 0.7 * independent  # outputs that move against each other, with noise that does not, say more
-
-
-def test_chi_square_is_judged_by_the_joint_covariance() -> None:
-    """Draws of correlated noise explain the tests in 95 % and more; taken for independent they still do, one by one."""
-    p_values, reduced = [], []
-    for seed in range(40):
-        tests = measured(0.9, 100 + seed)
-        problem, noise = exactly_known(LeastSquaresProblem.from_histories(LAW, tests, TwoOutputs(), SETTINGS))
-        u = problem.coordinates.u(LAW.to_internal({"A": 1e-15})[0])
-        found = Judge(problem, noise, {}, tests).adequacy(linearised(problem, u, problem.residuals(u)))
-        p_values.append(found.p_value)
-        reduced.append(found.chi_square)
-    assert np.mean(np.array(p_values) < 0.05) <= 0.15
-    assert np.mean(reduced) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (40 * 120)))
 
 
 def test_a_missing_frame_and_an_unknown_noise_leave_the_other_pairs() -> None:
@@ -141,14 +125,6 @@ def test_the_correlation_goes_through_the_transforms_of_outputs() -> None:
             for k, n in enumerate(observations.outputs)
         ])  # fmt: skip
         np.testing.assert_allclose(c[np.ix_(places, places)], np.cov(drawn), rtol=0.05)
-
-
-def test_without_correlation_nothing_changes() -> None:
-    plain, zero = measured(0.0, seed=1), [h.replace(noise_correlation={PAIR: 0.0}) for h in measured(0.0, seed=1)]
-    fits = [identify(LAW, tests, TwoOutputs(), settings=SETTINGS) for tests in (plain, zero)]
-    assert fits[0].values == fits[1].values
-    assert fits[0].estimates == fits[1].estimates
-    assert fits[0].log_likelihood == fits[1].log_likelihood
 
 
 def test_thinned_and_planned_histories_keep_it() -> None:

@@ -178,13 +178,10 @@ def test_value_and_gradient_are_those_of_fifty_digits(restricted, correlated):
 
 
 @pytest.mark.usefixtures("fifty_digits")
-@pytest.mark.parametrize("noise_of_offsets", [1e-3, 1e-5])
-def test_offsets_far_above_the_noise_cost_no_digits(noise_of_offsets):
+def test_offsets_far_above_the_noise_cost_no_digits():
     """A condition of up to 1e10: the matrix itself, in double precision, would leave six digits."""
     residuals, noise = example(seed=1)
-    small = {
-        name: replace(output, noise=noise_of_offsets, misfit=noise_of_offsets) for name, output in noise.outputs.items()
-    }
+    small = {name: replace(output, noise=1e-5, misfit=1e-5) for name, output in noise.outputs.items()}
     noise = replace(noise, outputs=small)
     value, _ = likelihood_of(residuals, noise)(noise.components)
     exact = exact_restricted_cost(residuals, exact_sizes(noise), (0.1, 0.0, 2.0), (0.2, 0.0, -0.4))
@@ -207,20 +204,6 @@ def test_whitening_is_by_the_cholesky_factor_and_solving_by_the_inverse(correlat
     np.testing.assert_array_equal(factor.whiten(values[..., 1]), factor.whiten(values)[..., 1])
     assert factor.log_determinant == pytest.approx(np.linalg.slogdet(c)[1].sum(), rel=1e-10)
     np.testing.assert_allclose(factor.variances, np.diagonal(c, axis1=1, axis2=2), rtol=1e-12)
-
-
-def test_correlations_are_those_of_their_factors():
-    output, frame = np.tile([0, 1, 2], (3, 2)), np.tile([0, 0, 0, 1, 1, 1], (3, 1))
-    shared = SharedNoise.of_correlations(CORRELATIONS, output, frame)
-    found = shared.covariance(np.ones(output.shape))
-    np.testing.assert_allclose(found[:, :3, :3] + np.eye(3), CORRELATIONS, atol=1e-12)
-    assert not found[:, :3, 3:].any()
-    vector = np.random.default_rng(2).normal(size=output.shape)
-    noise = 1.0 + np.random.default_rng(3).random(output.shape)
-    expected = noise**2 * vector + np.einsum("tij,tj->ti", shared.covariance(noise), vector)
-    times = shared.own_share * noise**2 * vector + shared.shared_with_frame(noise, vector)
-    np.testing.assert_allclose(times, expected, rtol=1e-12)
-    assert SharedNoise.of_correlations(np.tile(np.eye(3), (3, 1, 1)), output, frame) is None
 
 
 def test_correlated_noise_at_a_correlation_of_zero_is_no_other():
@@ -298,15 +281,6 @@ def test_what_the_unknowns_can_explain_changes_nothing():
     moved = replace(residuals, values=residuals.values + residuals.jacobian @ np.array([3.0, -2.0, 5.0]))
     plain, other = (likelihood_of(one, noise, FLAT, FLAT)(noise.components) for one in (residuals, moved))
     assert other[0] == pytest.approx(plain[0], rel=1e-11)
-    np.testing.assert_allclose(other[1], plain[1], rtol=1e-9, atol=1e-11)
-
-
-def test_other_coordinates_of_the_unknowns_shift_it_by_their_determinant():
-    residuals, noise = example(frames=9)
-    T = np.random.default_rng(5).normal(size=(3, 3))
-    changed = replace(residuals, jacobian=residuals.jacobian @ T)
-    plain, other = (likelihood_of(one, noise, FLAT, FLAT)(noise.components) for one in (residuals, changed))
-    assert other[0] - plain[0] == pytest.approx(np.log(abs(np.linalg.det(T))), rel=1e-10)
     np.testing.assert_allclose(other[1], plain[1], rtol=1e-9, atol=1e-11)
 
 

@@ -1,10 +1,11 @@
 """Unmodelled effects: each against a simulation, or an identification, in which it is there."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.inverse.composite_predictor import predict
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
@@ -13,7 +14,6 @@ from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.perturbation import DRIFT, unmodelled_note
 from creepkit.inverse.perturbations import (
     OFFSET_IN_NOISES,
-    USUAL_ACTIVATION_ENERGY,
     USUAL_DRIFT,
     _likeness_of_hardening,
     _log_rate_gradient,
@@ -23,7 +23,7 @@ from creepkit.inverse.perturbations import (
     with_random_effects,
 )
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.settings import USUAL_ERRORS, IdentificationSettings
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -32,6 +32,7 @@ from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.planted_bars import carried_out
 from helpers.steady_rate_predictor import Steady, planted
+from helpers.two_outputs_predictor import TwoOutputs, with_two_outputs
 
 T_REF, R = 1048.15, 8.314462618
 BAR = Uniaxial(tolerance=1e-9)
@@ -102,27 +103,6 @@ def test_independent_drifts_move_the_rate_by_no_more_than_their_own_mean(law, no
     found = perturbations(problem, linear, NoiseModel({"strain": OutputNoise(noise)}), tests)
     drift = next(e for e in found if e.kind == DRIFT)
     assert 0.3 < drift.rate_change / (0.5 * USUAL_DRIFT * drift.per_kelvin / np.sqrt(3.0)) < 1.0
-
-
-def test_a_law_without_temperature_has_the_usual_activation_energy():
-    """At constant stress the strain of a steady rate changes by rate x Q / R T^2 x 5 K x t^2 / 2 t_end."""
-    plain = NORTON_AT.fix(Q=420e3).at(1040.0)
-    VALUES[plain.name] = {name: value for name, value in VALUES[NORTON_AT.name].items() if name != "Q"}
-    tests = [h.replace(temperature=1040.0) for h in bars(plain)]
-    effects, problem, linear = effects_of(plain, tests)
-    rate = BAR.predict(plain, theta(plain)[None], tests).values[0, 0, -1, 0] / END
-    expected = rate * USUAL_ACTIVATION_ENERGY / (R * 1040.0**2) * USUAL_DRIFT * problem.observations.times**2 / 2 / END
-    found = effects[DRIFT].residual_change / linear.residuals.offset_sensitivity
-    np.testing.assert_allclose(found, expected, rtol=0.02, atol=1e-8)
-
-
-def test_a_recorded_temperature_leaves_no_drift_and_a_nuisance_neither():
-    tests = bars(NORTON_AT, [constant_stress(s, "stress") for s in (70.0, 90.0, 110.0)])
-    assert set(effects_of(NORTON_AT, tests)[0]) == {DRIFT, "offset of strain"}
-    recorded = [h.replace(temperature=h.temperature_program()) for h in tests]
-    assert set(effects_of(NORTON_AT, recorded)[0]) == {"offset of strain"}
-    modelled = replace(SETTINGS, nuisances=(Nuisance("offset"),))
-    assert set(effects_of(NORTON_AT, tests, settings=modelled)[0]) == {DRIFT}
 
 
 # ---- what an effect does to the rate ------------------------------------------------------------------------------
@@ -248,12 +228,6 @@ def test_a_change_that_is_the_hardening_itself_has_correlation_one():
     assert _likeness_of_hardening(problem, x, linear, factor, -0.5 * hardening + 7.0 * other)[1] == pytest.approx(1.0)
 
 
-def test_a_law_that_does_not_harden_is_like_no_drift():
-    problem, x, linear = at_the_truth(NORTON_AT, bars(NORTON_AT))
-    factor = CovarianceFactor.of_residuals(linear.residuals, NoiseModel({"strain": OutputNoise(NOISE)}))
-    assert np.isnan(_likeness_of_hardening(problem, x, linear, factor, np.ones_like(linear.residuals.values))).all()
-
-
 def test_cooling_looks_like_strain_hardening_and_is_said_with_its_sign():
     """One test at one stress, the exponents and energy fixed: a furnace that cools slows creep as hardening does."""
     law = HARDENING_AT.fix(n=4.0, Q=420e3)
@@ -282,14 +256,95 @@ def test_an_effect_in_the_covariance_is_a_rank_of_one_in_each_test():
     assert again.residuals.random_effect_sensitivities.shape[-1] == 3
 
 
-@dataclass(frozen=True)
-class Toleranced(Steady):
-    """States a tolerance of a length that it does not know as a nuisance parameter."""
+# ---- nuisance plausibility -------------------------------------------------------------------------------------------
 
-    tolerances = {"thickness": 0.02}  # noqa: RUF012
+# Nuisances of implausible size: a planted jump of an output and a planted temperature weaken what is said of a law.
 
 
-def test_a_predictor_that_does_not_know_a_length_has_no_effect_of_it():
-    tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(60.0, 1000.0), (80.0, 1000.0)], seed=0, noise=1e-5)
-    fit = identify(NORTON, tests, Toleranced(), settings=SETTINGS)
-    assert "thickness" not in {e.kind for e in fit.unmodelled}
+STRAIN_NOISE = {"amplitude": 2e-3, "width": 2e-2}
+
+
+def fitted(jump, *nuisances, law=NORTON):
+    """One law on three tests, of which the second has jumped by so many mm of amplitude at the start."""
+    bars = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(s, 1000.0) for s in (50.0, 70.0, 100.0)], seed=0, frames=40)
+    tests = with_two_outputs(bars, STRAIN_NOISE, seed=1)
+    moved = {**tests[1].outputs, "amplitude": tests[1].outputs["amplitude"] + jump}
+    tests[1] = tests[1].replace(outputs=moved)
+    settings = IdentificationSettings(
+        starts=1, sobol_points=8, frames=60, weights="likelihood", nuisances=nuisances or (Nuisance("offset"),)
+    )
+    return identify(law, tests, TwoOutputs(), settings=settings), tests[1]
+
+
+def test_a_law_that_needs_a_large_offset_explains_only_with_it():
+    fit, test = fitted(0.3)
+    share = 0.3 / test.outputs["amplitude"].max()
+    assert share > 0.1  # else nothing is planted
+    adequacy = fit.adequacy
+    assert adequacy.explains
+    assert not adequacy.explains_plausibly
+    (named,) = adequacy.implausible
+    assert (named.kind, named.owner, named.output, named.unit) == ("offset", test.name, "amplitude", "mm")
+    assert named.value == pytest.approx(0.3, rel=0.03)
+    assert named.standard_deviations == pytest.approx(0.3 / 2e-3, rel=0.03)
+    assert named.share == pytest.approx(share, rel=0.03)
+    assert f"only with an offset of 0.3 mm in amplitude of '{test.name}', {100 * share:.2g} %" in str(adequacy)
+    (note,) = (n for n in fit.notes if "offset of amplitude" in n and "the noise of a frame (0.002 mm)" in n)
+    assert f"{named.standard_deviations:.2g} times" in note
+
+
+@pytest.mark.parametrize("jump", [0.0, 0.008])
+def test_a_small_offset_is_not_named(jump):
+    adequacy = fitted(jump)[0].adequacy
+    assert adequacy.explains_plausibly
+    assert "only with" not in str(adequacy)
+
+
+# ---- imposed motion errors -------------------------------------------------------------------------------------------
+
+# Errors of the modulus and of held strains common to all relaxation tests, against identifications that have them.
+
+
+E, A, N = 150e3, 2e-8 / 200.0**6, 6.0
+
+
+def _relaxation(stiffness: float = E) -> list[ck.History]:
+    """Of Norton's law from E strain on, ds/dt = -E A s^n in closed form; files that state another modulus."""
+    times, rng, tests = np.geomspace(30.0, 1.4e5, 30), np.random.default_rng(5), []
+    for k, strain in enumerate((0.0015, 0.0018, 0.0020)):
+        first = E * np.log1p(strain)
+        stress = (first ** (1 - N) + (N - 1) * E * A * times) ** (1 / (1 - N)) + 0.4 * rng.standard_normal(30)
+        loading = ck.constant_strain(strain)
+        elastic = ck.Elastic(E=stiffness)
+        tests.append(ck.History(f"R{k}", times, {"stress": stress}, loading, 1073.15, "relaxation", elastic=elastic))
+    return tests
+
+
+@pytest.mark.parametrize(
+    ("share", "how", "tolerance"),
+    [
+        # of weights that no estimate changes, an error so small that its effect is linear
+        (0.05, {"weights": "equal", "nuisances": ()}, 0.05),
+        # whole errors, which a likelihood that does not know of them finds as offsets of tests
+        (1.0, {"weights": "likelihood", "usual_errors": "none"}, 0.15),
+    ],
+)
+def test_the_rate_moves_as_identifications_with_these_errors_say(share, how, tolerance):
+    fit = ck.identify("norton", _relaxation(), starts=1, **how)
+    effects = {e.kind: e for e in fit.unmodelled if e.common}
+    stiffer = _relaxation(E * (1 + share * USUAL_ERRORS["modulus"]))
+    factor = 1 + share * USUAL_ERRORS["motion"]
+    strained = [replace(h, loading=ck.constant_strain(h.loading.program().values[-1] * factor)) for h in _relaxation()]
+    stress = fit.reference.stress
+    for kind, altered in (("modulus", stiffer), ("imposed strain", strained)):
+        again = ck.identify("norton", altered, starts=1, **how)
+        moved = np.log(again.rate(stress)[0] / fit.rate(stress)[0])
+        assert share * effects[kind].rate_change == pytest.approx(moved, rel=tolerance)
+    assert effects["modulus"].sentence.endswith("with Young's moduli 2 % above those stated, in all 3 tests")
+
+
+def test_a_nuisance_parameter_of_all_tests_stands_for_the_modulus():
+    fit = ck.identify("norton", _relaxation(), starts=1, nuisances=[ck.Nuisance("modulus", scope="all", sd=0.02)])
+    kinds = {e.kind for e in fit.unmodelled if e.common}
+    assert "modulus" not in kinds
+    assert "imposed strain" in kinds

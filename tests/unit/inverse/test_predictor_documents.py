@@ -10,13 +10,12 @@ import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
-from creepkit.inverse.predictor_documents import (
-    missing_predictor,
-    predictor_documents,
-    predictor_from_documents,
-    registered_specimens,
-)
+from creepkit.inverse.identify import identify
+from creepkit.inverse.predictor_documents import missing_predictor, predictor_documents, predictor_from_documents
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.laws.norton import NORTON
 from helpers.planted_alloys import bars
+from helpers.steady_rate_predictor import Steady, planted
 
 BAR = ck.specimen("uniaxial").replace(strain_limit=0.7, max_steps=5000)
 TESTS = bars("X")
@@ -40,21 +39,6 @@ def fit():
 @pytest.fixture(scope="module")
 def document(fit):
     return json.loads(json.dumps(identification_to_json(fit)))
-
-
-def test_it_predicts_without_using(fit, tmp_path):
-    back = ck.load(fit.save(tmp_path / "fit.json"))
-
-    assert back.predictor == BAR
-    np.testing.assert_array_equal(back.predict(TESTS).values, fit.predict(TESTS).values)
-    np.testing.assert_array_equal(back.rupture_times(TESTS), fit.rupture_times(TESTS))
-    np.testing.assert_array_equal(back.rate(80.0), fit.rate(80.0))
-    assert ck.confirm(back, TESTS).verdict == ck.confirm(fit).verdict
-
-
-def test_a_specimen_of_changed_settings_confirms_its_own_fit(fit):
-    assert registered_specimens(fit.predictor) == {"uniaxial": BAR}
-    assert ck.confirm(fit).noise_ratio == 0.0
 
 
 def test_several_specimens_come_back_each_with_its_settings(fit):
@@ -97,15 +81,25 @@ def test_a_reduced_order_model_is_found_again_with_the_fields_of_its_specimen():
     assert "made with specimen 'torsion-tube', which is not known here" in missing_predictor(gone)
 
 
-def test_with_its_histories_alone_it_is_the_whole_identification(fit, tmp_path):
-    back = ck.load(fit.save(tmp_path / "fit.json")).with_histories(TESTS)
+# ---- identification document -----------------------------------------------------------------------------------------
 
-    assert back.predictor == BAR
-    again, profile = back.profile("n"), fit.profile("n")
-    assert (again.low, again.high) == pytest.approx((profile.low, profile.high), rel=1e-6)
-    assert ck.load(back.save(tmp_path / "again.json")).predictor == BAR
+# Identifications as files: noise model, adequacy, numerical error, unmodelled effects and samples come back.
 
 
-def test_a_specimen_under_another_ones_name_is_no_specimen():
-    (document,) = predictor_documents(Foreign("uniaxial")).values()
-    assert document.kind == "other"
+SAMPLES = np.random.default_rng(0).normal(size=(400, 2))
+
+
+@pytest.fixture(scope="module")
+def fit_of_the_file():
+    tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(60.0, 1000.0), (80.0, 1000.0)], seed=1, noise=2e-5)
+    settings = IdentificationSettings(
+        starts=1, sobol_points=8, weights="likelihood", nuisances=(), further_laws=3, usual_errors="none"
+    )
+    return identify(NORTON, tests, Steady(), settings=settings)
+
+
+def test_intervals_from_a_file_come_from_its_samples(fit_of_the_file):
+    samples = fit_of_the_file.u + 0.1 * SAMPLES
+    again = identification_from_json(identification_to_json(replace(fit_of_the_file, samples=samples)))
+    _, low, high = again.interval_of(lambda u: u[..., 1])
+    assert (low, high) == pytest.approx(np.quantile(samples[:, 1], (0.025, 0.975)))

@@ -80,16 +80,6 @@ def test_two_materials_are_told_by_their_rates():
     assert np.exp(first.size) == pytest.approx(4.0, rel=0.2)
 
 
-def test_groups_that_the_tests_state_need_less_of_a_difference():
-    labels = ["A", "A", "B", "B", "B", "A", "A", "B", "A", "B", "A"]
-    factor = {k: 1.5 for k, label in enumerate(labels) if label == "B"}
-    fit = fitted(bars(power_law(5.0, 4e5), scatter=0.05, factor=factor, labels=labels))
-    first = fit.adequacy.explanations[0]
-    assert first.kind == "two groups"
-    assert first.label in ("heat A", "heat B")
-    assert abs(first.size) == pytest.approx(np.log(1.5), abs=0.12)
-
-
 def test_an_exponent_that_rises_is_the_law_s_fault_and_not_that_of_the_test_at_the_lowest_stress():
     fit = fitted(bars(sinh_law))
     first = fit.adequacy.explanations[0]

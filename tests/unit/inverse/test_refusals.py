@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
@@ -21,7 +21,7 @@ from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.profile_likelihood import profile
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, Nuisance, PressureJump, StressSteps, constant_stress
+from creepkit.records import History, Nuisance, PressureJump, Status, StressSteps, constant_stress
 from helpers.steady_rate_predictor import Steady, planted
 
 QUICK = IdentificationSettings(starts=1, sobol_points=8, frames=20)
@@ -142,3 +142,66 @@ def test_every_mistake_is_named_in_one_sentence(tests, fit) -> None:
         else:
             wrong.append(f"{number}: nothing was said of '{words}'")
     assert wrong == []
+
+
+# ---- prediction failures ---------------------------------------------------------------------------------------------
+
+# Where nothing can be predicted there is no answer, but an error that counts how the candidates ended.
+
+
+SETTINGS = IdentificationSettings(starts=2, sobol_points=32)
+TESTS = planted(
+    NORTON, {"A": 1e-15, "n": 4.0}, [(60.0, 900.0), (80.0, 900.0), (110.0, 900.0)], seed=1, noise=1e-5, frames=12
+)  # fmt: skip
+SEARCHES = {
+    "multistart": None,
+    "swarm": ParticleSwarm(particles=16, iterations=3),
+    "swarm, unrefined": ParticleSwarm(particles=16, iterations=3, refined_candidates=0),
+    "cma": CmaEs(iterations=5, restarts=0),
+}
+
+
+class Failing(Steady):
+    """Fails at candidates and tests that `fails` names, with one status or the other."""
+
+    def __init__(self, fails=lambda theta, tests: np.ones((len(theta), len(tests)), bool)) -> None:
+        self.fails = fails
+
+    def predict(self, law, theta, histories, *, sensitivities=False):
+        found = super().predict(law, theta, histories, sensitivities=sensitivities)
+        failed = self.fails(theta, histories)
+        status = np.where(theta[:, 1:] > 6.0, int(Status.OUTSIDE_CLASS), int(Status.NOT_CONVERGED))
+        return replace(
+            found,
+            values=np.where(failed[..., None, None], np.nan, found.values),
+            status=np.where(failed, status, found.status),
+            end_times=np.where(failed, 0.0, found.end_times),
+        )
+
+
+@pytest.mark.parametrize("name", SEARCHES)
+def test_a_predictor_that_fails_everywhere_is_an_error_with_counts(name: str) -> None:
+    with pytest.raises(FitError, match=r"^law 'norton': none of \d+ candidates could be predicted: ") as caught:
+        identify(NORTON, TESTS, Failing(), settings=SETTINGS, search=SEARCHES[name])
+    text = str(caught.value)
+    assert "\n" not in text
+    tried, *counts = (int(n) for n in re.findall(r"(\d+) (?:candidates|not converged|outside the class of laws)", text))
+    assert sum(counts) == tried > 0
+    assert "not converged" in text
+
+
+def test_a_reduced_order_model_that_works_does_not_hide_that_its_predictor_fails() -> None:
+    class WithReducedModel(Failing):
+        def reduced_order_model(self):
+            return Steady()
+
+    with pytest.raises(FitError, match="could be predicted"):
+        identify(NORTON, TESTS, WithReducedModel(), settings=SETTINGS)
+
+
+def test_a_test_of_which_nothing_is_predicted_is_named() -> None:
+    def last_fails(theta, tests):
+        return np.tile([h.name == TESTS[-1].name for h in tests], (len(theta), 1))
+
+    found = identify(NORTON, TESTS, Failing(last_fails), settings=SETTINGS)
+    assert f"nothing is predicted of test '{TESTS[-1].name}': not converged" in found.notes

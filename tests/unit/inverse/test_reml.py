@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
 from creepkit.inverse.output_transforms import LinearTransform
+from creepkit.inverse.residuals import life_sensitivity, orthogonal_distance
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import restricted_covariance
 from creepkit.inverse.variance_components import (
@@ -81,13 +83,6 @@ def test_what_a_predictor_states_of_its_error_is_not_asked_of_the_data():
     ] == pytest.approx(22.0, rel=1e-3)
 
 
-def test_tests_that_share_their_values_share_one_freedom():
-    """Six tests of four frames each and one mean: n - p = 23, whatever falls to which test."""
-    rng = np.random.default_rng(6)
-    linear = linear_model(0.3 * rng.normal(size=(6, 4)), np.ones((6, 4, 1)))
-    assert restricted_covariance(linear, white(0.3), ())[1] == pytest.approx(23.0, rel=1e-6)
-
-
 def test_the_mean_of_a_few_tests_has_their_number_less_one():
     """Rates that scatter, seen without noise: Student's interval of the mean of T numbers has T - 1."""
     linear = linear_model(np.zeros((5, 3)), np.ones((5, 3, 1)))
@@ -96,29 +91,12 @@ def test_the_mean_of_a_few_tests_has_their_number_less_one():
     assert restricted_covariance(linear, scatter, ())[1] == pytest.approx(4.0, rel=1e-3)
 
 
-def test_a_spread_that_explains_no_more_is_not_more_likely():
-    """One unknown of a test without any data: its prior is normal whatever its spread, and the likelihood the same."""
-    linear = linear_model(np.ones((1, 10)), np.concatenate([polynomial(10, 0), np.zeros((1, 10, 1))], axis=-1))
-    narrow, broad = (replace(linear, precision=np.array([1e-12, p])) for p in (100.0, 0.01))
-    found = [restricted_log_likelihood(one, white(0.5)) for one in (narrow, broad)]
-    assert found[0] == pytest.approx(found[1], abs=1e-9)
-
-
 def test_a_prior_counts_where_its_unknown_stands_at_its_bound():
     linear = linear_model(np.zeros((1, 10)), polynomial(10, 0))
     held = replace(linear, precision=np.array([4.0]), prior_residual=np.array([1.5]), free=np.zeros(1, bool))
     assert held.solve(CovarianceFactor.of_residuals(held.residuals, white(0.5))).chi_square == pytest.approx(
         9.0, rel=1e-12
     )
-
-
-def test_noise_that_was_given_leaves_no_doubt_about_itself():
-    linear = linear_model(np.zeros((1, 25)), polynomial(25, 2), outputs=1)
-    from creepkit.records import Nuisance
-
-    scatter = NoiseModel({"strain": OutputNoise(0.0, offset=0.1)})
-    freedom = restricted_covariance(replace(linear), scatter, (Nuisance("offset", sd=0.1),))[1]
-    assert freedom > 20.0
 
 
 def test_the_likelihood_is_that_of_contrasts_that_know_nothing_of_the_values():
@@ -171,3 +149,51 @@ def test_a_discrepancy_is_not_taken_for_less_than_it_is():
         plain.append(estimate_variance_components(replace(unit, values=left), start, ()).discrepancy)
     assert np.median(plain) < 0.75
     assert np.median(restricted) == pytest.approx(1.0, abs=0.25)
+
+
+# ---- scatter of lives ------------------------------------------------------------------------------------------------
+
+# Scatter of rupture lives: the closed form of its effect on a residual, against a curve that is moved in life.
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.8, 0.95, 0.99])
+def test_a_longer_life_moves_the_residual_of_a_frame_as_stated(share):
+    """Kachanov and Rabotnov's curve e = tr l [1 - (1 - t / tr)^(1/l)], its life longer by 1e-5 at the same rate."""
+    growth, step = 5.0, 1e-5
+
+    def strain(t, life):
+        return life * growth * (1.0 - (1.0 - t / life) ** (1.0 / growth))
+
+    def log_time(e, life):
+        return np.log(life * (1.0 - (1.0 - e / (life * growth)) ** growth))
+
+    e = strain(share, 1.0)
+    slope = share * (1.0 - share) ** (1.0 / growth - 1.0) / e
+
+    def moved(strain_error, time_error):
+        found = orthogonal_distance(np.array(strain_error), np.array(time_error), np.array(slope))
+        return float(found.values) / step
+
+    by_life = -moved(np.log(strain(share, np.exp(step)) / e), np.log(share) - log_time(e, np.exp(step)))
+    by_rate = moved(slope * step, step)
+    residuals = SimpleNamespace(present=np.ones((1, 1), bool), log_rate_sensitivity=np.full((1, 1), by_rate))
+    observations = SimpleNamespace(followed_frames=np.ones((1, 1), bool))
+    assert life_sensitivity(residuals, observations)[0, 0] == pytest.approx(abs(by_life), rel=2e-3, abs=1e-3)
+    observations.followed_frames = np.zeros((1, 1), bool)
+    assert life_sensitivity(residuals, observations)[0, 0] == 0.0
+
+
+# ---- goodness of fit -------------------------------------------------------------------------------------------------
+
+# Relative squared error in its three readings, by hand; errors that were not predicted stay unknown.
+
+
+MEASURED = [np.array([1.0, 3.0]), np.array([5.0, 7.0])]
+PREDICTED = [np.array([1.0, 4.0]), np.array([5.0, 5.0])]
+
+
+def test_three_means():
+    """Squares 1 + 4; about 4 they are 9 + 1 + 1 + 9, about 2 and 6 four times 1, about 3 and 5 four times 4."""
+    assert relative_squared_error(MEASURED, PREDICTED) == pytest.approx(5 / 20)
+    assert relative_squared_error(MEASURED, PREDICTED, about="test") == pytest.approx(5 / 4)
+    assert relative_squared_error(MEASURED, PREDICTED, about="frame") == pytest.approx(5 / 16)

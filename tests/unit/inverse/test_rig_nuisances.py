@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import CompositePredictor, predict, predict_with_sensitivities
+from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
-from creepkit.inverse.settings import default_nuisances
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -76,28 +75,6 @@ def test_a_rate_step_reaches_internal_variables_and_hardening_laws():
     away = np.abs(t - START) > 10
     expected = (1.5 * 1e-15 * 90.0**4 * time) ** (1 / 1.5)
     np.testing.assert_allclose(found[away], expected[away], rtol=2e-4)
-
-
-def test_a_drift_of_temperature_is_the_recorded_ramp():
-    test = bar("one")
-    recorded = test.replace(temperature=test.temperature_program())
-    np.testing.assert_allclose(
-        strain({"temperature drift": 5.0}), strain({"temperature drift": 5.0}, recorded), rtol=1e-12
-    )
-    assert strain({"temperature drift": 5.0})[-1] > 1.05 * strain({})[-1]
-
-
-def test_candidates_and_specimens_may_differ_in_what_the_rig_did():
-    tests = [bar("one"), bar("two", 70.0).replace(specimen="other")]
-    both = CompositePredictor({"uniaxial": BAR, "other": BAR})
-    nuisances = {"temperature step@8250": np.array([[-5.0, 0.0], [8.0, 3.0]]), "rate drift": np.array([[0.1, 0.2]])}
-    theta = np.array([THETA, LAW.to_internal({**VALUES, "A": 5e-16})[0]])
-    found = predict(both, LAW, theta, tests, nuisances=nuisances).values
-    for c in range(2):
-        for k, test in enumerate(tests):
-            own = {key: values[min(c, len(values) - 1), k] for key, values in nuisances.items()}
-            expected = strain(own, test, both, theta=theta[c])
-            np.testing.assert_allclose(found[c, k, :, 0], expected, rtol=1e-9)
 
 
 # ---- derivatives -------------------------------------------------------------------------------------------------
@@ -228,27 +205,3 @@ def test_nuisances_that_do_the_same_are_named_or_refused():
 
 
 # ---- settings ----------------------------------------------------------------------------------------------------
-
-
-def test_finite_elements_differentiate_programs_themselves():
-    test = History("one", np.array([3600.0, 10800.0]), {}, PressureJump(8.0, 8.0, 9000.0), 1040.0, "bulge",
-                   elastic=Elastic(100e3))  # fmt: skip
-    values = {"temperature step@8250": np.array([[-5.0]]), "rate drift": np.array([[0.1]])}
-    found = predict(Bulge(refinement=0.5), LAW, THETA[None], [test], nuisances=values, sensitivities=True)
-    assert set(found.nuisance_jacobian) == set(values)
-    assert found.jacobian.shape[-1] == 3
-
-
-def test_a_fit_without_the_step_is_worse(fit):
-    plain = identify(LAW, planted(), BAR, settings=replace(QUICK, nuisances=()))
-    assert plain.rms > 5 * fit.rms
-
-
-def test_the_defaults_and_further_ones():
-    usual = IdentificationSettings().nuisances
-    thickness = Nuisance("thickness", mean=0.49, sd=0.03)
-    assert default_nuisances() == usual
-    assert default_nuisances(thickness, without=["rate"]) == (usual[0], thickness)
-    assert default_nuisances(Nuisance("rate", sd=0.2)) == (usual[0], Nuisance("rate", sd=0.2))
-    with pytest.raises(FitError, match="'rat' is no default nuisance that could be left out; did you mean 'rate'"):
-        default_nuisances(without=["rat"])

@@ -1,13 +1,22 @@
 """Whole-life identification: planted damage laws, rupture times with intervals, tests that were stopped."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import FitWarning
+from creepkit.errors import FitError, FitWarning
+from creepkit.inverse.compared_tests import (
+    UNTESTABLE,
+    common_rupture_times,
+    compared_tests,
+    has_tertiary_creep,
+    rests_on_durations,
+)
 from creepkit.inverse.composite_predictor import CompositePredictor, predict_to_rupture
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.cross_validation import cross_validate
+from creepkit.inverse.identified_values import state_at_strain
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
@@ -17,7 +26,8 @@ from creepkit.laws.norton import NORTON
 from creepkit.records import History, constant_strain, constant_stress
 from creepkit.specimens.relaxation import Relaxation
 from helpers.literature_laws import EQUATIONS
-from helpers.rupture_tests import BAR, OMEGA, campaign
+from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, whole_life_table
+from helpers.rupture_tests import BAR, campaign
 
 KACHANOV, LIU = (EQUATIONS[name] for name in ("Kachanov-Rabotnov", "Liu-Murakami"))
 LIU = LIU.fix(a=1)  # in tension the largest principal stress is the stress: its share cannot be seen
@@ -72,32 +82,6 @@ def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
     np.testing.assert_allclose(again, time, rtol=1e-3)
 
 
-def test_the_answer_says_how_tests_ended(planted, tmp_path):
-    _, _, tests, fit = planted
-    ends = [m.rupture for m in fit.tests]
-    assert [r.censored for r in ends] == [k in (0, 6) for k in range(8)]
-    assert [r.measured for r in ends] == [h.rupture_time or h.times[-1] for h in tests]
-    assert "rupture: 6 of 8 tests broke; time predicted over measured" in fit.details()
-    assert "2 stopped before, of which none should have broken" in fit.details()
-    assert len([a for a in fit.plot(tmp_path / "fit.png").axes if a.get_xlabel()]) == 3
-    back = ck.load(fit.save(tmp_path / "fit.json"))
-    assert [m.rupture for m in back.tests] == ends
-    np.testing.assert_array_equal(back.rupture_time(80.0), fit.rupture_time(80.0))
-
-
-def z_factor(ends):
-    """10^(2.5 spread) of measured over predicted rupture times."""
-    return 10 ** (2.5 * np.std([np.log10(end.measured / end.predicted) for end in ends], ddof=1))
-
-
-def test_rupture_times_scatter_as_planted(planted):
-    """Rate and life scatter by .15 and .08 in ln: Z = 10^(2.5 x .17/ln 10) = 1.5 for any law."""
-    _, _, tests, fit = planted
-    ruptured = {m.name: m.rupture for m in fit.tests if m.rupture is not None and not m.rupture.censored}
-    assert [*ruptured] == [h.name for h in tests if h.rupture_time]
-    assert z_factor(ruptured.values()) < 2.0
-
-
 @pytest.mark.parametrize("planted", ["Liu-Murakami"], indirect=True)
 def test_what_tension_cannot_tell_costs_the_other_parameters_nothing(planted):
     """The share of the largest principal stress moves nothing in tension: freeing it says that, and no more."""
@@ -113,16 +97,6 @@ def test_what_tension_cannot_tell_costs_the_other_parameters_nothing(planted):
         inner, free_one = law.table[e.name].to_internal, found[e.name]
         width = inner(free_one.high) - inner(free_one.low)
         assert width == pytest.approx(inner(e.high) - inner(e.low), rel=0.05)
-
-
-def test_a_condition_left_out_is_predicted():
-    tests = campaign(OMEGA, {"A": 1e-16, "n": 4.0, "m": 20.0}, [60, 80, 100, 120], 3)
-    fit = ck.identify(OMEGA, tests, using=BAR, starts=3, frames=16)
-    folds = cross_validate(fit, by="condition")
-    held = {name: values["rupture time"] for name, values in folds.single_values.items()}
-    assert len(folds.folds) == 4
-    assert z_factor(held.values()) < 3.5
-    assert {name: one.measured for name, one in held.items()} == {h.name: h.rupture_time for h in tests}
 
 
 # ---- the objective ------------------------------------------------------------------------------------------------
@@ -163,15 +137,6 @@ def test_ruptures_count_in_ln_time_and_stopped_tests_only_where_they_outlasted()
         assert residuals.values[1, last[1]] == pytest.approx(max(outlasted, 0.0), abs=0.01)
         assert residuals.present[1, last[1]] == (outlasted > 0)
     np.testing.assert_allclose(residuals.log_rate_sensitivity[last], 1.0, atol=0.01)
-
-
-def test_histories_that_say_nothing_of_their_end_are_compared_as_ever():
-    law, values = PLANTED["Kachanov-Rabotnov"]
-    tests = campaign(law, values, [60, 80], 1)
-    cut = [h.up_to("strain", 0.01) for h in tests]
-    assert not any(h.end_known for h in cut)
-    assert RUPTURE_OUTPUT not in problem(law, cut).observations.outputs
-    assert RUPTURE_OUTPUT in problem(law, tests).observations.outputs
 
 
 def test_a_coordinate_is_the_log_of_the_rate_of_damage():
@@ -223,3 +188,176 @@ def test_percent_taken_for_strain_shows_in_tests_followed_to_their_end_as_well()
     for wrong, given in ((True, percent), (False, tests)):
         fit = ck.identify(NORTON, given, using=BAR, starts=2, frames=8)
         assert any("a column in percent must say so" in note for note in fit.notes) == wrong
+
+
+# ---- compared tests --------------------------------------------------------------------------------------------------
+
+# Rupture times of tables and laws that have no mechanism for them, on planted tables whose rates and lives differ.
+
+
+DAMAGE_LAW = EQUATIONS["Kachanov-Rabotnov"]
+REFERENCE = 873.15
+
+
+def damaged_table(seed, exponent, energy, product, power, scatter):
+    """18 tests by closed forms: rate a power law, life product / rate^power (h), lives alone of every fifth test."""
+    rng, tests = np.random.default_rng(seed), []
+    for T, stresses in ((823.15, (200, 220, 240, 260, 280, 300)), (873.15, (110, 125, 140, 160, 180, 200)),
+                        (923.15, (60, 70, 80, 95, 110, 125))):  # fmt: skip
+        for stress in stresses:
+            factor = np.exp(-energy / GAS_CONSTANT * (1.0 / T - 1.0 / REFERENCE))
+            rate = 1e-5 * (stress / 150.0) ** exponent * factor * np.exp(scatter * rng.standard_normal())
+            life = 3600.0 * product / rate**power * np.exp(scatter * rng.standard_normal())
+            known = {} if len(tests) % 5 == 4 else {"minimum_rate": float(rate / 3600.0)}
+            loading = constant_stress(float(stress), "load")
+            tests.append(History(f"T{len(tests)}", np.array([life]), {}, loading, T, rupture_time=float(life), **known))
+    return tests
+
+
+def test_which_laws_have_tertiary_creep():
+    """By their formulas: rates that are constant or only fall, and those of damage, of exp(strain) and exp(time)."""
+    steady = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "combined")
+    assert not any(has_tertiary_creep(ck.law(name)) for name in steady)
+    assert not has_tertiary_creep(NORTON.times(ck.arrhenius(T_ref=900.0)))
+    assert all(has_tertiary_creep(EQUATIONS[name]) for name in ("Kachanov-Rabotnov", "MPC Omega"))
+    assert has_tertiary_creep(ck.law("norton") + DAMAGE_LAW)
+    assert has_tertiary_creep(ck.law("strain-hardening").with_bounds(m=(-0.5, 0.5)))
+
+
+def test_rates_hold_the_truth_whatever_the_lives_are():
+    """At a constant load a power law breaks after 1 / (n rate); these break up to ten times before, or after."""
+    law, held = NORTON.with_bounds(n=(1.0, 15.0)).times(ck.arrhenius(T_ref=REFERENCE)), np.zeros(3)
+    cases = np.array([(6.5, 430e3, 0.06, 0.9, 0.12), (4.0, 300e3, 0.02, 1.0, 0.3), (8.5, 550e3, 0.15, 0.85, 0.05)])
+    for seed, (exponent, energy, product, power, scatter) in enumerate([*cases, cases[0]]):
+        fit = ck.identify(law, damaged_table(seed, exponent, energy, product, power, scatter), starts=1)
+        values = {e.name: e for e in fit.estimates}
+        _, low, high = fit.rate(150.0, REFERENCE)
+        held += [
+            values["n"].low <= exponent <= values["n"].high,
+            values["Q"].low <= energy <= values["Q"].high,
+            low <= 1e-5 / 3600.0 <= high,
+        ]
+        assert not fit.adequacy.rejects
+        assert "the ends of 18 tests without curves (rupture times and run-outs) were not used" in fit.notes[0]
+        assert "left out, for they state nothing else: 'T4', 'T9', 'T14'" in fit.notes[0]
+    assert (held >= 3).all()
+
+
+def test_rates_and_lives_that_contradict_one_another_reject_a_law():
+    law = NORTON.times(ck.arrhenius(T_ref=REFERENCE))
+    fit = ck.identify(law, damaged_table(0, 6.5, 430e3, 0.06, 0.9, 0.12), starts=1, rupture_times="use")
+    assert fit.adequacy.rejects
+    assert fit.adequacy.contradicting.p_value < 1e-6
+    assert "contradict one another by this law: predicted over measured is" in fit.details()
+    assert "minimum rates and rupture times contradict one another" in fit.details().splitlines()[1]
+
+
+def test_laws_are_compared_from_the_same_values():
+    """Norton's law is rejected beside damage by lives of its tests, and alone identified from rates."""
+    tests = whole_life_table(np.random.default_rng(2))
+    ranking = ck.select([NORTON, DAMAGE_LAW.fix(r=KACHANOV_VALUES["r"])], tests, starts=1, sums=False)
+    best, other = (ranked.fit for ranked in ranking.laws)
+    assert best.law.name.startswith(DAMAGE_LAW.name)
+    assert not best.adequacy.rejects
+    for e in best.estimates:
+        assert e.low <= KACHANOV_VALUES[e.name] <= e.high
+    assert other.settings.rupture_times == "use"
+    with pytest.raises(FitError, match="rupture_times='use' or 'ignore' for all laws"):
+        ck.rank([ck.identify(NORTON, tests, starts=1), best])
+
+
+def test_what_says_nothing_is_left_out_and_ends_alone_are_refused():
+    settings, tests = IdentificationSettings(), damaged_table(0, 5.0, 4e5, 0.06, 0.9, 0.1)
+    silent = [h.replace(rupture_time=None, unruptured=False) for h in tests]
+    compared, notes = compared_tests(NORTON, silent, settings)
+    assert len(compared) == 15
+    assert notes[0].endswith("'T4', 'T9', 'T14'")
+    ends = [h.replace(minimum_rate=None) for h in tests]
+    with pytest.raises(FitError, match="breaks by loss of section alone, and these tests state nothing but their ends"):
+        compared_tests(NORTON, ends, settings)
+    assert len(compared_tests(DAMAGE_LAW, ends, settings)[0]) == len(ends)
+    assert common_rupture_times([NORTON, DAMAGE_LAW], settings).rupture_times == "use"
+    assert common_rupture_times([NORTON], settings) == settings
+    with pytest.raises(FitError, match="rupture_times 'never' is not known"):
+        IdentificationSettings(rupture_times="never")
+
+
+# ---- state at strain -------------------------------------------------------------------------------------------------
+
+# The stress exponent of bars compared at one strain, against closed forms of time and strain hardening.
+
+
+A, N, M = 1e-13, 4.0, -0.4
+TIMES = np.geomspace(360.0, 3.6e5, 30)
+
+
+def curves() -> list[ck.History]:
+    """Strain A s^n t^(1 + m) / (1 + m) under constant true stress, with 0.5 % of noise."""
+    rng = np.random.default_rng(3)
+    return [
+        ck.History(
+            f"{stress:g} MPa",
+            TIMES,
+            {"strain": A * stress**N * TIMES ** (1 + M) / (1 + M) * (1 + 0.005 * rng.standard_normal(TIMES.size))},
+            ck.constant_stress(stress, "stress"),
+            1000.0,
+            strain_measure="logarithmic",
+        )
+        for stress in (40.0, 60.0, 90.0)
+    ]
+
+
+def test_time_hardening_has_n_over_one_plus_m_at_constant_strain() -> None:
+    fit = ck.identify("time-hardening", curves(), starts=1)
+    state = state_at_strain(fit)
+    assert state is not None
+    n, m = fit.values["n"], fit.values["m"]
+    assert state.exponent[0] == pytest.approx(n / (1 + m), rel=1e-4)
+    assert state.exponent[1] < N / (1 + M) < state.exponent[2]
+    assert float(fit.local_exponent(60.0)[0]) == pytest.approx(n, rel=1e-6)
+    r = fit.reference
+    reached = (r.strain * (1 + m) / (fit.values["A"] * r.stress**n)) ** (1 / (1 + m))
+    assert state.time[0] == pytest.approx(reached, rel=1e-4)
+    assert state.rate[0] == pytest.approx((1 + m) * r.strain / reached, rel=1e-4)
+    assert "at constant time is" in fit.details()
+    assert "stress exponent at constant strain" in fit.details()
+
+
+# ---- rates and durations ---------------------------------------------------------------------------------------------
+
+# Laws of hardening and minimum rates without curves: their shape rests on the stated durations alone.
+
+
+def _table(rate_scatter: float = 0.05) -> list[ck.History]:
+    """Rates of Norton's law with n = 4.6 and lives of Monkman and Grant, as a table states them."""
+    rng = np.random.default_rng(4)
+    tests = []
+    for s in (60.0, 80.0, 100.0, 130.0, 160.0, 200.0):
+        rate = 1e-8 * (s / 100) ** 4.6 * np.exp(rate_scatter * rng.standard_normal())
+        tests.append(
+            ck.History(
+                f"{s:g} MPa", np.array([0.06 / rate]), {}, ck.constant_stress(s, "stress"), 1173.15,
+                minimum_rate=rate, rupture_time=0.06 / rate,
+            )
+        )  # fmt: skip
+    return tests
+
+
+@pytest.mark.parametrize(
+    ("name", "untestable"), [("norton", False), ("strain-hardening", True), ("time-hardening", True)]
+)
+def test_only_laws_of_hardening_rest_on_durations(name, untestable):
+    assert rests_on_durations(ck.law(name), _table()) is untestable
+    curve = ck.simulate(
+        "norton", "uniaxial", {"A": 1e-18, "n": 5.0}, times=[0.0, 1e4], loading=ck.constant_stress(80.0)
+    )
+    assert not rests_on_durations(ck.law(name), [*_table(), curve])
+
+
+def test_an_interval_that_excludes_the_planted_exponent_is_said_not_to_be_testable():
+    """Durations are inverse to the rates, so that time hardening explains the same rates with another exponent."""
+    fit = ck.identify(ck.law("time-hardening").fix(m=-0.3), _table(), using=BAR, starts=2)
+    (n,) = (e for e in fit.estimates if e.name == "n")
+    assert not n.low < 4.6 < n.high
+    assert UNTESTABLE in fit.notes
+    assert UNTESTABLE not in ck.identify("norton", _table(), using=BAR, starts=2).notes

@@ -1,7 +1,5 @@
 """Errors that tests usually have, in intervals: against identifications of tests that have them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,11 +7,9 @@ import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import reduced_order_model_of
 from creepkit.inverse.identify import identify
-from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
-from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, common_errors
-from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY
 from creepkit.inverse.settings import USUAL_ERRORS, IdentificationSettings
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
 from creepkit.language import Elastic, arrhenius
@@ -76,18 +72,6 @@ def test_what_is_common_to_all_tests_adds_in_quadrature_and_no_number_of_tests_a
     again = identify(AT_TEMPERATURES, tests, Steady(), settings=SETTINGS.changed({"usual_errors": "none"}))
     assert half_width(again) == pytest.approx(half_width(fit.by_tests_alone), rel=1e-3)
     assert again.rate(70.0, 1000.0)[0] == pytest.approx(fit.rate(70.0, 1000.0)[0], rel=0.03)
-
-
-def test_a_single_test_is_off_once_and_its_exponent_is_not():
-    """One bar of a law of one stress: 3 K of its 400 kJ/mol and 1 % of its load, nothing twice."""
-    law = NORTON.fix(n=4.0)
-    (test,) = planted(law, {"A": 1e-15}, [(70.0, 1000.0)], seed=1, noise=1e-6)
-    fit = identify(law, [test], Steady(), settings=SETTINGS)
-    by_temperature = USUAL_ERRORS["temperature"] * 400e3 / (R * 1000.0**2)
-    added = NORMAL * np.hypot(by_temperature, 4.0 * USUAL_ERRORS["load"])
-    assert half_width(fit) == pytest.approx(np.hypot(half_width(fit.by_tests_alone), added), rel=0.02)
-    (a,) = fit.estimates
-    assert np.log(a.high / a.value) == pytest.approx(half_width(fit), rel=1e-6)
 
 
 def test_intervals_hold_where_every_test_is_off_by_itself():
@@ -156,25 +140,6 @@ def test_a_law_without_temperature_takes_the_usual_energy_and_says_so():
         "by -13 % with temperatures 3 K above those stated, in all 3 tests (4.7 % a kelvin, assumed, as the law has no "
         "temperature)"
     )
-
-
-def test_a_law_with_temperature_takes_its_own_energy():
-    fit = identify(AT_TEMPERATURES, campaign_of_six(), Steady(), settings=SETTINGS)
-    effect = common(fit)["temperature"]
-    assert effect.per_kelvin == pytest.approx(fit.values["Q"] / (R * fit.reference.temperature**2), rel=1e-3)
-    assert not effect.assumed
-    assert "assumed" not in effect.sentence
-
-
-def test_a_nuisance_parameter_of_all_tests_stands_for_the_temperature_and_one_of_each_test_does_not():
-    bar, tests = Uniaxial(), campaign_of_six()
-    for scope, expected in (("all", {"load"}), ("test", {"load", "temperature"})):
-        settings = replace(SETTINGS, nuisances=(Nuisance("rate"), Nuisance("temperature", scope, sd=3.0)))
-        problem = LeastSquaresProblem.from_histories(AT_TEMPERATURES, tests, bar, settings)
-        nuisances = problem.nuisance_parameters
-        x = np.concatenate([problem.coordinates.u(AT_TEMPERATURES.to_internal(VALUES)[0]), nuisances.mean])
-        linear = linearised(problem, x, problem.residuals(x))
-        assert {e.kind for e in common_errors(problem, x, linear)} == expected
 
 
 # ---- values under these errors ---------------------------------------------------------------------------------------

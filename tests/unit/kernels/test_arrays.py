@@ -1,22 +1,29 @@
 """Kernels for NumPy arrays and torch tensors: values, shapes, zeros, gradients."""
 
+import re
+import time as clock
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 import torch
 
+import creepkit as ck
 from creepkit.errors import LawError
 from creepkit.kernels import lower
-from creepkit.language import CreepLaw, arrhenius
+from creepkit.kernels.compilation import assembly, module_source
+from creepkit.kernels.extremes import Heaviside, Max, Min
+from creepkit.kernels.symbolic_kernel import symbolic_kernel
+from creepkit.language import CreepLaw, arrhenius, parameters, strain, stress, time
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from helpers.literature_laws import EQUATIONS
+from helpers.literature_laws import EQUATIONS, POWER, RATE, A, law, m, n, number
 
 SHIPPED = [NORTON, STRAIN_HARDENING, TIME_HARDENING, HYPERBOLIC_SINE, DRIFTING_EXPONENT, COMBINED]
 LAWS = [*SHIPPED, EQUATIONS["combined with temperature"], EQUATIONS["Liu-Murakami"], EQUATIONS["threshold"]]
@@ -55,14 +62,6 @@ def test_candidates_and_points_broadcast(target: Any, array: Callable[[Any], Any
     expected = 1e-12 * np.array([10.0, 20.0, 30.0]) ** np.array([[2.0], [3.0]]) / 2
     np.testing.assert_allclose(kernel.rate(values, **point), expected, rtol=1e-13)
     assert {tuple(d.shape) for d in (*found.point.values(), *found.params.values())} == {(2, 3)}
-
-
-@each_target
-def test_numbers_alone_give_a_number(target: Any, array: Callable[[Any], Any]) -> None:
-    rate = lower(NORTON, target).rate({"A": 1e-10, "n": 2.0}, stress=3.0)
-
-    assert rate.shape == ()
-    assert float(rate) == pytest.approx(9e-10, rel=1e-14)
 
 
 @each_target
@@ -166,3 +165,164 @@ def test_single_precision_stays_single() -> None:
 def test_a_call_that_cannot_be_meant_is_refused(call: Callable[[], Any], message: str) -> None:
     with pytest.raises(LawError, match=message):
         call()
+
+
+# ---- extremes --------------------------------------------------------------------------------------------------------
+
+# Maxima that are differentiated without comparing their arguments: same values, and no time lost.
+
+
+x, y, z = sympy.symbols("x y z", real=True)
+
+
+@pytest.mark.parametrize(("own", "numpy_function"), [(Max, np.max), (Min, np.min)])
+def test_values_and_slopes_are_those_of_the_extreme_argument(own: type, numpy_function: Callable) -> None:
+    arguments = (x * y, y + 2, z**2 - x)
+    expression = own(*arguments)
+    for point in ((1.0, 2.0, 3.0), (4.0, 2.0, 1.0), (0.1, 7.0, 2.0), (-3.0, 1.0, 0.5)):
+        at = dict(zip((x, y, z), point, strict=True))
+        values = [float(one.subs(at)) for one in arguments]
+        chosen = arguments[values.index(numpy_function(values))]
+        assert float(expression.subs(at)) == numpy_function(values)
+        for symbol in at:
+            assert float(expression.diff(symbol).subs(at)) == float(chosen.diff(symbol).subs(at))
+
+
+def test_duplicates_nested_ones_and_numbers_are_joined() -> None:
+    assert Max(x, Max(y, x), 1, 3) == Max(3, x, y)
+    assert Min(x, x) == x
+    assert (Max(2, 5), Min(2, 5)) == (5, 2)
+    assert [Heaviside(sympy.Integer(k)) for k in (-1, 0, 1)] == [0, sympy.S.Half, 1]
+    assert Max(x, y).xreplace({x: z}) == Max(y, z)
+
+
+SHAPES = {
+    "a maximum of eight sums": lambda parts: sympy.Max(*parts, evaluate=False),
+    "a minimum of eight sums": lambda parts: sympy.Min(*parts, evaluate=False),
+    "a maximum of minima": lambda parts: sympy.Max(
+        *(sympy.Min(*parts[k : k + 2], evaluate=False) for k in range(0, 8, 2)), evaluate=False
+    ),
+    "absolute values in a maximum": lambda parts: sympy.Max(*(sympy.Abs(one) for one in parts[:4]), evaluate=False),
+    "steps of sums": lambda parts: sympy.Add(*(sympy.Heaviside(one, 0) * one for one in parts[:4])),
+    "branches": lambda parts: sympy.Piecewise(
+        *((a, b > strain) for a, b in zip(parts[:4], parts[4:], strict=True)), (parts[0], True), evaluate=False
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_law_of_many_branches_is_exported_in_seconds(name: str) -> None:
+    numbers = [1.0 + 0.37 * k for k in range(8)]
+    parts = [c * stress**2 - 1.5 * k * stress + sympy.sin(c * stress * time) for k, c in enumerate(numbers)]
+    law = CreepLaw("branches", {"t": A * stress**n * SHAPES[name](parts)}, {A: RATE, n: POWER})
+    start = clock.process_time()
+    for target in ("c", "abaqus", "mfront", "python", "latex"):
+        assert ck.export(law, target, {"A": 1e-16, "n": 4.0})
+    assert clock.process_time() - start < 30.0
+
+
+# ---- leading exponent ------------------------------------------------------------------------------------------------
+
+# The leading exponent of time: strain ~ t^beta from a virgin state at constant stress.
+
+
+def leading(of: CreepLaw, point: list[float] | None = None, **values: float) -> float:
+    compiled = lower(of, "compiled")
+    theta = of.to_internal({**of.center(), **values})
+    return float(
+        compiled.leading_exponent(theta)[0] if point is None else compiled.leading_exponent(theta, np.array([point]))[0]
+    )
+
+
+@pytest.mark.parametrize(
+    ("of", "values", "beta"),
+    [
+        (NORTON, {}, 1.0),
+        (TIME_HARDENING, {"m": -0.7}, 0.3),  # strain = A s^n t^(1+m)/(1+m)
+        (STRAIN_HARDENING, {"m": -0.6}, 1 / 1.6),  # strain^(1-m) = (1-m) A s^n t
+        (DRIFTING_EXPONENT, {"m": -0.5}, 1 / 1.5),
+        (COMBINED, {"m_1": -0.5, "m_2": -0.8}, 0.2),
+        (COMBINED, {"m_1": -0.5, "m_2": -0.1}, 1 / 1.5),
+        (COMBINED, {"m_1": -0.5, "m_2": -0.8, "A_3": 0.0}, 1 / 1.5),
+        (COMBINED, {"m_1": -0.5, "m_2": -0.8, "A_2": 0.0, "A_3": 0.0}, 1.0),
+        (COMBINED, {"A_1": 0.0, "A_2": 0.0, "A_3": 0.0}, 1.0),
+        (EQUATIONS["saturating"], {}, 2.0),  # 1 - exp(-r t) starts as r t
+        (EQUATIONS["saturating to a power"], {"m": 0.5}, 1.5),
+        (EQUATIONS["erf and atan"], {}, 1.0),
+        (law(A * stress**n * time**m * strain**m, {A: RATE, n: POWER, m: number(-0.9, 0)}), {"m": -0.5}, 0.5 / 1.5),
+        (law(A * stress**n * (strain + 1e-4), {A: RATE, n: POWER}), {}, 1.0),
+    ],
+)
+def test_the_exponent_is_that_of_the_closed_form(of: CreepLaw, values: dict[str, float], beta: float) -> None:
+    assert leading(of, **values) == pytest.approx(beta, rel=1e-12)
+
+
+def test_an_exponent_that_varies_with_temperature_is_taken_at_the_point() -> None:
+    warm = EQUATIONS["exponent of time with temperature"]
+    point = [100.0, 0.0, 0.0, 1173.15, 100.0, 33.0]  # 100 K above T_ref
+
+    assert leading(warm, point, m=-0.5, m_T=1e-3) == pytest.approx(0.6, rel=1e-12)
+
+
+# ---- source ----------------------------------------------------------------------------------------------------------
+
+# Printed kernels read well, whatever the author's names are.
+
+
+def test_a_kernel_is_printed_in_the_words_of_its_author() -> None:
+    source = lower(COMBINED, "numpy").source
+
+    assert "# strain hardening: A_2*strain**m_1*stress**n_2" in source
+    assert "    ln_stress = log_floor(stress, 1e-30)" in source
+    assert "    B = exp(ln_B)" in source
+    assert "    strain_hardening = exp(ln_A_2 + ln_strain*m_1 + ln_stress*n_2)" in source
+    assert "        hyperbolic_sine + strain_hardening + time_hardening," in source
+
+
+def test_what_needs_no_point_is_done_once_for_all_eight() -> None:
+    """Functions of parameters alone, such as exp(-r) of Liu-Murakami, are called for one number, not for a vector."""
+    for law_ in (COMBINED, EQUATIONS["Liu-Murakami"]):
+        for function in assembly(module_source(symbolic_kernel(law_))).split("define internal i64 ")[1:]:
+            numbers_in_every_lane = set(re.findall(r"(%\w+) = shufflevector", function))
+            for arguments in re.findall(r"= call <8 x double> @\w[\w.]*\((.*)\)", function):
+                assert set(re.findall(r"%\w+", arguments)) - numbers_in_every_lane
+
+
+@pytest.mark.parametrize("name", ["names of Python", "names of kernels"])
+def test_awkward_names_are_made_fit_to_print(name: str) -> None:
+    foreign = EQUATIONS[name]
+    values = foreign.center()
+
+    for target in ("numpy", "torch"):
+        rate = lower(foreign, target).rate(values, stress=50.0, strain=0.01, time=10.0, temperature=1000.0)
+        assert float(rate) == pytest.approx(float(_by_sympy(foreign, values)), rel=1e-12)
+
+
+def test_names_that_look_alike_stay_apart() -> None:
+    """Python reads the micro sign and the Greek letter as one name."""
+    micro, greek = parameters("µ μ")
+    foreign = law(A * stress**n * (micro + 10 * greek), {A: RATE, n: POWER, micro: POWER, greek: POWER})
+
+    rate = lower(foreign, "numpy").rate({"A": 1e-10, "n": 1.0, "µ": 2.0, "μ": 3.0}, stress=1.0)
+
+    assert float(rate) == pytest.approx(32e-10, rel=1e-14)
+
+
+def test_a_label_cannot_leave_its_comment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Laws refuse such labels; generated source does not rely on it."""
+    monkeypatch.setattr("creepkit.language.law_record.validate_law", lambda law_: None)
+    label = 'creep """\nraise SystemExit("label was run")\r# \x0c\u2028'
+    foreign = law({label: A * stress**n}, {A: RATE, n: POWER}, name=label)
+
+    assert float(lower(foreign, "numpy").rate({"A": 1e-10, "n": 2.0}, stress=3.0)) == pytest.approx(9e-10, rel=1e-14)
+    text = module_source(symbolic_kernel(foreign))
+    assert next(line for line in text.splitlines() if "SystemExit" in line).startswith("# ")
+
+
+def _by_sympy(foreign: CreepLaw, values: dict[str, float]) -> float:
+    at = {foreign.symbol(name): value for name, value in values.items()}
+    point = {s: v for s in foreign.rate.free_symbols for n, v in _POINT.items() if s.name == n}
+    return foreign.rate.evalf(30, subs={**at, **point})
+
+
+_POINT = {"stress": 50.0, "strain": 0.01, "time": 10.0, "temperature": 1000.0}

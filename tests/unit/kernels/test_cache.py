@@ -170,14 +170,3 @@ def test_what_others_can_write_is_not_run(cache: Path, made: list[str], shared: 
     lower(some_law(71), "compiled")
     assert len(made) == 2
     assert is_intact(folder)
-
-
-def test_the_folder_is_for_its_owner_alone(cache: Path) -> None:
-    before = os.umask(0o002)
-    try:
-        lower(some_law(37), "compiled")
-    finally:
-        os.umask(before)
-
-    for path in (cache / "kernels", folder_of(cache), *folder_of(cache).iterdir()):
-        assert path.stat().st_mode & 0o022 == 0

@@ -2,11 +2,13 @@
 
 import math
 
+import numpy as np
 import pytest
 import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import creepkit as ck
 from creepkit.errors import LawError
 from creepkit.language import (
     GAS_CONSTANT,
@@ -30,7 +32,6 @@ from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.laws.time_hardening import TIME_HARDENING
 
 POINT = {stress: 120.0, strain: 0.013, time: 3.6e4, temperature: 1123.15}
 
@@ -49,13 +50,6 @@ def test_the_combined_law_is_equation_2_of_the_paper():
     values = dict(A_1=1e-9, n_1=2, B=80, A_2=2e-17, n_2=4, m_1=-0.3, A_3=3e-15, n_3=3, m_2=-0.4)
     expected = 1e-9 * math.sinh(120 / 80) ** 2 + 2e-17 * 120**4 * 0.013**-0.3 + 3e-15 * 120**3 * 3.6e4**-0.4
     assert rate(COMBINED, **values) == pytest.approx(expected, rel=1e-13)
-
-
-def test_three_laws_have_the_same_names_in_both_associations():
-    left = (NORTON + STRAIN_HARDENING) + TIME_HARDENING
-    right = NORTON + (STRAIN_HARDENING + TIME_HARDENING)
-    assert left == right
-    assert left.fingerprint == right.fingerprint
 
 
 def _letters(names):
@@ -77,17 +71,6 @@ def test_addition_is_associative_whatever_the_names(a, b, c):
     assert list(left.terms.items()) == list(right.terms.items())
 
 
-def test_names_that_do_not_collide_stay():
-    total = DRIFTING_EXPONENT + NORTON
-    assert total.names == ("A_1", "n_0", "n_inf", "C", "tau_d", "tau_r", "m", "A_2", "n")
-
-
-def test_a_law_added_to_itself_doubles_the_rate():
-    twice = NORTON + NORTON
-    assert list(twice.terms) == ["power law 1", "power law 2"]
-    assert rate(twice, A_1=1e-16, n_1=5, A_2=1e-16, n_2=5) == pytest.approx(2e-16 * 120**5, rel=1e-14)
-
-
 def test_addition_renames_internal_variables_and_what_mentions_them():
     A, n = parameters("A n")
     (omega,) = states("omega")
@@ -107,11 +90,6 @@ def test_addition_renames_internal_variables_and_what_mentions_them():
     assert [str(c) for c in twice.constraints] == ["n_1 >= 0", "n_2 >= 0"]
 
 
-def test_only_laws_can_be_added():
-    with pytest.raises(TypeError):
-        NORTON + 1
-
-
 # ---- taking away ---------------------------------------------------------------------------------------------------
 
 
@@ -122,20 +100,6 @@ def test_only_and_without_are_two_ways_of_saying_the_same():
     assert kept.names == ("A_2", "n_2", "m_1", "A_3", "n_3", "m_2")
 
 
-def test_the_nearest_term_is_suggested():
-    with pytest.raises(LawError, match="no term 'time-hardening': did you mean 'time hardening'"):
-        COMBINED.without("time-hardening")
-    with pytest.raises(LawError, match="no term would be left"):
-        NORTON.without("power law")
-
-
-def test_fixing_m_at_zero_makes_strain_hardening_a_power_law():
-    reduced = STRAIN_HARDENING.fix(m=0)
-    assert reduced.names == ("A", "n")
-    assert dict(reduced.params) == {s: STRAIN_HARDENING.params[s] for s in reduced.params}
-    assert list(reduced.terms.values()) == list(NORTON.terms.values())
-
-
 def test_fixing_a_rate_coefficient_at_zero_drops_its_term_and_parameters():
     reduced = COMBINED.fix(A_2=0)
     assert list(reduced.terms) == ["hyperbolic sine", "time hardening"]
@@ -144,17 +108,6 @@ def test_fixing_a_rate_coefficient_at_zero_drops_its_term_and_parameters():
 
 def test_fixing_the_exponent_of_sinh_at_zero_drops_the_breakdown_stress():
     assert HYPERBOLIC_SINE.fix(n=0).names == ("A",)
-
-
-def test_fixing_a_number_gives_its_rate():
-    fixed = COMBINED.fix(n_1=2.5, B=80, A_3=0)
-    expected = 1e-9 * math.sinh(1.5) ** 2.5 + 1e-17 * 120**4 * 0.013**-0.3
-    assert rate(fixed, A_1=1e-9, A_2=1e-17, n_2=4, m_1=-0.3) == pytest.approx(expected, rel=1e-13)
-
-
-def test_fixing_nothing_gives_the_same_law():
-    assert NORTON.fix() == NORTON
-    assert NORTON.with_temperature() == NORTON
 
 
 def test_fixing_what_a_constraint_mentions_fixes_it_there_too():
@@ -194,21 +147,12 @@ def test_arrhenius_is_one_at_its_reference_and_falls_as_boltzmann_says():
     assert GAS_CONSTANT == 8.314462618
 
 
-def test_the_law_at_its_reference_temperature_no_longer_has_an_activation_energy():
-    assert NORTON.times(arrhenius(T_ref=1100)).at(1100).names == ("A", "n")
-
-
 def test_at_gives_the_rate_at_that_temperature():
     law = COMBINED.times(arrhenius()).with_temperature(n_1=linear())
     values = {**law.center(), "A_1": 1e-9, "n_1_T": -0.01}
     cold = law.at(1123.15)
     assert not cold.uses(temperature)
     assert rate(cold, **{name: values[name] for name in cold.names}) == pytest.approx(rate(law, **values), rel=1e-12)
-
-
-def test_a_second_factor_gets_a_parameter_of_its_own():
-    law = NORTON.times(arrhenius()).times(arrhenius())
-    assert law.names == ("A", "n", "Q", "Q_2")
 
 
 FORMS = {
@@ -277,3 +221,116 @@ def test_bounds_are_changed_and_nothing_else() -> None:
     assert HYPERBOLIC_SINE.with_bounds() is HYPERBOLIC_SINE
     with pytest.raises(LawError, match="has no parameter 'nn': did you mean 'n'"):
         HYPERBOLIC_SINE.with_bounds(nn=(3, 6))
+
+
+# ---- temperature factors ---------------------------------------------------------------------------------------------
+
+# Which rates an Arrhenius factor multiplies: by how much each rate rises between two temperatures.
+
+
+A, n, h, r, D, c = parameters("A n h r D c")
+H, w = states("H w")
+RATE = Param("rate coefficient", bounds=(1e-40, 1e-5), unit="1/s", scale="log", off=0.0)
+NUMBER = Param("number", bounds=(0.1, 10))
+TABLE = {A: RATE, n: NUMBER, h: NUMBER, r: RATE, D: RATE, c: NUMBER}
+CREEP = A * (stress * (1 - H)) ** n
+T_REF, T, HOT = 1000.0, 1010.0, 1030.0
+ENERGIES = {"Q": 3e5, "Q_r": 2e5, "Q_D": 1.5e5, "Q_H": 1e5, "Q_2": 5e4}
+VALUES = {"A": 1e-12, "n": 3.0, "h": 2.0, "r": 1e-6, "D": 1e-7, "c": 0.5} | ENERGIES
+
+
+def law(growth, term=CREEP):
+    used = set(sympy.sympify(term).free_symbols | sympy.sympify(growth).free_symbols)
+    table = {s: p for s, p in TABLE.items() if s in used}
+    return CreepLaw("trial", {"creep": term}, table, states={H: State(0.1, growth)})
+
+
+def energies(one):
+    """Apparent activation energies, J/mol, of the creep rate and of H between two temperatures."""
+    kernel, values = ck.lower(one, "numpy"), {name: VALUES[name] for name in one.names}
+    point = dict(stress=80.0, strain=0.02, H=0.3, temperature=np.array([T, HOT]))
+    scale = 8.314462618 / (1 / T - 1 / HOT)
+    growth = np.abs(np.broadcast_to(kernel.state_rates(values, **point)["H"], 2))
+    return tuple(float(scale * np.diff(v)[0]) for v in (kernel.log_rate(values, **point), np.log(growth)))
+
+
+@pytest.mark.parametrize(
+    ("growth", "names", "energy"),
+    [
+        (h * CREEP, "A n h Q", 3e5),  # work hardening
+        (h * (1 - H / c) * CREEP, "A n h c Q", 3e5),  # saturating hardening of Dyson and McLean
+        (CREEP * (h * sympy.sqrt(H) - c * H), "A n h c Q", 3e5),  # dislocation density of Kocks and Mecking
+        (sympy.Max(A * stress**n * (c - H), 0), "A n c Q", 3e5),
+        (sympy.Piecewise((A * stress**n, stress > 10), (0, True)), "A n Q", 3e5),
+        (D * stress**c * (1 - H), "A n D Q_D c Q", 1.5e5),  # damage
+        (-r * H, "A n r Q_r Q", 2e5),  # static recovery
+        (D * (c * strain - H + 1), "A n D Q_D c Q", 1.5e5),
+        (-H / c, "A n c Q Q_H", 1e5),  # a time constant c is no coefficient: the state gives the name
+        ((c - H) / (1 + c), "A n c Q Q_H", 1e5),
+    ],
+)
+def test_multiples_of_the_creep_rate_take_its_factor_and_other_rates_have_their_own(growth, names, energy):
+    one = law(growth).times(arrhenius(T_REF))
+    assert sorted(one.names) == sorted(names.split())
+    assert energies(one) == pytest.approx((3e5, energy), rel=1e-9)
+
+
+def test_hardening_follows_creep_and_recovery_has_its_own_energy():
+    """dH/dt = h (creep rate) - r H^2, also as a product of sums: each part is multiplied by its own factor."""
+    growth = (h * A * stress**n - r * H**2) * (1 - H)
+    one = law(growth).times(arrhenius(T_REF))
+    values = {name: VALUES[name] for name in one.names}
+    found = float(ck.lower(one, "numpy").state_rates(values, stress=80.0, H=0.3, temperature=HOT)["H"])
+    creep, recovery = (math.exp(-Q / 8.314462618 * (1 / HOT - 1 / T_REF)) for Q in (3e5, 2e5))
+    expected = 0.7 * (2 * 1e-12 * 80**3 * creep - 1e-6 * 0.09 * recovery)
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_rate_that_is_activated_already_keeps_its_energy():
+    """The order of times() and activated() does not matter, and a form given twice is refused."""
+    damage = law(D * stress**c)
+    assert damage.with_temperature(D=activated(T_REF)).times(arrhenius(T_REF)).names == ("A", "n", "D", "Q_D", "c", "Q")
+    one = damage.times(arrhenius(T_REF)).times(arrhenius(T_REF))
+    assert one.names == ("A", "n", "D", "Q_D", "c", "Q", "Q_2")
+    assert energies(one) == pytest.approx((3.5e5, 1.5e5), rel=1e-9)
+    with pytest.raises(LawError, match=r"Q_D exists already; D depends on temperature twice: leave this form out"):
+        damage.times(arrhenius(T_REF)).with_temperature(D=activated(T_REF))
+
+
+def test_terms_states_and_sharing_are_chosen():
+    damage = law(D * stress**c)
+    assert energies(damage.times(arrhenius(T_REF), states=())) == pytest.approx((3e5, 0), abs=1e-4)
+    assert energies(damage.times(arrhenius(T_REF), terms=())) == pytest.approx((0, 1.5e5), abs=1e-4)
+    assert energies(damage.times(arrhenius(T_REF), shared=True)) == pytest.approx((3e5, 3e5), rel=1e-9)
+    assert energies(damage.times(arrhenius(T_REF, Q=2.5e5))) == pytest.approx((2.5e5, 2.5e5), rel=1e-9)
+    assert energies(law(h * CREEP).times(arrhenius(T_REF), states=())) == pytest.approx((3e5, 3e5), rel=1e-9)
+    both = NORTON + STRAIN_HARDENING
+    part = both.times(arrhenius(T_REF), terms=["power law"])
+    assert [t.has(ck.temperature) for t in part.terms.values()] == [True, False]
+    assert both.times(arrhenius(T_REF)).names[-1:] == ("Q",)
+    assert damage.times(arrhenius(T_REF), states=()).name == "trial*arrhenius(creep)"
+
+
+def test_two_states_have_two_energies_unless_they_share_a_coefficient():
+    table = {A: RATE, n: NUMBER, D: RATE, r: RATE, c: NUMBER}
+    two = {H: State(0.0, r * (1 - H)), w: State(0.0, D * stress**c, limit=0.9)}
+    one = CreepLaw("two", {"creep": CREEP / (1 - w)}, table, states=two).times(arrhenius())
+    assert one.names == ("A", "n", "D", "Q_D", "r", "Q_r", "c", "Q")
+    chained = {H: State(0.0, D * (1 - H)), w: State(0.0, D * c * H)}
+    table.pop(r)
+    one = CreepLaw("chained", {"creep": CREEP / (1 - w)}, table, states=chained).times(arrhenius())
+    assert one.names == ("A", "n", "D", "Q_D", "c", "Q")
+
+
+@pytest.mark.parametrize(
+    ("chosen", "message"),
+    [
+        ({"states": ["x"]}, "has no state 'x'"),
+        ({"terms": "crep"}, "has no term 'crep': did you mean 'creep'"),
+        ({"terms": (), "states": ()}, "multiply no term and no state"),
+        ({"states": ["H"]}, "state 'H' is a multiple of the creep rate"),
+    ],
+)
+def test_wrong_choices_are_explained(chosen, message):
+    with pytest.raises(LawError, match=message):
+        law(h * CREEP).times(arrhenius(), **chosen)

@@ -9,9 +9,14 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.quality import check_data_quality, repeated_row_notes, without_copies
+from creepkit.quality.copies import copied_tests, repeated_rows
 from creepkit.quality.curve_shapes import shows_primary_creep, shows_tertiary_creep
-from creepkit.records import StressSteps
-from tests.helpers.paths import SHARED, needs_shared_data
+from creepkit.quality.rig import temperature_step
+from creepkit.quality.smooth_curve import smooth_curve
+from creepkit.readers.reading import creepkit_readers, read_histories
+from creepkit.records import History, PressureJump, StressSteps
+from helpers.paths import SHARED, needs_shared_data
 
 CONCAVE = {
     "straight": lambda x: x,
@@ -65,11 +70,6 @@ def test_tertiary_creep_is_seen_through_noise():
     assert share(TERTIARY, 2, 0.0, SIZES[:3]) >= 0.9
 
 
-def test_a_steady_curve_without_noise_is_not_tertiary():
-    rng = np.random.default_rng(0)
-    assert not shows_tertiary_creep(planted(CONCAVE["straight"], 40, 0.0, 0.0, rng))
-
-
 def test_a_rate_that_rises_and_falls_again_is_tertiary_creep():
     def s_shaped(x):
         return 0.4 * x + 0.6 / (1.0 + np.exp(-8.0 * (x - 0.5)))
@@ -114,3 +114,221 @@ def test_primary_creep_that_is_short_in_time_is_seen():
         test = ck.History("short", shown, {"strain": strain}, ck.constant_stress(150.0), 873.15)
         assert shows_primary_creep(test)
         assert not shows_primary_creep(test.replace(outputs={"strain": 0.03 * shown / shown[-1] + 3e-5}))
+
+
+# ---- common changes --------------------------------------------------------------------------------------------------
+
+# What happened in several tests at one time: planted steps of the furnace, jumps of a camera, and clean plates.
+
+
+TIMES = 150.0 * np.arange(1, 97)
+NOISE = 1.5e-3
+
+
+def dimple(rng, k, *, event=None, factor=1.0, jump=0.0, P2=8.0):
+    """Primary and steady growth, whose rate changes at `event` s; a raise of the pressure at 2 h doubles the rate."""
+    rate = (0.1 + 0.05 * k) * 1e-4 * (1 + 2.0 * np.exp(-TIMES / 2500.0)) * np.where(TIMES > 7200, (P2 / 8) ** 3, 1.0)
+    if event is not None:
+        rate = rate * np.where(TIMES > event, factor, 1.0)
+    clean = 0.06 + np.cumsum(150.0 * rate) + 0.01 * (P2 / 8 - 1) * (TIMES > 7200)
+    if event is not None:
+        clean = clean + jump * (TIMES > event)
+    values = {"amplitude": clean + NOISE * rng.standard_normal(TIMES.size)}
+    return History(f"t{k}", TIMES, values, PressureJump(8.0, P2, 7200.0), 1040.0 + 5 * k, specimen="bulge")
+
+
+def events(tests, kind="rate change"):
+    return [flag for flag in check_data_quality(tests) if flag.kind == kind]
+
+
+@pytest.mark.parametrize("factor", [1 / 3, 0.5, 2.0, 3.0])
+def test_a_step_of_the_furnace_is_found_with_its_time_and_size(factor):
+    rng = np.random.default_rng(1)
+    (flag,) = events([dimple(rng, k, event=9000.0, factor=factor) for k in range(2, 8)])
+    assert abs(flag.time - 9000.0) <= 150.0
+    assert flag.earliest <= 9000.0 <= flag.latest
+    assert len(flag.tests) >= 4
+    errors = [abs(np.log(flag.rate_factors[n] / factor)) / np.log(flag.factor_errors[n]) for n in flag.tests]
+    assert np.mean(np.array(errors) < 1.0) >= 0.7  # each is a 95 % error
+    for k, name in ((int(n[1:]), n) for n in flag.tests):
+        expected = temperature_step(1040.0 + 5 * k, flag.rate_factors[name], 400e3)
+        assert flag.temperature_steps[name] == pytest.approx(expected)
+    assert '"temperature step" (or "rate step")' in flag.proposal
+    assert "cut the frames after" in flag.proposal
+
+
+def test_changes_at_unlike_times_are_no_event_of_the_rig():
+    rng = np.random.default_rng(3)
+    tests = [dimple(rng, k, event=3900.0 + 1500.0 * k, factor=0.6) for k in range(1, 5)]
+    assert not events(tests)
+
+
+def test_a_raise_of_the_pressure_in_all_tests_is_no_event():
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        tests = [dimple(rng, k, P2=10.0) for k in range(2, 8)]
+        assert not [flag for flag in check_data_quality(tests) if flag.kind in ("rate change", "jump")]
+
+
+def test_a_jump_of_the_camera_is_one_finding_for_all_tests():
+    rng = np.random.default_rng(5)
+    tests = [dimple(rng, k, event=6000.0, jump=0.02) for k in range(2, 8)]
+    (flag,) = events(tests, "jump")
+    assert set(flag.tests) == {test.name for test in tests}
+    assert (flag.earliest, flag.latest) == (6000.0, 6150.0)
+    assert all(abs(size - 0.02) < 4 * NOISE for size in flag.jumps.values())
+    assert not events(tests)
+
+
+def test_a_step_of_the_load_without_a_record_is_called_one():
+    rng = np.random.default_rng(6)
+    tests = [dimple(rng, k, event=9000.0, factor=2.0, jump=0.02) for k in range(2, 8)]
+    (flag,) = events(tests)
+    assert '"load step"' in flag.proposal
+
+
+def test_slopes_and_steps_of_a_curve_are_those_planted():
+    rng = np.random.default_rng(7)
+    t = np.linspace(0.01, 1.0, 100)
+    values = np.sqrt(t) + np.where(t > 0.6, 0.1 + 0.5 * (t - 0.6), 0.0) + 1e-4 * rng.standard_normal(t.size)
+    step = smooth_curve(t, values, 0.0).rate_step(0.6)
+    assert step.jump == pytest.approx(0.1, abs=4 * step.jump_sd + 1e-3)
+    shifted = smooth_curve(t, values, 0.0, level_shifts=[0.605]).rate_step(0.6)
+    assert shifted.before == pytest.approx(0.5 / 0.6**0.5, rel=0.1)
+    assert shifted.after == pytest.approx(0.5 / 0.6**0.5 + 0.5, rel=0.1)
+
+
+@needs_shared_data
+def test_inconel_625_slows_at_8250_s():
+    """In all warm tests, by a factor of 1.1 to 1.8 in tests 01 to 08 and of some 3 in 09, 11 and 12; nothing jumps."""
+    (flag,) = events(read_histories(SHARED / "dabi/in625", creepkit_readers()))
+    assert flag.time == 8250.0
+    assert {f"test_{k:02d}" for k in (3, 4, 8, 11, 12)} <= set(flag.tests)  # 793 C and above
+    slow = {name: 1 / factor for name, factor in flag.rate_factors.items()}
+    assert all(1.1 < slow[name] < 1.8 for name in slow if int(name[-2:]) < 9)
+    assert all(2.5 < slow[f"test_{k:02d}"] < 3.6 for k in (9, 11, 12))
+    assert "no elastic jump" in flag.reason
+
+
+@needs_shared_data
+@pytest.mark.parametrize("folder", ["uniaxial/cmsx6", "uniaxial/alloy617"])
+def test_no_common_change_in_creep_machines(folder):
+    """Their tests ran on machines and clocks of their own."""
+    assert not events(read_histories(SHARED / folder, creepkit_readers()))
+
+
+# ---- copies ----------------------------------------------------------------------------------------------------------
+
+# Copies of tests: found in other layouts, rounding and units; repeated measurements are never taken for copies.
+
+
+HOUR = 3600.0
+HOURS = np.round(np.linspace(10.0, 900.0, 45), 1)
+
+
+def bar(seed, *, name="one", noise=2e-5, scatter=0.08, decimals=7, count=45, stress=150.0, celsius=600.0):
+    """A bar that hardens, its rate a factor exp(N(0, scatter)) off, read with noise and rounded to decimals."""
+    rng = np.random.default_rng(seed)
+    hours = HOURS[:: HOURS.size // count]
+    strain = 0.013 * np.exp(scatter * rng.standard_normal()) * (hours / 900.0) ** 0.66
+    strain = np.round(strain + noise * rng.standard_normal(hours.size), decimals)
+    return History(name, hours * HOUR, {"strain": strain}, StressSteps([(0.0, stress)]), celsius + 273.15)
+
+
+def changed(history, *, every=1, decimals=None, **changes):
+    strain = history.outputs["strain"][::every]
+    strain = strain if decimals is None else np.round(strain, decimals)
+    taken = {"times": history.times[::every], "used": history.used[::every], "outputs": {"strain": strain}}
+    return history.replace(**{"name": "other", **taken, **changes})
+
+
+@pytest.mark.parametrize("decimals", [7, 6, 5, 4])
+@pytest.mark.parametrize("every", [1, 3])
+def test_readings_of_another_test_are_found_when_rounded_or_thinned(decimals, every):
+    original = bar(1)
+    copy = changed(original, every=every, decimals=decimals)
+    assert copied_tests([original, copy]) == {1: 0}
+    if every > 1:
+        assert copied_tests([copy, original]) == {0: 1}, "the one with more readings stays"
+
+
+def test_conditions_that_were_converted_are_the_same():
+    original = bar(1)
+    kept = StressSteps([(0.0, round(150.0 / 6.894757, 2) * 6.894757)])  # written in ksi
+    assert copied_tests([original, changed(original, loading=kept, temperature=round(873.15) + 0.0)]) == {1: 0}
+    assert not copied_tests([original, changed(original, loading=StressSteps([(0.0, 160.0)]))])
+    assert not copied_tests([original, changed(original, temperature=883.15)])
+
+
+def test_total_strain_of_the_other_file_leaves_the_same_readings():
+    """Total strain, written to 5 decimals of a percent, less its elastic part, is off by the rounding of both."""
+    original = bar(1)
+    elastic = 150.0 / 163e3
+    total = np.round(100 * (original.outputs["strain"] + elastic), 5) / 100
+    assert copied_tests([original, changed(original, outputs={"strain": total - elastic})]) == {1: 0}
+
+
+@pytest.mark.parametrize("noise", [2e-5, 1e-4])
+@pytest.mark.parametrize("decimals", [4, 5, 7, 12])
+@pytest.mark.parametrize("count", [5, 9, 15, 45])
+def test_repeated_measurements_are_no_copies(noise, decimals, count):
+    """Of the same rate, and of rates that scatter by 2 % as little as any laboratory's do."""
+    for seed in range(20):
+        for scatter in (0.0, 0.02):
+            how = {"noise": noise, "scatter": scatter, "decimals": decimals, "count": count}
+            pair = [bar(2 * seed, name="a", **how), bar(2 * seed + 1, name="b", **how)]
+            assert not copied_tests(pair), (seed, scatter)
+
+
+def test_quality_names_copies_and_all_of_four_copies_count_once():
+    tests = [bar(1, name="F08"), bar(2, name="F05"), *(changed(bar(1), name=f"F08_{k}") for k in range(1, 4))]
+    flags = [flag for flag in check_data_quality(tests) if flag.kind == "copy"]
+    assert [flag.history for flag in flags] == ["F08_1", "F08_2", "F08_3"]
+    assert all("the same readings as F08" in flag.reason for flag in flags)
+    kept, reasons = without_copies(tests)
+    assert [test.name for test in kept] == ["F08", "F05"]
+    assert list(reasons) == ["F08_1", "F08_2", "F08_3"]
+
+
+def test_copies_change_no_value_and_no_interval_of_an_identification():
+    law = ck.law("strain-hardening")
+    tests = [bar(k, name=f"t{k}", stress=s) for k, s in enumerate((130.0, 140.0, 150.0, 160.0))]
+    copies = [changed(tests[3], name=f"copy {k}") for k in range(3)]
+    alone, beside = (ck.identify(law, some, starts=1) for some in (tests, [*tests, *copies]))
+    for one, other in zip(alone.estimates, beside.estimates, strict=True):
+        assert (one.value, one.low, one.high) == (other.value, other.low, other.high)
+    assert sum("the same readings as t3" in note for note in beside.notes) == 3
+    kept = ck.identify(law, [*tests, *copies], starts=1, suspect_frames="keep")
+    assert len(kept.tests) == 7
+
+
+def row(name, stress, *, hours=None, rate=None, heat="A"):
+    """A test of which a table states a time to rupture, h, or a minimum rate, 1/s."""
+    time = None if hours is None else hours * HOUR
+    return History(
+        name, [time or HOUR], {}, StressSteps([(0.0, stress)]), 873.15,
+        rupture_time=time, minimum_rate=rate, labels={"heat": heat},
+    )  # fmt: skip
+
+
+def test_a_row_that_repeats_a_rate_and_a_time_is_told_and_kept():
+    rows = [row("a", 150.0, hours=812.4, rate=3.21e-9), row("b", 150.0, hours=812.4, rate=3.21e-9)]
+    assert repeated_rows(rows) == {1: 0}
+    assert without_copies(rows)[0] == rows
+    (flag,) = [flag for flag in check_data_quality(rows).flags if flag.kind == "replicate"]
+    assert flag.tests == ("b",)
+    assert "same numbers as a" in flag.reason
+    assert repeated_row_notes(rows) == (f"b: {flag.reason}",)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        row("b", 150.0, hours=812.4, rate=3.22e-9),
+        row("b", 150.0, hours=812.5, rate=3.21e-9),
+        row("b", 151.0, hours=812.4, rate=3.21e-9),
+        row("b", 150.0, hours=812.4, rate=3.21e-9, heat="B"),
+    ],
+)
+def test_rows_that_differ_in_a_digit_or_in_the_heat_are_two(other):
+    assert repeated_rows([row("a", 150.0, hours=812.4, rate=3.21e-9), other]) == {}

@@ -1,12 +1,15 @@
 """LabVIEW measurement files: one head or several, one clock or one a channel, or none; as tests and as records."""
 
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import HistoryError
+from creepkit.testing.reader_checks import history_difference
+from helpers.creep_schema import LIS, SERIES_NAME, document, value
 
 HEAD = """LabVIEW Measurement\t
 Writer_Version\t2
@@ -80,7 +83,80 @@ def test_a_record_of_an_instrument(tmp_path: Path) -> None:
     np.testing.assert_allclose(record.channels["P1"].values, 12.0)
 
 
-def test_what_is_not_understood_names_the_format(tmp_path: Path) -> None:
-    (tmp_path / "x.lvm").write_text(head() + segment(units="MPa\tdegC\tmm"))
-    with pytest.raises(HistoryError, match=r"x.lvm:22: the unit 'mm' of 'Strain .mm.*LabVIEW.*Y_Unit_Label"):
-        ck.read_histories(tmp_path / "x.lvm")
+# ---- creep schema ----------------------------------------------------------------------------------------------------
+
+# Documents and series after the NFDI-MatWerk data schema for creep tests; the files are made up after it.
+
+
+def write(folder: Path, content: Any, series: str | None = LIS, encoding: str = "utf-8") -> Path:
+    path = folder / "Q7.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    if series is not None:
+        (folder / SERIES_NAME).write_text(series, encoding=encoding)
+    return path
+
+
+def test_document_with_its_series(tmp_path: Path):
+    (test,) = ck.read_histories(write(tmp_path, document()))
+    assert (test.name, test.alloy, test.condition) == ("Q7", "ALLOY-X", "950 °C, 152.5 MPa")
+    np.testing.assert_allclose(test.times, [0.0, 900.0, 37800.0, 218700.0])
+    np.testing.assert_allclose(test.outputs["strain"], [0.0, 1.25e-4, 2.125e-3, 0.025125])
+    assert test.rupture_time == 61.5 * 3600
+    assert (test.strain_measure, test.includes_elastic, test.loading.control) == ("engineering", False, "load")
+    assert test.labels == {"loading_strain": "0.00251", "measured_temperature_C": "950.69"}  # 7605.5 / 8
+
+
+def test_a_folder_gives_each_test_once_and_the_series_alone_says_the_same(tmp_path: Path):
+    path = write(tmp_path, document())
+    (test,) = ck.read_histories(tmp_path)
+    path.unlink()
+    (alone,) = ck.read_histories(tmp_path)
+    assert history_difference(test.replace(labels={}), alone.replace(labels={})) == ""
+    assert alone.labels["assumed"] == "control load"
+
+
+@pytest.mark.parametrize(
+    ("name", "at_start"), [("Percentage plastic extension", 0.07), ("Percentage extension", 0.251)]
+)
+def test_extensions_that_hold_the_loading_strain(tmp_path: Path, name: str, at_start: float):
+    """ISO 204: plastic extension = initial plastic + creep extension; extension = initial total + creep extension."""
+    head, _, rows = LIS.partition("\nh\t%\t°C\t°C\t\t\n")
+    lines = [line.split("\t") for line in rows.splitlines()]
+    moved = ["\t".join([line[0], f"{float(line[1]) + at_start:.6f}", *line[2:]]) for line in lines]
+    series = "".join([head, "\nh\t%\t°C\t°C\t\t\n", "\n".join(moved), "\n"])
+    (test,) = ck.read_histories(write(tmp_path, document(), series.replace("Percentage creep extension", name)))
+    np.testing.assert_allclose(test.outputs["strain"], [0.0, 1.25e-4, 2.125e-3, 0.025125], atol=1e-12)
+    assert "subtracted" in test.labels["assumed"]
+
+
+def test_a_stopped_test(tmp_path: Path):
+    changes = {"endOfTestCriterium": {"endOfTestCriteriumOptions": "Time limit"}}
+    (test,) = ck.read_histories(write(tmp_path, document(rupture=value("Not applicable", "h"), **changes)))
+    assert (test.rupture_time, test.unruptured) == (None, True)
+
+
+def test_a_rupture_time_without_a_series(tmp_path: Path):
+    (test,) = ck.read_histories(write(tmp_path, document(link="Not applicable"), series=None))
+    assert (test.times.tolist(), dict(test.outputs)) == ([61.5 * 3600], {})
+    assert (test.rupture_time, test.condition) == (61.5 * 3600, "950 °C, 152.5 MPa")
+
+
+def test_entries_are_known_by_their_whole_name(tmp_path: Path):
+    """An uncertainty, a tolerance, an expected time or an earlier test is not the quantity that its name ends with."""
+    others = (
+        "Uncertainty of initial stress\tu\tMPa\t2\t\t\t\nTolerance of specified temperature\tdT\t°C\t3\t\t\t\n"
+        "Expected creep rupture time\ttu\th\t5000\t\t\t\nPrevious test ID\t\t\tQ1\t\t\t\n"
+    )
+    (tmp_path / SERIES_NAME).write_text(LIS.replace("Date of test start", f"{others}Date of test start"))
+    (test,) = ck.read_histories(tmp_path)
+    assert (test.name, test.condition, test.rupture_time) == ("Q7", "950 °C, 152.5 MPa", 61.5 * 3600)
+
+
+def test_a_rupture_time_without_load_control_says_what_was_assumed(tmp_path: Path):
+    (test,) = ck.read_histories(write(tmp_path, document(link="", loadControlType=""), series=None))
+    assert (test.loading.control, test.labels) == ("load", {"assumed": "control load"})
+
+
+def test_the_first_files_are_in_the_code_page_of_windows(tmp_path: Path):
+    (test,) = ck.read_histories(write(tmp_path, document(), encoding="cp1252"))
+    assert test.times.size == 4

@@ -159,20 +159,6 @@ def test_texts_in_columns_are_conditions_and_labels(read):
 
 
 HEAD = "# temperature_C: 850\n# stress_MPa: 60\n"
-STRAINS_WITHOUT_UNIT = [
-    ("time_h,strain\n0,0\n1,3.5\n", 0.035, "strain in per cent (up to 3.5)"),
-    ("time_h,strain\n0,0\n1,2e-4\n", 2e-4, "strain a fraction (up to 0.0002)"),
-    ("# strain_unit: %\ntime_h,strain\n0,0\n1,0.5\n", 0.005, ""),
-    ("# strain_unit: 1\ntime_h,strain,strain_sd\n0,0,1e-4\n1,0.5,1e-4\n", 0.5, ""),
-    ("time_h,strain\n0,0 %\n1,0.5 %\n", 0.005, ""),
-]
-
-
-def test_strain_without_unit_that_is_decided(read):
-    for text, strain, assumption in STRAINS_WITHOUT_UNIT:
-        (history,) = read(HEAD + text)
-        assert history.outputs["strain"][1] == strain, text
-        assert assumption in history.labels.get("assumed", ""), text
 
 
 REFUSED = [
@@ -233,27 +219,6 @@ def test_a_canonical_file_that_a_spreadsheet_saved(read):
     assert history.labels["note"] == "a, b"
 
 
-def test_large_tables_read_as_small_ones_do(read):
-    rows = [f"{k},{k * 1e-3!r}\n" for k in range(8000)]
-    (large,) = read(HEAD + "time_h,strain_pct\n" + "".join(rows))
-    np.testing.assert_array_equal(large.outputs["strain"], [0.01 * float(row.split(",")[1]) for row in rows])
-    (german,) = read(HEAD + "Time (h);Strain (%)\n" + "".join(rows).replace(",", ";").replace(".", ","))
-    np.testing.assert_array_equal(german.outputs["strain"], large.outputs["strain"])
-    rows[7000] = "# a remark\n\n7000,7\n"
-    (remarked,) = read(HEAD + "time_h,strain_pct\n" + "".join(rows))
-    np.testing.assert_array_equal(remarked.outputs["strain"], large.outputs["strain"])
-    with pytest.raises(HistoryError, match="x.csv:7006: time falls from"):
-        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("7000,7\n", "6998,7\n"))
-    with pytest.raises(HistoryError, match="x.csv:7004: 'stress_MPa' stands below"):
-        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("# a remark", "# stress_MPa: 3"))
-    rows[7000] = "7000,a lot\n"
-    with pytest.raises(HistoryError, match="x.csv:7004: 'strain_pct' is 'a lot'"):
-        read(HEAD + "time_h,strain_pct\n" + "".join(rows))
-    rows[7000] = "6999,1e9\n"
-    with pytest.raises(HistoryError, match="x.csv:7004: 'time_h' is"):
-        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("6999,1e9", "-1,7"))
-
-
 def test_what_empty_cells_of_conditions_leave_unknown_is_said(tmp_path):
     path = tmp_path / "x.csv"
     path.write_text(
@@ -264,12 +229,6 @@ def test_what_empty_cells_of_conditions_leave_unknown_is_said(tmp_path):
     assert "cell" not in first.labels["assumed"]
     assert "modulus_GPa unknown (empty cell)" in second.labels["assumed"].split(", ")
     assert "heat" not in second.labels
-
-
-def test_pairs_of_different_length(read):
-    text = "# temperature_C: 850\nA1;;A2;\nStress (MPa);60;Stress (MPa);80\nTime (h);Strain (%);Time (h);Strain (%)\n"
-    first, second = read(text + "0;0;0;0\n1;0,5;1;0,7\n2;0,9;;\n")
-    assert (first.times.size, second.times.size) == (3, 2)
 
 
 def test_the_decimal_sign_may_be_stated(read):

@@ -1,16 +1,19 @@
 """What a plugin's object raises while a verb runs becomes one sentence with the plugin's file and line."""
 
-import inspect
 import re
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import ExportError, HistoryError, SolveError
+from creepkit.errors import SolveError
 from creepkit.exporters.exporting import exported_text
 from creepkit.readers.reading import read_histories
+from creepkit.records import checked_prediction
+from helpers.mistakes import said_otherwise
 
 TIMES = np.linspace(100.0, 5000.0, 8)
 VALUES = {"A": 1e-14, "n": 4.0}
@@ -34,82 +37,110 @@ class Broken:
         return 1.0 / 0.0 + "text"
 
 
-def line_of(method: str, within: str) -> int:
-    source, start = inspect.getsourcelines(getattr(Broken, method))
-    return start + next(k for k, line in enumerate(source) if within in line)
+class WithRun(Broken):
+    def run(self, law, values, plan):
+        raise OSError("the other program is not there")
 
 
-def said(error: pytest.ExceptionInfo[Exception], method: str, within: str) -> str:
-    message = str(error.value)
-    assert "\n" not in message
-    assert f"({__file__}, line {line_of(method, within)})" in message
-    return message
+class Asked(Broken):
+    def accepts(self, path):
+        return path.read_text()[99]
 
 
-def test_a_specimen_that_raises_in_simulate() -> None:
-    with pytest.raises(SolveError) as error:
-        ck.simulate("norton", Broken(), VALUES, loading=ck.constant_stress(80.0), times=TIMES)
-
-    assert "predictor 'broken': predict() raised IndexError: index 7" in said(error, "predict", "np.zeros")
+class ReadsNothing(Broken):
+    def read(self, path):
+        return None
 
 
-def test_a_run_that_raises() -> None:
-    class WithRun(Broken):
-        def run(self, law, values, plan):
-            raise OSError("the other program is not there")
-
-    with pytest.raises(SolveError, match=r"specimen 'broken': run\(\) raised OSError: the other program"):
-        ck.simulate("norton", WithRun(), VALUES, loading=ck.constant_stress(80.0), times=TIMES)
+class ReadsNumbers(Broken):
+    def read(self, path):
+        return [3]
 
 
-def test_a_reader_that_raises(tmp_path: Path) -> None:
+def test_what_a_plugin_raises_is_one_sentence_with_its_file_and_line(tmp_path: Path) -> None:
     (tmp_path / "test.txt").write_text("0 0\n")
 
-    with pytest.raises(HistoryError) as error:
-        read_histories(tmp_path / "test.txt", [Broken()])
+    def simulate(specimen):
+        return lambda: ck.simulate("norton", specimen, VALUES, loading=ck.constant_stress(80.0), times=TIMES)
 
-    assert "read() of reader 'broken' raised KeyError" in said(error, "read", "no such column")
+    def read(*readers):
+        return lambda: read_histories(tmp_path / "test.txt", [*readers])
 
-
-def test_a_reader_that_raises_when_it_is_asked(tmp_path: Path) -> None:
-    class Asked(Broken):
-        def accepts(self, path):
-            return path.read_text()[99]
-
-    (tmp_path / "test.txt").write_text("0 0\n")
-
-    with pytest.raises(HistoryError, match=r"accepts\(\) of reader 'broken' raised IndexError.*line \d+\)$"):
-        read_histories(tmp_path / "test.txt", [Asked(), Broken()])
-
-
-@pytest.mark.parametrize(
-    ("returned", "found"), [(None, "a NoneType; it must return a list"), ([3], "a int in its list")]
-)
-def test_a_reader_that_returns_something_else(returned: object, found: str, tmp_path: Path) -> None:
-    class Other(Broken):
-        def read(self, path):
-            return returned
-
-    (tmp_path / "test.txt").write_text("0 0\n")
-
-    with pytest.raises(HistoryError, match=re.escape(found)):
-        read_histories(tmp_path / "test.txt", [Other()])
-
-
-def test_an_exporter_that_raises() -> None:
-    with pytest.raises(ExportError) as error:
-        exported_text(Broken(), ck.LawWithValues(ck.law("norton"), VALUES))
-
-    assert "exporter 'broken': text() raised ZeroDivisionError" in said(error, "text", "1.0 / 0.0")
+    at = rf" \({re.escape(__file__)}, line \d+\)"
+    cases = (
+        (simulate(Broken()), rf"predictor 'broken': predict\(\) raised IndexError: index 7.*{at}"),
+        (simulate(WithRun()), r"specimen 'broken': run\(\) raised OSError: the other program"),
+        (read(Broken()), rf"read\(\) of reader 'broken' raised KeyError.*{at}"),
+        (read(Asked(), Broken()), rf"accepts\(\) of reader 'broken' raised IndexError.*{at}$"),
+        (read(ReadsNothing()), "a NoneType; it must return a list"),
+        (read(ReadsNumbers()), "a int in its list"),
+        (lambda: exported_text(Broken(), ck.LawWithValues(ck.law("norton"), VALUES)),
+         rf"exporter 'broken': text\(\) raised ZeroDivisionError.*{at}"),
+    )  # fmt: skip
+    assert said_otherwise(cases) == []
 
 
 def test_what_creepkit_itself_does_wrong_is_not_put_down_to_a_plugin(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("creepkit.specimens.uniaxial.Uniaxial.point_test", None)
+    test = ck.History("a", TIMES, {"strain": 1e-6 * TIMES}, ck.constant_stress(80.0), 1000.0)
 
     with pytest.raises(TypeError):
-        ck.identify(
-            "norton",
-            [ck.History("a", TIMES, {"strain": 1e-6 * TIMES}, ck.constant_stress(80.0), 1000.0)],
-            starts=1,
-            nuisances=[],
-        )
+        ck.identify("norton", [test], starts=1, nuisances=[])
+
+
+# ---- prediction checks -----------------------------------------------------------------------------------------------
+
+# What a predictor may not return, said in one sentence to whoever simulates or identifies with it.
+
+
+BAR = ck.specimen("uniaxial")
+FRAMES = np.linspace(100.0, 5000.0, 20)
+
+
+class Stub:
+    """A plugin's specimen that returns the prediction of a bar, changed."""
+
+    name, title, outputs, nuisances = "uniaxial", "Stub", ("strain",), ()
+
+    def __init__(self, change) -> None:
+        self.change = change
+
+    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+        return self.change(BAR.predict(law, theta, histories, sensitivities=sensitivities))
+
+
+def simulated(using=BAR, stress: float = 100.0):
+    return ck.simulate("norton", using, VALUES, loading=ck.constant_stress(stress), times=FRAMES)
+
+
+def converted(name: str, kind):
+    return lambda made: replace(made, **{name: getattr(made, name).astype(kind)})
+
+
+def test_a_prediction_that_is_none_is_one_sentence() -> None:
+    histories, cases = [simulated(), simulated(stress=150.0).replace(name="b")], []
+    for change, said in (
+        (lambda made: None, "a NoneType from predict\\(\\); it must return a Prediction"),
+        (lambda made: replace(made, values=made.values.tolist()), "a list as values; it must be an array of shape"),
+        (lambda made: replace(made, values=made.values.ravel()), "values of shape .* it must be .* for what was asked"),
+        (lambda made: replace(made, values=made.values[:, :, 1:]), "values of shape .* it must be .*20, 1\\)"),
+        (lambda made: replace(made, status=made.status[0, 0]), "a int64 as status; it must be an array"),
+        (lambda made: replace(made, status=made.status + 77), "the status 77; known are 0 \\(complete\\), 1"),
+        (lambda made: replace(made, lengths=made.lengths - 1), "the lengths .19.*; they must be the numbers of times"),
+        (lambda made: replace(made, outputs=("foo",)), "outputs foo; it must predict those that it names, strain"),
+        (converted("values", complex), "values of type complex128; it must hold real floating point numbers"),
+        (converted("end_times", str), "end_times of type <U.*; it must hold real numbers"),
+    ):
+        sentence, stub = f"^predictor 'uniaxial' (returned|predicted the) {said}", Stub(change)
+        cases.append((partial(simulated, stub), sentence))
+        cases.append((partial(ck.identify, "norton", histories, stub, seed=0), sentence))
+    assert said_otherwise(cases) == []
+
+
+def test_derivatives_have_a_column_for_each_parameter() -> None:
+    law, history = ck.law("norton"), simulated()
+    made = BAR.predict(law, law.to_internal(VALUES), [history], sensitivities=True)
+
+    assert checked_prediction(made, BAR, [history], 1, 2) is made
+    with pytest.raises(SolveError, match=r"jacobian of shape \(1, 1, 20, 1, 2\); it must be \(1, 1, 20, 1, 3\)"):
+        checked_prediction(made, BAR, [history], 1, 3)

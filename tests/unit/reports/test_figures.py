@@ -1,13 +1,33 @@
 """Axes of figures: round labels at both ends, whatever the range; figures in few bytes."""
 
+from __future__ import annotations
+
 import re
+from dataclasses import replace
+from functools import cache
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from creepkit.reports.figures import empty_figure, logarithmic_labels, set_range
-from creepkit.reports.svg import kept_dots, svg_text
+from creepkit.inverse.identify import identify
+from creepkit.inverse.selection.ranking import ranking_from_scores
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
+from creepkit.kernels import lower
+from creepkit.language import arrhenius
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
+from creepkit.laws.norton import NORTON
+from creepkit.records import History, Program, constant_stress
+from creepkit.reports.figures import LARGEST_PIXELS, RESOLUTION, empty_figure, logarithmic_labels, set_range
+from creepkit.reports.judged_readings import judged_readings
+from creepkit.reports.prediction_bands import fitted_curves, joint_covariance, rates_of_tests
+from creepkit.reports.ranking import MOST_TESTS_DRAWN, misfit_name, misfits
+from creepkit.reports.svg import svg_text
+from creepkit.specimens.uniaxial import Uniaxial
+from helpers.steady_rate_predictor import Steady, planted
 
 RANGES = [(80.0, 125.0), (32.0, 175.0), (0.011, 1100.0), (3e-11, 3e-6), (1e-14, 1e2), (1.0, 1.0), (0.99, 1.01)]
 
@@ -40,13 +60,6 @@ def test_an_axis_has_a_written_label_within_three_per_cent_of_either_end(low, hi
     assert ends[1] >= np.log(high) - 1e-9
 
 
-def test_of_dots_that_cover_each_other_one_stays() -> None:
-    points = np.random.default_rng(1).uniform(0.0, 20.0, (10_000, 2))
-    keep = kept_dots(points, 2.0)
-    assert keep.sum() == 100
-    assert np.abs(points[:, None] - points[keep][None]).max(axis=-1).min(axis=1).max() < 2.0
-
-
 def test_a_figure_in_few_bytes_has_its_lines_and_bands_where_they_were() -> None:
     """A sine of 10,000 points and a band about it on a logarithmic axis: what is written lies within a pixel."""
     figure = empty_figure(6.0, 4.0)
@@ -68,3 +81,234 @@ def test_a_figure_in_few_bytes_has_its_lines_and_bands_where_they_were() -> None
         assert np.linalg.norm(shown[:, None] - expected, axis=-1).min(axis=1).max() < 1.0
         between = np.concatenate([np.linspace(a, b, 200) for a, b in pairwise(shown)])
         assert np.linalg.norm(expected[::100, None] - between, axis=-1).min(axis=1).max() < 1.0
+
+
+# ---- prediction bands ------------------------------------------------------------------------------------------------
+
+# Bands of fitted curves: closed forms for a Norton bar, the joint covariance, and the rates that tests show.
+
+
+QUICK = IdentificationSettings(starts=2, sobol_points=16, frames=20)
+TRUTH = {"A": 1e-16, "n": 5.2}
+STRESSES = (30.0, 50.0, 80.0)
+
+
+@pytest.fixture(scope="module")
+def fit():
+    tests = planted(NORTON, TRUTH, [(s, 1050.0) for s in STRESSES], seed=5, rate=0.1, noise=1e-6)
+    return identify(NORTON, tests, Steady(), settings=QUICK)
+
+
+def test_the_band_of_a_norton_bar_is_that_of_its_rate(fit):
+    """strain = A s^n t: ln strain has the standard deviation of ln rate at that stress, at every time."""
+    curves, quantile = fitted_curves(fit), interval_quantile(fit.freedom)
+    jacobian = fit.coordinates.jacobian(fit.u)  # of (ln A, n) to u
+    for k, stress in enumerate(STRESSES):
+        to_log_rate = np.array([1.0, np.log(stress)]) @ jacobian
+        sd = np.sqrt(to_log_rate @ fit.covariance @ to_log_rate)
+        curve, half_width = curves.of(k, "strain")
+        strain = curve - fit.tests[k].offset
+        np.testing.assert_allclose(half_width / strain, quantile * sd, rtol=1e-4)
+        _, low, high = fit.rate(stress, 1050.0)
+        np.testing.assert_allclose(0.5 * np.log(high / low), quantile * sd, rtol=1e-4)
+
+
+def test_a_test_shows_its_own_rate(fit):
+    """Without noise the growth of strain is the rate: that of a faster test lies as far above the law's."""
+    factor = 1.3
+    faster = [h.replace(outputs={"strain": factor * h.outputs["strain"]}) for h in fit.histories[:1]]
+    changed = replace(fit, histories=(*faster, *fit.histories[1:]), problem=None)
+    before, after = (rates_of_tests(f, fit.predict()) for f in (fit, changed))
+    assert [r.stress for r in before] == list(STRESSES)
+    assert after[0].rate == pytest.approx(factor * before[0].rate, rel=1e-9)
+    assert after[1].rate == pytest.approx(before[1].rate, rel=1e-9)
+    for one, history in zip(before, fit.histories, strict=True):
+        slope = np.polyfit(history.times, history.outputs["strain"], 1)[0]
+        assert one.rate == pytest.approx(slope, rel=0.02)
+
+
+def test_the_joint_covariance_keeps_that_of_the_law_and_completes_it():
+    """Against the inverse of the precision, where the law's part is just that inverse."""
+    rng = np.random.default_rng(0)
+    jacobian = rng.normal(size=(12, 5))
+    expected = np.linalg.inv(jacobian.T @ jacobian)
+    fit = SimpleNamespace(
+        u=np.zeros(3),
+        nuisances=(None, None),
+        x=np.zeros(5),
+        covariance=expected[:3, :3],
+        least_squares_problem=SimpleNamespace(jacobian=lambda _: jacobian),
+    )
+    np.testing.assert_allclose(joint_covariance(fit), expected, rtol=1e-9)
+    fit.covariance = 4 * expected[:3, :3]
+    np.testing.assert_allclose(joint_covariance(fit)[:3, :3], fit.covariance, rtol=1e-9)
+
+
+# ---- residual panels -------------------------------------------------------------------------------------------------
+
+# Residuals of reports: the numbers by which a law is judged, an axis that most tests need, and texts that say so.
+
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+
+SIX_STRESSES = (60.0, 70.0, 80.0, 90.0, 100.0, 110.0)
+NOISE = 1e-5
+QUICK_40 = IdentificationSettings(starts=2, sobol_points=16, frames=40)
+
+
+@cache
+def fit_with_scatter(rate: float = 0.1) -> Identification:
+    tests = planted(
+        NORTON, {"A": 1e-19, "n": 5.0}, [(s, 873.15) for s in SIX_STRESSES], seed=3, rate=rate, offset=5e-5, noise=NOISE
+    )
+    return identify(NORTON, tests, Steady(), settings=QUICK_40)
+
+
+def test_the_chi_square_of_all_readings_is_that_of_the_verdict() -> None:
+    readings, adequacy = judged_readings(fit_with_scatter()), fit_with_scatter().adequacy
+    assert readings is not None
+    assert adequacy is not None
+    assert readings.chi_square() == pytest.approx(adequacy.chi_square, rel=1e-9)
+    counts = [int(readings.mask(k).sum()) for k in range(len(SIX_STRESSES))]
+    mean = np.average([readings.chi_square(k) for k in range(len(SIX_STRESSES))], weights=counts)
+    assert mean == pytest.approx(adequacy.chi_square, rel=1e-9)
+
+
+def test_the_scatter_between_tests_is_in_the_misfit_of_the_common_rate_alone() -> None:
+    """Rates that scatter by 10 % move strains of 0.02 by 0.002, some 200 noises; with own rates noise is left."""
+    readings = judged_readings(fit_with_scatter())
+    assert readings is not None
+    common = [readings.misfit_of_common_rate(k) for k in range(len(SIX_STRESSES))]
+    own = [readings.chi_square(k) for k in range(len(SIX_STRESSES))]
+    assert np.median(common) > 100.0
+    assert 0.3 < np.median(own) < 3.0
+    residuals = np.concatenate([readings.residuals(k, "strain")[1] for k in range(len(SIX_STRESSES))])
+    assert np.sqrt(np.mean(residuals**2)) == pytest.approx(1.0, abs=0.35)
+
+
+# ---- ranking plot ----------------------------------------------------------------------------------------------------
+
+# The plot of a ranking: misfits of each law in each test, weights, and the curves of the credible laws.
+
+
+BY_NOISE = IdentificationSettings(starts=2, sobol_points=16, frames=20, weights="noise")
+
+
+@pytest.fixture(scope="module")
+def fits():
+    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1050.0) for s in np.geomspace(30, 90, 8)], seed=5, noise=1e-5)
+    return [identify(law, tests, Steady(), settings=BY_NOISE) for law in (NORTON, HYPERBOLIC_SINE)]
+
+
+def ranked(fits, *scores):
+    return ranking_from_scores(fits, np.array(scores), "bic", independent_frames=50.0)
+
+
+def test_of_two_laws_that_cannot_be_told_apart_both_are_drawn_and_named(fits, tmp_path):
+    ranking = ranked(fits, 0.0, 1.0)
+    figure = ranking.plot(tmp_path / "ranking.png")
+    assert figure.get_suptitle().replace("\n", " ").replace("- ", "-") == ranking.verdict.replace("- ", "-")
+    (legend,) = figure.subfigs[1].legends
+    assert [t.get_text() for t in legend.get_texts()] == [
+        "measured",
+        *(f"{r.fit.law.name}, weight {r.weight:.3f}" for r in ranking.laws),
+    ]
+    panels = [axes for axes in figure.subfigs[1].axes if axes.get_visible()]
+    assert len(panels) == MOST_TESTS_DRAWN
+    assert all(len(axes.lines) == 3 for axes in panels)  # measured, and a curve of each law
+    assert (tmp_path / "ranking.png").stat().st_size > 10_000
+
+
+def test_misfits_are_those_of_which_the_verdict_is_the_mean(fits):
+    """All tests have as many readings, so that the reduced chi-square of all is the mean of theirs."""
+    ranking = ranked(fits, 0.0, 1.0)
+    shown = misfits(ranking)
+    np.testing.assert_allclose(shown.mean(axis=1), [r.fit.adequacy.chi_square for r in ranking.laws], rtol=1e-9)
+    (image,) = ranking.plot().subfigs[0].axes[0].images
+    np.testing.assert_allclose(image.get_array(), shown)
+    assert "own rate" in misfit_name(ranking)
+
+
+# ---- identification plot ---------------------------------------------------------------------------------------------
+
+# The plot of an identification: its panels, labels, bands and legends, for a few tests and for 84.
+
+
+ACTIVATED = NORTON.times(arrhenius(T_ref=1073.15))
+ACTIVATED_TRUTH = {"A": 1e-16, "n": 5.2, "Q": 350e3}
+
+
+def fitted(conditions):
+    tests = planted(ACTIVATED, ACTIVATED_TRUTH, conditions, seed=5, rate=0.2, offset=5e-5, noise=1e-5)
+    return identify(ACTIVATED, tests, Steady(), settings=QUICK)
+
+
+@pytest.fixture(scope="module")
+def few():
+    return fitted([(s, T) for T in (1000.0, 1050.0, 1100.0) for s in (30.0, 50.0, 80.0)])
+
+
+@pytest.fixture(scope="module")
+def many():
+    return fitted([(s, T) for T in np.linspace(1023.15, 1173.15, 6) for s in np.geomspace(40, 200, 14)])
+
+
+def test_a_few_tests_have_curves_and_rates_with_units(few, tmp_path):
+    figure = few.plot(tmp_path / "fit.png")
+    panels = [axes for axes in figure.axes if axes.get_xlabel()]
+    assert [axes.get_ylabel() for axes in panels] == ["strain, %", "creep rate, %/h"]
+    assert [axes.get_xlabel() for axes in panels] == ["time, h", "von Mises stress, MPa"]
+    assert (tmp_path / "fit.png").stat().st_size > 10_000
+
+
+def test_84_tests_have_a_colour_scale_and_fit_on_a_page(many):
+    figure = many.plot()
+    assert not figure.legends
+    assert any(axes.get_ylabel() == "temperature, °C" for axes in figure.axes)  # the colour bar
+    assert RESOLUTION * max(figure.get_size_inches()) < LARGEST_PIXELS
+    dots = [line for axes in figure.axes for line in axes.lines if line.get_marker() == "."]
+    assert len(dots) == 84
+
+
+# ---- stepped temperature ---------------------------------------------------------------------------------------------
+
+# Figures of a test with a step of temperature beside tests at one: its levels are named, and no mean of them.
+
+
+STEPPED_LAW = NORTON.times(arrhenius(T_ref=873.15))
+STEPPED_TRUTH = {"A": 1e-16, "n": 5.2, "Q": 350e3}
+COLD, HOT, HALF = 873.15, 893.15, 3600.0
+
+
+def rate(stress, kelvin):
+    return float(lower(STEPPED_LAW, "numpy").rate(STEPPED_TRUTH, stress=stress, temperature=kelvin))
+
+
+def stepped_test(stress):
+    """Strain grows at the rate at COLD until HALF and then at that at HOT."""
+    times = np.linspace(HALF / 20, 2 * HALF, 40)
+    strain = rate(stress, COLD) * np.minimum(times, HALF) + rate(stress, HOT) * np.maximum(times - HALF, 0.0)
+    program = Program((0.0, HALF, HALF, 2 * HALF), (COLD, COLD, HOT, HOT))
+    return History("stepped", times, {"strain": strain}, constant_stress(stress, "stress"), program)
+
+
+def steady_test(stress, kelvin):
+    times = np.linspace(HALF / 20, 2 * HALF, 40)
+    name = f"{stress:g} MPa at {kelvin:g} K"
+    strain = rate(stress, kelvin) * times
+    return History(name, times, {"strain": strain}, constant_stress(stress, "stress"), kelvin)
+
+
+@pytest.fixture(scope="module")
+def stepped_fit():
+    tests = [steady_test(s, T) for T in (COLD, HOT) for s in (200.0, 230.0)]
+    settings = IdentificationSettings(starts=2, sobol_points=16, frames=20)
+    return identify(STEPPED_LAW, [*tests, stepped_test(215.0)], Uniaxial(), settings=settings)
+
+
+def test_each_hold_of_temperature_shows_the_rate_at_that_temperature(stepped_fit):
+    shown = [r for r in rates_of_tests(stepped_fit, stepped_fit.predict()) if r.test == 4]
+    assert [(r.stress, r.temperature) for r in shown] == [(pytest.approx(215.0), COLD), (pytest.approx(215.0), HOT)]
+    for one in shown:
+        assert one.rate == pytest.approx(rate(215.0, one.temperature), rel=0.01)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -11,9 +13,11 @@ from creepkit.errors import DatasetError
 from creepkit.language import temperature
 from creepkit.records import Status
 from creepkit.sampling.coefficients import term_groups
-from creepkit.sampling.conditions import hold_times, planned_test
-from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion, SimulationOutcome
+from creepkit.sampling.conditions import TimeGrid, creep_output, hold_times, planned_test, specimen_conditions
+from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion, SimulationOutcome, paper_criteria
 from creepkit.sampling.domains import sampling_design
+from helpers.cantilever import Cantilever
+from helpers.mistakes import said_otherwise
 
 DIMPLE, BAR = ck.specimen("bulge"), ck.specimen("uniaxial")
 HOURS_12 = 43200.0
@@ -40,16 +44,6 @@ def test_the_rate_of_nortons_law_lies_where_creep_is_visible_and_the_test_lasts(
     assert low < strain.min() < low + 0.01
     assert high - 0.01 < strain.max() < high
     assert abs(strain.mean() - (low + high) / 2) < 2e-3  # uniform in the logarithm
-
-
-def test_a_thinner_dimple_and_a_shorter_test_shift_the_window():
-    changes = {"apex_thickness": 0.45, "end_time": 3600.0}
-    draws = sampling_design(ck.law("norton"), DIMPLE, **changes).draw(0, 1024, seed=2)
-    p = columns(draws, ck.law("norton"))
-    stress = reference(draws) * 0.9**-1.17
-    strain = np.log10(p["A"] * stress ** p["n"] * 3600.0)
-    np.testing.assert_allclose(strain.min(), np.log10(0.5 * 0.02 / (KAPPA * 0.9**-0.486)), atol=0.01)
-    np.testing.assert_allclose(strain.max(), np.log10(0.2), atol=0.01)
 
 
 def test_mixtures_have_the_shares_and_the_total_that_were_drawn():
@@ -144,11 +138,6 @@ def test_terms_that_share_a_coefficient_are_one_part():
     assert [len(part.law.terms) for part in parts] == [1, 1, 1, 3]
 
 
-def test_a_law_without_a_coefficient():
-    with pytest.raises(DatasetError, match="term 'power law' has no linear rate coefficient"):
-        sampling_design(ck.law("norton").fix(A=1e-15), DIMPLE)
-
-
 # ---- what they give -------------------------------------------------------------------------------------------------
 
 
@@ -167,9 +156,116 @@ def informative_share(design, specimen, samples):
     return good / samples
 
 
-def test_at_least_80_percent_of_bars_creep_visibly_and_last():
-    assert informative_share(sampling_design(ck.law("combined"), BAR), BAR, 60) >= 0.8
-
-
 def test_at_least_80_percent_of_dimples_do():
     assert informative_share(sampling_design(ck.law("norton"), DIMPLE), DIMPLE, 16) >= 0.8
+
+
+# ---- any specimen ----------------------------------------------------------------------------------------------------
+
+# Specimens that no module knows by name: their conditions, tests and reference stresses come from their records.
+
+
+BEAM, NORTON = Cantilever(), ck.law("norton")
+
+
+def test_conditions_are_those_of_the_record() -> None:
+    known = specimen_conditions(BEAM)
+    assert known.names == (
+        "force_1", "force_2", "jump_time", "end_time", "span", "breadth", "height", "temperature",
+    )  # fmt: skip
+    assert known.required == ("force_1",)
+    assert [known.unit(name) for name in known.names] == ["N", "N", "s", "s", "mm", "mm", "mm", "K"]
+    relaxation = specimen_conditions(ck.specimen("relaxation"))
+    assert relaxation.names == ("modulus", "strain_1", "strain_2", "jump_time", "end_time", "temperature")
+    assert [relaxation.unit(name) for name in relaxation.names] == ["MPa", "", "", "s", "s", "K"]
+
+
+def test_general_names_are_those_of_a_specimen_with_names_of_its_own() -> None:
+    dimple = ck.specimen("bulge")
+    own, general = {"P1": 8.0, "P2": 9.0, "Tj": 7200.0}, {"pressure_1": 8.0, "pressure_2": 9.0, "jump_time": 7200.0}
+    grid = TimeGrid.every()
+    assert (
+        planned_test(dimple, {"modulus": 1e5, **general}, grid).loading
+        == planned_test(dimple, {"modulus": 1e5, **own}, grid).loading
+    )
+    designs = [sampling_design(NORTON, dimple, **{name: (3, 20)}) for name in ("P1", "pressure_1")]
+    assert designs[0] == designs[1]
+    both = sampling_design(NORTON, dimple, pressure=(5, 20))
+    assert both == sampling_design(NORTON, dimple, P1=(5, 20), P2=(5, 20))
+    with pytest.raises(DatasetError, match="the range of pressure is that of both its levels, and P2 has one as well"):
+        sampling_design(NORTON, dimple, pressure=(5, 20), P2=20)
+    with pytest.raises(DatasetError, match="'pressure_1' and 'P1' are the same one"):
+        sampling_design(NORTON, dimple, P1=5, pressure_1=5)
+
+
+def test_rates_of_a_beam_lie_where_its_deflection_is_visible_and_the_test_lasts() -> None:
+    """By hand, for tests without a jump: 12 h at the reference stress."""
+    design = sampling_design(NORTON, BEAM, force_1=10.0, force_2=10.0, span=(40.0, 60.0))
+    draws = design.draw(0, 512, seed=2)
+    stress = 0.7 * 6.0 * 10.0 * draws.condition("span") / (10.0 * 2.0**2)
+    strain = np.log10(draws.parameters[:, 0] * stress ** draws.parameters[:, 1] * HOURS_12)
+    lowest = np.log10(0.5 * 0.02 / (draws.condition("span") ** 2 / 6.0))
+    share = (strain - lowest) / (np.log10(0.2) - lowest)
+    assert -1e-9 < share.min() < 0.01
+    assert 0.99 < share.max() < 1 + 1e-9
+    assert abs(share.mean() - 0.5) < 3e-3  # uniform in the logarithm
+
+
+def test_an_output_that_falls_shows_creep_by_its_fall() -> None:
+    shown = creep_output(ck.specimen("relaxation"))
+    assert (shown.falls, shown.column, str(shown.output)) == (True, 0, "stress")
+    criteria = {c.name: c for c in paper_criteria(ck.specimen("relaxation"))}
+    assert list(criteria) == ["1", "2", "3", "4"]  # a stress that has relaxed is no rejection
+    marks = np.array([300.0, 280.0, 420.0, 400.0])[:, None]
+    fallen = SimulationOutcome(np.arange(4.0), marks, marks, Status.COMPLETE, 4.0, {}, falls=True)
+    assert fallen.creep_in_holds == (20.0, 20.0)
+    assert criteria["4"].passes(fallen)
+    risen = SimulationOutcome(np.arange(4.0), marks[::-1], marks[::-1], Status.COMPLETE, 4.0, {}, falls=True)
+    assert not criteria["4"].passes(risen)
+
+
+class Silent(ck.PerTest):
+    """A specimen that says nothing but what PerTest asks for."""
+
+    name, title = "silent", "A specimen that says little"
+    outputs = ("deflection",)
+
+    def one(self, law, values, history, nuisances):
+        return {"deflection": history.times}
+
+
+def saying(**said):
+    return type("Saying", (Silent,), said)()
+
+
+FORCE = {"loads": (ck.Load("force", "force"),)}
+RANGE = {**FORCE, "conditions": {"force": (5.0, 20.0)}}
+NOISE = {**RANGE, "outputs": (ck.Output("deflection", "length", noise=0.002),)}
+
+
+BEAM_MISTAKES = [
+    ({"P1": (5, 20)}, "a cantilever test has no condition 'P1'"),
+    ({"modulus": 1e5}, "a cantilever test has no condition 'modulus'"),
+    ({"force_1": (10, 20)}, "force_2 from 5 to 20 N reaches below force_1, 10 to 20 N"),
+    ({"jump_time": (7200, 90000)}, "jump_time reaches 90000 s"),
+    ({"span": "long"}, r"condition 'span' is 'long'; give a number or \(low, high\) in mm"),
+]
+UNSAID = [
+    ({}, r"add the attribute loads = \(ck.Load"),
+    (FORCE, r'add the attribute conditions = {"force": \(low, high\)}, in N'),
+    ({**FORCE, "conditions": {"farce": (5.0, 20.0)}}, r"add the attribute conditions"),
+    ({**RANGE, "conditions": {"force": (5.0, 20.0), "spam": (1.0, 2.0)}}, "`conditions` name 'spam', which no test"),
+    (RANGE, r'write ck.Output\("deflection", "number", noise=...\)'),
+    (NOISE, r"add the method reference_stress\(self, history\)"),
+    ({**NOISE, "reference_stress": lambda self, h: 1.0}, r"add the method growth_per_strain\(self, history\)"),
+    (
+        {**NOISE, "reference_stress": lambda self, h: float("nan"), "growth_per_strain": lambda self, h: 1.0},
+        r"its reference_stress\(history\) gives 0 for a planned test",
+    ),
+]
+
+
+def test_what_a_record_does_not_say_and_what_is_no_design_of_a_beam_is_a_sentence() -> None:
+    designs = [(partial(sampling_design, NORTON, BEAM, **changes), told) for changes, told in BEAM_MISTAKES]
+    unsaid = [(lambda said=said: sampling_design(NORTON, saying(**said)).draw(0, 4, 1), told) for said, told in UNSAID]
+    assert not said_otherwise([*designs, *unsaid], DatasetError)

@@ -7,13 +7,18 @@ import h5py
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.api.objects import specimen
 from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.readers.history_csv import write_history
+from creepkit.records import PressureJump
 from creepkit.screening import files
-from creepkit.screening.alloys import Compositions
+from creepkit.screening.alloys import Alloy, Compositions, atomic_percent, check_tests, limitations, read_compositions
 from creepkit.screening.screen import ScreeningOptions, screen
+from creepkit.specimens.bulge.outputs import profile_displacement
 from helpers.narrow_predictor import Narrow
 from helpers.planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
@@ -195,3 +200,99 @@ def test_the_table_has_a_row_an_alloy(plate, tmp_path):
     assert float(rows["X"]["local_exponent_100MPa"]) == pytest.approx(NORTON["n"], abs=0.05)
     assert float(rows["X"]["n_low"]) < float(rows["X"]["n"]) < float(rows["X"]["n_high"])
     assert float(rows["X"]["loss_dense"]) == pytest.approx(float(rows["X"]["loss_reduced"]), rel=0.2)
+
+
+# ---- alloys ----------------------------------------------------------------------------------------------------------
+
+# What is wrong with the tests of an alloy, and what they leave open, in one sentence each.
+
+
+BULGE = ck.specimen("bulge")
+
+
+def test_growth_is_what_creeps_while_the_load_is_held():
+    """A straight line of slope s: means of outer thirds lie two thirds of a hold apart, in each of two holds."""
+    test = bulge(rise=0.0, noise=1e-9)
+    slope = 1e-5
+    outputs = {**test.outputs, "amplitude": test.outputs["amplitude"] + slope * test.times}
+    found = detect_creep(test.replace(outputs=outputs), "amplitude")
+    frames, every = 48, 150.0
+    assert found.increase == pytest.approx(2 * slope * every * (frames * 2 / 3), rel=1e-6)
+
+
+def test_the_standard_error_of_a_growth_is_that_of_many_draws():
+    drawn = [detect_creep(bulge(rise=0.0, seed=k), "amplitude") for k in range(200)]
+    assert np.std([g.increase for g in drawn]) == pytest.approx(np.mean([g.standard_error for g in drawn]), rel=0.15)
+    assert not any(g.shows_creep for g in drawn)
+
+
+def test_tests_of_another_specimen_need_a_predictor_of_their_own():
+    mixed = Alloy("X", (bulge("a", "X"), *bars("X")))
+    with pytest.raises(FitError, match=r"its tests are of different specimens \(bulge, uniaxial\) and using= predicts"):
+        check_tests(mixed, BULGE)
+    with pytest.raises(FitError, match="using= names predictors for bulge; add it"):
+        check_tests(mixed, CompositePredictor({"bulge": BULGE}))
+    both = CompositePredictor({"bulge": BULGE, "uniaxial": ck.specimen("uniaxial")})
+    check_tests(mixed, both)
+    assert "tests of several specimens (bulge, uniaxial) are identified together" in limitations(mixed, both)
+
+
+def test_displacement_at_a_radius_is_equation_3():
+    rows = {"amplitude": np.array([0.5, 0.5]), "width": np.array([4.0, 4.0]), "shape": np.array([2.0, 2.0])}
+    np.testing.assert_allclose(profile_displacement(rows, 4.0), 0.5 / np.e, rtol=1e-14)
+    np.testing.assert_allclose(profile_displacement(rows, 2.0), 0.5 * np.exp(-0.25), rtol=1e-14)
+    assert np.isnan(profile_displacement({"amplitude": np.ones(2)}, 2.0)).all()
+    np.testing.assert_array_equal(profile_displacement({"amplitude": np.ones(2)}, 0.0), 1.0)
+
+
+def test_one_test_says_what_it_cannot_know():
+    one = bulge("a", "X", outputs=("amplitude", "width")).replace(loading=PressureJump(8.0, 8.0, 7200.0))
+    assert limitations(Alloy("X", (one,)), BULGE) == (
+        "one test: how dimples or bars of this alloy differ cannot be known from it",
+        "one level of load: strain and time hardening are nearly the same law then",
+        "one temperature: the activation energy cannot be known",
+        "no shape in 1 of 1 tests: the stress exponent is known the less",
+    )
+
+
+# ---- compositions ----------------------------------------------------------------------------------------------------
+
+# Tables of compositions: atomic per cent, classes, and what is wrong with a table.
+
+
+def written(folder, text):
+    path = folder / "compositions.csv"
+    path.write_text(text)
+    return path
+
+
+def test_weight_becomes_atomic_per_cent_as_in_a_textbook():
+    """TiAl alloy of 64.0 wt.% Ti: Ti50Al50 by the masses 47.867 and 26.982 (50 at.% = 63.95 wt.%)."""
+    found = atomic_percent({"Ti": 100 * 47.867 / (47.867 + 26.982), "Al": 100 * 26.982 / (47.867 + 26.982)})
+    np.testing.assert_allclose([found["Ti"], found["Al"]], 50.0, rtol=1e-12)
+
+
+def test_atomic_per_cent_of_316l_against_hand_arithmetic():
+    """Fe 68, Cr 17, Ni 12, Mo 3 wt.%: moles 1.21766, .32695, .20445, .03127, in all 1.78033."""
+    found = atomic_percent({"Fe": 68.0, "Cr": 17.0, "Ni": 12.0, "Mo": 3.0})
+    expected = {"Fe": 68.395, "Cr": 18.365, "Ni": 11.484, "Mo": 1.756}
+    assert found == pytest.approx(expected, abs=2e-3)
+
+
+def test_classes_follow_the_principal_element_unless_the_second_is_near():
+    table = Compositions({"a": {"Fe": 70.0, "Cr": 30.0}, "b": {"Co": 40.0, "Ni": 35.1, "Cr": 24.9}, "c": {"Ni": 100.0}})
+    assert [table.class_of(name) for name in "abcd"] == ["Fe-rich", "near-equimolar", "Ni-rich", "unknown"]
+
+
+def test_a_table_is_read_in_its_unit(tmp_path):
+    weights = read_compositions(written(tmp_path, "# unit: wt.%\nalloy,Ti,Al\nX,63.951,36.049\n"))
+    assert weights.atomic["X"] == pytest.approx({"Ti": 50.0, "Al": 50.0}, abs=1e-2)
+    shares = read_compositions(written(tmp_path, "# unit: at.%\nalloy,Ti,Al,Nb\nX,50,50,\n"))
+    assert shares.atomic["X"] == {"Ti": 50.0, "Al": 50.0}
+
+
+def test_an_alloy_that_the_table_lacks_is_named():
+    told = Compositions({"alloy 1": {"Fe": 100.0}}, "table.csv").missing(["alloy 1", "aloy 1"])
+    assert told == (
+        "table.csv: no alloy 'aloy 1', whose class stays unknown; did you mean 'alloy 1'? (known: alloy 1)",
+    )

@@ -5,8 +5,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.integration.tensor_point import proportional_loading
-from creepkit.inverse.identification import IdentificationSettings
-from creepkit.inverse.identify import identify
 from creepkit.language import CreepLaw, mean_stress, principal_stress, stress
 from creepkit.laws.norton import NORTON
 from creepkit.readers.history_csv import write_history
@@ -34,14 +32,6 @@ def shown(loading, law=NORTON, values=VALUES, specimen=FINE, **changes):
     return {name: found.of(0)[:, k] for k, name in enumerate(found.outputs)}
 
 
-def test_equal_biaxial_tension_creeps_as_its_equivalent_stress_says():
-    """q = s, and half of the thinning lies in each direction of the plane."""
-    found = shown(PointLoading(stress={"11": 80, "22": 80}))
-    p = 1e-14 * 80.0**4 * TIMES
-    for name, share in {"strain": 1.0, "strain_11": 0.5, "strain_22": 0.5, "strain_33": -1.0, "strain_12": 0.0}.items():
-        np.testing.assert_allclose(found[name], share * p, rtol=1e-9)
-
-
 def test_tension_with_torsion():
     """q^2 = s^2 + 3 tau^2; creep 11 is p s/q, and the shear strain of the tensor 3/2 p tau/q."""
     found, q = shown(PointLoading(stress={"11": 60, "12": 40})), np.sqrt(60.0**2 + 3 * 40.0**2)
@@ -58,14 +48,6 @@ def test_measured_strains_may_include_the_elastic_part():
     expected = {"strain": 0.0, "strain_11": 60 / E, "strain_33": -NU * 60 / E, "strain_12": 40 * (1 + NU) / E}
     for name, elastic in expected.items():
         np.testing.assert_allclose(found[name] - creep[name], elastic, atol=1e-15)
-
-
-def test_a_held_twist_relaxes():
-    """k = 3G: q = [q0^-3 + 3 (3G) A t]^(-1/3), tau = q/sqrt(3)."""
-    G = E / (2 * (1 + NU))
-    start = np.sqrt(3) * 2 * G * 6e-4
-    expected = (start**-3.0 + 9 * G * 1e-14 * TIMES) ** (-1 / 3) / np.sqrt(3)
-    np.testing.assert_allclose(shown(PointLoading(strain={"12": 6e-4}))["stress_12"], expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -174,12 +156,6 @@ def test_a_run_keeps_tensors_and_states():
     assert (np.diff(run.states["damage"]) > 0).all()
 
 
-def test_creep_under_stresses_needs_no_elastic_data():
-    run = ck.simulate(NORTON, "point", VALUES, loading=PointLoading(stress={"12": 40}), times=TIMES)
-    np.testing.assert_allclose(run.equivalent, 1e-14 * 9 * 40.0**4 * TIMES, rtol=1e-9)
-    assert np.isnan(run.total_strain).all()
-
-
 def test_programmes_are_taken_as_they_are():
     ramp = Program([0.0, 100.0], [0.0, 80.0])
     found = shown(PointLoading(stress={"11": ramp, "22": ramp}), times=[100.0])
@@ -213,31 +189,6 @@ def test_planted_values_of_a_damage_law_are_found_from_tension_and_torsion():
     fit = ck.identify(KACHANOV, [*tension, *twisted], starts=2, frames=25)
     assert all(e.low <= BRITTLE[e.name] <= e.high for e in fit.estimates)
     assert fit.values["n"] == pytest.approx(4.0, abs=0.05)
-
-
-def test_planted_values_are_found_where_a_twist_is_held():
-    rng = np.random.default_rng(4)
-    times, tests = np.geomspace(10, 3e4, 20), []
-    for twist in (4e-4, 8e-4):
-        loading = PointLoading(strain={"12": twist})
-        clean = shown(loading, times=times)["stress_12"]
-        outputs = {"stress_12": clean + rng.normal(0, 0.2, times.size)}
-        tests.append(plan(loading, times=times).replace(name=f"{twist}", outputs=outputs))
-    fit = ck.identify(NORTON, tests, starts=2)
-    assert all(e.low <= VALUES[e.name] <= e.high for e in fit.estimates)
-    assert fit.values["n"] == pytest.approx(4.0, abs=0.1)
-
-
-def test_planted_values_are_found_by_differences():
-    """Plane strain has no scalar problem: one parameter, from a start close by."""
-    times, loading = np.array([1e3, 1e4, 1e5]), PointLoading(stress={"11": 80}, strain={"33": 0.0})
-    clean = shown(loading, times=times, specimen=MaterialPoint())["strain"]
-    test = plan(loading, times=times).replace(outputs={"strain": clean})
-    law = NORTON.fix(n=4.0)
-    fit = identify(
-        law, [test], MaterialPoint(), settings=IdentificationSettings(starts=1, sobol_points=2, nuisances=())
-    )
-    assert fit.values["A"] == pytest.approx(VALUES["A"], rel=1e-3)
 
 
 def test_a_history_of_a_point_survives_its_file(tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import SolveError
+from creepkit.errors import FitError, PluginError, SolveError
 from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.records import Status
 from creepkit.specimens.per_test import OneTest, PerTest
@@ -133,28 +133,127 @@ def test_a_length_is_what_the_test_states_else_its_nuisance_else_the_default():
     np.testing.assert_allclose(changed.values, given.values, rtol=1e-12)
 
 
-def test_a_diameter_is_found_as_a_nuisance_parameter():
-    """Five wires drawn to 1 %: each diameter lies within three of its standard deviations."""
-    rng = np.random.default_rng(5)
-    tests, diameters = [], 1.0 + 0.01 * rng.standard_normal(5)
-    for k, (diameter, weight) in enumerate(zip(diameters, (40.0, 50.0, 60.0, 70.0, 80.0), strict=True)):
-        plan = wire(diameter=diameter).replace(loading=ck.constant_load("weight", weight), name=f"wire {k}")
-        exact = Wire().predict(NORTON, NORTON.to_internal(TRUTH), [plan]).of(0)[:, 0]
-        noisy = exact + 1e-3 * rng.standard_normal(TIMES.size)
-        sd = {"elongation": np.full(TIMES.size, 1e-3)}
-        tests.append(plan.replace(outputs={"elongation": noisy}, standard_deviation=sd, geometry={}))
-    nuisance = ck.Nuisance("diameter", sd=0.01)
-    fit = ck.identify("norton", tests, Wire(), starts=1, sobol_points=16, nuisances=[nuisance], weights="likelihood")
-    for estimate in fit.estimates:
-        assert estimate.low < TRUTH[estimate.name] < estimate.high
-    assert "mm" in fit.details()
-    for estimate, truth in zip(fit.nuisances, diameters, strict=True):
-        assert abs(estimate.value - truth) < 3.0 * estimate.sd
+# ---- hostile specimens -----------------------------------------------------------------------------------------------
+
+# Specimens of plugins that say nonsense, or do it, are refused in one sentence and harm no other.
 
 
-def test_it_simulates_and_forecasts():
-    run = ck.simulate(NORTON, Bar(), TRUTH, loading=ck.constant_stress(80.0, "stress"), times=TIMES)
-    np.testing.assert_allclose(run.outputs["strain"], 1e-16 * 80.0**4 * TIMES, rtol=1e-12)
-    fit = ck.identify(NORTON, planted(), Bar(), starts=1, nuisances=[ck.Nuisance("rate", sd=0.1)])
-    one = fit.forecast(plans(70.0)).tests[0].outputs["strain"]
-    assert one.band.low[-1] < 1e-16 * 70.0**4 * TIMES[-1] < one.band.high[-1]
+THETA = NORTON.to_internal({"A": 1e-16, "n": 4.0})
+FRAMES = np.linspace(0.0, 3600.0, 5)
+
+PLUGIN = """
+import creepkit as ck
+class Piece(ck.PerTest):
+    name, title = "hostile-piece", "A piece"
+    outputs, loads = {outputs}, {loads}
+    def one(self, law, values, history, nuisances):
+        return {{}}
+@ck.hookimpl
+def creepkit_specimens():
+    return [Piece()]
+"""
+GOOD_OUTPUT, GOOD_LOAD = '(ck.Output("sag", "length"),)', '(ck.Load("push", "force"),)'
+
+
+@pytest.mark.parametrize(
+    ("outputs", "loads", "said"),
+    [
+        (GOOD_OUTPUT, '("push",)', "record that cannot be read"),
+        ("None", GOOD_LOAD, "record that cannot be read"),
+        ("()", GOOD_LOAD, "give at least one name"),
+        ('(ck.Output("push", "length"),)', GOOD_LOAD, "an output and a load called 'push'"),
+        ('(ck.Output("time", "time"),)', GOOD_LOAD, "calls something 'time', which means something else"),
+        (GOOD_OUTPUT, '(ck.Load("temperature", "temperature"),)', "calls something 'temperature'"),
+        (GOOD_OUTPUT, '(ck.Load("control", "force"),)', "calls something 'control'"),
+    ],
+)
+def test_a_record_that_files_and_options_could_not_use_is_no_specimen(tmp_path, outputs, loads, said):
+    path = tmp_path / "hostile.py"
+    path.write_text(PLUGIN.format(outputs=outputs, loads=loads))
+    with pytest.raises(PluginError, match=said):
+        ck.load_plugin(path)
+    assert "uniaxial" in ck.available("specimens")
+
+
+class Piece(ck.PerTest):
+    """What it returns is what a test gives it."""
+
+    name, title = "returning", "A piece that returns something"
+    outputs, loads = (ck.Output("sag", "length"),), (ck.Load("push", "force"),)
+
+    def __init__(self, returned):
+        self.returned = returned
+
+    def one(self, law, values, history, nuisances):
+        return self.returned() if callable(self.returned) else self.returned
+
+
+def plan(**changes):
+    return ck.History("test", FRAMES, {}, ck.constant_load("push", 3.0), 1000.0, "returning", **changes)
+
+
+@pytest.mark.parametrize(
+    ("returned", "said"),
+    [
+        (None, "one.. gave None; it must return"),
+        ({"sag": 1j * FRAMES}, "one.. gave 'sag' as array.*real numbers"),
+        ({"sag": ["a"] * 5}, "real numbers, one for each time, are needed"),
+        ({"sag": FRAMES[:3]}, "of shape .3,.; the test has 5 times"),
+        (lambda: ck.OneTest({"sag": FRAMES}, status="ruptured"), "gave the status 'ruptured'; use ck.Status"),
+        (lambda: sys.exit(0), "SystemExit: 0 .*test_per_test.py"),
+        (lambda: FRAMES.missing, r"AttributeError: .*missing.* \(.*test_per_test.py:\d+\)"),
+        ({"sga": FRAMES}, r"one\(\) gave 'sga'; it must give 'sag'"),
+        ({"sag": np.nan * FRAMES}, "no finite 'sag' at some time and no end"),
+    ],
+)
+def test_what_one_returns_is_judged_where_it_is_written(returned, said):
+    with pytest.raises(SolveError, match=said) as raised:
+        Piece(returned).predict(NORTON, THETA, [plan()])
+    assert "specimen 'returning', test 'test' with A = 1e-16, n = 4: " in str(raised.value)
+
+
+@dataclass(frozen=True)
+class Rod(ck.PerTest):
+    """A rod whose length has two names."""
+
+    thickness: float = ck.dimension(2.0, (1.0, 4.0), tolerance=0.02, alias="t")
+    name, title = "rod", "A rod"
+    outputs, loads = (ck.Output("sag", "angle"),), (ck.Load("push", "force"),)
+
+    def reference_stress(self, history):
+        return history.loading.program().values.max() / self.thickness**2
+
+    def one(self, law, values, history, nuisances):
+        return {"sag": values["A"] * self.reference_stress(history) ** values["n"] * history.times}
+
+
+def rods(*pushes, **changes):
+    rng = np.random.default_rng(1)
+    times = np.geomspace(600.0, 3.6e5, 15)
+    values, found = {"A": 1e-16, "n": 4.0}, []
+    for push in pushes:
+        plan = {"loading": ck.constant_load("push", push), "times": times, "temperature": 1000.0}
+        run = ck.simulate(NORTON, Rod(), values, **plan)
+        sag = run.outputs["sag"] * (1.0 + 1e-3 * rng.standard_normal(15))
+        found.append(run.replace(name=f"{push:g}", outputs={"sag": sag}, **changes))
+    return found
+
+
+def test_a_length_by_its_name_has_the_tolerance_of_its_specimen():
+    fit = ck.identify("norton", rods(200.0, 300.0), Rod(), starts=1, nuisances=["thickness"])
+    assert [n.prior_sd for n in fit.nuisances] == pytest.approx([0.04, 0.04])
+
+
+def test_beyond_its_bounds_a_length_counts_as_at_them():
+    plans = rods(200.0)
+    at, beyond = (
+        Rod().predict(NORTON, THETA, plans, nuisances={"thickness": np.array([[value]])}).values for value in (4.0, 5.0)
+    )
+    np.testing.assert_array_equal(at, beyond)
+
+
+def test_outputs_of_one_name_in_other_units_are_not_fitted_together():
+    length = Piece({"sag": FRAMES})
+    other = plan().replace(outputs={"sag": FRAMES})
+    with pytest.raises(FitError, match="'sag' is a angle of specimen 'rod' and a length of 'returning'"):
+        ck.identify("norton", [*rods(200.0), other], {"rod": Rod(), "returning": length}, starts=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from creepkit.studies.proposal import propose_study
 from creepkit.studies.study_file import parse_study
 from helpers.camera_samples import dice, vic_3d
 from helpers.instrument_samples import plate_record
+from helpers.paths import ROOT
 from helpers.plates import Schedule, write_record, write_times
 
 BULGE = ck.specimen("bulge")
@@ -63,17 +65,6 @@ def test_a_common_record_is_of_both_cameras_and_times_are_by_name(tmp_path: Path
         ("west_times.csv", "logger"),
     ]
     assert model.camera[0].channels == {"": ["P", "TC1", "TC2"]}  # the room is no thermocouple of the plate
-
-
-def test_files_in_the_folder_of_the_frames_are_of_these(tmp_path: Path) -> None:
-    write_views(tmp_path, {"a": 6, "b": 6})
-    for name, lag in (("a", 1.0), ("b", 2.0)):
-        write_times(tmp_path / name / "stamps.csv", Schedule(frames=6).times)
-        write_record(tmp_path / name / "log.csv", Schedule(frames=6), lag, {"T [C]": 800.0})
-    _, model = proposed(tmp_path)
-    assert [one.times for one in model.camera] == ["a/stamps.csv", "b/stamps.csv"]
-    records = {one.name: one.file for one in model.record}
-    assert [records[one.record] for one in model.camera] == ["a/log.csv", "b/log.csv"]
 
 
 def test_folders_say_that_they_hold_frames_and_files_may_have_the_number_alone(tmp_path: Path) -> None:
@@ -226,17 +217,6 @@ def test_priors_of_the_table_enter_and_rates_of_one_test_do_not(tmp_path: Path) 
     assert kinds == [("offset", None), ("rate", 0.2), ("thickness", 0.1)]
 
 
-def test_dimples_are_known_by_number_and_by_their_whole_name(tmp_path: Path) -> None:
-    path = tmp_path / "alloys.csv"
-    path.write_text("dimple,alloy\nWest D1,A\nwest d2,B\neast D1,C\n")
-    rows = read_alloy_table(path, BULGE).of_camera("west", ["D1", "D2"])
-    assert {name: row.alloy for name, row in rows.items()} == {"D1": "A", "D2": "B"}
-    path.write_text("Kamera,Dimple,Alloy\nwest,1,A\nwest,2,B\neast,1,C\n")
-    table = read_alloy_table(path, BULGE)
-    table.check("west", ["D1", "D2"], ["west", "east"])
-    assert table.of_camera("east", ["D1"])["D1"].alloy == "C"
-
-
 def test_numbers_of_dimples_are_no_names_of_the_record(tmp_path: Path) -> None:
     """A record of A1, B2 and D1 does not lend the channels of its D1 to the first of several dimples in the view."""
     from creepkit.api.extraction import ImposedChannels
@@ -250,3 +230,151 @@ def test_numbers_of_dimples_are_no_names_of_the_record(tmp_path: Path) -> None:
         HistoryError, match=r"channels of A1, B2, D1, and .* only numbered, D1 to D2 row by row; say names"
     ):
         ImposedChannels(numbered=True).check(record, ["D1", "D2"])
+
+
+# ---- cameras ---------------------------------------------------------------------------------------------------------
+
+# Cameras of a study file, found wrong before a frame is read; planned forecasts; what a report alone shows.
+
+
+CAMERA = """\
+[[record]]
+name = "rig"
+file = "record.csv"
+
+[[camera]]
+name = "plate"
+frames = "frames"
+record = "rig"
+interval_s = 10
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Three frames and a record beside them."""
+    (tmp_path / "frames").mkdir()
+    for k in range(3):
+        (tmp_path / "frames" / f"plate-{k:03d}_0.csv").write_bytes(vic_3d())
+    (tmp_path / "frames" / "notes.txt").write_text("of no use")
+    (tmp_path / "record.csv").write_text(plate_record())
+    (tmp_path / "times.csv").write_text("time\n1\n2\n3\n")
+    return tmp_path
+
+
+def loaded(folder: Path, text: str) -> ck.Study:
+    (folder / "study.toml").write_text(text)
+    return ck.Study.load(folder / "study.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ('record = "rig"', 'record = "rog"', 8, "there is no record 'rog'; did you mean 'rig'?"),
+        ('record = "rig"', "load = { pressure_bar = 5 }\ntemperature_C = 700", 2, "no [[camera]] says record = 'rig'"),
+        ('frames = "frames"', 'frames = "films"', 7, "there is no file or folder 'films'"),
+        ('file = "record.csv"', 'file = "rec*.txt"', 3, "there is no file or folder 'rec*.txt'"),
+        ("interval_s = 10", 'interval_s = 10\ntimes = "times.csv"', 9, "interval_s: contradicts times"),
+        ("interval_s = 10", 'format = "vic-4d"', 9, "there is no format 'vic-4d'; did you mean 'vic-3d'?"),
+        ("interval_s = 10", 'specimen = "uniaxial"', 9, "does not say how cameras see its surface"),
+        ("interval_s = 10", 'rest_frames = "9-3"', 9, "rest is 9-3: write the first and the last"),
+        ("interval_s = 10", 'camera_start = "yesterday"', 9, "'yesterday' is not known"),
+        ("interval_s = 10", 'camera_start = "2025-08-18T18:51:53"', 9, "is not known"),
+        ("interval_s = 10", "load = { pressure_bar = 5 }", 9, "contradicts record"),
+        ("interval_s = 10", 'names = ["A", "A"]', 9, "stand there twice"),
+        ("interval_s = 10", "lag_s = 3\nsearch_s = [-1, 1]", 10, "contradicts lag_s"),
+        ("interval_s = 10", "channels = []", 9, "needs 1 or more entries"),
+        ("interval_s = 10", 'infrared = { images = "frames" }', 9, "infrared has no 'center_mm'"),
+        ("interval_s = 10", "thermocouples_mm = { T1 = [1] }", 9, "needs 2 or more entries"),
+        ("interval_s = 10", "lengths = { apex_thicknes_mm = 0.5 }", 9, "did you mean 'apex_thickness_mm'?"),
+        ("interval_s = 10", 'labels = { heat = "7" }\nlagg_s = 3', 10, "did you mean 'lag_s'?"),
+    ],
+)
+def test_a_mistake_is_one_sentence_with_its_line(folder: Path, old: str, new: str, line: int, words: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        loaded(folder, CAMERA.replace(old, new, 1) if old != 'record = "rig"' else CAMERA.replace(old, new))
+    text = str(caught.value)
+    assert words in text.replace('"', "'")
+    assert "\n" not in text
+    assert f"study.toml:{line}:" in text
+
+
+def test_a_camera_that_fails_leaves_the_tests_of_files(folder: Path) -> None:
+    """49 points cannot hold a clamped plate; the curve of the file is identified all the same."""
+    (path,) = ck.example_data("planted creep curves").glob("*850C_70MPa*.csv")
+    (folder / path.name).write_bytes(path.read_bytes())
+    text = CAMERA + f'[data]\nfiles = ["{path.name}"]\n[[exclude]]\ntest = "plate D1"\nreason = "of the camera"\n'
+    result = loaded(folder, text).run()
+    assert {one.name: one.state for one in result.stages} == {
+        "extraction of plate": "failed",
+        "record of plate": "failed",
+        "quality": "made",
+    }
+    assert len(result.histories) == 1
+
+
+CURVES = """\
+[data]
+files = ["*.csv"]
+[identification]
+laws = ["norton"]
+starts = 1
+frames = 8
+temperature = "none"
+[[forecast]]
+name = "combined"
+load = { stress_11_MPa = 30, stress_12_MPa = [{ from_h = 5, level = 10 }] }
+end_h = 10
+draws = 50
+[[forecast]]
+name = "bolt"
+specimen = "relaxation"
+load = { strain = 0.002 }
+modulus_GPa = 150
+end_h = 10
+draws = 50
+"""
+
+
+@pytest.fixture
+def curves(tmp_path: Path) -> Path:
+    for path in ck.example_data("planted creep curves").glob("*850C*.csv"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    return tmp_path
+
+
+def test_a_report_alone_says_which_results_it_shows(curves: Path) -> None:
+    text = CURVES.partition("[[forecast]]")[0]
+    loaded(curves, text).run()
+    text += '[report]\n[[export]]\ntarget = "python"\n'
+    result = loaded(curves, text).run(only="report")
+    said = {one.name: (one.state, one.sentence) for one in result.stages}
+    assert said["identification"] == ("kept", "was not asked for; the report shows what was kept of it")
+    assert said["export 1: python"][0] == "left out"
+    assert "the report lacks it" in said["export 1: python"][1]
+    assert result.rankings[""].best.law.name in result.report.read_text()
+
+
+def test_a_proposal_names_frames_records_and_times(folder: Path) -> None:
+    """What it assumed stands in comments, and the file is a study."""
+    proposal = propose_study(folder, folder / "study.toml")
+    model = parse_study(folder / "study.toml", proposal.text).model
+    (camera,), (record,) = model.camera, model.record
+    assert (camera.frames, camera.times, camera.record) == (["frames"], "times.csv", record.name)
+    assert record.file == "record.csv"
+    assert "assumed" in proposal.text
+    (folder / "alloys.csv").write_text(proposal.alloys)
+    loaded(folder, proposal.text)
+
+
+def test_the_tables_of_the_guide_are_valid() -> None:
+    text = (ROOT / "docs" / "how-to" / "run_a_study.md").read_text()
+    blocks = re.findall(r"```toml\n(.*?)```", text, re.S)
+    models = [
+        parse_study(Path("study.toml"), block if "[[camera]]" in block or "[data]" in block else DATA + block).model
+        for block in blocks
+    ]
+    assert [len(model.camera) for model in models] == [0, 1, 0]
+
+
+DATA = '[data]\nfiles = ["*.csv"]\n'

@@ -1,23 +1,18 @@
 """Evaluation of the recurrent network in NumPy: torch's own cells and their derivatives, and no torch is loaded."""
 
 import ast
-import subprocess
-import sys
-from pathlib import Path
+import json
 
 import numpy as np
 import pytest
 import torch
-from torch import nn
 
-import creepkit as ck
-from creepkit.errors import SurrogateError
+from creepkit.errors import CreepkitError, SurrogateError
 from creepkit.surrogates.network_evaluation import FRAMES_IN_BLOCK, ParameterNetwork
-from creepkit.surrogates.parameter_gru import ParameterGru, Training
+from creepkit.surrogates.parameter_gru import ApplicabilityDomain
 from creepkit.surrogates.parameter_network import ParameterModule, weights_of
-from creepkit.surrogates.training import train
+from creepkit.surrogates.surrogate import CODEC
 from helpers import source_tree
-from helpers.planted_datasets import bars
 
 CONSTANTS, SERIES, OUTPUTS, HIDDEN, LAYERS = 4, 2, 3, 5, 3
 SIZES = CONSTANTS, SERIES, OUTPUTS
@@ -112,32 +107,6 @@ def test_weights_of_another_network_are_refused() -> None:
         ParameterNetwork.from_weights(weights, SIZES, ("lstm", HIDDEN, LAYERS), logarithm=False, corrects_base=False)
 
 
-@pytest.mark.parametrize(("cell", "kind"), [("gru", nn.GRU), ("lstm", nn.LSTM)])
-def test_all_weights_that_are_fitted_are_counted(cell: str, kind: type) -> None:
-    expected = sum(p.numel() for p in kind(CONSTANTS + SERIES, HIDDEN, LAYERS).parameters()) + (HIDDEN + 1) * OUTPUTS
-    assert network_of(module_of(cell), cell).weight_count == expected
-
-
-NO_TORCH = """
-import sys
-import numpy as np
-import creepkit as ck
-model = ck.surrogate({path!r})
-law = ck.law("norton")
-history = ck.History("bar", np.linspace(1800.0, 36000.0, 9), {{}}, ck.constant_stress(100.0), 293.15, "uniaxial")
-theta = law.to_internal({{"A": 1e-7 / 100.0**4, "n": 4.0}})
-found = model.predict(law, theta, [history], sensitivities=True)
-assert np.isfinite(found.jacobian).all()
-noise = 1 + 1e-3 * np.random.default_rng(0).normal(size=found.values[0, 0, :, 0].shape)
-outputs = {{"strain": found.values[0, 0, :, 0] * noise}}
-measured = ck.History("bar", history.times, outputs, history.loading, 293.15, "uniaxial")
-str(model)
-str(ck.identify(law, [measured], using=model, starts=1))
-str(ck.identify(law, [measured], starts=1))
-assert "torch" not in sys.modules
-"""
-
-
 TRAINING = {"surrogates.parameter_network", "surrogates.training"}
 """Modules that import torch when they are imported, beside the functions of the torch target of kernels."""
 
@@ -153,9 +122,56 @@ def test_only_training_and_the_torch_target_import_torch() -> None:
     assert found == {*TRAINING, "kernels.torch_functions"}
 
 
-def test_prediction_and_identification_load_no_torch(tmp_path: Path) -> None:
-    model = train(bars(40), ParameterGru(4, 1, target="log", training=Training(epochs=2, batch=16)))
-    program = NO_TORCH.format(path=str(model.save(tmp_path / "bars.safetensors")))
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert ck.surrogate(tmp_path / "bars.safetensors").weight_count == model.weight_count
+# ---- applicability domain --------------------------------------------------------------------------------------------
+
+# The domain guard: its leave-one-out distances, boxes, combinations that never occurred, and its document.
+
+
+def mahalanobis(row: np.ndarray, others: np.ndarray) -> float:
+    apart = row - others.mean(axis=0)
+    return float(np.sqrt(apart @ np.linalg.solve(np.cov(others, rowvar=False), apart)))
+
+
+def test_the_limit_is_the_largest_distance_of_a_row_from_all_others() -> None:
+    rows = np.random.default_rng(0).normal(size=(30, 3)) * [1.0, 100.0, 1e-3]
+    brute = max(mahalanobis(row, np.delete(rows, k, axis=0)) for k, row in enumerate(rows))
+    assert ApplicabilityDomain.from_rows("abc", rows).limit == pytest.approx(brute, rel=1e-9)
+
+
+def test_one_input_beyond_its_range_is_outside() -> None:
+    domain = ApplicabilityDomain.from_rows(
+        ("log10 A", "n"), np.random.default_rng(2).uniform(size=(100, 2)) * [10, 1] + [-20, 3]
+    )
+    assert domain.outside(np.array([[-15.0, 4.2], [-15.0, 3.5]])).tolist() == [True, False]
+
+
+def test_a_combination_that_never_occurred_is_outside_though_each_input_is_within_its_range() -> None:
+    n = np.linspace(2.0, 8.0, 60)
+    rows = np.stack([-7.0 - 2.0 * n + 0.3 * np.random.default_rng(3).normal(size=60), n], axis=1)
+    domain = ApplicabilityDomain.from_rows(("log10 A", "n"), rows)
+    odd = np.array([-11.0, 7.5])
+    assert (domain.low < odd).all()
+    assert (odd < domain.high).all()
+    assert domain.outside(odd)
+    assert not domain.outside(np.array([-7.0 - 2.0 * 5.0, 5.0]))
+
+
+def test_the_document_is_json_and_gives_the_same_distances() -> None:
+    rows = np.random.default_rng(5).normal(size=(40, 4))
+    domain = ApplicabilityDomain.from_rows("abcd", rows)
+    again = CODEC.from_json(ApplicabilityDomain, json.loads(json.dumps(CODEC.to_json(domain))))
+    assert np.array_equal(again.distance(rows), domain.distance(rows))
+
+
+def test_a_damaged_document_says_so() -> None:
+    document = CODEC.to_json(ApplicabilityDomain.from_rows("ab", np.random.default_rng(6).normal(size=(9, 2))))
+    for changes, message in (
+        ({"low": [0.0]}, "its arrays do not belong to 2 inputs"),
+        ({"mean": "x"}, "mean is 'x', where a list is needed"),
+        ({"names": None}, "names is null, where a list is needed"),
+        ({"whitening": [[1.0, 0.0]]}, "its arrays do not belong to 2 inputs"),
+        ({"whitening": [[1.0], 0.0]}, "whitening.1 is 0.0, where a list is needed"),
+        ({"limits": 1.0}, "unknown key 'limits'; did you mean 'limit'"),
+    ):
+        with pytest.raises(CreepkitError, match=message):
+            CODEC.from_json(ApplicabilityDomain, {**document, **changes})

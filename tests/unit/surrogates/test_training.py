@@ -6,13 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from creepkit.dataset.dataset import Dataset
 from creepkit.errors import DatasetError, SurrogateError
-from creepkit.surrogates.evaluation import dataset_fingerprint, evaluate, training_split
+from creepkit.surrogates.evaluation import (
+    PredictionComparison,
+    comparison_metrics,
+    dataset_fingerprint,
+    evaluate,
+    relative_squared_error,
+)
 from creepkit.surrogates.parameter_gru import ParameterGru, Training
-from creepkit.surrogates.parameter_network import ParameterModule
 from creepkit.surrogates.training import epochs_since_best, train
 from helpers.mistakes import said_otherwise
 from helpers.planted_datasets import bars
@@ -55,19 +59,6 @@ def test_resumed_is_bit_for_bit_uninterrupted(data: Dataset, tmp_path: Path) -> 
     assert names_in(tmp_path) == ["m.safetensors"]
 
 
-def test_a_training_leaves_the_generator_of_others_alone(data: Dataset) -> None:
-    torch.manual_seed(11)
-    expected = torch.rand(3)
-    torch.manual_seed(11)
-    train(data, SMALL, training=Training(epochs=1))
-    assert torch.equal(torch.rand(3), expected)
-
-
-def test_another_seed_is_another_training(data: Dataset) -> None:
-    one, other = (train(data, SMALL, seed=seed, training=Training(epochs=1)) for seed in (0, 1))
-    assert one.metadata.curves["loss"] != other.metadata.curves["loss"]
-
-
 def test_what_is_done_is_returned_and_what_is_another_is_kept(data: Dataset, tmp_path: Path) -> None:
     path = tmp_path / "m.safetensors"
     once = train(data, SMALL, to=path, seed=3)
@@ -77,25 +68,6 @@ def test_what_is_done_is_returned_and_what_is_another_is_kept(data: Dataset, tmp
     assert again.metadata.curves == once.metadata.curves
     with pytest.raises(SurrogateError, match="another surrogate is there already; remove it or choose another name"):
         train(data, SMALL, to=path, seed=4)
-
-
-def test_the_checkpoint_of_another_training_is_kept(data: Dataset, tmp_path: Path) -> None:
-    path = tmp_path / "m.safetensors"
-    with pytest.raises(Interrupted):
-        train(data, SMALL, to=path, progress=stop_at(1))
-    left = (tmp_path / "m.safetensors.checkpoint").read_bytes()
-    with pytest.raises(SurrogateError, match=r"left by another training \(there and here recipe.hidden is "):
-        train(data, replace(SMALL, hidden=9), to=path, seed=1)
-    with pytest.raises(SurrogateError, match=r"left by another training \(there and here data is "):
-        train(data.rows(slice(50)), SMALL, to=path)
-    assert (tmp_path / "m.safetensors.checkpoint").read_bytes() == left
-
-
-def test_a_damaged_checkpoint_says_so(data: Dataset, tmp_path: Path) -> None:
-    path = tmp_path / "m.safetensors.checkpoint"
-    path.write_bytes(b"torn")
-    with pytest.raises(SurrogateError, match="checkpoint: damaged"):
-        train(data, SMALL, to=tmp_path / "m.safetensors")
 
 
 def test_early_stop_and_the_best_epoch(data: Dataset) -> None:
@@ -118,18 +90,6 @@ def test_training_learns_and_the_file_holds_the_same_network(data: Dataset, tmp_
     assert sorted(model.metadata.metrics["times"]) == ["18750"[:5], "31250", "6250"]
 
 
-def test_the_cosine_ends_at_zero(data: Dataset) -> None:
-    model = train(data, SMALL, training=Training(rate=1e-2, schedule="cosine", epochs=4, batch=128))
-    assert model.metadata.curves["rate"] == pytest.approx(5e-3 * (1 + np.cos(np.pi * np.arange(4) / 4)))
-
-
-def test_rows_set_aside_are_a_fifth_and_none_is_lost() -> None:
-    aside, kept = training_split(101, Training(), seed=0)[::-1]
-    assert len(aside) == 20
-    assert sorted([*aside.tolist(), *kept.tolist()]) == list(range(101))
-    assert training_split(101, Training(), seed=1)[1].tolist() != aside.tolist()
-
-
 def test_frames_that_are_not_numbers_teach_nothing(data: Dataset) -> None:
     values = data.values.copy()
     values[::2, 7:] = np.nan
@@ -148,26 +108,6 @@ def test_samples_that_were_rejected_teach_nothing(data: Dataset) -> None:
         DatasetError, match="a data set with 9 accepted samples of 96 is too small to train on; 10 are the least"
     ):
         train(replace(data, reasons=reasons), SMALL)
-
-
-def test_a_constant_column_is_told_and_harmless(data: Dataset) -> None:
-    parameters = data.parameters.copy()
-    parameters[:, 1] = 4.5
-    model = train(replace(data, parameters=parameters), SMALL)
-    assert model.metadata.notes == ("constant in training, so that nothing is known beyond: n",)
-    assert math.isfinite(model.metadata.metrics["loss"])
-
-
-def test_a_data_set_of_another_kind_cannot_judge(data: Dataset) -> None:
-    model = train(data, SMALL)
-    with pytest.raises(DatasetError, match="another specimen than the surrogate: specimen.fields.tolerance"):
-        evaluate(model, replace(data, specimen=data.specimen.replace(tolerance=1e-4)))
-
-
-def test_a_training_that_diverges_says_so(data: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ParameterModule, "loss", lambda self, batch: self(batch).sum() * math.nan)
-    with pytest.raises(SurrogateError, match=r"diverged in epoch 1: .* lower the rate \(0.01\) or limit the gradient"):
-        train(data, SMALL)
 
 
 def test_fingerprints_see_what_can_be_learnt(data: Dataset) -> None:
@@ -195,3 +135,65 @@ def test_settings_that_make_no_sense_and_a_device_that_is_not_there(data: Datase
         (lambda: train(data, SMALL, device="tpu"), "device 'tpu' is not there; allowed are auto"),
     ]
     assert not said_otherwise(mistakes, SurrogateError)
+
+
+# ---- metrics ---------------------------------------------------------------------------------------------------------
+
+# Metrics against numbers worked out by hand, and what Eq. (4) is.
+
+
+def compared(
+    true: np.ndarray, predicted: np.ndarray, mask: np.ndarray | None = None, **more: object
+) -> PredictionComparison:
+    count, frames = true.shape[:2]
+    given = {
+        "times": np.tile(100.0 * np.arange(frames), (count, 1)),
+        "mask": np.ones((count, frames), bool) if mask is None else mask,
+        "outputs": tuple("abc"[: true.shape[2]]),
+        "scale": np.ones(true.shape[2]),
+        "index": 10 + np.arange(count),
+    }
+    return PredictionComparison(true=true, predicted=predicted, **{**given, **more})
+
+
+def test_the_mean_over_samples_at_each_time_has_a_loss_of_one() -> None:
+    true = np.random.default_rng(0).normal(size=(7, 5, 3))
+    mean = np.broadcast_to(true.mean(axis=0), true.shape)
+    assert relative_squared_error(true, mean, np.ones((7, 5), bool)) == pytest.approx(1.0, rel=1e-14)
+    assert relative_squared_error(true, true, np.ones((7, 5), bool)) == 0.0
+
+
+def test_a_loss_worked_out_by_hand_with_a_history_that_ends() -> None:
+    # at the first time 1 and 3 (mean 2), at the second 10 alone: its history is the only one that lasts
+    true = np.array([[[1.0], [10.0]], [[3.0], [0.0]]])
+    predicted = true + np.array([[[0.5], [0.5]], [[-0.5], [99.0]]])
+    mask = np.array([[True, True], [True, False]])
+    assert relative_squared_error(true, predicted, mask) == pytest.approx(3 * 0.25 / (1.0 + 1.0))
+
+
+def test_outputs_count_in_units_of_their_deviations() -> None:
+    true = np.random.default_rng(1).normal(size=(9, 4, 2))
+    predicted = true + 0.1
+    mask, big = np.ones((9, 4), bool), np.array([1.0, 1000.0])
+    alone = relative_squared_error(true, predicted, mask)
+    assert relative_squared_error(true * big, predicted * big, mask, big) == pytest.approx(alone, rel=1e-12)
+
+
+def test_at_a_time_between_frames_values_are_linear_and_short_histories_are_left_out() -> None:
+    true = np.array([[[0.0], [1.0], [2.0]], [[5.0], [6.0], [7.0]]])
+    mask = np.array([[True, True, True], [True, True, False]])
+    found = compared(true, true + 1.0, mask)
+    assert found.at_time(150.0)[0] == pytest.approx(np.array([[1.5]]))
+    assert found.at_time(50.0)[1] == pytest.approx(np.array([[1.5], [6.5]]))
+
+
+def test_the_worst_samples_come_first_with_their_numbers() -> None:
+    true = np.zeros((4, 3, 1))
+    predicted = true.copy()
+    predicted[2, 1], predicted[0, 2] = -3.0, 1.0
+    found = comparison_metrics(compared(true, predicted), (100.0,))
+    first, second = found["worst"][:2]
+    assert (first["index"], first["error"], first["time"]) == (12, 3.0, 100.0)
+    assert (second["index"], second["error"], second["time"]) == (10, 1.0, 200.0)
+    assert found["outputs"]["a"]["largest_median"] == 0.5
+    assert found["outputs"]["a"]["r2"] is None  # the truth does not vary, and JSON has no NaN

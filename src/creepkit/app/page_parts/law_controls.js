@@ -1,5 +1,5 @@
 "use strict";
-// The law: its equations, a slider for every parameter, what is known of them, and likely directions.
+// The law: its equations, a slider for every parameter, and what is known of them.
 (function (page) {
   const { element } = page;
   const DECADES = 3; // to either side, of a slider that does not span all bounds
@@ -8,19 +8,10 @@
   const internal = (p, value) => (isLog(p) ? Math.log(value) : value);
   const external = (p, value) => (isLog(p) ? Math.exp(value) : value);
 
-  const MOST_DIRECTIONS = 2;
-
-  // A direction in words: which parameters rise and which fall along it.
-  function words(direction) {
-    const order = Object.entries(direction).sort((a, b) => Math.abs(b[1]) - Math.abs(a[1]));
-    return order.slice(0, 4).filter(([, by]) => by !== 0).map(([name, by]) => `${name} ${by > 0 ? "up" : "down"}`).join(", ");
-  }
-
   // handlers: onInput(event), onRelease(), onLaw(position)
   page.lawControls = function (data, state, handlers) {
     const equations = element("div", { class: "equations" });
     const list = element("div", { class: "sliders" });
-    const directions = element("div", { class: "sliders directions" });
     const known = element("div", { class: "known" });
     const follow = element("input", { type: "checkbox", id: page.identifier("follow") });
     const followRow = element("div", { class: "check" }, follow, element("label", { for: follow.id }, "the others follow to their likely values"));
@@ -30,10 +21,10 @@
     const titles = data.laws.map((law) => law.title + (law.weight === null ? "" : ` (weight ${page.format(law.weight, 2)})`));
     const choice = page.choice("Law", titles, handlers.onLaw);
     const group = element(
-      "fieldset", {}, element("legend", {}, "Law"), data.laws.length > 1 ? choice.row : null, equations, list, directions,
+      "fieldset", {}, element("legend", {}, "Law"), data.laws.length > 1 ? choice.row : null, equations, list,
       element("div", { class: "buttons" }, reset), followRow, wholeRow, known,
     );
-    let law, sliders, shifts;
+    let law, sliders;
 
     function use(position) {
       law = data.laws[position];
@@ -55,28 +46,7 @@
         sliders[k].mark({ optimum: p.value, interval: low === null || high === null ? undefined : p.interval });
         sliders[k].row.append(element("div", { class: "estimate" }, `${page.format(p.value, digits + 1)}, 95 % from ${page.format(low, digits)} to ${page.format(high, digits)}` + (p.verdict === "determined" ? "" : `: ${p.verdict}`)));
       });
-      const shown = law.parameters.length > 1 ? law.directions.slice(0, MOST_DIRECTIONS) : [];
-      shifts = shown.map(() => 0);
-      directions.replaceChildren(...shown.map(directionSlider));
       windows();
-    }
-
-    const directionSliders = [];
-    function directionSlider(direction, d) {
-      const slider = page.slider({
-        name: `likely direction ${d + 1}`, help: words(direction), unit: "sd", low: -3, high: 3, value: 0,
-        onInput: (value, event) => {
-          shifts[d] = value;
-          law.parameters.forEach((p, k) => {
-            const shift = shifts.reduce((sum, by, j) => sum + by * law.directions[j][p.name], 0);
-            put(k, Math.min(Math.max(external(p, internal(p, p.value) + shift), p.low), p.high));
-          });
-          handlers.onInput(event);
-        },
-        onRelease: handlers.onRelease,
-      });
-      directionSliders[d] = slider;
-      return slider.row;
     }
 
     function put(k, value) {
@@ -123,8 +93,6 @@
         put(k, p.value);
         sliders[k].mark({ likely: undefined });
       });
-      shifts.fill(0);
-      directionSliders.forEach((slider) => slider.set(0));
       handlers.onInput(null);
       handlers.onRelease();
     }

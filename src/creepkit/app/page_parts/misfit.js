@@ -21,6 +21,16 @@
     return result;
   };
 
+  // {output: rms over all frames} of several tests.
+  page.together = function (misfits) {
+    const sums = {};
+    for (const [name, one] of misfits.flatMap((misfit) => Object.entries(misfit)).filter(([, one]) => one.frames)) {
+      const [squares, frames] = sums[name] ?? [0, 0];
+      sums[name] = [squares + one.frames * one.rms ** 2, frames + one.frames];
+    }
+    return Object.fromEntries(Object.entries(sums).map(([name, [squares, frames]]) => [name, Math.sqrt(squares / frames)]));
+  };
+
   // The rms of residuals over their noise, of all outputs of all tests; null where no noise is known.
   page.weighted = function (misfits) {
     const known = misfits.flatMap((misfit) => Object.values(misfit)).filter((one) => one.squares !== null);

@@ -4,6 +4,8 @@
   const { element } = page;
   const LONGEST_LABEL = 22; // letters beside an axis
   const MOST_SHOWN = 12; // tests that are shown at first
+  const PERCENT_PER_HOUR = 3.6e5; // of 1/s
+  const DECADES = 100; // of the last time over the first, from which axes are logarithmic
   page.latencies = []; // ms from an input to the frame after its curves were drawn
 
   const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
@@ -22,7 +24,7 @@
     const warning = element("p", { class: "warning", role: "note", hidden: true });
     const panels = element("div", { class: "panels" });
     const chosen = element("select", { "aria-label": "plot that is shown", onchange: offerPanels });
-    let inputAt = null, charts = new Map(), rates = null, section = null, last = null, timer = null, before = null, settled = true;
+    let inputAt = null, charts = new Map(), outputs = new Map(), rates = null, section = null, last = null, timer = null, before = null, settled = true;
 
     data.specimens = data.specimens.filter(page.predicts);
 
@@ -111,18 +113,23 @@
       return kinds.length === 1 ? kinds[0] : `of tests as measured (${[...measured].join(", ")}), planned logarithmic`;
     }
 
+    // Whether the shown tests follow an output over decades of time.
+    function overDecades(name) {
+      return data.tests.some((test, k) => state.tests[k] && test.outputs[name] && test.times.at(-1) > DECADES * test.times.find((t) => t > 0));
+    }
+
     // ---- panels ------------------------------------------------------------------------------------------------
 
     function makePanels() {
       const names = new Set(data.tests.filter((_, k) => state.tests[k]).map((test) => test.specimen));
       if (state.planned || names.size === 0) names.add(state.specimen.name);
-      const outputs = new Map(data.specimens.filter((one) => names.has(one.name)).flatMap((one) => one.outputs.map((output) => [output.name, output])));
+      outputs = new Map(data.specimens.filter((one) => names.has(one.name)).flatMap((one) => one.outputs.map((output) => [output.name, output])));
       // the title names it in full
       const label = (output) => (output.title.length > LONGEST_LABEL ? output.unit : output.unit ? `${output.title}, ${output.unit}` : output.title);
-      charts = new Map([...outputs].map(([name, output]) => [name, page.chart({ title: capital(output.title), x: { label: "time", logarithmic: false, choice: true }, y: { label: label(output), short: output.unit || output.title, logarithmic: false, choice: true } })]));
+      charts = new Map([...outputs].map(([name, output]) => [name, page.chart({ title: capital(output.title), x: { label: "time", logarithmic: overDecades(name), choice: true }, y: { label: label(output), short: output.unit || output.title, logarithmic: output.factor > 1 && overDecades(name), choice: true } })]));
       charts.get("strain")?.heading.append(element("span", { class: "help" }, ` ${strainKind()}`));
       const point = data.laws[state.law].rate_point;
-      rates = page.chart({ title: "Creep rate against stress", whole: true, x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, 1/s", short: "1/s", logarithmic: true } });
+      rates = page.chart({ title: "Creep rate against stress", whole: true, x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, %/h", short: "%/h", logarithmic: true } });
       rates.heading.append(element("span", { class: "help" }, ` at strain ${page.format(point.strain, 2)}, ${page.duration(point.time)}${data.tests.some((test) => test.minimum_rate !== null) ? "; points: measured minimum rates, each at the temperature of its test" : ""}`));
       section = page.section();
       section.panel.hidden = true;
@@ -147,18 +154,18 @@
       const shown = (answer.tests ?? []).filter((one) => state.tests[one.test]);
       const ends = [...shown.map((one) => data.tests[one.test].times.at(-1)), ...(answer.program ? [state.end] : [])];
       const unit = page.timeUnit(Math.max(...ends, 1e-30));
-      const inUnit = (times) => times.map((t) => (t === null ? null : t / unit.size));
+      const scaled = (values, factor) => values.map((v) => (v === null ? null : v * factor)), inUnit = (times) => scaled(times, 1 / unit.size);
       for (const [name, chart] of charts) {
-        const series = [];
+        const series = [], { factor, unit: shownUnit } = outputs.get(name);
         for (const one of shown) {
           const test = data.tests[one.test], colour = page.colour(one.test), offset = test.offset[name] ?? 0, x = inUnit(test.times);
-          if (test.outputs[name]) series.push({ kind: "points", name: one.test, x, y: test.outputs[name], colour });
-          if (one.outputs[name]) series.push({ kind: "line", x, y: one.outputs[name].map((v) => (v === null ? null : v + offset)), colour });
+          if (test.outputs[name]) series.push({ kind: "points", name: one.test, x, y: scaled(test.outputs[name], factor), colour });
+          if (one.outputs[name]) series.push({ kind: "line", x, y: one.outputs[name].map((v) => (v === null ? null : (v + offset) * factor)), colour });
         }
-        if (before?.program?.outputs[name] && answer.program) series.push({ kind: "line", style: "before", x: inUnit(before.program.times), y: before.program.outputs[name], colour: "var(--soft)" });
-        if (answer.program?.outputs[name]) series.push({ kind: "line", style: "plan", x: inUnit(answer.program.times), y: answer.program.outputs[name], colour: page.colour(null) });
+        if (before?.program?.outputs[name] && answer.program) series.push({ kind: "line", style: "before", x: inUnit(before.program.times), y: scaled(before.program.outputs[name], factor), colour: "var(--soft)" });
+        if (answer.program?.outputs[name]) series.push({ kind: "line", style: "plan", x: inUnit(answer.program.times), y: scaled(answer.program.outputs[name], factor), colour: page.colour(null) });
         const planned = answer.program?.outputs[name]?.filter((v) => v !== null).at(-1);
-        chart.draw({ series, xLabel: `time, ${unit.name}`, summary: planned === undefined ? `${shown.length} measured tests.` : `The planned test ends at ${page.format(planned)}.` });
+        chart.draw({ series, xLabel: `time, ${unit.name}`, summary: planned === undefined ? `${shown.length} measured tests.` : `The planned test ends at ${page.format(planned * factor)} ${shownUnit}.` });
       }
       warning.textContent = shown.length ? page.temperatureWarning(data, state) : "";
       warning.hidden = warning.textContent === "";
@@ -186,10 +193,10 @@
     function drawRates(rate) {
       if (!rate) return;
       const colour = page.colour(null);
-      const drawn = (rate, style, colour) => ({ kind: "line", style, x: rate.stress, y: rate.log_rate.map((v) => (v === null ? null : 10 ** v)), colour });
+      const drawn = (rate, style, colour) => ({ kind: "line", style, x: rate.stress, y: rate.log_rate.map((v) => (v === null ? null : PERCENT_PER_HOUR * 10 ** v)), colour });
       const series = [...(before?.rate ? [drawn(before.rate, "before", "var(--soft)")] : []), drawn(rate, "plan", colour)];
       data.tests.forEach((test, k) => {
-        if (state.tests[k] && test.minimum_rate !== null && test.load === "stress") series.push({ kind: "points", name: k, large: true, x: [test.program[1].at(-1)], y: [test.minimum_rate], colour: page.colour(k) });
+        if (state.tests[k] && test.minimum_rate !== null && test.load === "stress") series.push({ kind: "points", name: k, large: true, x: [test.program[1].at(-1)], y: [PERCENT_PER_HOUR * test.minimum_rate], colour: page.colour(k) });
       });
       rates.draw({ series, summary: rate.problem ?? "" });
     }

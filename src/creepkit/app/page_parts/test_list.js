@@ -32,17 +32,19 @@
     }
 
     const units = Object.fromEntries(data.specimens.flatMap((one) => one.outputs.map((output) => [output.name, output])));
+    const amount = (name, value) => `${page.format(value * units[name].factor, 2)} ${units[name].unit}`.trim();
     function show(misfits) {
       data.tests.forEach((test, k) => {
         const entries = Object.entries(misfits.get(k) ?? {});
         const lines = (write) => (state.tests[k] ? entries.map((entry) => element("div", {}, write(entry))) : []);
-        rows[k].rms.replaceChildren(...lines(([name, one]) => `${entries.length > 1 || !units[name]?.unit ? (units[name]?.title ?? name) + " " : ""}${page.format(one.rms, 2)} ${units[name]?.unit ?? ""}`.trim()));
+        rows[k].rms.replaceChildren(...lines(([name, one]) => `${entries.length > 1 || !units[name].unit ? units[name].title + " " : ""}${amount(name, one.rms)}`));
         rows[k].ratio.replaceChildren(...lines(([, one]) => (one.ratio === null ? "\u2013" : page.format(one.ratio, 2))));
       });
       const shown = [...misfits].filter(([k]) => state.tests[k]).map(([, misfit]) => misfit);
       const weighted = page.weighted(shown);
       const lost = shown.flatMap((misfit) => Object.values(misfit)).reduce((sum, one) => sum + one.lost, 0);
-      total.textContent = shown.length === 0 ? "No test is shown." : weighted === null ? "The noise of these tests is not known well enough: state it in their files to see misfits over noise." : `These curves lie ${page.format(weighted, 3)} times the noise of a frame (rms) from ${shown.length} ${shown.length === 1 ? "test" : "tests"}, with the same rate for all tests${lost ? `; ${lost} frames lie beyond the end of a curve` : ""}.`;
+      const apart = Object.entries(page.together(shown)).map(([name, rms]) => `${units[name].title} ${amount(name, rms)}`).join(", ");
+      total.textContent = shown.length === 0 ? "No test is shown." : weighted === null ? `Off by ${apart} (rms).` : `Off by ${apart} (rms). These curves lie ${page.format(weighted, 3)} times the noise of a frame (rms) from ${shown.length} ${shown.length === 1 ? "test" : "tests"}, with the same rate for all tests${lost ? `; ${lost} frames lie beyond the end of a curve` : ""}.`;
       judged.textContent = data.laws[state.law].judged;
     }
     return { group, show };

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
-from creepkit.presentation import present
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -65,10 +60,6 @@ class SearchTrace:
 
     def __len__(self) -> int:
         return len(self.best_cost)
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw the lowest cost, and how the candidates spread; written to `path` when given."""
-        return present("reports.search:search_figure", self, path)
 
 
 SAME_BASIN = 0.1

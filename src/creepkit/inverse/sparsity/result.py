@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats
 from creepkit.inverse.goodness_of_fit import OutputErrors
-from creepkit.presentation import Presentable, present
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from creepkit.presentation import Presentable
 
 
 @dataclass(frozen=True)
@@ -32,7 +27,7 @@ class FitStatistics:
 
 
 @dataclass(frozen=True)
-class Sparsity(Presentable, text="reports.search:sparsity_text"):
+class Sparsity(Presentable, text="reports.inference:sparsity_text"):
     """How a sum was reduced; the terms are those of `law`, the sum.
 
     penalty : its class; strength : None of a choice among subsets, which has none.
@@ -116,7 +111,7 @@ def _quoted_list(names: list[str] | TermNames) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class PenaltyPath(Presentable, text="reports.search:penalty_path_text"):
+class PenaltyPath(Presentable, text="reports.inference:penalty_path_text"):
     """One row for each strength, the first of which is 0.
 
     penalty : its class; terms : of the sum; strengths : (strengths,) -, half a chi-square.
@@ -138,10 +133,6 @@ class PenaltyPath(Presentable, text="reports.search:penalty_path_text"):
     def contributions_by_term(self, row: int | None = None) -> dict[str, float]:
         """{term: contribution} of one row, by default the chosen one."""
         return dict(zip(self.terms, map(float, self.contributions[self.chosen if row is None else row]), strict=True))
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Contributions and rise of chi-square against the strength; written to `path` when given."""
-        return present("reports.search:penalty_path_figure", self, path)
 
 
 LEAST_CONTRIBUTION = 0.05

@@ -41,7 +41,7 @@ WELL_DETERMINED_SD = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Correlation(Presentable, text="reports.uncertainty:correlation_text"):
+class Correlation(Presentable, text="reports.inference:correlation_text"):
     """The correlation of estimates: matrix (parameters, parameters) -, and sd (parameters,) on the internal scale.
 
     names : as the matrix is to be read, "ln A" where the logarithm is meant, "ln rate" of a conditioned coefficient.

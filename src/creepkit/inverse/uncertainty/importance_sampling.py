@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import chi2, multivariate_t, norm, qmc
@@ -40,7 +39,7 @@ from creepkit.presentation import Presentable, present
 from creepkit.records import Predictor
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 ROUNDS, MOST_ROUNDS = 4, 12
 """Of proposals: at least, and where the samples are still worth too few."""
@@ -100,7 +99,7 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
 
 
 @dataclass(frozen=True, eq=False)
-class PosteriorSamples(RateStatements, Presentable, text="reports.uncertainty:posterior_text"):
+class PosteriorSamples(RateStatements, Presentable, text="reports.inference:posterior_text"):
     """Draws of a law's values from their posterior.
 
     u : (draws, parameters) conditioned coordinates of equal weight. ranges : that the tests cover, as of an
@@ -129,9 +128,9 @@ class PosteriorSamples(RateStatements, Presentable, text="reports.uncertainty:po
         median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
         return median, low, high
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Every pair of parameters, and each alone; written to `path` when given."""
-        return present("reports.uncertainty:pairs_figure", self, path)
+    def to_arviz(self) -> Any:
+        """An xarray Dataset for arviz, whose plots and summaries take it: one chain, with units of the parameters."""
+        return present("reports.dataframes:to_arviz", self)
 
 
 def sample_posterior(

@@ -52,7 +52,7 @@ class WeightedLaws(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class ModelAverage(RateStatements, Presentable, text="reports.uncertainty:model_average_text"):
+class ModelAverage(RateStatements, Presentable, text="reports.inference:model_average_text"):
     """Laws with weights that add up to one, each with its own posterior."""
 
     fits: tuple[Identification, ...]

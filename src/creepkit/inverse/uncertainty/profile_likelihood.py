@@ -58,7 +58,7 @@ ZERO_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class ProfileLikelihood(Presentable, text="reports.uncertainty:profile_text"):
+class ProfileLikelihood(Presentable, text="reports.inference:profile_text"):
     """The profile of one quantity.
 
     values, chi_square : (points,) values in the quantity's unit, rising, and the rise of chi-square at each.
@@ -81,7 +81,7 @@ class ProfileLikelihood(Presentable, text="reports.uncertainty:profile_text"):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The rise of chi-square over the quantity, with that of Laplace's approximation; written to `path`."""
-        return present("reports.uncertainty:profile_figure", self, path)
+        return present("reports.inference:profile_figure", self, path)
 
 
 @dataclass(frozen=True)

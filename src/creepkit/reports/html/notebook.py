@@ -10,12 +10,13 @@ from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.language import CreepLaw
-from creepkit.records import SECONDS_PER_HOUR, History
+from creepkit.records import History
 from creepkit.reports.answer import equations, symbols_of, unit_text
 from creepkit.reports.blocks import Block, Formula, Paragraph, Table, Verbatim, number
 from creepkit.reports.contents import ReportGroup
 from creepkit.reports.findings import findings_of
 from creepkit.reports.forecast import forecast_blocks
+from creepkit.reports.histories import history_blocks
 from creepkit.reports.html.page import block_shown, group_answer
 from creepkit.reports.html.templates import template
 from creepkit.reports.law_names import LawNames
@@ -78,14 +79,4 @@ def _(law: CreepLaw) -> Sequence[Block]:
 
 @_blocks.register
 def _(history: History) -> Sequence[Block]:
-    end = "" if history.rupture_time is None else f"ruptured at {number(history.rupture_time / SECONDS_PER_HOUR)} h"
-    end = end or ("stopped unruptured" if history.unruptured else "")
-    rows = [
-        ("specimen", history.specimen),
-        ("condition", history.condition),
-        ("readings", f"{history.times.size} to {number(float(history.times[-1]) / SECONDS_PER_HOUR)} h"),
-        *((name.replace("_", " "), f"to {number(float(v[-1]))}") for name, v in history.outputs.items()),
-        *([("end", end)] if end else []),
-        *history.labels.items(),
-    ]
-    return [Table(history.name, ("of the test", "value"), rows)]
+    return history_blocks([history])

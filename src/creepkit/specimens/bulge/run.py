@@ -74,7 +74,7 @@ class BulgeRun(FiniteElementRun):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """A picture of what is observed, and of the pressure, over time."""
-        return present("reports.simulation:outputs_figure", self, path)
+        return present("reports.histories:run_figure", self, path)
 
     @property
     def _profiles(self) -> Floats:

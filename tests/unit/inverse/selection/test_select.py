@@ -9,11 +9,20 @@ import sympy
 
 import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.inverse.adequacy import Adequacy
-from creepkit.inverse.selection import rank
-from creepkit.inverse.selection.select import _richer_laws, sums_of_two
-from creepkit.language import Param, arrhenius, strain, temperature, time
+from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
+from creepkit.inverse.identify import identify
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
+from creepkit.inverse.selection.discrimination import under_common_covariance
+from creepkit.inverse.selection.perturbation_trials import Challenge
+from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores, verdict_of
+from creepkit.inverse.selection.select import _richer_laws
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.variance_components import LinearisedProblem
+from creepkit.language import Param, strain, temperature, time
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
+from creepkit.laws.norton import NORTON
 from creepkit.records import History, Program
+from helpers.steady_rate_predictor import Steady, planted
 
 TIMES = np.geomspace(600.0, 4e5, 40)
 LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
@@ -90,24 +99,6 @@ def test_hold_out_and_sums_are_asked_for_by_name():
     assert held.best.law.name == "strain-hardening"
 
 
-def test_single_terms_of_the_combined_law_with_exponents_in_or_out_hold_the_laws_of_table_1():
-    law = ck.law("combined")
-    single = [law.only(term) for term in law.terms]
-    off = [one.fix(**{name: 0.0}) for one in single for name, p in one.table.items() if p.scale != "log" and p.off == 0]
-    assert {form(ck.law(name)) for name in LAWS} <= {form(one) for one in (*single, *off)}
-
-
-def form(law):
-    """The rate with its parameters renamed in the law's order."""
-    names = {symbol: f"p{k}" for k, symbol in enumerate(law.params)}
-    return sum(law.terms.values()).subs(names)
-
-
-def test_sums_leave_out_what_is_there_already():
-    laws = [ck.law("norton"), ck.law("norton"), ck.law("strain-hardening")]
-    assert [law.fingerprint for law in sums_of_two(laws)] == [(laws[0] + laws[2]).fingerprint]
-
-
 def test_a_law_that_cannot_be_identified_is_named_and_the_others_go_on():
     norton = ck.law("norton")
     A, n = norton.params
@@ -139,20 +130,6 @@ def tried(*adequacies, laws=("norton", "hyperbolic-sine")):
     return SimpleNamespace(laws=ranked)
 
 
-@pytest.mark.parametrize(
-    "adequacies",
-    [
-        (LEAVES, replace(LEAVES, verdict="explains")),
-        (replace(LEAVES, verdict="cannot be judged"), LEAVES),
-        (None, LEAVES),
-        (LEAVES, replace(LEAVES, remedies=("thickness",))),
-    ],
-    ids=["one explains", "one cannot be judged", "unknown", "an effect would explain"],
-)
-def test_nothing_further_is_tried_without_need(adequacies):
-    assert _richer_laws(tried(*adequacies), []) == []
-
-
 def test_sums_with_the_best_come_first_then_laws_with_a_memory_that_none_of_the_tried_has():
     richer = _richer_laws(tried(LEAVES, LEAVES), [])
     assert richer[0].fingerprint == (ck.law("norton") + ck.law("hyperbolic-sine")).fingerprint
@@ -166,13 +143,6 @@ def test_sums_with_the_best_come_first_then_laws_with_a_memory_that_none_of_the_
     assert not any(law.uses(temperature) for law in richer)
     remembering = [len(law.params) for law in richer[1 : 1 + sum(has_memory)]]
     assert remembering == sorted(remembering)
-
-
-def test_with_temperatures_all_of_them_have_one():
-    laws = [ck.law(name).times(arrhenius(T_ref=1000.0)) for name in ("norton", "strain-hardening")]
-    plain = measured("norton", {"A": 1e-16, "n": 4.2})
-    tests = [h.replace(temperature=T) for h, T in zip(plain, (950.0, 1000.0, 1050.0), strict=True)]
-    assert all(law.uses(temperature) for law in _richer_laws(tried(LEAVES, LEAVES, laws=laws), tests))
 
 
 def softening():
@@ -203,3 +173,213 @@ def test_further_laws_are_tried_within_their_budget_and_are_proposals():
     single = ck.select(LAWS[:2], tests, "uniaxial", nuisances=[], starts=1, sobol_points=8, frames=24, sums=False)
     assert single.further == ()
     assert len(single.laws) == 2
+
+
+# ---- ranking ---------------------------------------------------------------------------------------------------------
+
+# Verdicts: one sentence for each case, and decisive only where everything that decisiveness needs is there.
+
+
+STRAIN = OutputAdequacy("strain", 120, 2e-5, "stated", 1.02, 0.4, 0.0)
+EXPLAINS = Adequacy("explains", (STRAIN,), 1.02, 117.0, 0.4, NAN, None)
+LEFT = Adequacy(
+    "leaves a discrepancy", (replace(STRAIN, chi_square=5.0, p_value=1e-20, discrepancy=4e-5),), 5.0, 117.0, 1e-20, 0.3,
+    LargestDeviation("bar 1", "strain", 5400.0, 4e-5, 2.0),
+)  # fmt: skip
+UNKNOWN = Adequacy("cannot be judged", (), NAN, 0.0, NAN, NAN, None)
+SUM = Challenge("sum", "norton+sinh", "norton+sinh with 30 % of the rate from sinh explains them as well")
+DRIFT = Challenge("unmodelled effect", "temperature drift", "a temperature drift would leave it a weight of 0.52")
+
+
+def fit(name, adequacy=EXPLAINS, **more):
+    values = {"predictor": None, "histories": (), **more}
+    return SimpleNamespace(law=SimpleNamespace(name=name), adequacy=adequacy, **values)
+
+
+def ranking_of(weights, adequacies=None, names=("norton", "sinh", "theta"), **more):
+    adequacies = adequacies or [EXPLAINS] * len(weights)
+    laws = [
+        RankedLaw(fit(name, adequacy), 0.0, weight)
+        for name, adequacy, weight in zip(names, adequacies, weights, strict=False)
+    ]
+    return Ranking(tuple(laws), **{"challenges": (), **more})
+
+
+def test_decisive_is_a_law_that_was_asked_for_explains_has_the_weight_and_stands_every_challenge():
+    best = ranking_of([0.97, 0.02, 0.01])
+    assert best.decisive
+    assert best.verdict == f"decisive: norton, of 3 laws tried; it {EXPLAINS}"
+
+
+def test_with_any_part_missing_it_is_not_decisive():
+    short = {
+        "weight": ranking_of([0.95, 0.04, 0.01]),
+        "adequacy": ranking_of([0.97, 0.02, 0.01], [LEFT, EXPLAINS, EXPLAINS]),
+        "no noise": ranking_of([0.97, 0.02, 0.01], [UNKNOWN] * 3),
+        "no adequacy": ranking_of([0.97, 0.02, 0.01], [None] * 3),
+        "not asked for": ranking_of([0.97, 0.02, 0.01], further=("norton",)),
+        "unexamined": ranking_of([0.97, 0.02, 0.01], challenges=None),
+        "challenge": ranking_of([0.97, 0.02, 0.01], challenges=(DRIFT,)),
+        "alone": ranking_of([1.0]),
+    }
+    assert [why for why, one in short.items() if one.decisive or one.verdict.startswith("decisive")] == []
+
+
+# ---- rankings ----------------------------------------------------------------------------------------------------
+
+
+def test_scores_are_ordered_and_weighted():
+    """exp(-excess / 2) over its sum."""
+    fits = [fit(name) for name in ("norton", "sinh", "theta")]
+    found = ranking_from_scores(fits, np.array([12.0, 10.0, 14.0]), "bic", independent_frames=40.0)
+    assert [r.fit.law.name for r in found.laws] == ["sinh", "norton", "theta"]
+    assert [r.excess for r in found.laws] == pytest.approx([0.0, 2.0, 4.0])
+    weights = np.exp([0.0, -1.0, -2.0])
+    assert [r.weight for r in found.laws] == pytest.approx(weights / weights.sum())
+    assert found.challenges is None
+    assert [r.fit.law.name for r in found.credible] == ["sinh", "norton", "theta"]
+
+
+@pytest.mark.parametrize("score", [8.0, NAN], ids=["test not predicted", "misfit is no number"])
+def test_a_law_that_does_not_predict_every_test_is_never_first(score):
+    """Of readings that it does not predict a law has no misfit: its criterion is no smaller for them."""
+    adequacy = EXPLAINS.with_unpredicted(("bar 1",) if score == score else ())
+    fits = [fit("norton", adequacy), fit("sinh"), fit("theta")]
+    found = ranking_from_scores(fits, np.array([score, 10.0, 12.0]), "bic", independent_frames=40.0)
+    assert [r.fit.law.name for r in found.laws] == ["sinh", "theta", "norton"]
+    assert [r.weight for r in found.laws] == pytest.approx([1 / (1 + np.exp(-1)), np.exp(-1) / (1 + np.exp(-1)), 0.0])
+    alone = ranking_from_scores(fits[:1], np.array([score]), "bic", independent_frames=40.0)
+    assert not alone.decisive
+
+
+def test_what_is_not_predicted_has_no_positive_verdict():
+    missing = EXPLAINS.with_unpredicted(("bar 1", "bar 2"))
+    for more in ({"weights": [0.99, 0.01]}, {"weights": [0.6, 0.4]}, {"weights": [0.99, 0.01], "further": ("norton",)}):
+        found = ranking_of(more.pop("weights"), [missing, missing], **more)
+        assert not found.singled_out
+        assert not found.decisive
+        assert "not contradicted" not in found.verdict
+        assert "it does not predict every reading of test 'bar 1' and 1 more" in found.verdict
+
+
+def test_only_a_law_that_is_singled_out_and_can_be_predicted_is_challenged(monkeypatch):
+    monkeypatch.setattr("creepkit.inverse.selection.challenges.challenges_of", lambda fits: (SUM,))
+    trials = "creepkit.inverse.selection.perturbation_trials.explaining_effects"
+    monkeypatch.setattr(trials, lambda fits, weights: ())
+    at_hand = {"predictor": object(), "histories": (object(),)}
+    whole = Ranking(tuple(RankedLaw(fit(n, **at_hand), 0.0, w) for n, w in (("norton", 0.99), ("sinh", 0.01))))
+    assert challenged(whole).challenges == (SUM,)
+    assert not challenged(whole).decisive
+    from_file = Ranking(tuple(RankedLaw(fit(n), 0.0, w) for n, w in (("norton", 0.99), ("sinh", 0.01))))
+    undecided = Ranking(tuple(RankedLaw(fit(n, **at_hand), 0.0, 0.5) for n in ("norton", "sinh")))
+    alone = Ranking((RankedLaw(fit("norton", **at_hand), 0.0, 1.0),))
+    for other in (from_file, undecided, alone):
+        assert challenged(other) is other
+
+
+def test_an_export_of_a_ranking_carries_its_verdict():
+    """What is not decisive must not be read as proved where the law is used."""
+    tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(55.0, 1000.0), (65.0, 1000.0)], seed=0, noise=2e-4)
+    settings = IdentificationSettings(starts=1, sobol_points=8, frames=20, weights="likelihood", nuisances=())
+    found = rank([identify(law, tests, Steady(), settings=settings) for law in (NORTON, HYPERBOLIC_SINE)])
+    assert not found.decisive
+    for target, marker in (("latex", "%"), ("python", "#"), ("ansys", "")):
+        text = " ".join(ck.export(found, target).replace(marker or "\0", " ").split())
+        assert "not decisive; weights" in text
+    assert "decisive; weights" not in ck.export(found.best, "latex")
+
+
+THINNER = Challenge("unmodelled effect", "thickness", "with a thickness 4.8 % smaller sinh would explain them")
+NONE = "not decisive: none of {} laws tried explains the tests"
+APART = "not decisive: of 3 laws tried these tests cannot tell apart norton and sinh"
+SENTENCES = [
+    (
+        ranking_of([1.0, 0.0, 0.0], [LEFT] * 3),
+        f"{NONE.format(3)}; the best, norton (weight 1.00 of the laws tried), leaves 4e-05 of strain (2 times its "
+        "stated noise) unexplained",
+        "most in strain of 'bar 1' about 1.5 h, where it lies 4e-05 above what was measured",
+    ),
+    (
+        ranking_of([0.6, 0.35, 0.05], [LEFT] * 3),
+        "norton (weight 0.60 of the laws tried, not told apart from sinh), leaves",
+    ),
+    # of the best law an effect stands in its adequacy; of another one it is said beside it
+    (
+        ranking_of([1.0, 0.0], [replace(LEFT, remedies=("thickness",)), LEFT]),
+        "it would explain them with thickness, which nobody modelled",
+    ),
+    (
+        ranking_of([1.0, 0.0], [LEFT, replace(LEFT, remedies=("thickness", "temperature drift"))]),
+        "; with thickness or temperature drift, which nobody modelled, sinh would explain them)",
+    ),
+    (
+        ranking_of([0.99, 0.01], [LEFT, LEFT], challenges=(THINNER,)),
+        f"{NONE.format(2)} as they are stated; {THINNER}; the best, norton (weight 0.99 of the laws tried), leaves",
+    ),
+    (ranking_of([0.5, 0.45, 0.05], challenges=(THINNER,)), f"{APART}; {THINNER}; the best is norton: it {EXPLAINS}"),
+    (ranking_of([0.5, 0.45, 0.05]), f"{APART}; the best is norton: it {EXPLAINS}"),
+    (
+        ranking_of([0.99, 0.01, 0.0], [EXPLAINS, LEFT, LEFT], further=("norton", "theta")),
+        "not decisive: the law asked for does not explain the tests; of 2 more that were tried, norton is not "
+        "contradicted by them (weight 0.99 of the laws tried): plan tests that can refute it",
+    ),
+    (
+        ranking_of([0.99, 0.01, 0.0], [EXPLAINS, LEFT, LEFT], further=("norton",)),
+        "not decisive: none of the 2 laws asked for explains the tests; of 1 more",
+    ),
+    (
+        ranking_of([0.99, 0.01], challenges=(SUM, DRIFT)),
+        "not decisive: of 2 laws tried norton has nearly all the weight (weight 0.99 of the laws tried) and is not "
+        f"contradicted by the tests; but {SUM}; and {DRIFT}",
+    ),
+    (
+        ranking_of([0.99, 0.01], [UNKNOWN, UNKNOWN]),
+        "not decisive: of 2 laws tried norton is best (weight 0.99 of the laws tried); it cannot be judged: no noise",
+    ),
+]
+
+
+def test_verdicts_name_the_best_law_what_it_leaves_and_what_else_the_tests_allow():
+    said = [(verdict_of(one), words) for one, *several in SENTENCES for words in several]
+    assert [(verdict, words) for verdict, words in said if words not in verdict] == []
+
+
+# ---- common covariance -----------------------------------------------------------------------------------------------
+
+# Laws under one covariance: what a law makes of its own scatter does not count in its favour.
+
+
+TESTS, ENTRIES = 3, 12
+
+
+def law(seed, size=1.0, **changes):
+    """A law of one parameter that moves every entry alike, its residuals drawn."""
+    shape, rng = (TESTS, ENTRIES), np.random.default_rng(seed)
+    ones = np.ones(shape)
+    values = size * rng.normal(size=shape)
+    values -= values.mean()
+    clock = np.broadcast_to(np.linspace(0.0, 5.0, ENTRIES), shape)
+    r = Residuals(values, ones, ones > 0, clock, ones[..., None], ones, np.zeros(shape, int), ones, np.ones(TESTS))
+    free, room = np.ones(1, bool), np.array([[-9.0], [9.0]])
+    linear = LinearisedProblem(replace(r, **changes), np.full(1, 1e-9), np.zeros(1), free, room)
+    return SimpleNamespace(
+        linearised=linear, noise_model=NoiseModel({"strain": OutputNoise(1.0)}, rate=0.5), u=np.zeros(1)
+    )
+
+
+def test_rates_that_matter_more_to_a_law_do_not_excuse_it():
+    best, poor = law(0), law(1, size=3.0)
+    excusing = law(1, size=3.0, log_rate_sensitivity=np.full((TESTS, ENTRIES), 20.0))
+    found = under_common_covariance([best, poor, excusing])
+    assert found.chi_square[2] == pytest.approx(found.chi_square[1], rel=1e-12)
+
+
+def test_chi_square_between_laws_is_that_of_their_difference_under_the_covariance():
+    """One law whose residuals are the other's and one more everywhere but in the mean of all, which is fitted."""
+    one, other = law(0), law(0)
+    step = np.zeros((TESTS, ENTRIES))
+    step[0, :6], step[0, 6:] = 1.0, -1.0
+    residuals = replace(other.linearised.residuals, values=other.linearised.residuals.values + step)
+    other.linearised = replace(other.linearised, residuals=residuals)
+    white = under_common_covariance([one, other]).whitened
+    assert ((white[0] - white[1]) ** 2).sum() == pytest.approx(12.0, rel=1e-9)

@@ -1,16 +1,17 @@
-"""A sum reduced to the terms that planted bulge tests need: single laws, two-term laws and paths."""
+"""Contributions of terms over what tests visit, against closed forms; where tests go."""
 
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import approx_fprime
 
 from creepkit.inverse.identification_document import CODEC
-from creepkit.inverse.search.derivative_free import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Sqrt, Subsets
-from creepkit.inverse.sparsity.reduced_laws import terms_above
+from creepkit.inverse.sparsity.contributions import STRESS_FACTORS
+from creepkit.inverse.sparsity.penalties import L2, GroupL2, PenalisedTerms, Sqrt, Subsets, switchable_exponents
 from creepkit.inverse.sparsity.result import Sparsity
 from creepkit.inverse.sparsity.term_selection import (
     TermChoice,
@@ -21,11 +22,165 @@ from creepkit.inverse.sparsity.term_selection import (
     identify_sparse,
     trace_path,
 )
+from creepkit.language import Elastic, arrhenius
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
+from creepkit.records import History, PressureJump
 from helpers.reduced_bulge_predictor import OneDegree, Plan, planted
+from helpers.term_contributions import bar, contributions, internal
+
+HOUR = 3600.0
+
+
+def test_two_power_laws_at_one_stress_have_the_closed_form():
+    """c_i over sigma x {.5, .8, 1, 1.3}, with f_1 / f_2 = (A_1 / A_2) sigma^(n_1 - n_2) at each."""
+    law, sigma = NORTON + NORTON, 40.0
+    own = contributions(law, [bar(sigma)])
+    u = own.coordinates.u(internal(law, A_1=2e-13, n_1=3.0, A_2=1e-16, n_2=5.0))
+    stress = sigma * np.array(STRESS_FACTORS)
+    first, second = 2e-13 * stress**3, 1e-16 * stress**5
+    share = first / (first + second)
+    wanted = [np.sqrt(np.mean(share**2)), np.sqrt(np.mean((1 - share) ** 2))]
+    assert_allclose(own.values(u[None])[0], wanted, rtol=1e-12)
+    assert own.by_term(u) == pytest.approx(dict(zip(law.terms, wanted, strict=True)))
+
+
+def test_an_arrhenius_factor_on_all_terms_changes_no_share():
+    plain = NORTON + STRAIN_HARDENING
+    warm = plain.times(arrhenius(T_ref=1000.0))
+    tests = [bar(30.0, T=950.0), bar(30.0, "hot", T=1050.0)]
+    values = dict(A_1=1e-14, n_1=4.0, A_2=1e-17, n_2=3.0, m=-0.5)
+    first, second = contributions(plain, tests), contributions(warm, tests)
+    u, v = first.coordinates.u(internal(plain, **values)), second.coordinates.u(internal(warm, **values, Q=3e5))
+    assert_allclose(second.values(v[None]), first.values(u[None]), rtol=1e-9)
+
+
+def test_factors_of_single_terms_shift_shares_between_temperatures():
+    """Q of 200 kJ/mol in one term: its rate over the other's grows by exp(Q/R (1/T_1 - 1/T_2)) from test to test."""
+    law = NORTON.times(arrhenius(T_ref=1000.0)) + NORTON
+    tests = [bar(30.0, T=950.0), bar(30.0, "hot", T=1050.0)]
+    own = contributions(law, tests)
+    u = own.coordinates.u(internal(law, A_1=1e-14, n_1=4.0, Q=2e5, A_2=1e-14, n_2=4.0))
+    ratio = np.exp(-2e5 / 8.314462618 * (1 / np.array([950.0, 1050.0]) - 1 / 1000.0))
+    share = ratio / (1 + ratio)
+    assert_allclose(own.values(u[None])[0, 0], np.sqrt(np.mean(share**2)), rtol=1e-9)
+
+
+def test_the_jacobian_is_that_of_the_closed_form():
+    """d share_i / d ln A_j = share_i (delta_ij - share_j); A_j moves with its log rate at the reference."""
+    law = NORTON + NORTON
+    own = contributions(law, [bar(40.0)])
+    u = own.coordinates.u(internal(law, A_1=2e-13, n_1=3.0, A_2=1e-16, n_2=5.0))
+    s, c = own.fractions(u[None])[0], own.values(u[None])[0]
+    slopes = s[:, :, None] * (np.eye(2) - s[:, None, :])
+    wanted = np.einsum("p,pi,pij->ij", own.points.weight, s, slopes) / c[:, None]
+    found = own.jacobian(u)
+    assert_allclose(found[:, [law.names.index("A_1"), law.names.index("A_2")]], wanted, atol=1e-9)
+
+
+def test_nothing_overflows_where_rates_do():
+    """sinh(400/1)^8 is e^3194."""
+    own = contributions(COMBINED, [bar(400.0)])
+    values = {**COMBINED.center(), "A_1": 1e-5, "n_1": 8.0, "B": 1.0}
+    c = own.values(own.coordinates.u(internal(COMBINED, **values))[None])[0]
+    assert_allclose(c, [1.0, 0.0, 0.0], atol=1e-12)
+
+
+# ---- where tests go ------------------------------------------------------------------------------------------------
+
+
+def dimple(**more):
+    times = np.arange(1, 49) * 900.0
+    grown = 0.05 + 0.3 * times / times[-1]
+    return History(
+        "dimple", times, {"amplitude": grown}, PressureJump(P1=8, P2=10, Tj=4 * HOUR), 1000.0, specimen="bulge",
+        elastic=Elastic(150e3), **more,
+    )  # fmt: skip
+
+
+# ---- penalties -------------------------------------------------------------------------------------------------------
+
+# Penalties on contributions: where they are smallest, and that least squares sees what they are.
+
+
+EVERY = (L2(3.0), GroupL2(3.0), Sqrt(3.0))
+
+
+def simplex(count=60):
+    """Shares of three terms that add up to one, corners and centre among them."""
+    rng = np.random.default_rng(0)
+    return np.concatenate([np.eye(3), np.full((1, 3), 1 / 3), rng.dirichlet(np.ones(3), count)])
+
+
+def test_squared_l2_is_smallest_at_equal_shares():
+    """By Cauchy and Schwarz, sum c^2 >= (sum c)^2 / 3 with equality only there: it spreads, it does not select."""
+    values = L2.OF_CONTRIBUTIONS.value(simplex())
+    assert values.argmin() == 3
+    assert values[3] == pytest.approx(1 / 3)
+    assert_allclose(values[:3], 1.0)
+
+
+def test_the_square_root_is_smallest_in_a_corner():
+    values = Sqrt.OF_CONTRIBUTIONS.value(simplex())
+    assert values.argmin() in (0, 1, 2)
+    assert values[3] == values.max()
+
+
+@pytest.mark.parametrize("penalty", EVERY, ids=lambda p: type(p).__name__)
+def test_parabolas_touch_the_penalty_and_lie_above_it(penalty):
+    """w c^2 + const through c_0, of equal slope there; for concave functions of c^2 it majorises."""
+    penalty, grid = penalty.OF_CONTRIBUTIONS, np.linspace(0.0, 1.0, 201)[:, None]
+    for c in (0.01, 0.2, 0.9):
+        at = np.array([[c]])
+        w = penalty.weights(at)
+        parabola = penalty.value(at) + (w * (grid**2 - at**2))[:, 0]
+        assert (parabola >= penalty.value(grid) - 1e-12).all()
+        slope = (penalty.value(at + 1e-6) - penalty.value(at - 1e-6)) / 2e-6
+        assert slope[0] == pytest.approx(2 * w[0, 0] * c, rel=1e-5)
+
+
+@pytest.fixture(scope="module")
+def combined():
+    """Contributions of Eq. (2), and a point at which all terms matter."""
+    own = contributions(COMBINED, [bar(40.0), bar(55.0, "other")])
+    u = own.coordinates.u(internal(COMBINED, **{**COMBINED.center(), "m_1": -0.3, "m_2": -0.6}))
+    rates = list(own.coordinates.term_rates)
+    u[rates] = np.log([0.5, 0.3, 0.2]) - 14.0
+    return own, u
+
+
+@pytest.mark.parametrize("penalty", EVERY, ids=lambda p: type(p).__name__)
+def test_residuals_are_the_penalty_and_their_gradient_is_its_gradient(penalty, combined):
+    own, u = combined
+    found = PenalisedTerms(own, penalty, 3.0)
+    residuals, jacobian = found.residuals(u), found.jacobian(u)
+    assert 0.5 * (residuals**2).sum() == pytest.approx(found.values(u[None])[0], rel=1e-12)
+    wanted = approx_fprime(u, lambda v: found.values(v[None])[0], 1e-7)
+    assert_allclose(jacobian.T @ residuals, wanted, atol=2e-5)
+
+
+def test_exponents_that_can_be_off_are_those_of_memory():
+    """n of 1 to 8 has {0} outside its bounds; m of -1 to 0 can get there."""
+    assert [COMBINED.names[k] for k, _ in switchable_exponents(COMBINED)] == ["m_1", "m_2"]
+    assert switchable_exponents(NORTON) == []
+
+
+def test_a_simple_term_costs_less_than_one_with_memory(combined):
+    own, u = combined
+    simple = u.copy()
+    simple[COMBINED.names.index("m_1")] = 0.0
+    both = np.stack([u, simple])
+    same = PenalisedTerms(own, Sqrt(exponents=0.0), 1.0).values(both)
+    dearer = PenalisedTerms(own, Sqrt(), 1.0).values(both) - same
+    assert dearer[0] > dearer[1]
+
+
+# ---- sparse ----------------------------------------------------------------------------------------------------------
+
+# A sum reduced to the terms that planted bulge tests need: single laws, two-term laws and paths.
+
 
 EXACT = OneDegree(exact=True)
 QUICK = IdentificationSettings(starts=1, sobol_points=4, frames=24, nuisances=())
@@ -59,28 +214,6 @@ def test_subsets_find_it_too(hardening):
     choice = choose_terms(hardening[1], Subsets())
     assert choice.kept_terms == (STRAIN,)
     assert choice.contributions[STRAIN] == pytest.approx(1.0, abs=1e-3)
-
-
-def test_a_swarm_searches_the_penalised_landscape(hardening):
-    """Its cost at the optimum is what least squares has there, penalty included."""
-    _, reductions = hardening
-    stage = reductions.problem
-    penalised = PenalisedTerms.from_problem(stage.problem, Sqrt())
-    searched, u = stage.search_problem(penalised), stage.start[: stage.parameter_count]
-    wanted = 0.5 * stage.problem.chi_square(stage.start) + penalised.values(u[None])[0]
-    assert searched.cost(u[None])[0] == pytest.approx(wanted, rel=1e-9)
-    choice = choose_terms(reductions, Sqrt(), ParticleSwarm(particles=8, iterations=2, refined_candidates=1))
-    assert choice.kept_terms == (STRAIN,)
-    assert len(choice.trace) == 2
-
-
-def test_squared_l2_shares_the_rate_out(hardening):
-    """What one term gives alone is given by several: the penalty is smallest at equal shares."""
-    stage = hardening[1].problem
-    x = stage.minimise(stage.start, PenalisedTerms.from_problem(stage.problem, L2(240.0))).x
-    contributions = stage.contributions_at(x)
-    assert max(contributions.values()) < max(stage.contributions_at(stage.start).values())
-    assert len(terms_above(contributions)) > 1
 
 
 def test_memory_that_is_not_there_is_switched_off():
@@ -128,11 +261,6 @@ def test_a_term_that_is_needed_comes_back(hardening):
     _, reductions = hardening
     wrong = TermChoice((SINE,), {SINE: 0.6, STRAIN: 0.3, TIME: 0.1}, reductions.problem.start)
     assert STRAIN in confirmed_law(reductions, wrong).kept_terms
-
-
-def test_the_largest_term_stays_whatever_the_least_share():
-    assert terms_above({"a": 0.6, "b": 0.04}) == ("a",)
-    assert terms_above({"a": 0.03, "b": 0.04}) == ("b",)
 
 
 def test_the_record_says_what_was_dropped_and_survives_a_file(reduced):

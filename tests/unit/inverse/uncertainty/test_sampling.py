@@ -1,16 +1,24 @@
 """Samples of the posterior against closed forms."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import beta, multivariate_normal, truncnorm
 from scipy.stats import t as student
 
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.uncertainty.importance_sampling import sample_posterior
+from creepkit.inverse.uncertainty.importance_sampling import (
+    SAMPLES,
+    needs_samples,
+    posterior_samples,
+    sample_posterior,
+    shortened_covariance,
+    with_samples,
+)
 from creepkit.inverse.uncertainty.posterior import Posterior
+from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals
 from creepkit.inverse.uncertainty.quantities import exponent_at, rate_at
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
@@ -67,37 +75,6 @@ def test_poorly_known_scatter_widens_them(fit, tests):
     assert found.interval("n") == pytest.approx((best[1], best[1] - half, best[1] + half), abs=0.15 * half)
 
 
-def test_rates_that_scatter_between_tests_count_once_a_test():
-    """ln rate of 12 tests on ln stress is a regression: the slope's standard error is sd / sqrt(sum of squares).
-
-    A quarter of the half width holds what draws scatter by, and what rates do beyond second order.
-    """
-    stresses = np.geomspace(30.0, 80.0, 12)
-    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1000.0) for s in stresses], seed=5, rate=0.2, noise=1e-5)
-    fit = identify(NORTON, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=12))
-    x = np.log(stresses)
-    y = np.array([np.log(h.outputs["strain"][-1] / h.times[-1]) for h in tests])
-    slope, level = np.polyfit(x, y, 1)
-    sd = np.sqrt(((y - level - slope * x) ** 2).sum() / 10)
-    half = student.ppf(0.975, 10) * sd / np.sqrt(((x - x.mean()) ** 2).sum())
-    assert sample_posterior(fit, seed=1).interval("n") == pytest.approx(
-        (slope, slope - half, slope + half), abs=0.25 * half
-    )
-
-
-def test_a_bound_cuts_the_posterior(tests):
-    """Far more than n = 3 allows: against its bound the density is an exponential tail, all of it below."""
-    short = replace(NORTON, params={A: NORTON.params[A], N: replace(NORTON.params[N], bounds=(1.0, 3.0))})
-    found = sample_posterior(known_scatter(short, tests, SD), seed=2)
-    best, covariance = least_squares(tests, SD)
-    middle, sd = best[1], float(np.sqrt(covariance[1, 1]))
-    expected = middle + sd * norm.ppf(norm.cdf((3.0 - middle) / sd) * np.array([0.5, 0.025]))
-    n = found.interval("n")
-    assert n[0] == pytest.approx(expected[0], abs=0.1 * (3.0 - expected[0]))
-    assert n[1] == pytest.approx(expected[1], abs=0.15 * (3.0 - expected[1]))
-    assert found.values["n"].max() <= 3.0
-
-
 def test_nuisances_are_integrated_out(tests):
     """y = theta . basis + e b with e normal: that is a covariance of C + b b' sd^2 of the residuals."""
     using = LogRates(by=3.0)
@@ -119,7 +96,158 @@ def test_nuisances_are_integrated_out(tests):
     assert up - down == pytest.approx(left[0] @ inverse @ left[0] - left[1] @ inverse @ left[1], rel=1e-4)
 
 
-def test_a_seed_repeats_the_draws(fit):
-    first, again = (sample_posterior(fit, seed=5) for _ in range(2))
-    assert np.array_equal(first.u, again.u)
-    assert not np.array_equal(first.u, sample_posterior(fit, seed=6).u)
+# ---- importance sampling ---------------------------------------------------------------------------------------------
+
+# Samples where Laplace's approximation fails: truncated normal distributions, and a grid of the posterior.
+
+
+SETTINGS = IdentificationSettings(starts=1, sobol_points=8, weights="likelihood", nuisances=(), usual_errors="none")
+BOUNDED = replace(NORTON, params={A: NORTON.params[A], N: replace(NORTON.params[N], bounds=(1.0, 4.0))})
+"""Norton's law with n of at most 4."""
+
+
+def sampled(log_density, centre, covariance, seed=0):
+    """Samples of ln p (candidates, parameters) from a Gaussian about `centre`."""
+
+    def density(u):
+        return np.atleast_1d(log_density(u))
+
+    centre = np.array(centre)
+    return posterior_samples(density, centre, shortened_covariance(density, centre, np.array(covariance)), seed)
+
+
+# ---- closed forms ------------------------------------------------------------------------------------------------
+
+PROBABILITIES = np.array([0.025, 0.25, 0.5, 0.75, 0.975])
+
+
+@pytest.mark.parametrize("upper", [0.0, -1.0, 2.0])
+def test_quantiles_of_a_truncated_normal(upper):
+    """N(0, 1) below a bound, beside a parameter that is normal: 3 % of the standard deviation in each quantile."""
+
+    def density(u):
+        inside = (u[:, 0] <= upper) & (u[:, 0] > -30)
+        return np.where(inside, -0.5 * u[:, 0] ** 2 - 0.5 * (u[:, 1] - 5.0) ** 2 / 0.04, -np.inf)
+
+    samples = sampled(density, [min(upper, 0.0), 5.0], np.diag([1.0, 0.04]))
+    assert samples.shape == (SAMPLES, 2)
+    assert samples[:, 0].max() <= upper
+    truth = truncnorm(-np.inf, upper).ppf(PROBABILITIES)
+    np.testing.assert_allclose(
+        np.quantile(samples[:, 0], PROBABILITIES), truth, atol=0.12 * truncnorm(-99, upper).std()
+    )
+    assert samples[:, 1].mean() == pytest.approx(5.0, abs=0.03)
+    assert samples[:, 1].std() == pytest.approx(0.2, rel=0.12)
+
+
+def test_a_covariance_that_is_far_too_narrow_is_made_wider():
+    """Laplace's standard deviations are a third of the true ones, and the parameters are correlated by 0.9."""
+    truth = multivariate_normal([1.0, -2.0], [[1.0, 0.9], [0.9, 1.0]])
+    samples = sampled(truth.logpdf, [1.0, -2.0], np.eye(2) / 9.0)
+    np.testing.assert_allclose(samples.mean(axis=0), [1.0, -2.0], atol=0.15)
+    np.testing.assert_allclose(np.cov(samples.T), [[1.0, 0.9], [0.9, 1.0]], atol=0.2)
+
+
+def test_a_parameter_of_which_only_the_bounds_are_known_is_uniform():
+    """Its standard deviation is that of the bounds: 1 / sqrt(12)."""
+
+    def density(u):
+        return np.where((u[:, 0] >= 0) & (u[:, 0] <= 1), -0.5 * (u[:, 1] / 0.1) ** 2, -np.inf)
+
+    samples = sampled(density, [0.5, 0.0], np.diag([1 / 12, 0.01]))[:, 0]
+    np.testing.assert_allclose(np.quantile(samples, PROBABILITIES), beta(1, 1).ppf(PROBABILITIES), atol=0.04)
+
+
+# ---- identifications ---------------------------------------------------------------------------------------------
+
+
+def steady_tests(n=4.0, noise=4e-4):
+    made = planted(NORTON, {"A": 1e-15, "n": n}, [(s, 1000.0) for s in (60.0, 70.0, 80.0)], seed=3, noise=noise)
+    return [h.replace(standard_deviation={"strain": np.full(h.times.size, noise)}) for h in made]
+
+
+@pytest.fixture(scope="module")
+def at_bound():
+    """n of 4.1 planted, at most 4 allowed."""
+    return identify(BOUNDED, steady_tests(4.1), Steady(), settings=SETTINGS)
+
+
+def test_a_value_at_its_bound_gets_samples(at_bound):
+    assert at_bound.estimates[1].verdict == "at its bound"
+    assert needs_samples(at_bound)
+    assert at_bound.samples.shape == (SAMPLES, 2)
+    assert at_bound.coordinates.theta(at_bound.samples)[:, 1].max() <= 4.0
+
+
+def test_quantiles_are_those_of_a_grid_of_the_posterior(at_bound):
+    """exp(ln p) summed over 120 x 120 points within the bounds, marginal in each coordinate."""
+    posterior, u = Posterior.from_identification(at_bound), at_bound.u
+    samples, spread = at_bound.samples, at_bound.samples.std(axis=0)
+    axes = [
+        np.linspace(max(c - 9 * s, low), min(c + 9 * s, high), 120)
+        for c, s, low, high in zip(u, spread, posterior.lower, posterior.upper, strict=True)
+    ]
+    points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=-1)
+    density = np.exp(posterior(points)).reshape(120, 120)
+    for k in range(2):
+        marginal = density.sum(axis=1 - k)
+        cumulative = (np.cumsum(marginal) - 0.5 * marginal) / marginal.sum()
+        found = np.interp(np.quantile(samples[:, k], PROBABILITIES), axes[k], cumulative)
+        assert np.abs(found - PROBABILITIES).max() < 0.04
+        assert np.abs(found - PROBABILITIES)[[0, -1]].max() < 0.02
+
+
+def test_intervals_come_from_the_samples_and_hold_the_value(at_bound):
+    value, low, high = at_bound.local_exponent(70.0, 1000.0)
+    draws = at_bound.coordinates.theta(at_bound.samples)[:, 1]
+    assert low == pytest.approx(np.quantile(draws, 0.025), abs=1e-3)
+    assert high == pytest.approx(4.0, abs=1e-3)
+    assert low < value <= high
+    rate, low, high = at_bound.rate(70.0, 1000.0)
+    assert low < rate < high
+    laplace = replace(at_bound, samples=None).local_exponent(70.0, 1000.0)
+    assert laplace[2] > 4.0
+
+
+def test_values_inside_their_bounds_need_none():
+    fit = identify(NORTON, steady_tests(), Steady(), settings=SETTINGS)
+    assert not needs_samples(fit)
+    assert fit.samples is None
+
+
+@dataclass(frozen=True)
+class Shifted(Steady):
+    """The same but for a constant factor: it agrees once it is corrected."""
+
+    def predict(self, law, theta, histories, *, sensitivities=False):
+        found = Steady.predict(self, law, theta, histories, sensitivities=sensitivities)
+        jacobian = None if found.jacobian is None else 1.05 * found.jacobian
+        return replace(found, values=1.05 * found.values, jacobian=jacobian)
+
+
+def test_a_cheaper_predictor_is_corrected_before_samples_are_drawn_through_it(at_bound):
+    found = with_samples(replace(at_bound, samples=None), Shifted())
+    deviation = (found.samples.mean(axis=0) - at_bound.samples.mean(axis=0)) / at_bound.samples.std(axis=0)
+    assert np.abs(deviation).max() < 0.3
+
+
+# ---- quadratic residuals -----------------------------------------------------------------------------------------
+
+
+def test_quadratic_functions_come_back_with_their_derivatives():
+    """Of 12 points six terms are found, whatever the weights; derivatives are those of differences."""
+    rng = np.random.default_rng(0)
+    a, b, c = rng.standard_normal((1, 3)), rng.standard_normal((2, 3)), rng.standard_normal((2, 2, 3))
+
+    def residuals(u):
+        return (a + u @ b + np.einsum("ni,ijo,nj->no", u, c, u))[:, None, :]
+
+    u = np.array([3.0, -1.0]) + rng.standard_normal((12, 2))
+    shape = np.array([[1.0, 0.3], [0.3, 0.5]])
+    found = QuadraticResiduals.fitted(u, residuals(u), rng.uniform(0.1, 1.0, 12), np.array([3.0, -1.0]), shape)
+    further = np.array([[5.0, 2.0], [1.0, 0.0]])
+    values, jacobian = found.candidate_jacobian(further)
+    np.testing.assert_allclose(values, residuals(further), rtol=1e-9)
+    for k, step in enumerate(1e-5 * np.eye(2)):
+        difference = (residuals(further + step) - residuals(further - step)) / 2e-5
+        np.testing.assert_allclose(jacobian[..., k], difference, rtol=1e-6, atol=1e-6)

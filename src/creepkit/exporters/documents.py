@@ -1,0 +1,420 @@
+"""LaTeX, Markdown and MathML: the equation, a table of values with units, and Arrhenius' law in both of its forms.
+
+LaTeX needs amsmath. Markdown holds the equation between $$, as GitHub and Jupyter show it, with notes and references.
+
+MathML: a page of well-formed XHTML whose equations are presentation MathML, with values, notes and references.
+
+Browsers show the file as it is; each <math> element carries its namespace and can be cut out.
+"""
+
+from __future__ import annotations
+
+import html
+import html.entities
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+import sympy
+from sympy.printing.mathml import MathMLPresentationPrinter
+
+from creepkit.exporters.law_description import (
+    ParameterRow,
+    comment_lines,
+    note_lines,
+    parameter_rows,
+    printable_text,
+    remarks,
+)
+from creepkit.exporters.unit_conversion import ConvertedValues, convert_values
+from creepkit.hookspecs import hookimpl
+from creepkit.language.law import CreepLaw
+from creepkit.language.printing import ArrheniusExponent, LatexLawPrinter, arrhenius_exponent, latex_equations
+from creepkit.language.symbols import GAS_CONSTANT, mean_stress, principal_stress, strain, stress, temperature, time
+from creepkit.records import Exporter, LawWithValues
+
+_LATEX_ESCAPES = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "%": r"\%",
+    "_": r"\_",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+}
+
+
+class LatexExporter:
+    """Equation and table of values for a paper."""
+
+    serves = ("tex",)
+    name = "latex"
+    title = "LaTeX equation and table of values"
+    suffix = ".tex"
+
+    def text(self, source: LawWithValues) -> str:
+        """Return an align environment and a tabular; notes and references become comments."""
+        law, converted_values, printer = source.law, convert_values(source), LatexLawPrinter(source.law)
+        comments_text = (source.title, *source.notes, *(f"Source: {reference}" for reference in law.references))
+        lines = comment_lines(comments_text, "%")
+        lines += equations_in_latex(law, printer)
+        lines += [rf"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
+        lines += _value_table(source, converted_values, printer)
+        lines += (
+            [] if source.units.is_native else [f"In this table, {latex_escaped(converted_values.reference_sentence)}."]
+        )
+        lines += _arrhenius_equations(law, converted_values, printer)
+        return "\n".join(lines) + "\n"
+
+
+def equations_in_latex(law: CreepLaw, printer: LatexLawPrinter | None = None) -> list[str]:
+    """The lines of an align environment with the rate of strain and those of internal variables."""
+    equations = latex_equations(law, printer or LatexLawPrinter(law))
+    return _align_environment([row for left, right in equations for row in _equation_rows(left, right)])
+
+
+def _equation_rows(left: str, summands: Sequence[str]) -> list[str]:
+    """One equation, a summand a row."""
+    first, *rest = summands
+    return [f"{left} &= {first}", *(rf"&\quad + {summand}" for summand in rest)]
+
+
+def _align_environment(rows: Sequence[str]) -> list[str]:
+    return [r"\begin{align*}", " \\\\\n".join(f"  {row}" for row in rows), r"\end{align*}"]
+
+
+def _value_table(source: LawWithValues, converted_values: ConvertedValues, printer: LatexLawPrinter) -> list[str]:
+    rows = []
+    for row in parameter_rows(source, converted_values):
+        symbol, value = f"${_row_symbol(row, printer)}$", f"${latex_number(row.value)}$"
+        rows.append(rf"  {symbol} & {latex_escaped(row.meaning)} & {value} & {latex_unit(row.unit)} \\")
+    heads = r"  Symbol & Meaning & Value & Unit \\"
+    return [r"\begin{tabular}{llll}", r"  \hline", heads, r"  \hline", *rows, r"  \hline", r"\end{tabular}"]
+
+
+def _row_symbol(row: ParameterRow, printer: LatexLawPrinter) -> str:
+    return f"{printer.doprint(row.symbol)}{'(0)' if row.is_initial else ''}"
+
+
+def latex_escaped(text: str) -> str:
+    """Text with LaTeX's special characters made plain."""
+    return "".join(_LATEX_ESCAPES.get(c, c) for c in text)
+
+
+def latex_unit(text: str) -> str:
+    """A unit for the table, where there is one."""
+    return "" if not text else f"${_upright_unit(text)}$"
+
+
+def latex_number(value: float | mpmath.mpf, digits: int = 6) -> str:
+    r"""A number of any size as 4.2 \times 10^{5}."""
+    mantissa, _, exponent = mpmath.nstr(mpmath.mpf(value), digits, strip_zeros=True).partition("e")
+    mantissa = mantissa.removesuffix(".0")
+    return rf"{mantissa} \times 10^{{{int(exponent)}}}" if exponent else mantissa
+
+
+def _upright_unit(text: str) -> str:
+    numerator, _, denominator = text.partition("/")
+    if numerator == "1" and re.fullmatch(r"\w+", denominator):
+        return rf"\mathrm{{{latex_escaped(denominator)}}}^{{-1}}"
+    return rf"\mathrm{{{latex_escaped(text)}}}".replace(" ", r"\,")
+
+
+# ---- Arrhenius' law without a reference temperature ----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _ArrheniusTerm:
+    """A term as coefficient x Arrhenius factors x rest."""
+
+    coefficient: sympy.Symbol
+    factors: tuple[ArrheniusExponent, ...]
+    rest: sympy.Expr
+
+
+def _arrhenius_term(law: CreepLaw, term: sympy.Expr) -> _ArrheniusTerm | None:
+    """Take a term apart; None when it has no Arrhenius factor or not exactly one rate coefficient."""
+    factors = sympy.Mul.make_args(term)
+    coefficients = [f for f in factors if f in law.params and law.params[f].scale == "log"]
+    exponents = [a for f in factors if isinstance(f, sympy.exp) for a in sympy.Add.make_args(f.args[0])]
+    activations = {exponent: arrhenius_exponent(exponent) for exponent in exponents}
+    arrhenius_factors = tuple(activation for activation in activations.values() if activation)
+    if len(coefficients) != 1 or not arrhenius_factors:
+        return None
+    others = [f for f in factors if f not in coefficients and not isinstance(f, sympy.exp)]
+    remaining = [exponent for exponent, activation in activations.items() if not activation]
+    return _ArrheniusTerm(coefficients[0], arrhenius_factors, sympy.Mul(*others, sympy.exp(sympy.Add(*remaining))))
+
+
+def _arrhenius_equations(law: CreepLaw, converted_values: ConvertedValues, printer: LatexLawPrinter) -> list[str]:
+    """The law with A_inf exp(-Q/(R T)) in place of A exp[-(Q/R)(1/T - 1/T_ref)], and the value of every A_inf."""
+    parts = {term: _arrhenius_term(law, term) for term in law.terms.values()}
+    if not any(parts.values()):
+        return []
+    right = [_term_without_reference(part, printer) if part else printer.doprint(term) for term, part in parts.items()]
+    rows = _equation_rows(r"\dot{\varepsilon}_{cr}", right)
+    rows += [_coefficient_at_infinity(law, part, converted_values, printer) for part in parts.values() if part]
+    return [f"% The same without a reference temperature, R = {GAS_CONSTANT} J/(mol K):", *_align_environment(rows)]
+
+
+def _term_without_reference(part: _ArrheniusTerm, printer: LatexLawPrinter) -> str:
+    """A_inf times the rest times exp(-Q/(R T))."""
+    rest = "" if part.rest == 1 else printer.doprint(part.rest) + " "
+    factors = " ".join(rf"\exp\!\left[-\frac{{{printer.doprint(f.Q)}}}{{R T}}\right]" for f in part.factors)
+    return f"{_infinity_symbol(printer.doprint(part.coefficient))} {rest}{factors}"
+
+
+def _coefficient_at_infinity(
+    law: CreepLaw, part: _ArrheniusTerm, converted_values: ConvertedValues, printer: LatexLawPrinter
+) -> str:
+    """A_inf = A exp[Q/(R T_ref)] and its number, which may lie far outside double range."""
+    name = printer.doprint(part.coefficient)
+    fractions = [rf"\frac{{{printer.doprint(f.Q)}}}{{R \cdot {f.T_ref:g}\,\mathrm{{K}}}}" for f in part.factors]
+    coefficient = mpmath.mpf(converted_values.values[part.coefficient.name])
+    for factor in part.factors:
+        energy = factor.Q.xreplace({s: sympy.Float(converted_values.values[s.name]) for s in law.params})
+        coefficient *= mpmath.exp(mpmath.mpf(float(energy)) / (GAS_CONSTANT * factor.T_ref))
+    value_text = f"{latex_number(coefficient)} \\; {_upright_unit(converted_values.units[part.coefficient.name])}"
+    return rf"{_infinity_symbol(name)} &= {name} \exp\!\left[{' + '.join(fractions)}\right] = {value_text}"
+
+
+def _infinity_symbol(name: str) -> str:
+    return rf"{name[:-1]},\infty}}" if re.search(r"_\{[^{}]*\}$", name) else rf"{name}_{{\infty}}"
+
+
+class MarkdownExporter:
+    """A section of a report."""
+
+    serves = ("md",)
+    name = "markdown"
+    title = "Markdown with the equation, a table of values, notes and references"
+    suffix = ".md"
+
+    def text(self, source: LawWithValues) -> str:
+        """Return the section, under a heading of the first level."""
+        law, converted_values, printer = source.law, convert_values(source), LatexLawPrinter(source.law)
+        lines = [f"# {markdown_escaped(source.title)}", "", "$$", r"\begin{aligned}"]
+        rows = [row for left, right in latex_equations(law, printer) for row in _equation_rows(left, right)]
+        lines.append(" \\\\\n".join(rows))
+        lines += [r"\end{aligned}", "$$", "", "| Symbol | Meaning | Value | Unit |", "| --- | --- | --- | --- |"]
+        lines += [_markdown_row(row, printer) for row in parameter_rows(source, converted_values)]
+        lines += ["", *(markdown_escaped(sentence) for sentence in remarks(source, converted_values))]
+        lines += [f"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
+        lines += _markdown_section("Notes", note_lines(source))
+        lines += _markdown_section("References", law.references)
+        return "\n".join(lines) + "\n"
+
+
+def markdown_escaped(text: str) -> str:
+    """Text with Markdown's signs made plain."""
+    return re.sub(r"([\\`*_\[\]<>#|$~])", r"\\\1", " ".join(text.split()))
+
+
+def _markdown_row(row: ParameterRow, printer: LatexLawPrinter) -> str:
+    cells = (f"${_row_symbol(row, printer)}$", markdown_escaped(row.meaning), f"${latex_number(row.value)}$")
+    return f"| {' | '.join(cells)} | {markdown_escaped(row.unit)} |"
+
+
+def _markdown_section(title: str, items: Sequence[str]) -> list[str]:
+    return ["", f"## {title}", "", *(f"- {markdown_escaped(item)}" for item in items)] if items else []
+
+
+MATHML_NAMESPACE = "http://www.w3.org/1998/Math/MathML"
+
+
+_VARIABLE_NAMES = {
+    stress: ("σ", "e"),
+    strain: ("ε", "cr"),
+    time: ("t", ""),
+    temperature: ("T", ""),
+    principal_stress: ("σ", "1"),
+    mean_stress: ("σ", "m"),
+}
+
+
+_XML_ENTITIES = ("amp", "lt", "gt", "quot", "apos")
+"""The names of characters that XML knows itself."""
+
+
+_STYLE = "table { border-collapse: collapse } td, th { border: 1px solid #999; padding: 0.2em 0.6em; text-align: left }"
+
+
+class MathmlExporter:
+    """A page with the law's equations as presentation MathML."""
+
+    name = "mathml"
+    title = "MathML in a page of XHTML, with a table of values, notes and references"
+    suffix = ".xhtml"
+
+    def text(self, source: LawWithValues) -> str:
+        """Return the page."""
+        law, converted_values, printer = source.law, convert_values(source), MathmlPrinter()
+        title = _xml_escaped(source.title)
+        lines = [
+            '<?xml version="1.0" encoding="UTF-8"?>',
+            '<html xmlns="http://www.w3.org/1999/xhtml" lang="en">',
+            f'<head><meta charset="utf-8"/><title>{title}</title><style>{_STYLE}</style></head>',
+            "<body>",
+            f"<h1>{title}</h1>",
+            *law_equations(law),
+            "<table>",
+            "<tr><th>Symbol</th><th>Meaning</th><th>Value</th><th>Unit</th></tr>",
+            *(_html_row(row, printer) for row in parameter_rows(source, converted_values)),
+            "</table>",
+            *(f"<p>{_xml_escaped(sentence)}</p>" for sentence in remarks(source, converted_values)),
+            *(f"<p>Valid where {_math_element(printer.doprint(relation))}.</p>" for relation in law.constraints),
+            *_html_section("Notes", note_lines(source)),
+            *_html_section("References", law.references),
+            "</body>",
+            "</html>",
+        ]
+        return "\n".join(lines) + "\n"
+
+
+class Exponential(sympy.Function):  # type: ignore[misc]
+    """exp, which sympy's printer takes for a denominator where its exponent is negative."""
+
+
+class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
+    """Print with numeric characters instead of names, symbols of the point as in papers, Arrhenius factors as such."""
+
+    def __init__(self) -> None:
+        super().__init__({"mul_symbol": None})
+        # sympy writes its texts as they are, the sign < of a relation among them
+        create_text_node = self.dom.createTextNode
+        self.dom.createTextNode = lambda text: create_text_node(text.replace("<", "&lt;").replace(">", "&gt;"))
+
+    def doprint(self, expr: sympy.Basic) -> str:
+        """The expression as MathML without a root element."""
+        try:
+            kept = expr.replace(sympy.exp, Exponential)
+        except ValueError:  # of a maximum, which sympy cannot compare with the exponential of a number
+            kept = expr
+        return re.sub(r"&(\w+);", _character_reference, str(super().doprint(kept)))
+
+    def _print_Symbol(self, sym: Any, style: str = "plain") -> Any:
+        if sym in _VARIABLE_NAMES:
+            base, subscript = _VARIABLE_NAMES[sym]
+            node = self._leaf("mi", base)
+            return self._node("msub", node, self._leaf("mtext", subscript)) if subscript else node
+        if sym.name.endswith("_inf"):
+            stem = super()._print_Symbol(sympy.Symbol(sym.name.removesuffix("_inf")), style)
+            return self._node("msub", stem, self._leaf("mi", "∞"))
+        return super()._print_Symbol(sym, style)
+
+    def _print_Exponential(self, expr: Any) -> Any:
+        activations = {exponent: arrhenius_exponent(exponent) for exponent in sympy.Add.make_args(expr.args[0])}
+        factors = [self._arrhenius(activation) for activation in activations.values() if activation]
+        rest = sympy.Add(*(part for part, found in activations.items() if not found))
+        if rest != 0:
+            factors.append(self._exponential(self._print(rest)))
+        return self._node("mrow", *factors)
+
+    def _arrhenius(self, activation: ArrheniusExponent) -> Any:
+        """exp[-(Q/R)(1/T - 1/T_ref)]."""
+        is_negative = activation.Q.could_extract_minus_sign()
+        energy = self._node("mfrac", self._print(-activation.Q if is_negative else activation.Q), self._leaf("mi", "R"))
+        reference = self._node("mrow", self._leaf("mn", f"{activation.T_ref:g}"), self._leaf("mtext", "\u00a0K"))
+        warm, at_reference = (self._node("mfrac", self._leaf("mn", "1"), T) for T in (self._leaf("mi", "T"), reference))
+        opening, minus, closing = (self._leaf("mo", sign) for sign in "(−)")
+        difference = self._node("mrow", opening, warm, minus, at_reference, closing)
+        sign = [] if is_negative else [self._leaf("mo", "−")]
+        return self._exponential(self._node("mrow", *sign, energy, difference))
+
+    def _exponential(self, argument: Any) -> Any:
+        opening, closing = self._leaf("mo", "["), self._leaf("mo", "]")
+        return self._node("mrow", self._leaf("mi", "exp"), self._node("mrow", opening, argument, closing))
+
+    def _node(self, tag: str, *children: Any) -> Any:
+        node = self.dom.createElement(tag)
+        for child in children:
+            node.appendChild(child)
+        return node
+
+    def _leaf(self, tag: str, text: str) -> Any:
+        return self._node(tag, self.dom.createTextNode(text))
+
+
+def _character_reference(match: re.Match[str]) -> str:
+    """A character by number where XML does not know its name."""
+    if match[1] in _XML_ENTITIES:
+        return match[0]
+    return "".join(f"&#x{ord(c):X};" for c in html.entities.html5[f"{match[1]};"])
+
+
+# ---- the page ------------------------------------------------------------------------------------------------------
+
+
+def law_equations(law: CreepLaw) -> Iterator[str]:
+    """A display for the rate of strain, a summand a row, and one for each internal variable: <math> elements."""
+    printer = MathmlPrinter()
+    yield _equation_block(_with_dot(printer.doprint(strain)), [printer.doprint(term) for term in law.terms.values()])
+    for symbol, state in law.states.items():
+        yield _equation_block(_with_dot(printer.doprint(symbol)), [printer.doprint(state.rate)])
+
+
+def expression_mathml(expression: sympy.Basic) -> str:
+    """An expression as a <math> element."""
+    return _math_element(f"<mrow>{MathmlPrinter().doprint(expression)}</mrow>")
+
+
+def _with_dot(name: str) -> str:
+    """The name of a rate: a dot over the letter, not over its index."""
+    if name.startswith("<msub><mi>"):
+        letter, _, rest = name.removeprefix("<msub>").partition("</mi>")
+        return f"<msub><mover>{letter}</mi><mo>&#x2D9;</mo></mover>{rest}"
+    return f"<mover>{name}<mo>&#x2D9;</mo></mover>"
+
+
+def _equation_block(left: str, summands: Sequence[str]) -> str:
+    signs = ["=", *["+"] * (len(summands) - 1)]
+    names = [left, *["<mrow/>"] * (len(summands) - 1)]
+    rows = [
+        f'<mtr><mtd style="text-align: right">{name}</mtd><mtd><mo>{sign}</mo></mtd>'
+        f'<mtd style="text-align: left">{summand}</mtd></mtr>'
+        for name, sign, summand in zip(names, signs, summands, strict=True)
+    ]
+    return _math_element(f'<mtable displaystyle="true">{"".join(rows)}</mtable>', ' display="block"')
+
+
+def _math_element(content: str, attributes: str = "") -> str:
+    return f'<math xmlns="{MATHML_NAMESPACE}"{attributes}>{content}</math>'
+
+
+def _html_row(row: ParameterRow, printer: MathmlPrinter) -> str:
+    initial = "<mo>(</mo><mn>0</mn><mo>)</mo>" if row.is_initial else ""
+    symbol = _math_element(f"<mrow>{printer.doprint(row.symbol)}{initial}</mrow>")
+    cells = (symbol, _xml_escaped(row.meaning), _math_element(_mathml_number(row.value)), _xml_escaped(row.unit))
+    return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+
+
+def _mathml_number(value: float) -> str:
+    """A number as 4.2 x 10^5."""
+    mantissa, _, exponent = latex_number(value).partition(r" \times 10^{")
+    sign, magnitude = ("<mo>−</mo>", mantissa[1:]) if mantissa.startswith("-") else ("", mantissa)
+    if not exponent:
+        return f"<mrow>{sign}<mn>{magnitude}</mn></mrow>"
+    power = exponent.rstrip("}").replace("-", "−")
+    return f"<mrow>{sign}<mn>{magnitude}</mn><mo>×</mo><msup><mn>10</mn><mn>{power}</mn></msup></mrow>"
+
+
+def _html_section(title: str, items: Sequence[str]) -> list[str]:
+    return (
+        [f"<h2>{title}</h2>", "<ul>", *(f"<li>{_xml_escaped(item)}</li>" for item in items), "</ul>"] if items else []
+    )
+
+
+def _xml_escaped(text: str) -> str:
+    """Text for XML, which allows no control characters."""
+    return html.escape(printable_text(text))
+
+
+@hookimpl
+def creepkit_exporters() -> list[Exporter]:
+    """The exporters of this module."""
+    return [LatexExporter(), MarkdownExporter(), MathmlExporter()]

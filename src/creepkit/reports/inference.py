@@ -1,0 +1,177 @@
+"""Text of what follows an identification: term selection, profiles, posterior, confirmation, cross-validation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.inverse.sparsity.result import LEAST_CONTRIBUTION
+from creepkit.records.units import celsius_text
+from creepkit.reports.answer import unit_text
+from creepkit.reports.blocks import aligned, number
+from creepkit.reports.figures import panels_of, place_legend_right, save_figure, span
+from creepkit.reports.json_values import finite
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from creepkit.inverse.confirmation import Confirmation
+    from creepkit.inverse.cross_validation import CrossValidation
+    from creepkit.inverse.single_values import SingleValue
+    from creepkit.inverse.sparsity.result import PenaltyPath, Sparsity
+    from creepkit.inverse.uncertainty.correlation import Correlation
+    from creepkit.inverse.uncertainty.importance_sampling import PosteriorSamples
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+    from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
+
+
+# ---- term selection --------------------------------------------------------------------------------------------------
+
+
+def sparsity_text(sparsity: Sparsity) -> str:
+    """The verdict, and the contribution of every term without penalty, with it, and after the refit."""
+    strength = "" if sparsity.strength is None else f" of strength {sparsity.strength:g}"
+    rows = []
+    for term, contribution in sparsity.contributions_without_penalty.items():
+        after = sparsity.contributions_after_refit.get(term)
+        numbers = (contribution, sparsity.contributions_with_penalty[term])
+        rows.append((term, *(f"{one:.3f}" for one in numbers), "dropped" if after is None else f"{after:.3f}"))
+    lines = [f"{sparsity.penalty}{strength}: {sparsity.verdict}", *aligned(("", "without", "with", "after"), rows)]
+    return "\n".join([*lines, f"(contributions; below {LEAST_CONTRIBUTION:g} a term is dropped)"])
+
+
+def penalty_path_text(path: PenaltyPath) -> str:
+    """One row a strength: chi-square, BIC less the least, contributions and the terms that are kept."""
+    rows = []
+    for k, strength in enumerate(path.strengths):
+        numbers = [f"{strength:g}", f"{path.chi_square[k]:.1f}", f"{path.bic_excess[k]:.1f}"]
+        rows.append([*numbers, *(f"{c:.3f}" for c in path.contributions[k]), ", ".join(path.kept_terms[k])])
+    rows[path.chosen][-1] += "   <- chosen"
+    return "\n".join(aligned(("strength", "chi-square", "BIC - least", *path.terms, "kept"), rows))
+
+
+# ---- uncertainty -----------------------------------------------------------------------------------------------------
+
+
+LOGARITHMIC_RATIO = 30.0
+"""Ratio of largest to smallest value beyond which the axis of a profile is logarithmic."""
+
+
+def profile_text(profile: ProfileLikelihood) -> str:
+    """One line: the best value and the interval by the profile."""
+    low, high = (f"{end:.4g}" if end is not None else "open" for end in (profile.low, profile.high))
+    value = f"{profile.name} = {profile.best:.5g} {unit_text(profile.unit)}".rstrip()
+    return "; ".join([f"{value}, {100 * profile.level:g} % interval [{low}, {high}] by its profile", *profile.notes])
+
+
+def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -> Figure:
+    """The rise of chi-square over the quantity, its limit, and the parabola of Laplace's approximation.
+
+    Between the values of the profile its signed root is interpolated, which is nearly straight.
+    """
+    figure, axes = panels_of(6.0, 4.2)
+    (low, high), values = profile.laplace, profile.values
+    positive = bool((values > 0).all()) and low > 0
+    scale, inverse = (np.log, np.exp) if positive else (np.asarray, np.asarray)
+    root = np.sqrt(np.maximum(profile.chi_square, 0.0)) * np.sign(values - profile.best)
+    places = scale(values)
+    grid = np.unique(np.concatenate([places, np.linspace(places[0], places[-1], 300)]))
+    axes.plot(inverse(grid), np.interp(grid, places, root) ** 2, "-", color="C0", label="profile")
+    axes.plot(values, profile.chi_square, "o", ms=4, color="C0")
+    ends = np.array([scale(low), scale(high)])
+    grid = np.linspace(float(ends[0]), float(ends[1]), 80)
+    axes.plot(
+        inverse(grid),
+        profile.limit * ((grid - ends.mean()) / (0.5 * np.ptp(ends))) ** 2,
+        "--",
+        color="C1",
+        label="Laplace",
+    )
+    axes.axhline(profile.limit, color="black", lw=0.8, label=f"{100 * profile.level:g} %")
+    for end in (profile.low, profile.high):
+        if end is not None:
+            axes.axvline(end, color="black", lw=0.8, ls=":")
+    span(axes, "x", values, logarithmic=positive and float(values.max() / values.min()) > LOGARITHMIC_RATIO)
+    unit = unit_text(profile.unit) and f", {profile.unit}"
+    axes.set(xlabel=f"{profile.name}{unit}", ylabel="rise of chi-square", ylim=(0.0, 1.6 * profile.limit))
+    place_legend_right(axes)
+    return save_figure(figure, path)
+
+
+def posterior_text(samples: PosteriorSamples) -> str:
+    """The median and 95 % interval of every parameter."""
+    width = max(len(name) for name in samples.coordinates.names)
+    lines = [f"{len(samples.u)} draws from the posterior"]
+    for name, param in samples.coordinates.law.table.items():
+        median, low, high = samples.interval(name)
+        lines.append(f"  {name:{width}} = {median:.5g}  [{low:.4g}, {high:.4g}] {unit_text(param.unit)}".rstrip())
+    return "\n".join([*lines, *(f"  note: {note}" for note in samples.notes)])
+
+
+def correlation_text(correlation: Correlation) -> str:
+    """The matrix with its names, four digits."""
+    rows = [(name, *(f"{v:.4f}" for v in row)) for name, row in zip(correlation.names, correlation.matrix, strict=True)]
+    return "\n".join(aligned(("", *correlation.names), rows, numeric=range(1, 1 + len(rows))))
+
+
+def model_average_text(average: ModelAverage) -> str:
+    """One line: the laws with their weights, rate and local exponent at the reference point."""
+    reference = average.fits[0].reference
+    rate, low, high = (float(v) for v in average.rate(reference.stress))
+    exponent, exponent_low, exponent_high = (float(v) for v in average.local_exponent(reference.stress))
+    names = ", ".join(f"{fit.law.name} ({w:.2g})" for fit, w in zip(average.fits, average.weights, strict=True))
+    return (
+        f"over the laws {names}: rate at {reference.stress:.4g} MPa, {celsius_text(reference.temperature)} {rate:.3g} "
+        f"[{low:.3g}, {high:.3g}] 1/s, local stress exponent {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]"
+    )
+
+
+# ---- confirmation and cross-validation -------------------------------------------------------------------------------
+
+
+def confirmation_text(confirmation: Confirmation) -> str:
+    """The verdict, and chi-square of the simulation and of the fit, a row an output of a test."""
+    rows = [
+        (
+            test.name,
+            one.output,
+            number(one.simulation_errors.chi_square, 3),
+            "–" if one.fit_errors is None else number(one.fit_errors.chi_square, 3),
+            number(math.sqrt(one.simulation_errors.mean_squared_error), 3),
+            number(one.rms_difference, 3),
+        )
+        for test in confirmation.tests
+        for one in test.outputs
+    ]
+    columns = ("test", "output", "chi-square", "of the fit", "rms", "apart, noise")
+    head = f"{confirmation.law} by {confirmation.predictor_name}: {confirmation.verdict}"
+    return "\n".join([head, *(f"  {line}" for line in aligned(columns, rows, numeric=(2, 3, 4, 5)))])
+
+
+def confirmation_to_json(confirmation: Confirmation) -> dict[str, Any]:
+    """The same as JSON-able data."""
+    return {"holds": confirmation.confirmed, "verdict": confirmation.verdict, **finite(asdict(confirmation))}
+
+
+def cross_validation_text(validation: CrossValidation) -> str:
+    """One line for each held-out test: its relative squared errors, about the mean of the test.
+
+    Of its rupture time and minimum rate the prediction over the measured one, with its 95 % interval.
+    """
+    lines = [f"law '{validation.fit.law.name}', held out by {validation.by}: relative squared errors"]
+    for name, errors in validation.errors.items():
+        cells = [f"{output} {e.relative_squared_error:.3g}" for output, e in errors.items()]
+        cells += [f"{what} {_held_out_text(one)}" for what, one in validation.single_values[name].items()]
+        lines.append(f"  {name}: {', '.join(cells)}")
+    return "\n".join(lines)
+
+
+def _held_out_text(one: SingleValue) -> str:
+    """Predicted over measured, with the interval of a single test."""
+    low, high = one.low / one.measured, one.high / one.measured
+    unbroken = " of the time it lasted unbroken" if one.censored else ""
+    return f"predicted over measured {one.ratio:.3g} [{low:.3g}, {high:.3g}]{unbroken}"

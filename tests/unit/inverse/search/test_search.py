@@ -1,0 +1,217 @@
+"""ParticleSwarm, CmaEs and their trace: known minima, the rules of their sources, bounds, seeds, restarts."""
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.inverse.bounds import Bounds
+from creepkit.inverse.identify import identify
+from creepkit.inverse.initial_search import search_problem
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
+from creepkit.inverse.search.global_search import SearchTrace
+from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
+from creepkit.inverse.search.local_refinement import robust_loss, robust_weight
+from creepkit.inverse.search.multistart import MultiStart, distinct, screened_starts
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.records import History
+from helpers.cost_functions import Known, cube, quadratic, rastrigin, rosenbrock
+
+SWARM, CMA_ES = ParticleSwarm(refined_candidates=0), CmaEs(refined_candidates=0)
+BEYOND = Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0]))
+"""The minimum lies beyond a bound."""
+KNOWN = [
+    (SWARM, quadratic, cube(3), [1, 2, 3]),
+    (SWARM, quadratic, BEYOND, [2, 2]),
+    (SWARM, rosenbrock, cube(2), [1, 1]),
+    (SWARM, rastrigin, cube(3, 5.12), [0, 0, 0]),
+    (CMA_ES, quadratic, cube(3), [1, 2, 3]),
+    (CMA_ES, quadratic, BEYOND, [2, 2]),
+    (CMA_ES, rosenbrock, cube(2), [1, 1]),
+    (CMA_ES, rosenbrock, cube(5), [1, 1, 1, 1, 1]),
+]
+
+
+def test_known_minima_are_found_without_refinement_and_no_candidate_leaves_the_bounds():
+    missed = []
+    for search, cost, box, at in KNOWN:
+        landscape = Known(cost, box)
+        found, everything = search.minima(landscape).minima[0], np.concatenate(landscape.seen)
+        if np.abs(found.x - at).max() > 0.02 or found.cost != cost(found.x[None])[0]:
+            missed.append((search.description, cost.__name__, found))
+        if (everything < box.lower).any() or (everything > box.upper).any():
+            missed.append((search.description, cost.__name__, "left the bounds"))
+    assert missed == []
+
+
+def test_least_squares_finishes_what_the_swarm_leaves():
+    rough, fine = (s.minima(Known(rosenbrock, cube(5))) for s in (SWARM, ParticleSwarm()))
+    assert rough.minima[0].cost > 0.01  # a curved valley in five dimensions is too long for 100 iterations
+    np.testing.assert_allclose(fine.minima[0].x, 1.0, atol=1e-3)
+    assert fine.trace.best_cost[-1] == rough.minima[0].cost
+    assert fine.trace.refined_cost == fine.minima[0].cost
+
+
+def test_refined_minima_differ_and_come_best_first():
+    found = ParticleSwarm(refined_candidates=4).minima(Known(rastrigin, cube(3, 5.12))).minima
+    assert [m.cost for m in found] == sorted(m.cost for m in found)
+    assert len(found) == 4
+    assert len(np.unique(np.array([m.x for m in found]).round(2), axis=0)) > 1
+
+
+@pytest.mark.parametrize("search", [ParticleSwarm(12, 25), CmaEs(population=12, iterations=25, restarts=0)])
+def test_an_iteration_is_one_prediction_and_a_seed_gives_the_same_answer_twice(search):
+    runs = []
+    for seed in (7, 7, 8):
+        landscape = Known(rastrigin, cube(4), IdentificationSettings(seed=seed))
+        runs.append(search.minima(landscape))
+        assert landscape.calls == [12] * len(runs[-1].trace)
+    np.testing.assert_array_equal(runs[0].minima[0].x, runs[1].minima[0].x)
+    np.testing.assert_array_equal(runs[0].trace.quartiles, runs[1].trace.quartiles)
+    assert (runs[0].trace.quartiles != runs[2].trace.quartiles).any()
+
+
+# ---- rules ---------------------------------------------------------------------------------------------------------
+
+
+def test_constriction_is_the_published_one():
+    """K = 0.7298437881283576 for c1 = c2 = 2.05 (Clerc & Kennedy 2002, and the authors' code)."""
+    for velocity, attraction in ((0.1, 0.0), (0.0, 0.1)):
+        found = SWARM.next_velocity(np.array([velocity]), np.array([attraction]))
+        assert found / 0.1 == pytest.approx(0.7298437881283576, rel=1e-15)
+
+
+@pytest.mark.parametrize("velocity", [0.05, 0.15])
+def test_no_step_of_a_particle_is_longer_than_the_limit(velocity):
+    landscape = Known(rastrigin, Bounds(np.array([0.5, -5.0]), np.array([5.0, 0.1])))
+    ParticleSwarm(50, 40, max_velocity=velocity, refined_candidates=0).minima(landscape)
+    x = (np.array(landscape.seen) - landscape.bounds.lower) / landscape.bounds.width
+    steps = np.abs(np.diff(x, axis=0))
+    assert 0.9 * velocity < steps.max() <= velocity * (1 + 1e-12)
+
+
+def test_the_swarm_starts_from_a_sobol_set():
+    """One point in each of 64 equal boxes of a plane: balance of a scrambled Sobol set."""
+    landscape = Known(quadratic, cube(2))
+    ParticleSwarm(particles=64, iterations=1, refined_candidates=0).minima(landscape)
+    counts, *_ = np.histogram2d(*landscape.seen[0].T, bins=8, range=[[-5, 5], [-5, 5]])
+    assert (counts == 1).all()
+
+
+def test_restarts_find_what_one_run_misses():
+    """Of four runs on many minima the best one counts; each has twice the candidates of the one before."""
+    landscape = Known(rastrigin, cube(4, 5.12))
+    found = CmaEs(iterations=600, restarts=3).minima(landscape)
+    np.testing.assert_allclose(found.minima[0].x, 0.0, atol=1e-3)
+    starts = (0, *found.trace.restarts)
+    assert [landscape.calls[k] for k in starts] == [landscape.calls[0] * 2**run for run in range(len(starts))]
+    alone = CmaEs(iterations=600, restarts=0, refined_candidates=0).minima(Known(rastrigin, cube(4, 5.12)))
+    assert alone.trace.best_cost[-1] > 0.5  # the next best minimum lies at 1
+    assert alone.trace.restarts == ()
+
+
+def test_a_trace_keeps_the_lowest_so_far_what_was_asked_and_the_quartiles():
+    costs = [np.array([9.0, 5.0, 7.0]), np.array([6.0, 8.0, 10.0]), np.array([3.0, 4.0, 5.0, 6.0, 7.0])]
+    trace = SearchTrace.from_costs("search", costs)
+    np.testing.assert_array_equal(trace.best_cost, [5, 5, 3])
+    np.testing.assert_array_equal(trace.evaluations, [3, 6, 11])
+    np.testing.assert_array_equal(trace.quartiles, [[6, 7, 8], [7, 8, 9], [4, 5, 6]])
+    assert len(trace) == 3
+
+
+# ---- levenberg marquardt ---------------------------------------------------------------------------------------------
+
+# Least squares from several starts at once: planted values found from each of them, within bounds.
+
+
+TIMES = np.geomspace(600.0, 4e5, 25)
+
+
+def landscape(law, values, stresses=(60.0, 90.0, 130.0)):
+    """Uniaxial tests without noise."""
+    bar = ck.specimen("uniaxial")
+    tests = []
+    for stress in stresses:
+        run = ck.simulate(law, bar, values, loading=ck.constant_stress(stress), times=TIMES)
+        tests.append(History(name=f"{stress:g}", times=TIMES, outputs=run.outputs, loading=run.loading,
+                             temperature=293.15))  # fmt: skip
+    return search_problem(LeastSquaresProblem.from_histories(law, tests, bar, IdentificationSettings()), bar)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("norton", {"A": 1e-16, "n": 4.2}), ("strain-hardening", {"A": 3e-16, "n": 4.0, "m": -0.4}),
+     ("hyperbolic-sine", {"A": 2e-9, "n": 1.7, "B": 45.0})],
+)  # fmt: skip
+def test_planted_values_are_found_from_many_starts(name, values):
+    law = ck.law(name)
+    view = landscape(law, values)
+    ends = batched_levenberg_marquardt(view, screened_starts(view, starts=6, draws=32))
+    found = view.coordinates.values(ends[0].x)
+    assert {n: found[n] for n in values} == pytest.approx(values, rel=1e-3)
+    assert sum(end.cost < ends[0].cost + 1e-4 for end in ends) >= 4
+    assert all((view.bounds.lower <= end.x).all() and (end.x <= view.bounds.upper).all() for end in ends)
+
+
+def test_one_prediction_for_all_starts_is_as_good_as_one_each():
+    law = ck.law("strain-hardening")
+    view = landscape(law, {"A": 3e-16, "n": 4.0, "m": -0.4})
+    starts = np.array(screened_starts(view, starts=4, draws=16))
+    values, jacobian = view.candidate_jacobian(starts)
+    for k, u in enumerate(starts):
+        alone = view.residuals(u)
+        assert values[k] == pytest.approx(alone.values, rel=1e-6, abs=1e-9)
+        assert jacobian[k] == pytest.approx(alone.jacobian, rel=1e-4, abs=1e-6)
+
+
+def test_minima_that_predict_the_same_are_one():
+    view = landscape(ck.law("hyperbolic-sine"), {"A": 2e-9, "n": 1.7, "B": 45.0})
+    found = MultiStart().minima(view).minima
+    assert len(distinct(found, view.bounds)) <= 2
+
+
+@pytest.mark.parametrize("loss", ["linear", "soft_l1", "huber", "cauchy", "arctan"])
+def test_losses_have_their_own_slopes(loss):
+    z = np.geomspace(1e-3, 30.0, 40)
+    slope = (robust_loss(z * (1 + 1e-6), loss) - robust_loss(z * (1 - 1e-6), loss)) / (2e-6 * z)
+    assert robust_weight(z, loss) == pytest.approx(slope, rel=1e-6)
+
+
+# ---- bulge -----------------------------------------------------------------------------------------------------------
+
+# The swarm and CMA-ES on the real landscape: a planted bulge test through the stand-in of one degree of freedom.
+
+
+TRUTH = {"A": 2e-16, "n": 4.5}
+FRAMES = np.arange(1800.0, 43201.0, 1800.0)
+LOADING, ELASTIC = ck.PressureJump(P1=8, P2=10, Tj=14400), ck.Elastic(E=150e3)
+NORTON = ck.law("norton")
+SEARCHES = {
+    "swarm": ParticleSwarm(particles=40, iterations=15, refined_candidates=2),
+    "cma": CmaEs(iterations=30, restarts=0, refined_candidates=1),
+}
+
+
+@pytest.fixture(scope="module")
+def stand_in():
+    return ck.specimen("bulge").reduced_order_model()
+
+
+@pytest.fixture(scope="module")
+def test(stand_in):
+    run = ck.simulate(NORTON, stand_in, TRUTH, elastic=ELASTIC, loading=LOADING, times=FRAMES)
+    rng = np.random.default_rng(1)
+    sizes = {"amplitude": 1.5e-3, "width": 0.02, "shape": 0.02}
+    noisy = {name: run.outputs[name] + sd * rng.standard_normal(FRAMES.size) for name, sd in sizes.items()}
+    return ck.History("planted", FRAMES, noisy, LOADING, 293.15, specimen="bulge", elastic=ELASTIC)
+
+
+@pytest.mark.parametrize("name", SEARCHES)
+def test_a_planted_law_lies_in_its_intervals_whatever_searched(stand_in, test, name):
+    fit = identify(NORTON, [test], stand_in, search=SEARCHES[name])
+    default = identify(NORTON, [test], stand_in)
+    assert all(e.low <= TRUTH[e.name] <= e.high for e in fit.estimates)
+    assert fit.log_likelihood == pytest.approx(default.log_likelihood, abs=0.01)
+    assert fit.search_trace is not None
+    assert fit.search_trace.refined_cost <= fit.search_trace.best_cost[-1] + 1e-3 < fit.search_trace.best_cost[0]
+    assert fit.search_trace.evaluations[-1] <= fit.provenance["search_evaluations"]
