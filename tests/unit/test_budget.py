@@ -43,7 +43,7 @@ BUDGET = {
     "rupture_assessment": 1804,
     "sampling": 1027,
     "screening": 683,
-    "specimens": 3592,
+    "specimens": 3591,
     "studies": 3056,
     "surrogates": 1668,
     "testing": 1850,

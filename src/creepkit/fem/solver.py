@@ -104,8 +104,8 @@ def solve(
     mises, reactions = _empty_record(rows, points), _empty_record(rows)
     pattern = _contiguous(program.pattern)
     record = _Record(
-        rows, address(times), address(numbers), address(displacements), _optional(values), address(mises),
-        address(positions), address(counts), points, address(reactions),
+        rows, address(times), address(numbers), address(displacements), None if values is None else address(values),
+        address(mises), address(positions), address(counts), points, address(reactions),
     )  # fmt: skip
     entries = _Law(*_entry_addresses(law), address(theta), theta.size, law.states)
     given = _Input(
@@ -222,10 +222,6 @@ def _empty_record(rows: int, *shape: int) -> Floats:
 
 def _contiguous(values: Floats) -> Floats:
     return np.ascontiguousarray(values, dtype=float)
-
-
-def _optional(array: Floats | None) -> ctypes.c_void_p | None:
-    return None if array is None else address(array)
 
 
 _NUMBER, _REAL, _ARRAY = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
