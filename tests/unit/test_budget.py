@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 5610,
     "records": 1979,
     "registry": 615,
-    "reports": 6354,
+    "reports": 6182,
     "rupture_assessment": 1869,
     "sampling": 1037,
     "screening": 683,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30053
+TESTS = 30047
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
