@@ -25,19 +25,19 @@ BUDGET = {
     "exporters": 2663,
     "extraction": 1307,
     "fem": 1827,
-    "files": 1419,
+    "files": 1403,
     "forecasts": 1412,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 11473,
+    "inverse": 11468,
     "jobs": 251,
     "kernels": 1703,
     "language": 1506,
     "laws": 136,
     "modules": 781,
-    "quality": 1477,
-    "readers": 5610,
-    "records": 1979,
+    "quality": 1470,
+    "readers": 5574,
+    "records": 1996,
     "registry": 615,
     "reports": 6182,
     "rupture_assessment": 1869,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30047
+TESTS = 30097
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -51,7 +51,7 @@ def command(
     """
     import creepkit as ck
     from creepkit.quality import remark_flags
-    from creepkit.readers.questions import single_errors
+    from creepkit.readers.questions import merged
     from creepkit.readers.reading import summarise_tables
     from creepkit.reports import histories as report
 
@@ -97,7 +97,7 @@ def command(
     if plot is not None:
         report.histories_figure(found, plot)
         tell_written(plot, err=as_json)
-    for error in (one for several in unread for one in single_errors(several)):
+    for error in merged(unread):
         tell(f"not read: {error}", err=True)
     if unread:
         raise typer.Exit(1)

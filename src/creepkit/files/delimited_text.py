@@ -6,7 +6,6 @@ Nothing is guessed: what could be read in two ways is refused in one sentence. A
 from __future__ import annotations
 
 import csv
-import io
 import math
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -88,7 +87,7 @@ _PADDED = re.compile(r"^[+-]?0\d+$", re.ASCII | re.MULTILINE)
 
 
 _PART_CHARACTERS = 4_000_000
-"""Of a table of numbers that are read at once."""
+"""Of a text whose lines are taken apart at once."""
 
 
 _PLAIN_CHARACTERS = frozenset("0123456789+-.eE")
@@ -236,24 +235,6 @@ def parse_numbers(
         if not math.isfinite(values[k]):
             raise HistoryError(f"{locate(k)}: '{name}' is {_why_no_number(cell, dialect)}")
     return values
-
-
-def table_of_numbers(text: str, dialect: Dialect) -> Floats | None:
-    """(rows, columns) of lines that hold plain numbers alone, by a faster way; None where they hold anything else."""
-    separators = rf"\n{re.escape(dialect.delimiter)}"
-    allowed = f"0123456789+-eE\n{dialect.delimiter}{dialect.decimal}".encode()
-    parts = list[Floats]()
-    try:
-        for lines in parts_of_lines(text):
-            if not lines.isascii() or lines.encode().translate(None, allowed):
-                return None
-            if re.search(rf"(?:^|[{separators}+-])0[0-9]+(?:[{separators}]|$)", lines):
-                return None  # a whole number such as 0123 is refused
-            plain = io.StringIO(lines if dialect.decimal == "." else lines.replace(",", "."))
-            parts.append(np.loadtxt(plain, delimiter=dialect.delimiter, comments=None, ndmin=2))
-        return np.concatenate(parts)
-    except ValueError:  # also of parts that differ in their number of columns
-        return None
 
 
 def parts_of_lines(text: str, start: int = 0) -> Iterator[str]:

@@ -48,11 +48,7 @@ def minimum_rates_of(fit: Identification) -> list[MinimumRate]:
     ]
     rates = []
     for k, h, one in zip(measured, tests, law.minimum_rates(tests).values(), strict=True):
-        held: dict[str, Any] = {
-            "test": k,
-            "stress": float(h.loading.program().values[0]),
-            "temperature": h.mean_temperature,
-        }
+        held: dict[str, Any] = {"test": k, "stress": float(h.load_levels[0]), "temperature": h.mean_temperature}
         rates.append(MinimumRate(one.measured, one.predicted, one.low, one.high, **held))
     return rates
 

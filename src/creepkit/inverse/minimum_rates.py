@@ -72,7 +72,7 @@ def check_minimum_rates(law: CreepLaw, histories: Sequence[History], predictor: 
                 f"history '{history.name}' has a minimum creep rate and no frames, which is predicted where the "
                 f"leading output is a strain; of specimen '{history.specimen}' {known}: leave the test out"
             )
-        values = history.loading.program().values
+        values = history.load_levels
         if np.ptp(values) > CONSTANT_LOAD * np.abs(values).max():
             raise FitError(
                 f"history '{history.name}' has a minimum creep rate and a load that changes from {values.min():g} to "
@@ -228,7 +228,7 @@ def measured_minimum_rate(history: History) -> float:
 
     Load and temperature have to be constant, and the leading output a strain.
     """
-    loads, temperatures = history.loading.program().values, history.temperature_program().values
+    loads, temperatures = history.load_levels, history.temperature_program().values
     held = history.loading.quantity == "stress" and np.ptp(temperatures) <= ISOTHERMAL_RANGE
     if not (held and np.ptp(loads) <= CONSTANT_LOAD * np.abs(loads).max()):
         return float("nan")

@@ -91,7 +91,6 @@ def _load_holds(history: History, used: Bools) -> Iterator[Ints]:
 def reference_stresses(history: History, predictor: Predictor | None = None) -> Floats:
     """(stresses,) MPa, the reference stresses of a test."""
     reference_stress = _stated(history, predictor, "reference_stress")
-    loads = history.loading.program().values
     if reference_stress is not None:
         return np.atleast_1d(np.asarray(reference_stress(history), float))
     if history.loading.quantity != "stress":
@@ -99,7 +98,7 @@ def reference_stresses(history: History, predictor: Predictor | None = None) -> 
             f"{history.origin}: nothing says which stress a {history.loading.quantity} makes in the specimen "
             f"'{history.specimen}', and searches begin at a stress; give it a method reference_stress(history), MPa"
         )
-    return loads
+    return history.load_levels
 
 
 def reference_condition(history: History, predictor: Predictor | None = None) -> tuple[float, float]:

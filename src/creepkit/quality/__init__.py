@@ -3,7 +3,7 @@
 Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one with the
 readings of another, one far from its replicates or from the trend of the others, a modulus off the trend, a first
 frame that is not elastic, strain of loading that nothing states, a strain above 100 %, a record of load or temperature
-that contradicts the stated program, a last number in which the file may have been cut.
+that contradicts the stated program.
 Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load,
 idle time in which nothing crept.
 """
@@ -37,7 +37,7 @@ from creepkit.quality.rig import (
     rate_change_flag,
     record_flags,
 )
-from creepkit.records import CUT_LABEL, History, Predictor
+from creepkit.records import History, Predictor
 
 __all__ = [
     "ACTIVATION_ENERGY",
@@ -86,15 +86,6 @@ def check_data_quality(
     return DataQuality(tuple(flags), len(histories))
 
 
-def _cut_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
-    """That the file of a test may end within its last number."""
-    advice = "compare it with its source; if it is whole, end its last line with a line end"
-    for history in histories:
-        if CUT_LABEL in history.labels:
-            last, reason = (history.times.size - 1,), history.labels[CUT_LABEL]
-            yield QualityFlag((history.name,), "cut", last, reason, proposal=advice)
-
-
 def _copy_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
     for k, original in copied_tests(histories).items():
         yield QualityFlag((histories[k].name,), "copy", (), copy_reason(histories[original]))
@@ -139,7 +130,7 @@ def remark_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
 
 
 TEST_RULES: tuple[Callable[[Sequence[History]], Iterable[QualityFlag]], ...] = (
-    *(_cut_flags, _copy_flags, _replicate_flags, temperature_trend_outliers, modulus_trend_outliers, _large_strains),
+    *(_copy_flags, _replicate_flags, temperature_trend_outliers, modulus_trend_outliers, _large_strains),
     remark_flags,
 )
 """What questions whole tests, each by itself or beside the others."""

@@ -27,7 +27,6 @@ FlagKind = Literal[
     "rate change",
     "unreadable",
     "few points",
-    "cut",
     "motion",
     "residual",
     "fit",

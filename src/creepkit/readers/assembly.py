@@ -13,7 +13,6 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError, quoted
-from creepkit.readers.condition_texts import with_weak_sources
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
     StatedConditions,
@@ -21,7 +20,13 @@ from creepkit.readers.conditions import (
     errors_located_at,
     read_noise_correlation,
 )
-from creepkit.readers.derived_records import as_plain_bar, modulus_of_ramp, without_loading, without_steps
+from creepkit.readers.derived_records import (
+    as_plain_bar,
+    from_loading_on,
+    modulus_of_ramp,
+    without_loading,
+    without_steps,
+)
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
@@ -40,6 +45,7 @@ from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table import CellTable, SourceText
+from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 from creepkit.records import (
     UNKNOWN_DURATION,
@@ -81,6 +87,7 @@ def assemble_history(
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
     frames = as_plain_bar(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
+    frames = from_loading_on(conditions, frames)
     for assumption in frames.table.assumptions[len(table.assumptions) :]:
         conditions.record_assumption(assumption)
     if count := len(frames.marked):
@@ -108,7 +115,11 @@ def assemble_history(
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
         elastic = elastic if record.modulus is None else _elastic_of(record.modulus)
     else:
-        elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required=False) == "yes"
+        stated = conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
+        elastic_included = stated == "yes"
+        if stated == "no" and not any(name.startswith("strain") for name in outputs):
+            what = f"the elastic part in {' and '.join(outputs)} all the same; that of a {specimen} always includes it"
+            conditions.record_assumption(what.replace(",", ";"))
     outputs = without_steps(conditions, frames.times, outputs, used)
     merged = {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
     rupture_time, unruptured = _end_of_test(conditions, frames, used, name, loading.quantity != "strain")
@@ -172,10 +183,15 @@ def assemble_without_frames(
     end = conditions.take_number("end_time")
     if is_end:
         time, end = None, end or time
+    if ended == RUPTURED and time is None and end is not None:
+        time, end = end, None
     if rate_known and time is None and ended == RUPTURED:  # when it broke is not known
         conditions.labels.setdefault("ended", ended)
         ended = ""
     _check_end_without_frames(time, end, ended, location)
+    if not rate_known and end is not None and not ended:
+        what = f"'{end.key}' says how long the test lasted, and nothing whether it broke then; which is it?"
+        raise conditions.question(what, "ended", RUPTURED, STOPPED, location=end.location, is_free=False)
     if not rate_known and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
@@ -335,6 +351,9 @@ def _specimen_and_outputs(
         chosen = [name for name in present if load in terms.loads.get(name, [load])] or present
     _refuse_unknown_specimen(named, terms, location)
     if len(chosen) != 1:
+        if len(chosen) > 1:
+            what = f"the columns are those of {' and '.join(chosen)}; which specimen is it?"
+            raise conditions.question(what, "specimen", *chosen, location=location, is_free=False)
         raise _unidentified(named, present if named in terms.outputs else chosen, terms, location)
     outputs = {name: frames.values[name] for name in terms.outputs[chosen[0]] if name in frames.values}
     return named or chosen[0], outputs
@@ -348,9 +367,8 @@ def _unidentified(named: str, present: Sequence[str], terms: Terms, location: st
         return HistoryError(
             f"{location}: missing column: the columns hold {description}, those of {named} are needed: {known}"
         )
-    known = "; ".join(f"{', '.join(outputs)} ({name})" for name, outputs in terms.outputs.items())
-    advice = f"name one, such as '# specimen: {present[0]}'" if present else "those of one specimen are needed"
-    return HistoryError(f"{location}: missing column: the columns hold {description}, {advice}: {known}")
+    known = "strain_pct, stress_MPa (relaxation), deflection_mm (beams), elongation_mm, amplitude_mm (bulge)"
+    return HistoryError(f"{location}: missing column: no output of a specimen, such as {known}")
 
 
 def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], location: str) -> None:

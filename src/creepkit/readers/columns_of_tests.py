@@ -14,18 +14,19 @@ from functools import lru_cache
 from itertools import accumulate
 
 from creepkit.files.delimited_text import Dialect, is_number
-from creepkit.readers.column_names import (
+from creepkit.readers.ends_of_tests import FIRM, kind_of_column, plain_words
+from creepkit.readers.table import CellTable, TableRow
+from creepkit.readers.vocabulary import (
+    CONDITION_KINDS,
     NAMES_OF,
     NameTable,
+    names_tests,
     plain_name,
     split_unit,
     split_written_name,
     unit_suffix,
     words_of,
 )
-from creepkit.readers.ends_of_tests import FIRM, kind_of_column, plain_words
-from creepkit.readers.table import CellTable, TableRow
-from creepkit.readers.vocabulary import CONDITION_KINDS
 from creepkit.records.quantities import RATE, STRESS, TEMPERATURE, TIME, QuantityKind
 
 TIME_TO_STRAIN = "time_to_strain"
@@ -56,11 +57,7 @@ QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
 
 
 TEXTS: Mapping[str, tuple[str, ...]] = {
-    "name": (
-        *("name", "test", "test id", "test name", "test no", "test number", "id", "no", "sample", "sample id"),
-        *("specimen id", "specimen no", "specimen name", "probennummer", "versuch", "probe", "proben nr", "nr"),
-        *("essai", "éprouvette", "n° essai", "repère", "probenbezeichnung", "test piece", "bar"),
-    ),
+    "name": ("name", "id", "no", "nr", "nom", "bar"),
     "alloy": (*NAMES_OF["alloy"], "alloy", "nuance", "steel", "grade"),
     "control": ("control",),
     "specimen": ("specimen",),
@@ -153,6 +150,8 @@ def column_called(written: str) -> TestColumn:
 def _meaning(name: str, is_per_cent: bool) -> str:
     if name.casefold() in ("a", "el") and not is_per_cent:
         return ""
+    if names_tests(name):
+        return "name"
     plain = plain_words(name).replace("|", " ").replace("?", " ")
     return NAMES.meaning(name) or NAMES.meaning(plain) or ""
 
@@ -165,6 +164,12 @@ def _quantity_by_words(name: str, unit: str) -> str:
         return "minimum_rate"
     is_rupture = _OF_RUPTURE.search(plain) and _IS_TIME.search(plain) and not _OF_OTHERS.search(plain)
     return "rupture" if is_rupture else ""
+
+
+def is_rate(written: str) -> bool:
+    """Whether a column that means no quantity may be one of rates of creep."""
+    name, unit = split_written_name(written)
+    return _RATES.search(plain_words(name)) is not None and (not unit or unit_suffix(unit) in (*RATE.units, "pct"))
 
 
 def _strain_reached(written: str) -> float | None:
@@ -252,7 +257,7 @@ def head_of_tests(table: CellTable, meant: Mapping[str, str]) -> TestTableHead |
         first -= 1
     for start in range(body - 1, first - 1, -1):
         names = _joined([row.cells for row in rows[start:body]], meant)
-        if not is_test_table([meant.get(name, name) for name in names]):
+        if not is_test_table([meant.get(name, name) for name in names], rows[body:]):
             continue
         # A further row above may hold units, or what stands above several columns.
         for higher in range(first, start):
@@ -307,13 +312,23 @@ def _name_of(k: int, rows: Sequence[Sequence[str]], above: Sequence[Sequence[str
     return f"{options[0]} ({units[0]})" if units else options[0]
 
 
-def is_test_table(names: Sequence[str]) -> bool:
-    """Whether names are those of tests: a stress or a temperature, and a rate, a rupture time or a time to a strain."""
-    columns = [column_called(name) for name in names if name]
+def is_test_table(names: Sequence[str], rows: Sequence[TableRow] = ()) -> bool:
+    """Whether names are those of tests: a stress or a temperature, and a rate, a rupture time or a time to a strain.
+
+    Where each of the rows has its own name of a test, a strain beside its time is that at its end.
+    """
+    columns = [column_called(name) for name in names]
     found = {one.quantity for one in columns}
+    is_named = any(_differ(rows, k) for k, one in enumerate(columns) if one.quantity in ("name", "specimen"))
     measured = not {"minimum_rate", "rupture"}.isdisjoint(found) or any(one.strain is not None for one in columns)
-    measured |= "end_time" in found and any(kind_of_column(name) in FIRM for name in names)
-    return measured and not {"stress", "temperature"}.isdisjoint(found) and not has_frames(names)
+    measured |= "end_time" in found and (is_named or any(kind_of_column(name) in FIRM for name in names))
+    return measured and not {"stress", "temperature"}.isdisjoint(found) and (is_named or not has_frames(names))
+
+
+def _differ(rows: Sequence[TableRow], column: int) -> bool:
+    """Whether no two of several rows have the same cell of a column."""
+    cells = [row.cells[column] for row in rows if column < len(row.cells) and sum(map(bool, row.cells)) > 1]
+    return len(cells) > 1 and len(set(cells)) == len(cells) and sum(map(bool, cells)) >= len(cells) - 1
 
 
 def has_frames(names: Sequence[str]) -> bool:

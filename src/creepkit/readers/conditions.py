@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from creepkit.errors import CreepkitError, HistoryError, nearest
-from creepkit.readers.column_names import plain_name, split_unit, unit_suffix
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
@@ -28,7 +27,16 @@ from creepkit.readers.ends_of_tests import (
 )
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.table import SourceText
-from creepkit.readers.vocabulary import CLOSE_SPELLING, SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms, is_misspelling
+from creepkit.readers.vocabulary import (
+    CLOSE_SPELLING,
+    SPECIMEN_NAME_PATTERN,
+    HeaderVocabulary,
+    Terms,
+    is_misspelling,
+    plain_name,
+    split_unit,
+    unit_suffix,
+)
 from creepkit.records import Program
 from creepkit.records.noise_correlations import can_hold_together
 from creepkit.records.quantities import LENGTH, TIME, QuantityKind
@@ -217,7 +225,7 @@ class StatedConditions:
         elif word.casefold() == "label" and rest.strip():
             self._put(self.labels, rest.strip(), entry.text, entry)
         elif word.casefold() == "geometry" and rest.strip():
-            self._put(self.geometry, *_specimen_dimension(rest.strip(), entry, self.terms), entry)
+            self._put_length(_length(rest.strip(), entry, self.terms, is_free=True), entry)
         elif name == "ended":
             self._put(self._texts, "ended", replace(entry, text=self._end(entry.text)), entry)
         elif found and found[0] == "rupture" and (mark := marked_time(entry.text, self.end_terms)).said != "":
@@ -229,12 +237,11 @@ class StatedConditions:
         elif name in self._text_keys:
             self._put(self._texts, name, entry, entry)
         elif base in self.terms.dimensions and suffix in LENGTH.units:
-            value = LENGTH.convert(entry.number(written), suffix, entry.location, written)
-            self._put(self.geometry, self.terms.dimensions[base], value, entry)
+            self._put_length(_length(name, entry, self.terms, is_free=False), entry)
         elif found and (found[1] in self._kinds[found[0]].units or not self._is_misspelt_text(name)):
             self._put_number(*found, written, entry)
         else:
-            _refuse_misread_length(name, entry, self.terms)
+            _length(name, entry, self.terms, is_free=False)
             misspelt = self._misspelt(key) if key.strip() else ""
             is_label = kind_of_column(key) in (*FIRM, "remark") or (columns_as_labels and not misspelt)
             if not (key.strip() and is_label):
@@ -249,6 +256,10 @@ class StatedConditions:
             raise HistoryError(f"{entry.location}: '{key}' is given twice (perhaps in two units); keep one of them")
         target[key] = value
         self._locations[key] = entry.location
+
+    def _put_length(self, length: tuple[str, float] | None, entry: SourceText) -> None:
+        if length is not None:
+            self._put(self.geometry, *length, entry)
 
     def _put_number(self, quantity: str, suffix: str, written: str, entry: SourceText) -> None:
         kind = self._kinds[quantity]
@@ -298,19 +309,6 @@ class StatedConditions:
         return any(is_misspelling(plain_name(name), text) for text in self._text_keys)
 
 
-def _refuse_misread_length(name: str, entry: SourceText, terms: Terms) -> None:
-    """HistoryError for what looks like a length of the test piece, in another unit or misspelt; not for a label."""
-    base, _, suffix = name.rpartition("_")
-    lengths, units = terms.own_dimensions, ", ".join(LENGTH.units)
-    for known in lengths:
-        if name == known or (base == known and suffix not in LENGTH.units):
-            raise HistoryError(f"{entry.location}: '{name}' needs a unit of length: write {known}_mm (or {units})")
-    if suffix in LENGTH.units and lengths and get_close_matches(base, lengths, 1, cutoff=CLOSE_SPELLING):
-        raise HistoryError(
-            f"{entry.location}: no length of the test piece is called '{base}'; {nearest(base, lengths)}"
-        )
-
-
 @contextmanager
 def errors_located_at(location: str) -> Iterator[None]:
     """Give a complaint of a record about its fields the place in the file that they came from."""
@@ -322,16 +320,29 @@ def errors_located_at(location: str) -> Iterator[None]:
         raise HistoryError(f"{location}: {error}") from error
 
 
-def _specimen_dimension(stem: str, entry: SourceText, terms: Terms) -> tuple[str, float]:
-    """A measure of the specimen, `geometry apex_thickness_mm`: a length in any unit, or a bare number."""
+def _length(stem: str, entry: SourceText, terms: Terms, is_free: bool) -> tuple[str, float] | None:
+    """A length of the test piece, in any unit; HistoryError where it is nearly one.
+
+    is_free : whether another measure may be stated, `geometry facets`, as a bare number too; else None where it is no
+    length.
+    """
     base, _, suffix = stem.rpartition("_")
-    number, has_unit = entry.number(stem), bool(base) and suffix in LENGTH.units
-    name, known = (base if has_unit else stem), terms.own_dimensions or terms.dimensions
-    misspelt = [dimension for dimension in known if is_misspelling(plain_name(name), plain_name(dimension))]
-    if misspelt and name not in known:
-        raise HistoryError(
-            f"{entry.location}: no length of the test piece is called '{name}'; did you mean '{misspelt[0]}'?"
-        )
+    has_unit, known = (
+        bool(base) and suffix in LENGTH.units,
+        terms.own_dimensions or (terms.dimensions if is_free else ()),
+    )
+    if has_unit and base in terms.dimensions:
+        return terms.dimensions[base], LENGTH.convert(entry.number(entry.key or stem), suffix, entry.location, stem)
+    if not is_free and any(stem == one or (base == one and not has_unit) for one in known):
+        one, units = stem if stem in known else base, ", ".join(LENGTH.units)
+        raise HistoryError(f"{entry.location}: '{stem}' needs a unit of length: write {one}_mm (or {units})")
+    name = base if has_unit else stem
+    if (has_unit or is_free) and name not in known and (near := get_close_matches(name, known, 1, CLOSE_SPELLING)):
+        what = f"no length of the test piece is called '{name}'; did you mean '{near[0]}'? (known: {', '.join(known)})"
+        raise HistoryError(f"{entry.location}: {what}")
+    if not is_free:
+        return None
+    number = entry.number(stem)
     return (base, LENGTH.convert(number, suffix, entry.location, stem)) if has_unit else (stem, number)
 
 

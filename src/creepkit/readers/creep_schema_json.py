@@ -16,17 +16,16 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from creepkit.errors import HistoryError, nearest, quoted
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.json_documents import read_json
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
-from creepkit.readers.column_names import plain_name, unit_suffix
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width
-from creepkit.readers.vocabulary import HeaderVocabulary
+from creepkit.readers.vocabulary import HeaderVocabulary, plain_name, unit_suffix
 from creepkit.records import History
-from creepkit.records.quantities import STRAIN, STRESS, TEMPERATURE, TIME, QuantityKind
+from creepkit.records.quantities import TIME
 
 DOCUMENT = FileKind("a creep test after the NFDI-MatWerk schema", HistoryError, "name its JSON document or LIS file")
 
@@ -41,35 +40,32 @@ NOT_STATED = ("", "not applicable", "n/a", "todo", "unknown")
 _TEST, _RECORDED = "AdditionalMetadata/TestInfo/testParameters", "TestResult/valuesRecordedDuringTestRun"
 
 
-ENTRIES: Mapping[str, tuple[str, str, QuantityKind | None]] = {
-    "name": ("AdditionalMetadata/TestInfo/testJobDetails/testID", "test id", None),
-    "alloy": ("AdditionalMetadata/MaterialHistoryAndCondition/materialIdentifier", "material identifier", None),
-    "kind of loading": (f"{_TEST}/typeOfLoading", "type of loading", None),
-    "control": (f"{_TEST}/loadControlType", "load control type", None),
-    "end": (f"{_TEST}/endOfTestCriterium/endOfTestCriteriumOptions", "end of test criterium", None),
-    "temperature": (f"{_TEST}/specifiedTemperature", "specified temperature", TEMPERATURE),
-    "stress": (f"{_TEST}/initialStress", "initial stress", STRESS),
-    "rupture": (*("PrimaryData/TestResult/valuesRecordedAfterTestEnd/creepRuptureTime", "creep rupture time"), TIME),
-    "end_time": (f"PrimaryData/{_RECORDED}/testDuration", "test duration", TIME),
+ENTRIES: Mapping[str, tuple[str, str]] = {
+    "name": ("AdditionalMetadata/TestInfo/testJobDetails/testID", "test id"),
+    "alloy": ("AdditionalMetadata/MaterialHistoryAndCondition/materialIdentifier", "material identifier"),
+    "kind of loading": (f"{_TEST}/typeOfLoading", "type of loading"),
+    "control": (f"{_TEST}/loadControlType", "load control type"),
+    "end": (f"{_TEST}/endOfTestCriterium/endOfTestCriteriumOptions", "end of test criterium"),
+    "temperature": (f"{_TEST}/specifiedTemperature", "specified temperature"),
+    "stress": (f"{_TEST}/initialStress", "initial stress"),
+    "rupture": ("PrimaryData/TestResult/valuesRecordedAfterTestEnd/creepRuptureTime", "creep rupture time"),
+    "end_time": (f"PrimaryData/{_RECORDED}/testDuration", "test duration"),
     "loading_strain": (
         *("SecondaryData/TestResult/extensionValues/percentageInitialTotalExtension",),
-        *("percentage initial total extension", STRAIN),
+        "percentage initial total extension",
     ),
-    "series": (f"PrimaryData/{_RECORDED}/elapsedTimeFromEndOfLoading", "", None),
-    "second series": (f"SecondaryData/{_RECORDED}/percentageExtension", "", None),
+    "series": (f"PrimaryData/{_RECORDED}/elapsedTimeFromEndOfLoading", ""),
+    "second series": (f"SecondaryData/{_RECORDED}/percentageExtension", ""),
 }
-"""{what: where it stands below MeasurementData in a document, its name in a LIS file, and the kind of a number}."""
+"""{what: where it stands below MeasurementData in a document, and its name in a LIS file}."""
 
 
 MEANINGS: Mapping[str, Mapping[str, str]] = {
     "kind of loading": {"tension": "tension"},
     "control": {"constant force": "load", "constant stress": "stress"},
+    "end": dict.fromkeys(("test piece break", "break", "rupture", "fracture"), "ruptured"),
 }
-"""{what: {text in small letters: what it means}}."""
-
-
-BROKEN = ("test piece break", "break", "rupture", "fracture")
-"""Criteria of the end of a test, in small letters, that say that it broke."""
+"""{what: {text in small letters: what it means}}; any other end is that of a test that was stopped."""
 
 
 CREEP_EXTENSION, PLASTIC_EXTENSION, TOTAL_EXTENSION = EXTENSIONS = (
@@ -80,21 +76,13 @@ CREEP_EXTENSION, PLASTIC_EXTENSION, TOTAL_EXTENSION = EXTENSIONS = (
 """ISO 204: that since the end of loading; with the initial plastic extension; with the whole initial extension."""
 
 
-_NUMBER_AND_UNIT = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eEdD][+-]?\d+)?)\s*(\D*)", re.ASCII)
+_NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?(?:[eEdD][+-]?\d+)?", re.ASCII)
 
 
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}\b.*", re.ASCII)
 
 
 _FILE_NAME = re.compile(r"[\w.\- ]{0,200}\w\.lis\b", re.IGNORECASE)
-
-
-class SchemaEntry(NamedTuple):
-    """What is stated; unit : that stands apart from it."""
-
-    text: str
-    unit: str
-    place: str
 
 
 @dataclass(frozen=True)
@@ -122,105 +110,88 @@ class CreepSchemaReader:
             entries, table, extension = _read_series(path)
             return [_history(entries, path, table, extension)]
         document = read_json(path, DOCUMENT)
-        data = _member(document, "measurementdata") if isinstance(document, dict) else None
+        data = _member(document, "measurementdata")
         if not isinstance(data, dict):
             raise HistoryError(f"{path}: no object 'MeasurementData'; {DOCUMENT.advice}")
-        entries = {what: _nested(data, where, path) for what, (where, _, _) in ENTRIES.items()}
-        for link in ("series", "second series"):
-            if found := _FILE_NAME.search(entries[link].text):
-                file = path.parent / found[0].strip()
-                if not file.is_file():
-                    raise HistoryError(f"{path}: its series stand in '{file.name}', which is not beside it")
-                others, table, extension = _read_series(file)
-                named, here = others["name"].text, entries["name"].text
-                if named and here and plain_name(named) != plain_name(here):
-                    what = f"it is of the test '{named}', and {path} of '{here}'"
-                    raise HistoryError(f"{file}: {what}; correct one of them")
-                return [_history(entries, path, table, extension)]
-        return [_history(entries, path)]
+        entries = {what: _nested(data, where, path) for what, (where, _) in ENTRIES.items()}
+        link = next(filter(None, (_FILE_NAME.search(entries[one].text) for one in ("series", "second series"))), None)
+        if link is None:
+            return [_history(entries, path)]
+        file = path.parent / link[0].strip()
+        if not file.is_file():
+            raise HistoryError(f"{path}: its series stand in '{file.name}', which is not beside it")
+        others, table, extension = _read_series(file)
+        named, here = others["name"].text, entries["name"].text
+        if named and here and plain_name(named) != plain_name(here):
+            raise HistoryError(f"{file}: it is of the test '{named}', and {path} of '{here}'; correct one of them")
+        return [_history(entries, path, table, extension)]
 
 
-def _member(found: Mapping[str, Any], name: str) -> Any:
+def _member(found: Any, name: str) -> Any:
     """A member by its name in small letters: versions of the schema differ in capitals."""
-    return next((value for key, value in found.items() if key.casefold() == name.casefold()), None)
+    members = found.items() if isinstance(found, dict) else ()
+    return next((value for key, value in members if key.casefold() == name.casefold()), None)
 
 
-def _nested(data: Mapping[str, Any], where: str, path: Path) -> SchemaEntry:
-    """The entry that stands somewhere in a document."""
+def _nested(data: Mapping[str, Any], where: str, path: Path) -> SourceText:
+    """The entry that stands somewhere in a document, a pair of value and unit as one text."""
     found: Any = data
     for name in where.split("/"):
-        found = _member(found, name) if isinstance(found, dict) else None
-    is_pair = isinstance(found, dict)
-    value, unit = ((_member(found, name) or "") for name in ("value", "unit")) if is_pair else (found, "")
+        found = _member(found, name)
+    value, unit = (_member(found, "value"), _member(found, "unit")) if isinstance(found, dict) else (found, "")
     place = f"{path}: MeasurementData/{where}"
-    value = "" if value is None else value
-    if not isinstance(value, (str, int, float)) or isinstance(value, bool) or not isinstance(unit, str):
+    if not isinstance(value, (str, int, float, type(None))) or isinstance(value, bool):
         raise HistoryError(f"{place}: it is {type(value).__name__}; write a text or a number")
-    return _entry(value if isinstance(value, str) else repr(value), unit, place)
+    return _entry("" if value is None else str(value), str(unit or ""), place)
 
 
-def _entry(text: str, unit: str, place: str) -> SchemaEntry:
+def _entry(text: str, unit: str, place: str) -> SourceText:
+    """An entry; unit : that stands apart from a number."""
     text = " ".join(text.replace("*", "").split())
-    return SchemaEntry("" if text.casefold() in NOT_STATED else text, unit.strip(), place)
+    if _THOUSANDS.fullmatch(text):
+        raise HistoryError(f"{place}: '{quoted(text)}' may be a thousand or a decimal; write a decimal point")
+    text = "" if text.casefold() in NOT_STATED else text
+    return SourceText(f"{text} {unit.strip()}".strip() if _NUMBER.fullmatch(text) else text, place, ",")
 
 
-def _number(what: str, entry: SchemaEntry, kind: QuantityKind) -> tuple[str, SourceText]:
-    """Key with its unit, and number with a decimal point."""
-    match = _NUMBER_AND_UNIT.fullmatch(entry.text)
-    if match is None:
-        raise HistoryError(f"{entry.place}: '{entry.text}' is no number; write one such as 980, and its unit apart")
-    if _THOUSANDS.fullmatch(match[1]):
-        raise HistoryError(f"{entry.place}: '{match[1]}' may be a thousand or a decimal; write a decimal point")
-    written = match[2].strip() or entry.unit
-    suffix = unit_suffix(written)
-    if suffix not in kind.units:
-        raise HistoryError(f"{entry.place}: the unit '{written}' is not understood; {nearest(written, kind.units)}")
-    return f"{what}_{suffix}", SourceText(match[1].replace(",", "."), entry.place)
-
-
-def _stated(entries: Mapping[str, SchemaEntry]) -> Iterator[tuple[str, SourceText]]:
+def _stated(entries: Mapping[str, SourceText]) -> Iterator[tuple[str, SourceText]]:
     """Keys and texts of a history file; HistoryError for a test that is none in tension, or ends that contradict."""
-    for what, (_, _, kind) in ENTRIES.items():
-        entry = entries[what]
-        if what in MEANINGS and entry.text:
-            if entry.text.casefold() not in MEANINGS[what]:
-                allowed = ", ".join(MEANINGS[what])
-                raise HistoryError(f"{entry.place}: '{entry.text}' is not understood; allowed: {allowed}")
-            entry = entry._replace(text=MEANINGS[what][entry.text.casefold()])
-        if entry.text and (kind or what in ("name", "alloy", "control")):
-            yield _number(what, entry, kind) if kind else (what, SourceText(entry.text, entry.place))
-    criterion, place = entries["end"].text, entries["end"].place
-    if criterion and criterion.casefold() not in BROKEN:
-        if entries["rupture"].text:
-            what = f"it is '{quoted(criterion, 60)}', and a rupture time is stated"
-            raise HistoryError(f"{place}: {what}; correct one of them")
-        yield "ended", SourceText("stopped", place)
-    yield "strain_measure", SourceText("engineering", place)
+    for what, entry in entries.items():
+        meant = MEANINGS.get(what, {}).get(entry.text.casefold(), "")
+        if what in ("kind of loading", "control") and entry.text and not meant:
+            allowed = ", ".join(MEANINGS[what])
+            raise HistoryError(f"{entry.location}: '{entry.text}' is not understood; allowed: {allowed}")
+        if what == "end" and entry.text and not meant:
+            if entries["rupture"].text:
+                what = f"it is '{quoted(entry.text, 60)}', and a rupture time is stated"
+                raise HistoryError(f"{entry.location}: {what}; correct one of them")
+            yield "ended", replace(entry, text="stopped")
+        elif entry.text and what not in ("kind of loading", "end", "series", "second series"):
+            yield what, replace(entry, text=meant or entry.text)
 
 
 def _history(
-    entries: Mapping[str, SchemaEntry], path: Path, table: CellTable | None = None, extension: str = CREEP_EXTENSION
+    entries: Mapping[str, SourceText], path: Path, table: CellTable | None = None, extension: str = CREEP_EXTENSION
 ) -> History:
     """The history; table : its series, None for a rupture time alone; extension : one of EXTENSIONS, of the series."""
     stated, name, vocabulary = dict(_stated(entries)), entries["name"].text or path.stem, HeaderVocabulary()
-    lengths = [key for key in stated if key.startswith("end_time")]
+    stated["strain_measure"] = SourceText("engineering", str(path))
     if table is None:
         for quantity in ("temperature", "stress"):
-            if not entries[quantity].text:
-                raise HistoryError(f"{entries[quantity].place}: it is not stated; a test needs its {quantity}")
-        if not entries["rupture"].text and "ended" not in stated:
+            if quantity not in stated:
+                raise HistoryError(f"{entries[quantity].location}: it is not stated; a test needs its {quantity}")
+        if not {"rupture", "ended"} & stated.keys():
             found = "the test piece broke" if entries["end"].text else "it is not stated"
             raise HistoryError(
-                f"{entries['end'].place}: {found}, and there is no creepRuptureTime; state it, or the criterion by "
+                f"{entries['end'].location}: {found}, and there is no creepRuptureTime; state it, or the criterion by "
                 "which the test was stopped"
             )
-        kept = ("temperature", "stress", "alloy", "control", "ended", "rupture", "end_time")
-        drop = [*(lengths if entries["rupture"].text else []), *(key for key in stated if not key.startswith(kept))]
-        stated = {key: entry for key, entry in stated.items() if key not in drop}
+        for key in ("name", "loading_strain", "strain_measure", *(["end_time"] if "rupture" in stated else [])):
+            stated.pop(key, None)
         return assemble_without_frames(name, stated, vocabulary, location=str(path), source=str(path))
     # What loading left of the plastic extension is its first value; the total extension is another.
-    drop = [*lengths, *(key for key in stated if key.startswith("loading_strain") and extension == PLASTIC_EXTENSION)]
-    stated = {key: entry for key, entry in stated.items() if key not in drop}
+    for key in ("end_time", *(["loading_strain"] if extension == PLASTIC_EXTENSION else [])):
+        stated.pop(key, None)
     if extension == CREEP_EXTENSION:
         stated["includes_elastic"] = SourceText("no", str(path))
     stated["includes_loading"] = SourceText("no" if extension == CREEP_EXTENSION else "yes", str(path))
@@ -238,29 +209,23 @@ def _text(path: Path, first: int | None = None) -> str:
         return content.decode("cp1252", errors="replace")
 
 
-def _read_series(path: Path) -> tuple[dict[str, SchemaEntry], CellTable, str]:
+def _read_series(path: Path) -> tuple[dict[str, SourceText], CellTable, str]:
     """Entries of the head of a LIS file, its table, and its extension."""
-    lines = _text(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    cells = [[cell.strip().strip('"') for cell in line.rstrip().split("\t")] for line in lines]
-    start = next((k for k, line in enumerate(lines) if line.strip().casefold() == "[data]"), None)
-    if start is None or len(lines) < start + 4:
+    cells = [[cell.strip().strip('"') for cell in line.rstrip().split("\t")] for line in _text(path).splitlines()]
+    start = next((k for k, row in enumerate(cells) if row[0].casefold() == "[data]"), None)
+    if start is None or len(cells) < start + 5:
         raise HistoryError(f"{path}: no line '[data]' with rows of names, symbols and units below it; {SERIES.advice}")
-    meant = {name: what for what, (_, name, _) in ENTRIES.items()}
-    found: dict[str, SchemaEntry] = {}
-    for number, row in enumerate(cells[:start], 1):
-        if len(row) < 4 or not row[0]:
-            continue
+    found = {name: SourceText("", f"{path}: {name}") for _, name in ENTRIES.values() if name}
+    for row in cells[:start]:
         name = " ".join(row[0].casefold().split()).removeprefix("(digital) ")
-        if name not in meant:
-            continue
-        entry, what = _entry(row[3], row[2], f"{path}: {name}"), meant[name]
-        if found.setdefault(what, entry) != entry:
-            raise HistoryError(f"{path}:{number}: '{name}' stands there twice, with other values; keep one of them")
+        if len(row) > 3 and name in found:
+            entry = _entry(row[3], row[2], f"{path}: {name}")
+            if found[name].text and found[name] != entry:
+                raise HistoryError(f"{path}: '{name}' stands there twice, with other values; keep one of them")
+            found[name] = entry
     names, units, columns = cells[start + 1], cells[start + 3], list[str]()
-    if len(units) != len(names):
-        raise HistoryError(f"{path}:{start + 4}: {len(units)} units for {len(names)} columns; write one for each")
-    for name, written in zip(names, units, strict=True):
-        plain, unit = name.casefold(), unit_suffix(written) or written
+    for k, name in enumerate(names):
+        plain, unit = name.casefold(), unit_suffix(units[k]) if k < len(units) else None
         if plain.startswith("elapsed time from end of loading") and unit in TIME.units:
             columns.append(f"time_{unit}")
         elif plain in EXTENSIONS and unit == "pct":
@@ -268,16 +233,14 @@ def _read_series(path: Path) -> tuple[dict[str, SchemaEntry], CellTable, str]:
         elif name.startswith("Corrected measured temperature") and unit == "C":
             columns.append(name)
         else:
-            what = f"column '{name}' in '{written}' is not understood"
+            what = f"column '{name}' in '{units[k] if k < len(units) else ''}' is not understood"
             raise HistoryError(f"{path}:{start + 2}: {what}; correct it or leave it out")
     table = CellTable(path, (), columns=columns, columns_line=start + 2)
-    numbered = ((number, row) for number, row in enumerate(cells[start + 4 :], start + 5) if any(row))
-    rows = [TableRow(k, cells_of_width(table, TableRow(k, row), len(columns))) for k, row in numbered]
-    if not rows:
-        raise HistoryError(f"{path}:{start + 4}: no rows below the units; a test needs at least two")
+    numbered = [TableRow(k, row) for k, row in enumerate(cells[start + 4 :], start + 5) if any(row)]
+    rows = [TableRow(row.line, cells_of_width(table, row, len(columns))) for row in numbered]
     extension = next((name.casefold() for name in names if name.casefold() in EXTENSIONS), CREEP_EXTENSION)
-    entries = {what: SchemaEntry("", "", f"{path}: {name}") for what, (_, name, _) in ENTRIES.items()}
-    return {**entries, **found}, replace(table, rows=rows), extension
+    entries = {what: found.get(name, SourceText("", str(path))) for what, (_, name) in ENTRIES.items()}
+    return entries, replace(table, rows=rows), extension
 
 
 CREEP_SCHEMA = CreepSchemaReader()

@@ -39,11 +39,11 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import HistoryError
-from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.conditions import StatedConditions
 from creepkit.readers.frames import TableFrames
 from creepkit.readers.imposed import hold_begins
 from creepkit.readers.table import SourceText
+from creepkit.readers.vocabulary import unit_suffix
 from creepkit.records.quantities import TIME
 from creepkit.records.recorded_programs import noise_of_readings
 from creepkit.records.units import time_text
@@ -61,6 +61,10 @@ RAMP_RANGE, CREEP_RANGE = (0.05, 1.02), 0.6
 
 CREEP_SHOWS = 0.01
 """Fraction of the stress that is lost within one frame of the ramp after its end, above which it bends the ramp."""
+
+
+PRELOAD, SHORT_RAMP, SOFTEST = 0.02, 1e-3, 20e3
+"""Of the largest stress, a preload at most; of the duration, a ramp in which creep is none; MPa, of a modulus."""
 
 
 FEWEST_RAMP_FRAMES, RAMP_FROM = 3, 0.2
@@ -162,10 +166,26 @@ def _area(conditions: StatedConditions) -> tuple[float | None, str]:
     return None, ""
 
 
+def from_loading_on(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
+    """The frames from the last one on in which a bar bears its preload alone; time counts from there."""
+    stress = frames.values.get("stress")
+    if stress is None or any(conditions.states(f"stress_{form}") for form in ("steps", "program", "1")):
+        return frames
+    before = int(np.argmax(stress > PRELOAD * stress.max())) - 1
+    if before < 1 or stress.size - before < 3:
+        return frames
+    start, values = float(frames.times[before]), {name: one[before:] for name, one in frames.values.items()}
+    what = f"time counts from the end of a preload of {stress[before]:.3g} MPa at {time_text(start)}"
+    conditions.record_assumption(what)
+    return replace(frames, values={**values, "time": values["time"] - start}, lines=frames.lines[before:])
+
+
 def _frames_of_ramp(times: Floats, stress: Floats) -> int:
     """The number of frames before a stress that was raised from nothing is held; 0 where the record shows no ramp."""
     end = hold_begins(times, stress)
-    is_raised = end is not None and end >= FEWEST_RAMP_FRAMES and stress[0] <= RAMP_FROM * stress[end]
+    is_short = end is not None and times[end] - times[0] <= SHORT_RAMP * (times[-1] - times[0])
+    fewest = 1 if is_short else FEWEST_RAMP_FRAMES
+    is_raised = end is not None and end >= fewest and stress[0] <= RAMP_FROM * stress[end]
     return int(end) if end is not None and is_raised else 0
 
 
@@ -296,10 +316,8 @@ def _loaded_by_ramp(
     noise = noise_of_readings(strain[end : end + SEARCHED_FRAMES])
     if not end or strain[end] - strain[0] < max(SMALLEST_STRAIN, NOISE_FACTOR * noise):
         return None
-    used, until = (
-        used & (times >= times[end]),
-        f"frames before the end of the loading ramp at {times[end]:g} s not used",
-    )
+    used = used & (times >= times[end])
+    until = f"frames before the end of the loading ramp at {times[end]:g} s not used"
     found = None if modulus is not None else modulus_of_ramp(strain[: end + 1], stress[: end + 1])
     elastic = modulus if modulus is not None else found[0] if found is not None else None
     if elastic is not None and _is_elastic(float(strain[end]), float(stress[end]) / elastic, ELASTIC_RANGE):
@@ -307,6 +325,8 @@ def _loaded_by_ramp(
         if found is not None:
             conditions.record_assumption(found[1])
         return StrainRecord(strain, used, True, None if found is None else found[0])
+    if end < FEWEST_RAMP_FRAMES and stress[end] < SOFTEST * (strain[end] - strain[0]):
+        return None
     conditions.record_assumption(f"includes_elastic no (loading strain {strain[end]:.3g} subtracted) and {until}")
     return StrainRecord(strain - strain[end], used, includes_elastic=False)
 

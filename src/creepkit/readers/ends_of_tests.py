@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 from creepkit.files.delimited_text import is_missing
-from creepkit.readers.column_names import unit_suffix
+from creepkit.readers.vocabulary import unit_suffix
 from creepkit.records.quantities import TIME
 
 RUPTURED, STOPPED, INTERRUPTED, UNCLEAR = "ruptured", "stopped", "interrupted", "unclear"

@@ -13,11 +13,10 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError
-from creepkit.readers.column_names import NameTable, split_unit, split_written_name, unit_suffix
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.table import CellTable, some_of
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms
+from creepkit.readers.vocabulary import HeaderVocabulary, NameTable, Terms, split_unit, split_written_name, unit_suffix
 from creepkit.records.quantities import FORCE, LENGTH, STRAIN, STRESS, TEMPERATURE, QuantityKind
 
 NOISE_OF_ZERO = 0.01

@@ -21,8 +21,7 @@ error.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -34,17 +33,14 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
-from creepkit.readers.condition_texts import sources_of_names
 from creepkit.readers.conditions import noise_correlation_text
-from creepkit.readers.cut_files import CutNumber
 from creepkit.readers.questions import collected, raise_all
 from creepkit.readers.table import CellTable
-from creepkit.readers.table_heads import is_frame, names_time
+from creepkit.readers.table_heads import is_frame, names_time, sources_of_names
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.text_files import peek_table, read_head_alone, read_text_table
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
-    CUT_LABEL,
     UNKNOWN_DURATION,
     History,
     PointLoading,
@@ -71,18 +67,6 @@ class HistoryCsvReader:
     columns: tuple[str, ...] = ()
     vocabulary: HeaderVocabulary = field(default_factory=HeaderVocabulary)
 
-    def __post_init__(self) -> None:
-        is_listed = isinstance(self.columns, Sequence) and not isinstance(self.columns, str)
-        if not is_listed or not all(isinstance(name, str) for name in self.columns):
-            raise HistoryError(
-                f"reader '{self.name}': columns is a {type(self.columns).__name__}; give a tuple of names of columns "
-                "as its files write them, such as ('Time (h)', 'Strain (%)'), and vocabulary=HeaderVocabulary(...)"
-            )
-        if not isinstance(self.vocabulary, HeaderVocabulary):
-            raise HistoryError(
-                f"reader '{self.name}': vocabulary is a {type(self.vocabulary).__name__}; give a HeaderVocabulary(...)"
-            )
-
     def accepts(self, path: Path) -> bool:
         """Say whether `path` is a text table with the columns."""
         if path.suffix.lower() not in (*TABLE_SUFFIXES, *TEXT_SUFFIXES) or not path.is_file():
@@ -99,9 +83,7 @@ class HistoryCsvReader:
         head = read_head_alone(path)
         if head and any(key.startswith(("minimum_rate", "rupture", "ended")) for key in head):
             return [assemble_without_frames(path.stem, head, self.vocabulary, location=str(path), source=str(path))]
-        grid = read_text_table(path)
-        with _errors_of_format(grid):
-            return histories_of_tests(tests_in(grid, self.vocabulary), path, self.vocabulary)
+        return histories_of_tests(tests_in(read_text_table(path), self.vocabulary), path, self.vocabulary)
 
 
 def _has_numbers(grid: CellTable) -> bool:
@@ -110,19 +92,7 @@ def _has_numbers(grid: CellTable) -> bool:
     return any(is_frame(row, one) for one in signs for row in grid.rows)
 
 
-@contextmanager
-def _errors_of_format(grid: CellTable) -> Iterator[None]:
-    """Say of errors about a LabVIEW measurement where its names and units stand."""
-    try:
-        yield
-    except HistoryError as error:
-        if type(error) is not HistoryError or "label format" not in grid.header:
-            raise
-        where = "names are those of its line X_Value, units those of Y_Unit_Label"
-        raise HistoryError(f"{error} (a LabVIEW measurement: {where})") from None
-
-
-TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv", ".lvm"), (".txt", ".dat", ".asc", ".tra", ".prn")
+TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv", ".lvm"), (".txt", ".dat", ".asc", ".prn", ".tra")
 """Endings of files that are taken for tables, and of those that are where a column of time is among the first names."""
 
 
@@ -143,16 +113,9 @@ def histories_of_tests(found: Iterable[TabulatedTest], path: Path, vocabulary: H
         table = replace(table, sources=(*table.sources, *sources_of_names(table, vocabulary)))
         make = partial(assemble_history, unique, test.entries, table, vocabulary, location=table.place, source=source)
         history = collected(errors, make)
-        if history is not None and table.cut is not None and _holds_number(table, table.cut):
-            history = history.replace(labels={**history.labels, CUT_LABEL: str(table.cut)})
         histories += [] if history is None else [history]
     raise_all(errors)
     return histories
-
-
-def _holds_number(table: CellTable, number: CutNumber) -> bool:
-    """Whether the last row of a test ends with this number of the file."""
-    return int(table.lines[-1]) == number.line and number.column in (table.positions or [number.column])
 
 
 @checked
@@ -205,7 +168,8 @@ def _header_lines(history: History) -> Iterator[tuple[str, str]]:
         yield f"stated_{quantity}_program", _program_text(program, unit)
     yield from _elastic_lines(history)
     yield "strain_measure", history.strain_measure
-    yield "includes_elastic", "yes" if history.includes_elastic else "no"
+    if history.includes_elastic or not history.outputs or any(one.startswith("strain") for one in history.outputs):
+        yield "includes_elastic", "yes" if history.includes_elastic else "no"
     if history.rupture_time is not None:
         yield "rupture_s", _number_text(history.rupture_time)
     if history.unruptured:

@@ -25,6 +25,7 @@ from creepkit.records.recorded_programs import (
     noise_of_readings,
     recorded_program,
 )
+from creepkit.records.units import time_text
 
 _PROGRAM_FORMS = ("steps", "program")
 
@@ -189,7 +190,8 @@ def _stated_loading(
     earlier = conditions.take_pairs(f"stated_{quantity}_program", kind)
     if earlier is not None:
         conditions.stated[quantity] = Program(*np.array(earlier).T)
-    if column is None or (stated is not None and _agrees(_as_program(stated), frames.times, column)):
+    noise = _noise_of_level(column) if isinstance(stated, tuple) and column is not None else 0.0
+    if column is None or (stated is not None and _agrees(_as_program(stated), frames.times, column, noise)):
         return stated
     if stated is None and "step" not in frames.values:
         jump = _step_change(conditions, quantity) if quantity != "temperature" else None
@@ -199,10 +201,10 @@ def _stated_loading(
     return _recorded(conditions, frames, quantity, column)
 
 
-def _agrees(program: Program, times: Floats, column: Floats) -> bool:
+def _agrees(program: Program, times: Floats, column: Floats, noise: float) -> bool:
     """Whether a column says what was stated, at every frame; at a jump, the value before or after it."""
     later, before = program.at(times), program.at(np.nextafter(times, -np.inf).clip(0.0))
-    same = [np.isclose(column, stated, rtol=1e-9, atol=0.0) for stated in (later, before)]
+    same = [np.isclose(column, stated, rtol=1e-9, atol=noise) for stated in (later, before)]
     return bool(np.logical_or(*same).all())
 
 
@@ -355,20 +357,57 @@ def _recorded(
         program = recorded_program(frames.times, column, tolerance)
         return program if column.min() < 0.0 else Program(program.times, np.maximum(program.values, 0.0))
     bounds = [*starts, column.size]
-    for before, frame, after in zip(bounds, bounds[1:-1], bounds[2:], strict=False):
+    levels = [float(np.median(column[first:last])) for first, last in pairwise(bounds)]
+    times = [0.0, *(float(frames.times[frame]) for frame in starts[1:])]
+    for k, (before, frame, after) in enumerate(zip(bounds, bounds[1:-1], bounds[2:], strict=False), 1):
         shorter = min(frames.times[frame - 1] - frames.times[before], frames.times[after - 1] - frames.times[frame])
         gap = frames.times[frame] - frames.times[frame - 1]
         if gap > LARGEST_GAP * shorter and int(frames.lines[frame]) not in frames.marked:
             unit = "K" if is_temperature else next(iter(conditions.terms.load_kinds[quantity].units))
-            first, second = (f"{column[k]:g} {unit}".rstrip() for k in (frame - 1, frame))
-            early, late = (f"{frames.times[k]:g} s" for k in (frame - 1, frame))
-            raise HistoryError(
-                f"{frames.location(frame)}: the {quantity} changes from {first} to {second} between {early} and "
-                f"{late}; state when, such as '# {quantity}_steps: 0 s {first}; {early} {second}', or add a frame there"
-            )
-    conditions.record_assumption(f"steps of {quantity} from the first frame of each level on")
-    values = [float(np.median(column[first:last])) for first, last in pairwise(bounds)]
-    return tuple((0.0 if k == 0 else float(frames.times[k]), v) for k, v in zip(starts, values, strict=True))
+            early = float(frames.times[frame - 1])
+            steps = [[*times[:k], time, *times[k + 1 :]] for time in (early, times[k])]
+            texts = ["; ".join(f"{t:g} s {v:g} {unit}" for t, v in zip(one, levels, strict=True)) for one in steps]
+            is_early = _steps_early(frames, quantity, (before, frame, after), levels[k] - levels[k - 1])
+            if is_early is None:
+                raise conditions.question(
+                    f"the {quantity} changes from {levels[k - 1]:g} to {levels[k]:g} {unit} between {early:g} s and "
+                    f"{times[k]:g} s; state when",
+                    f"{quantity}_steps",
+                    *texts,
+                    location=frames.location(frame),
+                )
+            times[k] = early if is_early else times[k]
+            which = f"the {'earlier' if is_early else 'later'} of two frames as what was measured shows"
+            conditions.record_assumption(f"{quantity} {levels[k]:g} {unit} from {time_text(times[k])} on ({which})")
+    if times[1:] == [float(frames.times[frame]) for frame in starts[1:]]:
+        conditions.record_assumption(f"steps of {quantity} from the first frame of each level on")
+    return tuple(zip(times, levels, strict=True))
+
+
+TYPICAL_MODULUS, NEAR = 150e3, 0.5
+"""MPa; ratio of two distances above which none is the nearer one."""
+
+
+def _steps_early(frames: TableFrames, quantity: str, bounds: tuple[int, int, int], step: float) -> bool | None:
+    """Whether a load was changed at the earlier of two frames, as what is observed grows between them.
+
+    bounds : first frames of two levels, and the end. None where neither the rate before nor that behind, each perhaps
+    with the elastic strain of the step, is clearly nearer to that between them.
+    """
+    before, frame, after = bounds
+    names = [n for n in frames.values if n not in ("time", "used", "step", "temperature", quantity) and n[-3:] != "_sd"]
+    first, last = max(before, frame - 4), min(after - 1, frame + 2)
+    if quantity == "strain" or not names or first > frame - 2 or last == frame:
+        return None
+    y, times = frames.values["strain" if "strain" in names else names[0]], frames.times
+    gap, growth = times[frame] - times[frame - 1], y[frame] - y[frame - 1]
+    slow = gap * (y[frame - 1] - y[first]) / (times[frame - 1] - times[first])
+    fast = gap * (y[last] - y[frame]) / (times[last] - times[frame])
+    elastic = step / TYPICAL_MODULUS if quantity == "stress" and "strain" in names else 0.0
+    if (fast - slow) * step <= 0.0:
+        return None
+    late, early = (min(abs(growth - rate - extra) for extra in (0.0, elastic)) for rate in (slow, fast))
+    return None if min(late, early) > NEAR * max(late, early) else bool(early < late)
 
 
 def _drifts(held: Floats, tolerance: float) -> bool:
@@ -395,11 +434,17 @@ def _ramp_and_hold(times: Floats, column: Floats, start: int) -> Program:
     return Program(np.array([before[0], end, times[-1]]), np.array([first, level, level]))
 
 
+def _noise_of_level(column: Floats) -> float:
+    """Within which readings of one level lie: eight standard deviations, by the median of what changes at once."""
+    return 8.0 * 1.05 * float(np.median(np.abs(np.diff(column))))
+
+
 def _level_starts(column: Floats, tolerance: float) -> list[int]:
-    """First frames of nominal levels, each held over two frames or more; [] where a column holds no such levels."""
+    """First frames of nominal levels, each but the last over two frames or more; [] where a column holds no such."""
+    tolerance = max(tolerance, _noise_of_level(column))
     starts = [0, *(np.flatnonzero(np.abs(np.diff(column)) > tolerance) + 1).tolist()]
-    bounds = [*starts, column.size]
-    held = all(last - first > 1 and np.ptp(column[first:last]) <= tolerance for first, last in pairwise(bounds))
+    parts = [column[first:last] for first, last in pairwise([*starts, column.size])]
+    held = all(one.size > 1 for one in parts[:-1]) and all(np.ptp(one) <= tolerance for one in parts)
     return starts if held and len(starts) > 1 else []
 
 

@@ -6,7 +6,6 @@ the index that are no condition known by name become labels, as they stand; one 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -37,86 +36,56 @@ class IndexedFolderReader:
     def accepts(self, path: Path) -> bool:
         """Say whether `path` is such a folder, its index, or a file of frames in it."""
         folder = path if path.is_dir() else path.parent
-        if path.is_file() and path.name != self.index_file and not path.match(self._pattern):
+        if path.is_file() and path.name != self.index_file and not path.match(self.frames_file.replace("{key}", "*")):
             return False
         index = peek_table(folder / self.index_file)
-        return index is not None and self.key_column in index.rows[0].cells and bool(self._frame_files(folder))
+        return index is not None and self.key_column in index.rows[0].cells and bool(self._files_by_key(folder))
 
     def read(self, path: Path) -> list[History]:
         """Return the histories in the folder, in the order of the index; of one file of frames, when it is named."""
         folder = path if path.is_dir() else path.parent
         index = read_table(folder / self.index_file, self.vocabulary.ignored)
-        tests = self._index_rows(index)
-        if self._has_common_frames_file:
-            parts = self._split_common_file(self._frames(folder / self.frames_file), index, tests)
-        else:
-            only = path if path.is_file() and path.name != self.index_file else None
-            parts = self._read_files(folder, index, tests, only)
-        return [self._history(index, tests[key], key, frames) for key, frames in parts]
-
-    @property
-    def _has_common_frames_file(self) -> bool:
-        return "{key}" not in self.frames_file
-
-    @property
-    def _pattern(self) -> str:
-        return self.frames_file.replace("{key}", "*")
-
-    def _frame_files(self, folder: Path) -> list[Path]:
-        return sorted(path for path in folder.glob(self._pattern) if path.name != self.index_file)
-
-    def _index_rows(self, index: CellTable) -> dict[str, TableRow]:
-        """The rows of the index by key."""
-        k = index.column(self.key_column)
-        tests: dict[str, TableRow] = {}
-        for row in index.rows:
-            key, location = row.cells[k], index.location(row.line)
+        tests = grouped(index.rows, index.column(self.key_column))
+        for key, rows in tests.items():
             if not key or not key.isprintable():
-                raise HistoryError(f"{location}: the {self.key_column} is empty or not printable; name every test")
-            if key in tests:
-                raise HistoryError(
-                    f"{location}: test '{key}' already stands in line {tests[key].line}; keep one of them"
+                what = f"the {self.key_column} is empty or not printable; name every test"
+                raise HistoryError(f"{index.location(rows[0].line)}: {what}")
+            if len(rows) > 1:
+                what = f"test '{key}' already stands in line {rows[0].line}; keep one of them"
+                raise HistoryError(f"{index.location(rows[1].line)}: {what}")
+        files, parts = self._files_by_key(folder), dict[str, CellTable]()
+        if "" in files:
+            table = read_table(files[""], self.vocabulary.ignored)
+            parts = {
+                key: replace(table, rows=rows)
+                for key, rows in grouped(table.rows, table.column(self.key_column)).items()
+            }
+        for key in [one for one in (parts or files) if one not in tests]:
+            place = parts[key].location(parts[key].rows[0].line) if parts else files[key]
+            raise HistoryError(
+                f"{place}: test '{quoted(key)}' is not in {index.path}; add it there, or move its frames"
+            )
+        for key, rows in tests.items():
+            if key not in (parts or files):
+                where = (
+                    f"frames in {files['']}" if parts else f"file {self.frames_file.replace('{key}', key)} in {folder}"
                 )
-            tests[key] = row
-        return tests
+                raise HistoryError(f"{index.location(rows[0].line)}: test '{key}' has no {where}")
+        wanted = [key for key in tests if path not in files.values() or parts or files[key] == path]
+        return [
+            self._history(
+                index, tests[key][0], key, parts[key] if parts else read_table(files[key], self.vocabulary.ignored)
+            )
+            for key in wanted
+        ]
 
-    def _split_common_file(
-        self, table: CellTable, index: CellTable, tests: dict[str, TableRow]
-    ) -> Iterator[tuple[str, CellTable]]:
-        """Key and frames of every test, cut from one table."""
-        k = table.column(self.key_column)
-
-        def check(row: TableRow) -> None:
-            if row.cells[k] not in tests:
-                raise HistoryError(
-                    f"{table.location(row.line)}: test '{quoted(row.cells[k])}' is not in {index.path}; add it there"
-                )
-
-        rows = grouped(table.rows, k, check)
-        for key in tests:
-            part = rows.get(key)
-            if part is None:
-                raise HistoryError(f"{index.location(tests[key].line)}: test '{key}' has no frames in {table.path}")
-            yield key, replace(table, rows=part)
-
-    def _read_files(
-        self, folder: Path, index: CellTable, tests: dict[str, TableRow], only: Path | None
-    ) -> Iterator[tuple[str, CellTable]]:
-        """Key and frames of every test, each in a file of its own; of the one whose file is named, if any."""
-        files = {key: folder / self.frames_file.replace("{key}", key) for key in tests}
-        for path in self._frame_files(folder):
-            if path not in files.values():
-                raise HistoryError(f"{path}: no test in {index.path} has these frames; add it there or move the file")
-        for key, path in files.items():
-            if path.parent != folder or not path.is_file():
-                raise HistoryError(
-                    f"{index.location(tests[key].line)}: test '{key}' has no file {path.name} in {folder}"
-                )
-            if only is None or path == only:
-                yield key, self._frames(path)
-
-    def _frames(self, path: Path) -> CellTable:
-        return read_table(path, self.vocabulary.ignored)
+    def _files_by_key(self, folder: Path) -> dict[str, Path]:
+        """{test: its file of frames}; "" for that of all tests."""
+        front, _, back = self.frames_file.partition("{key}")
+        paths = [
+            one for one in sorted(folder.glob(self.frames_file.replace("{key}", "*"))) if one.name != self.index_file
+        ]
+        return {one.name[len(front) : len(one.name) - len(back)] if one.name != front else "": one for one in paths}
 
     def _history(self, index: CellTable, row: TableRow, key: str, frames: CellTable) -> History:
         entries = {name: entry for name, entry in index.entries(row).items() if name != self.key_column}
@@ -126,14 +95,13 @@ class IndexedFolderReader:
         unknown = [name for name in index.empty_columns(row) if known.is_condition(name) and name not in entries]
         if unknown and "label assumed" not in entries:
             entries["label assumed"] = SourceText(", ".join(map(unknown_text, unknown)), location)
-        source = f"{frames.path} ({key})" if self._has_common_frames_file else str(frames.path)
         return assemble_history(
             key,
             entries,
             frames,
             self.vocabulary,
             location=location,
-            source=source,
+            source=f"{frames.path}{'' if '{key}' in self.frames_file else f' ({key})'}",
             skipped_columns=(self.key_column,),
             columns_as_labels=True,
         )

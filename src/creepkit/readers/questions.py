@@ -7,7 +7,9 @@ raises it.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterable, Sequence
+from itertools import takewhile
 from pathlib import Path
 from typing import TypeVar
 
@@ -24,18 +26,12 @@ Answer = str | float | dict[str, str]
 """What answers a question: a text, a number, or {name: what it is}."""
 
 
-def toml_key(name: str) -> str:
-    """A key of TOML, bare where it may be."""
-    is_bare = bool(name) and all(sign.isascii() and (sign.isalnum() or sign in "_-") for sign in name)
-    return name if is_bare else json.dumps(name, ensure_ascii=False)
-
-
 class Question(HistoryError):
     """What is not known of a file, and asked for.
 
     path : of the file. key : of the table of tests.toml, such as ended, columns or gauge_length_mm. choices : answers,
     the likely one first; each is a value, or {name: value} where the key holds a table. is_free : whether another value
-    may be written.
+    may be written. names, at : of the files of a folder of which the same is asked, and all places where it is.
     """
 
     def __init__(
@@ -43,31 +39,59 @@ class Question(HistoryError):
     ) -> None:
         self.path, self.place, self.sentence, self.key = path, place, sentence, key
         self.choices, self.is_free = tuple(choices), is_free
-        super().__init__(self.asked_of(path.name))
+        self.names: tuple[str, ...] = (path.name,)
+        self.at = frozenset((place,))
+        super().__init__(sentence)
 
-    def asked_of(self, files: str, count: int = 1) -> str:
-        """The question with the line that answers it; files : name or pattern of those that it is about."""
+    def __str__(self) -> str:
+        """The question with the line that answers it."""
         others = " or ".join(self.entry(choice) for choice in self.choices[1:])
         first = self.entry(self.choices[0]) if self.choices else f"{self.key} = ..."
-        more = f" (and {count - 1} file{'s' if count > 2 else ''} more)" if count > 1 else ""
-        under = f"rite into {ANSWERS_FILE} beside it: [{toml_key_in_quotes(files)}] {first}"
+        under = f"rite into {ANSWERS_FILE} beside it: [{toml_value(self.pattern)}] {first}"
         joined = f"{self.sentence} W" if self.sentence.endswith("?") else f"{self.sentence}; w"
-        return f"{self.place}{more}: {joined}{under}{f' (or {others})' if others else ''}"
+        return f"{self.places}: {joined}{under}{f' (or {others})' if others else ''}"
+
+    @property
+    def places(self) -> str:
+        """Where it stands, and how often else."""
+        more = len(self.names) - 1
+        others = f" (and {more} file{'s' if more > 1 else ''} more)" if more else ""
+        return f"{self.place}{others or (f' (and {len(self.at) - 1} more)' if len(self.at) > 1 else '')}"
+
+    @property
+    def pattern(self) -> str:
+        """The name of its file; of several a pattern, such as RX*.csv, which may match others."""
+        if len(self.names) == 1:
+            return self.names[0]
+        suffixes = {Path(name).suffix for name in self.names}
+        shared = takewhile(lambda signs: len(set(signs)) == 1, zip(*self.names, strict=False))
+        return f"{''.join(signs[0] for signs in shared)}*{suffixes.pop() if len(suffixes) == 1 else ''}"
 
     def entry(self, choice: Answer) -> str:
         """The line of tests.toml that gives an answer."""
         return f"{self.key} = {toml_value(choice)}"
 
 
-def toml_key_in_quotes(name: str) -> str:
-    """A key of TOML in quotes."""
-    return json.dumps(name, ensure_ascii=False)
+def merged(errors: Iterable[Exception]) -> list[Exception]:
+    """Errors by themselves, each once; questions that say the same of files of a folder as one."""
+    found, questions = list[Exception](), dict[tuple[object, ...], Question]()
+    for one in (one for error in errors for one in single_errors(error)):
+        if isinstance(one, Question):
+            key = (one.path.parent, one.key, one.sentence, repr(one.choices))
+            question = questions.setdefault(key, one)
+            question.at |= one.at
+            question.names = tuple(sorted({*question.names, *one.names}))
+            found.append(question)
+        else:
+            found.append(one)
+    return list({str(one): one for one in found}.values())
 
 
 def toml_value(value: object) -> str:
     """A text, a number, or {name: text} as TOML."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{toml_key(k)} = {toml_value(v)}" for k, v in value.items()) + "}"
+        keys = {k: k if re.fullmatch(r"[A-Za-z0-9_-]+", k) else toml_value(k) for k in value}
+        return "{" + ", ".join(f"{keys[k]} = {toml_value(v)}" for k, v in value.items()) + "}"
     return f"{value:g}" if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
 
 
@@ -87,10 +111,10 @@ def single_errors(error: Exception) -> tuple[Exception, ...]:
 
 def raise_all(errors: Iterable[HistoryError]) -> None:
     """Raise the errors, if there are some: one as it is, several as one, each sentence once."""
-    single = {str(one): one for error in errors for one in single_errors(error) if isinstance(one, HistoryError)}
+    single = [one for one in merged(errors) if isinstance(one, HistoryError)]
     if len(single) > 1:
-        raise SeveralErrors(list(single.values()))
-    for one in single.values():
+        raise SeveralErrors(single)
+    for one in single:
         raise one
 
 

@@ -24,7 +24,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
 from creepkit.files.limits import how_to_raise, raised
 from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
-from creepkit.readers.column_names import TEST_NAME_COLUMNS, words_of
+from creepkit.readers.columns_of_tests import column_called, head_of_tests
 from creepkit.readers.frames import unknown_text
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.table import (
@@ -36,10 +36,11 @@ from creepkit.readers.table import (
     named_columns,
     refuse_long_cells,
     without_ignored,
+    without_logarithms,
 )
 from creepkit.readers.table_heads import names_time
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
-from creepkit.readers.vocabulary import HeaderVocabulary
+from creepkit.readers.vocabulary import HeaderVocabulary, names_tests, words_of
 from creepkit.records import History
 
 SPREADSHEET_SUFFIXES = (".xlsx", ".xlsm")
@@ -186,7 +187,8 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str], fir
         for cell, text in notes.comments.items()
     }
     filled = _with_merged(_with_points(rows, texts, table.place), notes.merged)
-    return replace(table, rows=filled, header=header, comments=late, merged=_cells_below(rows, notes.merged))
+    merged = _cells_below(rows, notes.merged)
+    return without_logarithms(replace(table, rows=filled, header=header, comments=late, merged=merged))
 
 
 def _entries(
@@ -324,7 +326,7 @@ class SpreadsheetReader:
         check_readable(path, SPREADSHEET_FILE)
         left_out = {name.casefold() for name in self.vocabulary.ignored}
         sheets = [sheet for sheet in read_sheets(path) if sheet.sheet.casefold() not in left_out]
-        framed = [sheet for sheet in sheets if names_time(sheet, self.vocabulary)]
+        framed = [sheet for sheet in sheets if holds_frames(sheet, self.vocabulary)]
         if not framed:
             listed = ", ".join(f"'{sheet.sheet}'" for sheet in sheets) or "none that holds anything"
             raise HistoryError(f"{path}: no sheet has a column of time (sheets: {listed}); name one time_h or Time (h)")
@@ -350,31 +352,37 @@ class SpreadsheetReader:
         return histories_of_tests(_with_conditions(path, tests, stated), path, self.vocabulary)
 
 
-_TEST_NAMES = (*TEST_NAME_COLUMNS, "name", "sheet")
-"""Names, in small letters, of the column that says to which test or sheet conditions belong."""
+def holds_frames(sheet: CellTable, vocabulary: HeaderVocabulary) -> bool:
+    """Whether a sheet has a column of time above frames, and not one row a test."""
+    return names_time(sheet, vocabulary) and head_of_tests(sheet, vocabulary.synonyms) is None
 
 
-def _names_tests(row: TableRow) -> bool:
-    """Whether a row names columns of conditions, one of them that of the tests."""
-    cells = [words_of(cell) for cell in row.cells if cell]
-    return len(cells) > 1 and not set(cells).isdisjoint(_TEST_NAMES)
+def _names_sheets(name: str) -> bool:
+    """Whether a column says to which test or sheet conditions belong."""
+    return names_tests(name) or words_of(name) in ("name", "sheet", "specimen")
 
 
 def _conditions_by_test(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[str, dict[str, SourceText]]:
     """{test: its conditions} of a sheet with a column of tests; {} of any other sheet."""
-    head = [k for k, row in enumerate(sheet.rows[:_FILLED_ROWS]) if _names_tests(row)]
+    head = [
+        k
+        for k, row in enumerate(sheet.rows[:_FILLED_ROWS])
+        if sum(map(bool, row.cells)) > 1 and any(map(_names_sheets, row.cells))
+    ]
     if not head or head[0] + 1 >= len(sheet.rows):
         return {}
     sheet = replace(sheet, rows=sheet.rows[head[0] :])  # rows above the names are titles
     table, known = named_columns(without_ignored(sheet, 0, vocabulary.ignored)), vocabulary.terms()
-    columns = [k for k, name in enumerate(table.columns) if words_of(name) in _TEST_NAMES]
+    columns = [k for k, name in enumerate(table.columns) if _names_sheets(name)]
     tests: dict[str, dict[str, SourceText]] = {}
     for row in table.rows if columns else ():
         test, place = row.cells[columns[0]], table.location(row.line)
         if not test or test in tests:
             raise HistoryError(f"{place}: the test is '{quoted(test)}', which is empty or named before; name each once")
         tests[test] = {
-            known.condition(name) if known.is_condition(name) else f"label {name}": replace(entry, key=name)
+            known.condition(name) if known.is_condition(name) else column_called(name).key or f"label {name}": replace(
+                entry, key=name
+            )
             for name, entry in table.entries(row).items()
             if name != table.columns[columns[0]]
         }
@@ -403,8 +411,10 @@ def _with_conditions(
         )
     for test in tests:
         extra = stated.get(test.name, stated.get(test.table.sheet, {}))
-        if clash := sorted(extra.keys() & test.entries.keys()):
-            raise HistoryError(f"{extra[clash[0]].location}: '{clash[0]}' was already given; keep one of them")
+        for key in extra.keys() & test.entries.keys():
+            if not extra[key].says_the_same(test.entries[key]):
+                what = f"'{key}' is {quoted(extra[key].text, 60)}, and {test.entries[key].location} says another one"
+                raise HistoryError(f"{extra[key].location}: {what}; correct one of them")
         yield replace(test, entries={**test.entries, **extra})
 
 

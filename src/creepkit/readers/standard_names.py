@@ -15,25 +15,27 @@ or `Time of day`, or the values: elapsed are times that begin below one hour or 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
+from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve
-from creepkit.readers.column_names import (
+from creepkit.readers.questions import Question
+from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of
+from creepkit.readers.vocabulary import (
     STATED_BY_NAME,
+    HeaderVocabulary,
+    Terms,
     plain_name,
     split_unit,
     split_written_name,
     unit_suffix,
     words_of,
 )
-from creepkit.readers.questions import Question
-from creepkit.readers.table import CellTable, NumberRows, SourceText, TableRow, cells_of
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms
 
 SURELY_PER_CENT, SURELY_FRACTION = 1.0, 1e-3
 """Largest strain above which, and below which, a strain without unit is decided by its values."""
@@ -64,7 +66,22 @@ def in_standard_names(
     columns = [known.column(name) for name in table.columns]
     table = replace(table, columns=columns, written=table.columns) if columns != list(table.columns) else table
     table = with_elapsed_times(stated, table, known)
+    table = _with_decided_temperature(stated, table, known)
     return _with_decided_strains(stated, _without_per_cent_signs(table, known), known)
+
+
+def _with_decided_temperature(stated: Mapping[str, SourceText], table: CellTable, known: Terms) -> CellTable:
+    """The table with a column of temperatures without a unit in that of the one stated temperature that is like it."""
+    if "temperature" not in table.columns:
+        return table
+    written, middle = table.as_written(table.column("temperature")), float(np.median(table.numbers("temperature")))
+    texts = [f"{one.text} {key[12:]}" for key, one in stated.items() if key.startswith("temperature_")]
+    for text in (*texts, *(one.text for one in table.sources if one.key == "temperature")):
+        number, _, unit = text.partition(" ")
+        if (suffix := unit_suffix(unit)) and is_number(number, Dialect()) and abs(float(number) - middle) < 5.0:
+            columns = [f"temperature_{suffix}" if name == "temperature" else name for name in table.columns]
+            return table.renamed(columns).assuming(f"'{written}' in {suffix} as stated")
+    return table
 
 
 def specimen_named(entries: Mapping[str, SourceText], vocabulary: HeaderVocabulary) -> str:
@@ -84,6 +101,8 @@ def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[st
             suffix = unit_suffix(match[2])
             if suffix in known.conditions.kinds[found[0]].units and found[1] in ("", suffix):
                 name, entry = f"{found[0]}_{suffix}", replace(entry, text=match[1])
+        if name in stated and stated[name].says_the_same(entry):
+            continue
         if name in stated:
             raise HistoryError(f"{entry.location}: '{key}' is given twice (perhaps in two units); keep one of them")
         stated[name] = entry if name == key else replace(entry, key=entry.key or key)
@@ -103,8 +122,6 @@ def _stated_by_columns(table: CellTable) -> list[tuple[str, SourceText]]:
 
 def _without_per_cent_signs(table: CellTable, known: Terms) -> CellTable:
     """The table without the signs in cells such as `1.2 %`, whose columns are in per cent, as their names must say."""
-    if isinstance(table.rows, NumberRows):
-        return table
     signed = [k for k, cell in enumerate(table.rows[0].cells) if cell.endswith("%") and _kind(table.columns[k], known)]
     if not signed:
         return table
@@ -115,21 +132,12 @@ def _without_per_cent_signs(table: CellTable, known: Terms) -> CellTable:
             place = table.location(table.columns_line, k)
             raise HistoryError(f"{place}: '{columns[k]}' is not in per cent, but its cells are; correct one of them")
         columns[k] = f"{name}_pct"
-    rows = list(_rows_without_signs(replace(table, columns=columns), signed))
-    return replace(table, columns=columns, rows=rows, written=table.written or table.columns)
-
-
-def _rows_without_signs(table: CellTable, signed: Collection[int]) -> Iterator[TableRow]:
     for row in table.rows:
-        cells = list(row.cells)
-        for k in signed:
-            if not cells[k].endswith("%"):
-                place = table.location(row.line, k)
-                raise HistoryError(
-                    f"{place}: '{table.columns[k]}' is '{quoted(cells[k])}' without the sign % of others"
-                )
-            cells[k] = cells[k].removesuffix("%").rstrip()
-        yield TableRow(row.line, cells)
+        if odd := [k for k in signed if not row.cells[k].endswith("%")]:
+            what = f"'{columns[odd[0]]}' is '{quoted(row.cells[odd[0]])}' without the sign % of others"
+            raise HistoryError(f"{table.location(row.line, odd[0])}: {what}")
+    rows = [TableRow(r.line, [c.rstrip("% ") if k in signed else c for k, c in enumerate(r.cells)]) for r in table.rows]
+    return replace(table, columns=columns, rows=rows, written=table.written or table.columns)
 
 
 def _kind(name: str, known: Terms) -> bool:
@@ -209,7 +217,7 @@ def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: T
     if order is not None and order.text not in DATE_ORDERS:
         raise HistoryError(f"{order.location}: date_order is '{quoted(order.text)}'; allowed: {', '.join(DATE_ORDERS)}")
     times = [k for k, name in enumerate(table.columns) if known.quantity(name) == "time"]
-    if len(times) != 1 or isinstance(table.rows, NumberRows) or not is_clock_time(table.rows[0].cells[times[0]]):
+    if len(times) != 1 or not is_clock_time(table.rows[0].cells[times[0]]):
         if order is not None or zone is not None:
             key, entry = ("date_order", order) if order is not None else ("time_zone", zone)
             assert entry is not None

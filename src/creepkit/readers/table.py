@@ -3,7 +3,7 @@
 `text_files.read_text_table` reads a text of any dialect and `spreadsheets.read_sheets` the sheets of an .xlsx into a
 `CellTable`. Its `rows` are then all rows that hold something, in which names, units and titles stand anywhere;
 `named_columns` makes the table whose `columns` are named by the first of them. Cells stay text, with their place, until
-`CellTable.numbers` makes numbers of a column; `column_names` knows what names and units mean.
+`CellTable.numbers` makes numbers of a column; `vocabulary` knows what names and units mean.
 
     table = read_table(Path("alloys.csv"))
     thickness = table.numbers("thickness (mm)")
@@ -13,22 +13,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple, overload
+from typing import NamedTuple
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import ERROR_VALUES, Dialect, is_missing, is_number, parse_number, parse_numbers
+from creepkit.files.delimited_text import (
+    ERROR_VALUES,
+    Dialect,
+    float_of,
+    is_missing,
+    is_number,
+    parse_number,
+    parse_numbers,
+)
 from creepkit.files.limits import how_to_raise, raised
-from creepkit.readers.column_names import plain_name, split_written_name
-from creepkit.readers.cut_files import CutNumber
+from creepkit.readers.vocabulary import plain_name, split_written_name, unit_suffix
 
-MAXIMUM_COLUMNS, MAXIMUM_CELL, MAXIMUM_TEXTS = 2000, 10_000, 40_000_000
-"""Columns of a table; characters of a cell, in which units are looked for; cells that are not all numbers."""
+MAXIMUM_COLUMNS, MAXIMUM_CELL = 2000, 10_000
+"""Columns of a table; characters of a cell, in which units are looked for."""
 
 
 _POINT_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
@@ -48,6 +55,11 @@ class SourceText:
     decimal: str = "."
     key: str = ""
 
+    def says_the_same(self, other: SourceText) -> bool:
+        """Whether both are one text, or one number."""
+        numbers = [float_of(one.text) for one in (self, other) if is_number(one.text.replace(",", "."), Dialect())]
+        return self.text.casefold() == other.text.casefold() or (len(numbers) == 2 and numbers[0] == numbers[1])
+
     def number(self, name: str) -> float:
         """The text as a finite number; `name` says in the error what it was meant to be."""
         dialect = Dialect(decimal=self.decimal)
@@ -63,50 +75,8 @@ class TableRow(NamedTuple):
     cells: Sequence[str]
 
 
-@dataclass(frozen=True)
-class NumberRows(Sequence[TableRow]):
-    """The rows of a large table that holds numbers alone below its names, whose text is not kept.
-
-    numbers : (rows, columns). lines : (rows,) of the file. decimal : the sign of the table, in the text of its rows.
-    above : rows of text before those of numbers.
-    """
-
-    numbers: Floats
-    lines: Ints
-    decimal: str = "."
-    above: tuple[TableRow, ...] = ()
-
-    def __len__(self) -> int:
-        return len(self.above) + len(self.numbers)
-
-    @overload
-    def __getitem__(self, index: int) -> TableRow: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[TableRow]: ...
-    def __getitem__(self, index: int | slice) -> TableRow | Sequence[TableRow]:
-        above = len(self.above)
-        if isinstance(index, slice):
-            start, stop, _ = index.indices(len(self))
-            if stop <= above:
-                return self.above[index]
-            rows = slice(max(start - above, 0), stop - above)
-            return NumberRows(self.numbers[rows], self.lines[rows], self.decimal, self.above[start:])
-        row = range(len(self))[index] - above
-        if row < 0:
-            return self.above[row + above]
-        return TableRow(int(self.lines[row]), [repr(float(x)).replace(".", self.decimal) for x in self.numbers[row]])
-
-
-def joined(above: Sequence[TableRow], rows: Sequence[TableRow]) -> Sequence[TableRow]:
-    """Rows above others."""
-    return replace(rows, above=(*above, *rows.above)) if isinstance(rows, NumberRows) else [*above, *rows]
-
-
-def with_columns(rows: Sequence[TableRow], kept: Sequence[int]) -> Sequence[TableRow]:
+def with_columns(rows: Sequence[TableRow], kept: Sequence[int]) -> list[TableRow]:
     """The rows with some of their columns."""
-    if isinstance(rows, NumberRows):
-        above = tuple(with_columns(rows.above, kept))
-        return replace(rows, numbers=rows.numbers[:, list(kept)], above=above)
     return [TableRow(row.line, [row.cells[k] for k in kept if k < len(row.cells)]) for row in rows]
 
 
@@ -115,15 +85,12 @@ def cells_of(rows: Sequence[TableRow], column: int) -> Iterator[str]:
     return (row.cells[column] for row in rows)
 
 
-def grouped(
-    rows: Sequence[TableRow], column: int, check: Callable[[TableRow], object]
-) -> dict[str, Sequence[TableRow]]:
-    """{cell of a column: the rows that have it}, in the order of the first ones; check : is called for each row."""
+def grouped(rows: Sequence[TableRow], column: int) -> dict[str, list[TableRow]]:
+    """{cell of a column: the rows that have it}, in the order of the first ones."""
     found: dict[str, list[TableRow]] = {}
     for row in rows:
-        check(row)
         found.setdefault(row.cells[column], []).append(row)
-    return dict(found)
+    return found
 
 
 def some_of(names: Sequence[str], count: int = 12) -> str:
@@ -132,16 +99,11 @@ def some_of(names: Sequence[str], count: int = 12) -> str:
     return shown if len(names) <= count else f"{shown} and {len(names) - count} more"
 
 
-def refuse_more(place: str, found: int, usual: int, noun: str, advice: str) -> None:
-    """Refuse a table that is larger than tables of tests are."""
-    if found > usual and found > (most := raised(usual)):
-        what = f"number of {noun} {found}, more than {most}"
-        raise HistoryError(f"{place}: {what}; {advice}, or {how_to_raise(found, most)}")
-
-
 def refuse_long_cells(place: str, cells: Sequence[str]) -> None:
     """Refuse more columns than a table has, and a cell that is no name, number or remark."""
-    refuse_more(place, len(cells), MAXIMUM_COLUMNS, "columns", "write the tests to several files")
+    if len(cells) > (most := raised(MAXIMUM_COLUMNS)):
+        what = f"number of columns {len(cells)}, more than {most}; write the tests to several files"
+        raise HistoryError(f"{place}: {what}, or {how_to_raise(len(cells), most)}")
     if len(longest := max(cells, key=len, default="")) > MAXIMUM_CELL:
         what = f"a cell of {len(longest)} characters, more than {MAXIMUM_CELL}"
         raise HistoryError(f"{place}: {what}; is a quote or a line missing?")
@@ -156,8 +118,8 @@ class CellTable:
     `columns_line`, where they are known. positions : the column of the file, from 0, in which each column stands, where
     errors must tell it. written : the columns as they were written, where they were given creepkit's names.
     assumptions : what was assumed of the table, for the label "assumed". sources : what titles and names of sheets and
-    files state of its test, which must agree with what else does. cut : the last number of the file, where the file may
-    have been cut in it. merged : row and column, from 0, of cells that are merged with one above them.
+    files state of its test, which must agree with what else does. merged : row and column, from 0, of cells that are
+    merged with one above them.
     """
 
     path: Path
@@ -172,7 +134,6 @@ class CellTable:
     written: Sequence[str] = ()
     assumptions: tuple[str, ...] = ()
     sources: tuple[SourceText, ...] = ()
-    cut: CutNumber | None = None
     merged: frozenset[tuple[int, int]] = frozenset()
 
     @property
@@ -199,16 +160,12 @@ class CellTable:
     def numbers(self, name: str) -> Floats:
         """(rows,) One column as numbers."""
         k = self.column(name)
-        if isinstance(self.rows, NumberRows):
-            return self.rows.numbers[:, k]
         cells = list(cells_of(self.rows, k))
         return parse_numbers(cells, self.dialect, lambda row: self.location(self.rows[row].line, k), self.as_written(k))
 
     @property
     def lines(self) -> Ints:
         """(rows,) The line of the file in which each row stands."""
-        if isinstance(self.rows, NumberRows):
-            return self.rows.lines
         return np.array([row.line for row in self.rows], dtype=int)
 
     def entries(self, row: TableRow) -> dict[str, SourceText]:
@@ -266,6 +223,42 @@ def entry_of(line: str) -> tuple[str, bool, str]:
 # ---- columns -------------------------------------------------------------------------------------------------------
 
 
+_LOGARITHM = re.compile(
+    r"(?:log|lg)[ _]?(?:10|₁₀)?(?:[ _]+|(?=[(\[]))[(\[]?(?P<of>[^()\[\]]+)[)\]]?(?:\s*[(\[](?P<unit>[^()\[\]]+)[)\]])?"
+)
+_MAY_BE_LOGARITHM = re.compile(
+    r"t(?: ?[rfbu])?|(?:time|temps|[σε])(?: .*)?|.*(?:rate|stress|life|zeit|spannung|vitesse|contrainte)", re.IGNORECASE
+)
+_LARGEST_LOGARITHM = 20.0
+
+
+def without_logarithms(table: CellTable) -> CellTable:
+    """The table with numbers in the place of decimal logarithms, whose columns are called as `log t_r (h)` is."""
+    rows, columns = table.rows, dict[int, str]()
+    at = next((r for r, row in enumerate(rows[:60]) if any(map(_LOGARITHM.fullmatch, row.cells))), len(rows))
+    for k, cell in enumerate(rows[at].cells if at < len(rows) else ()):
+        if match := _LOGARITHM.fullmatch(cell):
+            name, unit = split_written_name(match["of"])
+            unit = match["unit"] or unit
+            numbers = [abs(float_of(row.cells[k])) for row in rows[at:] if _is_number_at(row, k, table)]
+            is_quantity = unit_suffix(unit) or _MAY_BE_LOGARITHM.fullmatch(plain_name(name).replace("_", " "))
+            if is_quantity and numbers and max(numbers) <= _LARGEST_LOGARITHM:
+                columns[k] = f"{name} ({unit})" if unit else name
+    if not columns:
+        return table
+    notes = [f"'{rows[at].cells[k]}' is a decimal logarithm" for k in columns]
+    changed = [TableRow(rows[at].line, [columns.get(k, cell) for k, cell in enumerate(rows[at].cells)])]
+    for row in rows[at + 1 :]:
+        powers = {k: f"{10.0 ** float_of(row.cells[k]):.12g}" for k in columns if _is_number_at(row, k, table)}
+        powers = {k: text.replace(".", table.dialect.decimal) for k, text in powers.items()}
+        changed.append(TableRow(row.line, [powers.get(k, cell) for k, cell in enumerate(row.cells)]))
+    return replace(table, rows=[*rows[:at], *changed]).assuming(*notes)
+
+
+def _is_number_at(row: TableRow, column: int, table: CellTable) -> bool:
+    return column < len(row.cells) and is_number(row.cells[column], table.dialect)
+
+
 def without_ignored(table: CellTable, names_at: int, ignored: Collection[str]) -> CellTable:
     """The table without the columns that its key `ignore` names, all of which must be there, and those in `ignored`.
 
@@ -288,11 +281,8 @@ def without_ignored(table: CellTable, names_at: int, ignored: Collection[str]) -
     header = {name: entry for name, entry in table.header.items() if name != key}
     if not left_out:
         return replace(table, header=header)
-    is_text = not isinstance(table.rows, NumberRows)
-    width = max(len(row.cells) for row in (table.rows if is_text else table.rows[:1]))
-    kept = [k for k in range(width) if k not in left_out]
-    rows = with_columns(table.rows, kept)
-    rows = [row for row in rows if any(row.cells)] if is_text else rows
+    kept = [k for k in range(max(len(row.cells) for row in table.rows)) if k not in left_out]
+    rows = [row for row in with_columns(table.rows, kept) if any(row.cells)]
     return replace(table, header=header, rows=rows, positions=kept)
 
 
@@ -320,8 +310,7 @@ def named_columns(table: CellTable) -> CellTable:
     width = max((k for k, cell in enumerate(names.cells, 1) if cell), default=0)
     place = table.location(names.line)
     check_columns(place, names.cells[:width])
-    if not isinstance(rows, NumberRows):
-        rows = [TableRow(row.line, cells_of_width(table, row, width)) for row in rows]
+    rows = [TableRow(row.line, cells_of_width(table, row, width)) for row in rows]
     if not rows:
         raise HistoryError(f"{place}: no rows below the line of columns; a table needs at least one")
     return replace(table, columns=names.cells[:width], columns_line=names.line, rows=rows)

@@ -16,13 +16,10 @@ from typing import NamedTuple
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
-from creepkit.readers.column_names import TEST_NAME_COLUMNS, split_written_name, unit_suffix, words_of
-from creepkit.readers.condition_texts import conditions_in_text, conditions_of_head
 from creepkit.readers.ends_of_tests import kind_of_column
 from creepkit.readers.frames import OF_UNIT, unknown_text
 from creepkit.readers.table import (
     CellTable,
-    NumberRows,
     SourceText,
     TableRow,
     cells_of,
@@ -33,8 +30,18 @@ from creepkit.readers.table import (
     some_of,
     with_columns,
 )
-from creepkit.readers.table_heads import HeadedTable, HeadOfTest, headed_table, heads_of_tests, test_and_column
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms
+from creepkit.readers.table_heads import (
+    HeadedTable,
+    HeadOfTest,
+    conditions_in_text,
+    conditions_of_head,
+    headed_table,
+    heads_of_tests,
+    is_frame,
+    is_time,
+    test_and_column,
+)
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, split_written_name, unit_suffix, words_of
 from creepkit.records.quantities import STRAIN
 
 # ---- tests in rows ---------------------------------------------------------------------------------------------------
@@ -62,8 +69,7 @@ def without_remarks(table: CellTable, notes: dict[str, SourceText], labels: Coll
 
     labels : columns of words that are remarks where their cells differ.
     """
-    count = 0 if isinstance(table.rows, NumberRows) else len(table.columns)
-    cells = {k: set(cells_of(table.rows, k)) for k in range(count)}
+    cells = {k: set(cells_of(table.rows, k)) for k in range(len(table.columns))}
     words = [k for k, one in cells.items() if len(one) > 1 and not any(is_number(cell, table.dialect) for cell in one)]
     columns = [k for k in cells if kind_of_column(table.columns[k]) == "remark"]
     columns += [k for k in words if table.columns[k] in labels and k not in columns]
@@ -81,7 +87,7 @@ _DATES = frozenset(("date", "datum", "day", "jour", "heure"))
 
 def without_clocks(table: CellTable, known: Terms) -> CellTable:
     """The table without dates and times of a clock, where a column of elapsed times in a unit is beside them."""
-    if isinstance(table.rows, NumberRows) or not table.rows:
+    if not table.rows:
         return table
     first = table.rows[0].cells
     times = [k for k, name in enumerate(table.columns) if known.quantity(name) == "time"]
@@ -104,7 +110,7 @@ def with_groups(table: CellTable, known: Terms) -> CellTable:
 
     A group begins where time falls. Groups that no name tells apart, but a condition does, get numbers.
     """
-    if isinstance(table.rows, NumberRows) or len(table.rows) < 2:
+    if len(table.rows) < 2:
         return table
     time = next((k for k, name in enumerate(table.columns) if known.quantity(name) == "time"), None)
     clock = [row.cells[time] for row in table.rows] if time is not None else [""]
@@ -112,7 +118,7 @@ def with_groups(table: CellTable, known: Terms) -> CellTable:
         return table
     times = list(map(float_of, clock))
     starts = {0, *(k for k in range(1, len(times)) if times[k] < times[k - 1])}
-    keys = [k for k, name in enumerate(table.columns) if words_of(name) in TEST_NAME_COLUMNS]
+    keys = [k for k, name in enumerate(table.columns) if names_tests(name) or words_of(name) == "specimen"]
     stated = keys + [
         k
         for k, name in enumerate(table.columns)
@@ -143,16 +149,15 @@ def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Ter
     foreign = [
         k for k, column in enumerate(table.columns) if column not in known.declared and not known.quantity(column)
     ]
-    keys = [k for k in foreign if words_of(table.columns[k]) in TEST_NAME_COLUMNS]
+    keys = [k for k in foreign if names_tests(table.columns[k])]
+    keys += [k for k in foreign if not keys and _names_specimens(table, k, known)]
     if not foreign:
         return [TabulatedTest("", entries, table)]
 
-    def check(row: TableRow) -> None:
-        if not row.cells[keys[0]]:
-            column = table.columns[keys[0]]
-            raise HistoryError(f"{table.location(row.line)}: the row names no test; fill the column '{column}'")
-
-    groups = grouped(table.rows, keys[0], check) if keys else {"": table.rows}
+    groups = grouped(table.rows, keys[0]) if keys else {"": [*table.rows]}
+    if keys and "" in groups:
+        what = f"the row names no test; fill the column '{table.columns[keys[0]]}'"
+        raise HistoryError(f"{table.location(groups[''][0].line)}: {what}")
     tests = []
     of_rows = {f"label line {row.line}" for row in (table.rows if len(groups) > 1 else ())}
     for name, rows in groups.items():
@@ -170,6 +175,12 @@ def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Ter
         notes = {key: entry for key, entry in entries.items() if key not in others}
         tests.append(TabulatedTest(name, {**notes, **own}, part))
     return tests
+
+
+def _names_specimens(table: CellTable, column: int, known: Terms) -> bool:
+    """Whether a column of specimens holds the names of tests, and not those of kinds of specimens."""
+    cells = {cell.casefold() for cell in cells_of(table.rows, column)}
+    return words_of(table.columns[column]) == "specimen" and len(cells) > 1 and not cells & known.outputs.keys()
 
 
 def _states_condition(table: CellTable, column: int, rows: Sequence[TableRow], known: Terms) -> bool:
@@ -225,8 +236,79 @@ class Layout:
 
 def tests_in(table: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
     """The tests of a table; HistoryError, in one sentence, where it cannot be told how it is laid out."""
-    headed = headed_table(table, vocabulary)
-    return next(layout for layout in LAYOUTS if layout.match(headed)).tests(headed)
+    table = _without_page_heads(table)
+    blocks = _blocks(table, vocabulary.terms())
+    if not blocks:
+        headed = headed_table(table, vocabulary)
+        return next(layout for layout in LAYOUTS if layout.match(headed)).tests(headed)
+    found = [one for block in blocks for one in tests_in(block, vocabulary)]
+    names = [one.name or _name_in_titles(block) for block, one in zip(blocks, found, strict=False)]
+    if len(found) != len(blocks) or len(set(names)) < len(names):
+        return found
+    return [replace(one, name=name) for one, name in zip(found, names, strict=True)]
+
+
+# ---- blocks below one another ----------------------------------------------------------------------------------------
+
+
+_PAGE = re.compile(r"\b(?:page|seite|blatt)\b", re.IGNORECASE)
+_TITLE_OF_TEST = re.compile(
+    r"(?:creep )?(?:test|specimen|sample|probe|versuch|essai|[ée]prouvette|bar)[ -]?(?:piece|no|nr|n°|id|name)?[.: #=]*"
+    r"(\S.*)",
+    re.IGNORECASE,
+)
+
+
+def _without_page_heads(table: CellTable) -> CellTable:
+    """The table without the lines at the beginning of further pages, which repeat that of the first one."""
+    seen, rows = set[str](), list[TableRow]()
+    for row in table.rows:
+        text = " ".join(row.cells) if any(map(_PAGE.search, row.cells)) else ""
+        plain = re.sub(r"\d+", "", text)
+        if plain not in seen:
+            rows.append(row)
+            seen |= {plain} if text else set()
+    return replace(table, rows=rows)
+
+
+def _blocks(table: CellTable, known: Terms) -> list[CellTable]:
+    """The tables below one another that each begin with titles and names of columns; [] of a single one.
+
+    One whose head says nothing new and whose times go on is the same test on a new page.
+    """
+    starts, head, last, blocks = [0], -1, -1, list[list[TableRow]]()
+    for k, row in enumerate(table.rows):
+        if is_frame(row, table):
+            last = k
+        elif (head < 0 or last > head) and sum(map(bool, row.cells)) > 1 and any(is_time(c, known) for c in row.cells):
+            end = last + 1
+            while end < k and re.match(r"\W*(?:end|ende|fin)\b", " ".join(table.rows[end].cells), re.IGNORECASE):
+                end += 1
+            starts += [end] if head >= 0 else []
+            head = k
+    for start, end in pairwise([*starts, len(table.rows)] if len(starts) > 1 else ()):
+        part = list(table.rows[start:end])
+        body = next((k for k, row in enumerate(part) if is_frame(row, table)), len(part))
+        said = {cell for row in blocks[-1] for cell in row.cells} if blocks else set()
+        is_new = any(cell not in said for row in part[:body] for cell in row.cells)
+        times = [next(float_of(c) for c in row.cells if is_number(c, table.dialect)) for row in part[body:][:1]]
+        if is_new or not times or times[0] < _last_number(blocks[-1], table):
+            blocks.append(part)
+        else:
+            blocks[-1] += part[body:]
+    return [replace(table, rows=rows) for rows in blocks]
+
+
+def _last_number(rows: Sequence[TableRow], table: CellTable) -> float:
+    """The first number of the last row of frames."""
+    return next(float_of(c) for row in reversed(rows) for c in row.cells if is_number(c, table.dialect))
+
+
+def _name_in_titles(block: CellTable) -> str:
+    """The name of the test in the titles above a block, `Specimen A`; "" where none has it."""
+    texts = [" ".join(filter(None, row.cells)) for row in block.rows[:8]]
+    found = [match[1] for text in texts if (match := _TITLE_OF_TEST.fullmatch(text))]
+    return (found[0].split(" ")[0] if block.dialect.delimiter == " " else found[0]) if found else ""
 
 
 # ---- columns of each test side by side -----------------------------------------------------------------------------
@@ -271,7 +353,7 @@ def _are_columns(headed: HeadedTable) -> bool:
         return bool(headed.rows) and len(set(others)) == 1
     if _are_conditions(headed):
         return True
-    if any(words_of(cell) in TEST_NAME_COLUMNS or known.is_condition(cell) for cell in others):
+    if any(names_tests(cell) or known.is_condition(cell) for cell in others):
         return False
     if len({kind for cell in others for kind in _kinds_of_unit(cell)}) > 1:
         return False
@@ -336,11 +418,7 @@ def _tests_of_blocks(
     table, known, place = headed.table, headed.known, headed.place
     header = {key: entry for key, entry in table.header.items() if key != "columns"}
     used, rows, notes = {k for test in tests for k in test.columns}, table.rows[1:], dict[str, SourceText]()
-    is_text = not isinstance(rows, NumberRows)
-    checked = list(
-        _rows_beside_notes(table, rows if is_text else rows[:1], used, notes)
-    )  # every row has the same columns
-    rows = checked if is_text else rows
+    rows = list(_rows_beside_notes(table, rows, used, notes))
     results: dict[str, TabulatedTest] = {}
     heads = heads_of_tests(headed, [test.columns for test in tests], key_columns)
     for number, (test, head) in enumerate(zip(tests, heads, strict=True), 1):
@@ -355,9 +433,8 @@ def _tests_of_blocks(
         if name in results:
             raise HistoryError(f"{place}: two tests are called '{quoted(name)}'; give each its own name")
         check_columns(f"{place}, test '{quoted(name)}'", columns)
-        cut = with_columns(rows, list(test.columns))
-        if is_text:  # in pairs its time is among what the columns of a test hold
-            cut = [row for row in cut if not all(map(is_missing, row.cells[1:]))]
+        # In pairs its time is among what the columns of a test hold.
+        cut = [row for row in with_columns(rows, list(test.columns)) if not all(map(is_missing, row.cells[1:]))]
         if not cut:
             what = f"test '{quoted(name)}' has no rows below the names of its columns"
             raise HistoryError(f"{place}: {what}; remove it or fill it")
@@ -415,8 +492,6 @@ def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> t
 
     What says so of the latter is returned. Numbers beside the columns are told by who reads them.
     """
-    if isinstance(table.rows, NumberRows):
-        return table, []
     count, footers = len(table.rows), list[str]()
     while count > 2 and _is_remark(row := table.rows[count - 1], table):
         count -= 1
@@ -443,7 +518,8 @@ def _is_remark(row: TableRow, table: CellTable) -> bool:
         return False
     words = cells[0].lower().strip(".:*-= ").split()
     lost = {"nan", "inf", "na", "n/a", "-", "--", "none", "null", "-nan", "-inf"}
-    return (len(words) > 1 and not lost.intersection(words)) or words in (["end"], ["eof"])
+    count = sum(word in lost for word in words)
+    return (len(words) > 1 + 3 * count and count < 2) or words in (["end"], ["eof"])
 
 
 LAYOUTS: Sequence[Layout] = (

@@ -16,7 +16,6 @@ from itertools import pairwise
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_missing, is_number
-from creepkit.readers.column_names import plain_name, split_unit, split_written_name, unit_suffix, words_of
 from creepkit.readers.columns_of_tests import (
     NAMES,
     QUANTITIES,
@@ -25,15 +24,25 @@ from creepkit.readers.columns_of_tests import (
     TestTableHead,
     column_called,
     is_number_like,
+    is_rate,
     only_text,
     quantity_of,
 )
-from creepkit.readers.condition_texts import conditions_in_text, sources_of_names
 from creepkit.readers.ends_of_tests import LABEL, NO, YES, kind_of_column
 from creepkit.readers.questions import Answer, Question, collected
-from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width, joined, without_ignored
-from creepkit.readers.vocabulary import CONDITION_KINDS, HeaderVocabulary, Terms
-from creepkit.records.quantities import TIME
+from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width, without_ignored
+from creepkit.readers.table_heads import conditions_in_text, sources_of_names
+from creepkit.readers.vocabulary import (
+    CONDITION_KINDS,
+    HeaderVocabulary,
+    Terms,
+    plain_name,
+    split_unit,
+    split_written_name,
+    unit_suffix,
+    words_of,
+)
+from creepkit.records.quantities import STRESS, TIME
 
 MOST_ASKED = 6
 """Texts that a question or a note names."""
@@ -148,7 +157,7 @@ class TestTable:
         known, line, dialect = self.vocabulary.terms(), sheet.rows[head.line].line, sheet.dialect
         heading = {tuple(row.cells) for row in sheet.rows[head.first : head.body]}
         body = [row for row in sheet.rows[head.body :] if tuple(row.cells) not in heading]
-        below = replace(sheet, rows=joined([TableRow(line, list(head.names))], body))
+        below = replace(sheet, rows=[TableRow(line, list(head.names)), *body])
         below = without_ignored(below, 0, self.vocabulary.ignored)
         header = self._around(replace(sheet, header=below.header), sheet.rows[: head.first], known)
         names, body = below.rows[0].cells, list(below.rows[1:])
@@ -227,7 +236,7 @@ class TestTable:
             elif not column.quantity:
                 if meant == written and not is_label:
                     collected(self.errors, partial(self._refuse_misspelt, written))
-                    collected(self.errors, partial(self._ask_of_time, written))
+                    collected(self.errors, partial(self._ask_of_quantity, written))
                 column = TestColumn(meant if meant.startswith(("label ", "geometry ")) else f"label {meant}")
             elif column.quantity == "specimen" and self._tells_tests_apart(cells):
                 column = TestColumn("name")
@@ -278,20 +287,33 @@ class TestTable:
         lists = (*(names for _, names in QUANTITIES.values()), *TEXTS.values())
         known = [one for names in lists for one in names if len(one) > 3]
         near = get_close_matches(words_of(name), known, 1, cutoff=0.8)
-        if near and kind_of_column(written) == "":
+        is_another = (
+            near and {*near[0].split()} & {*words_of(name).split()} and self._has(column_called(near[0]).quantity)
+        )
+        if near and kind_of_column(written) == "" and not is_another:
             meant = f"{near[0]} ({unit_suffix(unit)})" if unit_suffix(unit) else near[0]
             what = f"column '{quoted(written, 60)}' is not understood; did you mean '{near[0]}'?"
             raise self.question(what, "columns", ({written: meant}, {written: LABEL}))
 
-    def _ask_of_time(self, written: str) -> None:
-        """Ask of a time that is not understood: `t0.2 (h)` may be one to a strain."""
+    def _ask_of_quantity(self, written: str) -> None:
+        """Ask of a time or a rate that is not understood: `t0.2 (h)` may be one to a strain."""
         name, unit = split_written_name(written)
-        if unit_suffix(unit) not in TIME.units or _OF_TREATMENT.search(name):
+        if is_rate(written):
+            meaning, what = f"minimum rate ({unit})" if unit else "minimum rate", "rate that is not understood; is it a"
+            what = f"column '{quoted(written, 60)}' is a {what} minimum creep rate?"
+        elif unit_suffix(unit) in TIME.units and not _OF_TREATMENT.search(name):
+            number = re.search(r"\d+(?:[.,]\d+)?", name)
+            meaning = f"time to {number[0].replace(',', '.')} % ({unit})" if number else f"duration ({unit})"
+            what = f"column '{quoted(written, 60)}' is a time that is not understood; is it a time to a strain?"
+        elif unit_suffix(unit) in STRESS.units and not self._has("stress"):
+            meaning, what = f"stress ({unit})", f"column '{quoted(written, 60)}' is not understood; is it the stress?"
+        else:
             return
-        number = re.search(r"\d+(?:[.,]\d+)?", name)
-        meaning = f"time to {number[0].replace(',', '.')} % ({unit})" if number else f"duration ({unit})"
-        what = f"column '{quoted(written, 60)}' is a time that is not understood; is it a time to a strain?"
         raise self.question(what, "columns", [{written: meaning}, {written: LABEL}], is_free=True)
+
+    def _has(self, quantity: str) -> bool:
+        """Whether some column is called as one of a quantity."""
+        return any(column_called(self.vocabulary.synonyms.get(n, n)).quantity == quantity for n in self.names)
 
     # ---- cells that stand elsewhere
 

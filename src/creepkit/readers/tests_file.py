@@ -15,7 +15,6 @@ name of a test: ruptured, stopped or label}.
 
 from __future__ import annotations
 
-import re
 import tomllib
 from dataclasses import replace
 from difflib import get_close_matches
@@ -25,13 +24,12 @@ from typing import Any, NamedTuple
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.reading import FileKind, read_text
-from creepkit.readers.column_names import NameTable, split_written_name, words_of
 from creepkit.readers.columns_of_tests import NAMES
 from creepkit.readers.ends_of_tests import LABEL, RUPTURED, STOPPED
 from creepkit.readers.frames import UNUSED
-from creepkit.readers.questions import ANSWERS_FILE, raise_all, toml_value
+from creepkit.readers.questions import ANSWERS_FILE, raise_all
 from creepkit.readers.standard_names import ELAPSED, OF_DAY
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms
+from creepkit.readers.vocabulary import HeaderVocabulary, NameTable, Terms, split_written_name, words_of
 
 ANSWERS = FileKind("answers about tests", HistoryError, "correct or remove it", maximum_bytes=1_000_000)
 
@@ -128,27 +126,3 @@ def _problem(key: str, value: Any, known: Terms) -> str:
     meant = near[0] if near else known.suggestion(key)
     allowed = "allowed are columns, ended, and conditions as in the head of a file, such as stress_MPa or specimen"
     return f"is no key; did you mean '{meant}'?" if meant else f"is no key; {allowed}"
-
-
-def with_answer(text: str, name: str, key: str, value: str) -> str:
-    """The text of a file of answers with one more: `key = value` in the table of a file.
-
-    value : as TOML, {name: value} where the key holds a table, whose further entries stay.
-    """
-    lines = text.rstrip("\n").split("\n") if text.strip() else []
-    heading = f'["{name}"]'
-    if heading not in lines:
-        lines += [*([""] if lines else []), heading]
-    start = lines.index(heading) + 1
-    end = next((k for k in range(start, len(lines)) if lines[k].startswith("[")), len(lines))
-    at = next((k for k in range(start, end) if re.match(rf"{re.escape(key)}\s*=", lines[k])), None)
-    if at is None:
-        while end > start and not lines[end - 1].strip():
-            end -= 1
-        lines.insert(end, f"{key} = {value}")
-    elif value.startswith("{") and lines[at].rstrip().endswith("}"):
-        earlier, new = (tomllib.loads(f"x = {one}")["x"] for one in (lines[at].partition("=")[2], value))
-        lines[at] = f"{key} = {toml_value({**earlier, **new})}"
-    else:
-        lines[at] = f"{key} = {value}"
-    return "\n".join(lines) + "\n"

@@ -21,17 +21,14 @@ from pathlib import Path
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_missing
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
-from creepkit.readers.column_names import split_written_name, words_of
 from creepkit.readers.columns_of_tests import (
     TestColumn,
     column_called,
-    has_frames,
     head_of_tests,
     only_text,
     quantity_of,
     stands_in_columns,
 )
-from creepkit.readers.condition_texts import with_weak_sources
 from creepkit.readers.ends_of_tests import (
     FIRM,
     LABEL,
@@ -48,22 +45,17 @@ from creepkit.readers.ends_of_tests import (
     marked_time,
 )
 from creepkit.readers.frames import unknown_text
+from creepkit.readers.history_csv import TABLE_SUFFIXES, TEXT_SUFFIXES
 from creepkit.readers.questions import Question, collected, raise_all
-from creepkit.readers.spreadsheets import SPREADSHEET_SUFFIXES, read_sheets
+from creepkit.readers.spreadsheets import SPREADSHEET_SUFFIXES, holds_frames, read_sheets
 from creepkit.readers.standard_names import in_standard_keys, specimen_named
 from creepkit.readers.table import CellTable, SourceText, TableRow
+from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.tables_of_tests import MOST_ASKED, TestRow, TestTable
 from creepkit.readers.text_files import peek_table, read_text_table
-from creepkit.readers.vocabulary import HeaderVocabulary
+from creepkit.readers.vocabulary import HeaderVocabulary, split_written_name, words_of
 from creepkit.records import History
 from creepkit.records.quantities import TIME
-
-TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc")
-
-
-_TITLES = 10
-"""Rows of a sheet in which a column of strain makes it one of frames."""
-
 
 _ROUNDING = 0.01
 """Part of a time by which two that are the same may differ."""
@@ -85,17 +77,17 @@ class RowPerTestReader:
     def accepts(self, path: Path) -> bool:
         """Say whether `path` is such a table: a rate or a time beside a stress or a temperature, and no strain."""
         suffix = path.suffix.lower()
-        if suffix not in (*TEXT_SUFFIXES, *SPREADSHEET_SUFFIXES) or not path.is_file():
+        is_text = suffix in (*TABLE_SUFFIXES, *TEXT_SUFFIXES)
+        if not (is_text or suffix in SPREADSHEET_SUFFIXES) or not path.is_file():
             return False
-        if suffix in TEXT_SUFFIXES:
+        if is_text:
             table = peek_table(path)
             return table is not None and self._is_table(table)
         try:
             sheets = read_sheets(path)
         except HistoryError:
             return False
-        framed = any(has_frames(row.cells) for sheet in sheets for row in sheet.rows[:_TITLES])
-        return not framed and any(map(self._is_table, sheets))
+        return any(map(self._is_table, sheets)) and not any(holds_frames(sheet, self.vocabulary) for sheet in sheets)
 
     def _is_table(self, table: CellTable) -> bool:
         names = self.vocabulary.synonyms
@@ -167,11 +159,6 @@ class RowPerTestReader:
             *(_unknown(quantity, stated, cells) for quantity in empty),
             *(*end.assumptions, *of_names, *row.assumed, *assumptions),
         ]
-        if sheet.cut is not None and sheet.cut.line == row.line:
-            assumptions.append(
-                f"{sheet.cut.text} in line {row.line} is whole (the file ends there without a line end and with fewer "
-                "digits than the numbers above have)"
-            )
         if assumed := ", ".join(filter(None, assumptions)):
             entries.setdefault("label assumed", SourceText(assumed, location))
         name, where = f"{sheet.sheet or sheet.path.stem} {row.line}", f"sheet {sheet.sheet}, " if sheet.sheet else ""

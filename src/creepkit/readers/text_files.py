@@ -1,15 +1,9 @@
-"""A text of any encoding, delimiter and decimal sign as a table, with the `# key: value` lines above it.
-
-A large table of numbers alone is read as numbers at once; else the cells are kept as texts.
-"""
+"""A text of any encoding, delimiter and decimal sign as a table, with the `# key: value` lines above it."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from itertools import islice
 from pathlib import Path
-
-import numpy as np
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import (
@@ -20,29 +14,25 @@ from creepkit.files.delimited_text import (
     parts_of_lines,
     split_line,
     split_lines,
-    table_of_numbers,
     text_lines,
 )
 from creepkit.files.labview import is_labview, table_of_labview
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.files.time_stamps import is_clock_time
-from creepkit.readers.column_names import plain_name
-from creepkit.readers.cut_files import cut_number
 from creepkit.readers.table import (
     MAXIMUM_CELL,
     MAXIMUM_COLUMNS,
-    MAXIMUM_TEXTS,
     CellTable,
-    NumberRows,
     SourceText,
     TableRow,
     entry_of,
     is_comment,
     named_columns,
     refuse_long_cells,
-    refuse_more,
     without_ignored,
+    without_logarithms,
 )
+from creepkit.readers.vocabulary import plain_name
 
 TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
 
@@ -51,8 +41,8 @@ DECIMAL_SIGNS: Mapping[str, str] = {".": ".", ",": ",", "point": ".", "comma": "
 """What `# decimal:` may say."""
 
 
-_LARGE_TEXT, _HEAD_LINES = 65_536, 1000
-"""Characters above which rows are read as numbers at once where they hold nothing else; lines of a head above them."""
+_BEGINNING = 65_536
+"""Bytes with which a file is recognised."""
 
 
 _BEFORE_COMMENT = frozenset(' \t"\ufeff#/')
@@ -79,8 +69,8 @@ def peek_table(path: Path) -> CellTable | None:
 
 def _beginning(path: Path) -> bytes:
     """The whole lines with which a file begins."""
-    content = read_bytes(path, TABLE_FILE, first=_LARGE_TEXT)
-    if len(content) < _LARGE_TEXT:
+    content = read_bytes(path, TABLE_FILE, first=_BEGINNING)
+    if len(content) < _BEGINNING:
         return content
     end = content.rfind(b"\n") + 1  # not within a character: a line feed of UTF-16 has two bytes
     return content[: end + end % 2] if content[:2] in (b"\xff\xfe", b"\xfe\xff") else content[:end]
@@ -88,8 +78,8 @@ def _beginning(path: Path) -> bytes:
 
 def read_head_alone(path: Path) -> dict[str, SourceText]:
     """The entries of a file that holds `# key: value` lines and no table; {} where it holds one."""
-    start = read_bytes(path, TABLE_FILE, first=_LARGE_TEXT)
-    lines = text_lines(decode_text(start, path)) if len(start) < _LARGE_TEXT else [" a table"]
+    start = read_bytes(path, TABLE_FILE, first=_BEGINNING)
+    lines = text_lines(decode_text(start, path)) if len(start) < _BEGINNING else [" a table"]
     if any(line.strip() and not is_comment(line) for line in lines):
         return {}
     return _head_entries(path, lines, (), Dialect(decimal=_stated_decimal(path, lines) or "."))
@@ -107,19 +97,11 @@ def _table_of(path: Path, text: str, decimal: str | None = None) -> CellTable:
         raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain_pct, then rows")
     comments, first = list[tuple[int, str]](), len(head) + 1
     decimal = decimal or _stated_decimal(path, head)
-    is_large = len(text) > _LARGE_TEXT and len(head) < _HEAD_LINES
-    rows: Sequence[TableRow] | None = None
-    if is_large:
-        rows, dialect = _rows_of_numbers(path, text, offset, first, decimal, comments)
-    if rows is None:
-        dialect = detect_dialect((line for _, line in _numbered(text, offset, first)), str(path), decimal)
-        width = len(split_line(next(_numbered(text, offset, first))[1], dialect, f"{path}:{first}"))
-        cells = text.count("\n", offset) * max(width, 2)  # a table has two columns or more
-        refuse_more(str(path), cells, MAXIMUM_TEXTS, "cells that are not all numbers", "keep its numbers alone")
-        rows = list(_rows_of_texts(_numbered(text, offset, first, comments), dialect, path))
+    dialect = detect_dialect((line for _, line in _numbered(text, offset, first)), str(path), decimal)
+    rows = list(_rows_of_texts(_numbered(text, offset, first, comments), dialect, path))
     if not rows:
         raise HistoryError(f"{path}:{first}: no cell holds anything; write a line of columns, then rows")
-    return CellTable(
+    table = CellTable(
         path,
         rows,
         dialect=dialect,
@@ -130,8 +112,8 @@ def _table_of(path: Path, text: str, decimal: str | None = None) -> CellTable:
             for key, colon, entry in [entry_of(comment)]
             if colon
         ],
-        cut=cut_number(text, dialect),
     )
+    return without_logarithms(table)
 
 
 def _numbered(
@@ -162,32 +144,6 @@ def _rows_of_texts(numbered: Iterator[tuple[int, str]], dialect: Dialect, path: 
             yield TableRow(number, cells)
 
 
-def _rows_of_numbers(
-    path: Path, text: str, offset: int, first: int, decimal: str | None, comments: list[tuple[int, str]]
-) -> tuple[NumberRows | None, Dialect]:
-    """The rows of a table that holds numbers alone below its names, None of any other, and its dialect."""
-    sample = [line for _, line in islice(_numbered(text, offset, first), _HEAD_LINES)]
-    try:
-        dialect = detect_dialect(sample, decimal=decimal)
-    except HistoryError:  # told by who reads line by line
-        return None, Dialect()
-    if dialect.delimiter == " " or '"' in sample[0]:
-        return None, dialect
-    body = text[offset + len(sample[0]) + 1 :].rstrip("\n")
-    lines = first + 1 + np.arange(body.count("\n") + 1)
-    found = list[tuple[int, str]]()
-    if "\n\n" in body or body.startswith("\n") or "#" in body or "/" in body:
-        kept = list(_numbered(body, 0, first + 1, found))
-        body, lines = "\n".join(line for _, line in kept), np.array([number for number, _ in kept], dtype=int)
-    numbers = table_of_numbers(body, dialect) if body.strip() else None
-    names = split_line(sample[0], dialect, f"{path}:{first}")
-    if numbers is None or numbers.shape != (lines.size, len(names)) or not np.isfinite(numbers).all():
-        return None, dialect
-    refuse_long_cells(f"{path}:{first}", names)
-    comments += found
-    return NumberRows(numbers, lines, dialect.decimal, (TableRow(first, names),)), dialect
-
-
 # ---- the head ------------------------------------------------------------------------------------------------------
 
 
@@ -210,7 +166,7 @@ def _with_names_behind_marks(text: str, head: list[str], offset: int) -> tuple[s
     numpy.savetxt and digitisers write them so. They are the first of the last comments that have as many cells as the
     row below has; further ones are rows of the head too.
     """
-    sample = [line for line in text[offset : offset + _LARGE_TEXT].split("\n")[:50] if line.strip()]
+    sample = [line for line in text[offset : offset + _BEGINNING].split("\n")[:50] if line.strip()]
     try:
         dialect = detect_dialect(sample, decimal=".")
         first = split_line(sample[0], dialect) if sample else []

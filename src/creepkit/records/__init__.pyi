@@ -4,7 +4,6 @@ from .camera_format import CameraFormat as CameraFormat
 from .camera_frames import CameraFrame as CameraFrame
 from .camera_frames import Frames as Frames
 from .clock_alignment import ClockAlignment as ClockAlignment
-from .history import CUT_LABEL as CUT_LABEL
 from .history import EVERY_FRAME as EVERY_FRAME
 from .history import UNKNOWN_DURATION as UNKNOWN_DURATION
 from .history import History as History

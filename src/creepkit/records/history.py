@@ -34,8 +34,8 @@ UNKNOWN_DURATION = 1.0
 """s; the one time of a test without frames whose duration nobody stated."""
 
 
-CUT_LABEL = "cut_number"
-"""Label of a test whose file may have been cut within its last number: a sentence, which checks of quality show."""
+LOADING_RAMP, RISES = 0.1, 0.98
+"""Of the duration of a test, the longest ramp that raises its load first; it rises to more than what was over this."""
 
 
 EVERY_FRAME: Bools = frozen([], dtype=bool)
@@ -270,6 +270,18 @@ class History:
         """(levels,) K, those of the program up to the last used frame: later ones decide nothing that is compared."""
         program, end = self.temperature_program(), self.used_times[-1]
         return np.append(program.values[program.times < end], program.before(end))  # a step at it did nothing to it
+
+    @property
+    def load_levels(self) -> Floats:
+        """(levels,) the load at the breakpoints of its program, from the end of a short ramp that raised it on."""
+        program = self.loading.program()
+        times, loads = program.times, np.abs(program.values)
+        short, first = LOADING_RAMP * max(self.times[-1] - times[0], 0.0), 0
+        while (
+            first + 1 < times.size and loads[first] < RISES * loads[first + 1] and times[first + 1] - times[0] <= short
+        ):
+            first += 1
+        return program.values[first:]
 
     @property
     def condition(self) -> str:

@@ -21,6 +21,10 @@ LARGEST_NOISE = 10.0
 makes no breakpoints."""
 
 
+SURE_DRIFT = 0.01
+"""Probability of a slope by noise alone below which a record that is a line drifts; above, it is held."""
+
+
 _MEDIAN_FRAMES = 5
 
 
@@ -33,18 +37,27 @@ def recorded_program(times: Floats, values: Floats, tolerance: float) -> Program
 
     times : (frames,) s. values : (frames,) MPa or K. tolerance : in the same unit; where three standard deviations of
     the record's noise are more, that is taken. Breakpoints are frames (Douglas and Peucker's choice), and where noise
-    decides their values are the least-squares ones of all frames.
+    decides their values are the least-squares ones of all frames; a line whose slope noise alone may make is held.
     """
     noise = noise_of_readings(values)
     noisy = LARGEST_NOISE * noise > tolerance and values.size > _MEDIAN_FRAMES
     followed = running_median(values) if noisy else values
     kept = _breakpoints(times, followed, max(tolerance, NOISE_FACTOR * noise) if noisy else tolerance)
     at_breakpoints: Floats = values[kept]
-    if noisy:
+    if noisy and kept.size == 2 and not _drifts(times, values):
+        at_breakpoints = np.full(2, values.mean())
+    elif noisy:
         at_breakpoints = _least_squares(times, values, kept)
     if times[0] == 0.0:
         return Program(times[kept], at_breakpoints)
     return Program(np.append(0.0, times[kept]), np.append(at_breakpoints[0], at_breakpoints))
+
+
+def _drifts(times: Floats, values: Floats) -> bool:
+    """Whether the slope of a line through readings is more than their noise makes, at 1 %."""
+    from scipy.stats import linregress
+
+    return bool(linregress(times, values).pvalue < SURE_DRIFT)
 
 
 def _least_squares(times: Floats, values: Floats, kept: Ints) -> Floats:

@@ -135,7 +135,7 @@ class FibreBeam(TestPiece, ABC):
         """
         piece, tested = self.of_test(history, {})
         plastic, _ = piece._section_moments()
-        levels = np.unique(np.abs(tested.loading.program().values))
+        levels = np.unique(np.abs(tested.load_levels))
         levels = levels[levels > 0]
         if self.relaxes:
             levels = levels * piece._modulus(tested).values[0] / piece.compliance

@@ -18,10 +18,10 @@ from pathlib import Path
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
 from creepkit.files.delimited_text import Dialect, is_number, parse_number
-from creepkit.readers.column_names import plain_name, split_written_name, unit_suffix
 from creepkit.readers.spreadsheets import read_sheets
 from creepkit.readers.table import CellTable
 from creepkit.readers.text_files import read_text_table
+from creepkit.readers.vocabulary import plain_name, split_written_name, unit_suffix
 from creepkit.records import Specimen, dimensions_of
 from creepkit.records.quantities import LENGTH, MODULUS
 

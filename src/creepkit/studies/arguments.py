@@ -21,7 +21,7 @@ from creepkit.forecasts.planned_tests import (
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.language import temperature
 from creepkit.options import values_of_table
-from creepkit.readers.column_names import split_unit
+from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (
     SECONDS_PER_HOUR,
     TENSOR_COMPONENTS,

@@ -363,7 +363,7 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
         specimen_stress = getattr(self.specimen, "reference_stress", None)
         if specimen_stress is not None:
             return np.asarray(specimen_stress(history))
-        levels = np.unique(history.loading.program().values)
+        levels = np.unique(history.load_levels)
         return np.asarray(levels[levels > 0])
 
     @property

@@ -77,15 +77,35 @@ def test_nominal_levels_of_a_column_are_steps_and_no_ramp(read):
     assert "steps of stress from the first frame of each level on" in assumed(history)
 
 
-def test_a_step_between_distant_frames_is_asked_for(read):
+def test_the_strain_tells_when_a_load_was_raised_between_distant_frames(read):
+    """Strain hardening; read each 20 h, the load was raised at 80.1 h, at 99.9 h, or amid two readings."""
+    times, fine = np.array([0.0, 5, 10, 20, *range(40, 201, 20)]), np.linspace(0.0, 200.0, 4001)
+    for raised, modulus, expected in (
+        (80.1, None, 80.0),
+        (99.9, None, 100.0),
+        (99.9, 150e3, 100.0),
+        (90.0, None, None),
+    ):
+        rate = 1e-4 * np.where(fine < raised, 1.0, 1.3**5) * 1e3**-0.5  # of the strain e: de/dt = rate / e^0.5
+        creep = (1.5 * np.append(0.0, np.cumsum(rate[:-1] * np.diff(fine)))) ** (2 / 3)
+        stress = np.where(times < 99.0, 100.0, 130.0) + (
+            0.0 if modulus is None else 0.1 * (-1.0) ** np.arange(times.size)
+        )
+        strain = np.interp(times, fine, creep) + (
+            0.0 if modulus is None else np.where(times < raised, 100, 130) / modulus
+        )
+        text = HOT + "time_h,stress_MPa,strain_1\n" + rows(times, stress, strain)
+        if expected is None:
+            with pytest.raises(HistoryError, match=r"between 288000 s and 360000 s; state when; .*\] stress_steps = "):
+                read(text)
+        else:
+            program = read(text).loading.program()
+            assert program.times[np.argmax(program.values > 120.0)] == pytest.approx(3600.0 * expected)
+
+
+def test_a_step_between_distant_frames_may_be_stated(read):
     kept = STEP_TIMES != 50.5 * 3600
     body = "time_s,strain_pct,stress_MPa\n" + rows(STEP_TIMES[kept], STRAIN[kept], LEVELS[kept])
-    message = (
-        "x.csv:9: the stress changes from 100 MPa to 120 MPa between 180000 s and 216000 s; state when, such as "
-        "'# stress_steps: 0 s 100 MPa; 180000 s 120 MPa'"
-    )
-    with pytest.raises(HistoryError, match=message):
-        read(HOT + body)
     stated = read(HOT + "# stress_steps: 0 s 100 MPa; 52 h 120 MPa\n" + body)
     assert stated.loading == StressSteps(((0.0, 100.0), (52 * 3600.0, 120.0)))
     assert dict(stated.stated) == {}

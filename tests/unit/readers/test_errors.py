@@ -8,16 +8,12 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
-from creepkit.files.delimited_text import Dialect
 from creepkit.quality import check_data_quality
-from creepkit.readers.column_names import plain_name
-from creepkit.readers.cut_files import cut_number
 from creepkit.readers.history_csv import HISTORY_CSV, write_history
 from creepkit.readers.indexed_folders import INDEXED_TABLE
 from creepkit.readers.tests_in_rows import TEST_TABLE
-from creepkit.readers.vocabulary import HeaderVocabulary
+from creepkit.readers.vocabulary import HeaderVocabulary, plain_name
 from creepkit.records import History
-from helpers.command_line import creepkit
 from helpers.misspellings import misspelt_keys
 from helpers.workbooks import workbook
 
@@ -32,7 +28,7 @@ CASES = [
     (HEAD + "time_s,strain_1\n0,0\n", "x.csv:4: only one frame in time; at least two are needed"),
     (HEAD + "time_s,strain_1\n1,0\n1,1\n", "x.csv:4: only one frame in time"),
     (HEAD + "strain\n0\n1\n", "x.csv:3: missing column: no time among strain; name one time_s, time_min"),
-    (HEAD + "time_s,temperature_C\n0,850\n1,850\n", "x.csv:3: missing column: the columns hold no output"),
+    (HEAD + "time_s,temperature_C\n0,850\n1,850\n", "x.csv:3: missing column: no output of a specimen"),
     (HEAD + "time_s,strain_1,shape\n0,0,2\n1,0,2\n", "x.csv:3: a column of shape has no meaning beside strain, stress"),
     (HEAD + "# specimen: bulge\n" + BODY, "x.csv:4: .* outputs of point and uniaxial, those of bulge are"),
     (HEAD + "time_s,strian\n0,0\n1,0\n", "x.csv:3: column 'strian' is not understood; did you mean 'strain'"),
@@ -249,85 +245,6 @@ def test_capitals_blanks_hyphens_and_brackets_do_not_matter(tmp_path: Path):
     assert dict(history.labels) == {}
 
 
-# ---- cut files -------------------------------------------------------------------------------------------------------
-
-# Files that were cut within their last number, and honest files without a last line end.
-
-
-BARS = sorted(ck.example_data("planted creep curves").glob("*.csv"))
-
-
-def _kinds(path):
-    return [flag.kind for flag in ck.check_data_quality(ck.read_histories([path]))]
-
-
-@pytest.mark.parametrize("path", BARS[:3], ids=lambda path: path.stem)
-def test_a_file_cut_at_each_place_of_its_last_number(path, tmp_path):
-    """What is left is a number of the same beginning: three digits less are always noticed."""
-    text = path.read_text().rstrip("\n")
-    last = text.rpartition(",")[2]
-    cut = tmp_path / path.name
-    for lost in range(3, len(last)):
-        cut.write_text(text[:-lost])
-        assert "cut" in _kinds(cut), text[-30:-lost]
-    for whole in (text, text + "\n", text[:-4] + "\n"):  # with a line end what stands there is what was written
-        cut.write_text(whole)
-        assert "cut" not in _kinds(cut)
-
-
-FORMS = {
-    "fixed": lambda x: f"{x:.4f}",
-    "shortest": lambda x: repr(float(np.round(x, 6))),
-    "four significant": lambda x: f"{x:.4g}",
-    "exponents": lambda x: f"{x:.3e}",
-    "coarse": lambda x: f"{x:.1f}",
-    "whole": lambda x: f"{1e4 * x:.0f}",
-}
-
-
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("rows", [6, 10, 25, 60])
-def test_honest_files_without_a_last_line_end_are_left_alone(form, rows):
-    """Curves of any number of rows and magnitude, in the forms in which programs write numbers."""
-    rng, named, trials = np.random.default_rng(0), 0, 1000
-    for _ in range(trials):
-        times = np.sort(10.0 ** rng.uniform(0, 4, rows))
-        values = (
-            10.0 ** rng.uniform(-3, 1.5) * (times / times[-1]) ** rng.uniform(0.3, 1.5) * rng.lognormal(0, 0.01, rows)
-        )
-        lines = [f"{t:.1f},{FORMS[form](x)}" for t, x in zip(times, values, strict=True)]
-        named += cut_number("time_h,strain_pct\n" + "\n".join(lines), Dialect()) is not None
-    assert named <= 0.005 * trials
-
-
-def test_decimal_commas_and_one_column_a_test(tmp_path):
-    """The note is that of the test whose column is the last."""
-    rows = [f"{k}\t0,{1000 + 17 * k}\t0,{2000 + 19 * k}" for k in range(30)]
-    path = tmp_path / "two.txt"
-    path.write_text(
-        "# specimen: uniaxial\n# stress_MPa: 100\n# temperature_C: 750\n# includes_elastic: no\n"
-        "Time (h)\tA1 strain (%)\tB2 strain (%)\n" + "\n".join(rows)[:-2]
-    )
-    flags = ck.check_data_quality(ck.read_histories([path]))
-    assert [flag.tests for flag in flags if flag.kind == "cut"] == [("B2",)]
-
-
-@pytest.mark.parametrize("lost", [0, 4, 5, 6])
-def test_the_last_test_of_a_table_of_rates(lost, tmp_path):
-    """A rate that lost its exponent lies millions of times from the others; it is said whence it may come."""
-    rows = [f"A{k},{90 + k},750,{2.1e-6 * 1.03**k:.3e}" for k in range(30)]
-    path = tmp_path / "rates.csv"
-    text = "test,stress_MPa,temperature_C,min creep rate (1/h)\n" + "\n".join(rows)
-    path.write_text(text[: len(text) - lost])
-    *others, last = ck.read_histories([path])
-    assumed = [history.labels["assumed"] for history in others]
-    assert not any("is whole" in one for one in assumed)
-    written = path.read_text().rpartition(",")[2]
-    assert (f"{written} in line 31 is whole" in last.labels["assumed"]) == (lost > 0)
-    said = " ".join(creepkit("read", str(path)).stdout.split())
-    assert ("fewer digits than the numbers above have" in said) == (lost > 0)
-
-
 # ---- decimal signs ---------------------------------------------------------------------------------------------------
 
 # The decimal sign of a table holds for all that stands in it: run-outs, steps and correlations too.
@@ -368,16 +285,6 @@ def test_steps_with_decimal_commas_or_a_plain_point(tmp_path: Path):
         path.write_text(FRAMES.format(f"# stress_steps: 0 s 100 MPa; {word} h 120 MPa"))
         (history,) = HISTORY_CSV.read(path)
         np.testing.assert_allclose(history.loading.steps, [(0.0, 100.0), (5400.0, 120.0)])
-
-
-def test_a_large_table_of_several_tests_keeps_its_decimal_commas(tmp_path: Path):
-    path, times = tmp_path / "wide.csv", np.arange(6000) + 0.125
-    rows = [f"{t:.3f};{t / 1e3:.4f};{t / 2e3:.4f}".replace(".", ",") for t in times]
-    head = "# stress_MPa: 100\n# temperature_C: 800\ntime_h;A1 strain (%);A2 strain (%)\n"
-    path.write_text(head + "\n".join(rows) + "\n")
-    first, second = HISTORY_CSV.read(path)
-    np.testing.assert_allclose(first.times, 3600 * times)
-    np.testing.assert_allclose(second.outputs["strain"] * 100, times / 2e3, atol=6e-5)
 
 
 def test_exponents_of_fortran_are_numbers(tmp_path: Path):

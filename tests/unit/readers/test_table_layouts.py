@@ -219,27 +219,6 @@ def test_a_canonical_file_that_a_spreadsheet_saved(read):
     assert history.labels["note"] == "a, b"
 
 
-def test_large_tables_read_as_small_ones_do(read):
-    rows = [f"{k},{k * 1e-3!r}\n" for k in range(8000)]
-    (large,) = read(HEAD + "time_h,strain_pct\n" + "".join(rows))
-    np.testing.assert_array_equal(large.outputs["strain"], [0.01 * float(row.split(",")[1]) for row in rows])
-    (german,) = read(HEAD + "Time (h);Strain (%)\n" + "".join(rows).replace(",", ";").replace(".", ","))
-    np.testing.assert_array_equal(german.outputs["strain"], large.outputs["strain"])
-    rows[7000] = "# a remark\n\n7000,7\n"
-    (remarked,) = read(HEAD + "time_h,strain_pct\n" + "".join(rows))
-    np.testing.assert_array_equal(remarked.outputs["strain"], large.outputs["strain"])
-    with pytest.raises(HistoryError, match="x.csv:7006: time falls from"):
-        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("7000,7\n", "6998,7\n"))
-    with pytest.raises(HistoryError, match="x.csv:7004: 'stress_MPa' stands below"):
-        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("# a remark", "# stress_MPa: 3"))
-    rows[7000] = "7000,a lot\n"
-    with pytest.raises(HistoryError, match="x.csv:7004: 'strain_pct' is 'a lot'"):
-        read(HEAD + "time_h,strain_pct\n" + "".join(rows))
-    rows[7000] = "6999,1e9\n"
-    with pytest.raises(HistoryError, match="x.csv:7004: 'time_h' is"):
-        read(HEAD + "time_h,strain_pct\n" + "".join(rows).replace("6999,1e9", "-1,7"))
-
-
 def test_what_empty_cells_of_conditions_leave_unknown_is_said(tmp_path):
     path = tmp_path / "x.csv"
     path.write_text(

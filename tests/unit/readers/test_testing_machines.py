@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.readers.tests_file import with_answer
 
 MODULUS, STRESS, RAMP = 155e3, 120.0, 60.0
 AREA, LENGTH = 0.25 * math.pi * 8.0**2, 50.0
@@ -85,10 +84,3 @@ def test_a_creep_strain_that_does_not_rise_with_the_load_is_left_as_it_is(tmp_pa
     assert not history.includes_elastic
     assert history.used.all()
     assert history.outputs["strain"] == pytest.approx(CREEP, abs=1e-7)
-
-
-def test_an_answer_takes_the_place_of_an_earlier_one_of_the_same_column() -> None:
-    text = with_answer("", "A*.csv", "columns", '{"Load (N)" = "unused", X = "label"}')
-    assert with_answer(text, "A*.csv", "columns", '{"Load (N)" = "load_N"}') == (
-        '["A*.csv"]\ncolumns = {"Load (N)" = "load_N", X = "label"}\n'
-    )

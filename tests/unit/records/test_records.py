@@ -12,8 +12,8 @@ import creepkit as ck
 from creepkit.cameras.reading import TIME_UNITS
 from creepkit.instruments.column_heads import channel_unit
 from creepkit.quality import check_data_quality
-from creepkit.readers.column_names import unit_suffix
 from creepkit.readers.history_csv import HISTORY_CSV, history_text
+from creepkit.readers.vocabulary import unit_suffix
 from creepkit.records import (
     History,
     Nuisance,

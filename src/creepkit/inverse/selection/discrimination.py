@@ -241,7 +241,7 @@ def _equivalence_sentence(
     if reduction:
         parts.append(f"{richer_law} with {reduction} is the other law, and the tests allow it")
     lowest, highest = a.ranges["stress"]
-    constant_loads = all(_is_constant(h.loading.program().values) for h in a.histories)
+    constant_loads = all(_is_constant(h.load_levels) for h in a.histories)
     if highest <= 1.001 * lowest:
         parts.append(f"every test holds one stress, {lowest:.4g} MPa")
     elif not any(fit.law.uses(symbol) for fit in (a, b) for symbol in (strain, time)):

@@ -245,5 +245,5 @@ class BulgeSettings(FiniteElementSettings):
         """
         thickness = history.geometry.get("apex_thickness", self.geometry.apex_thickness)
         slenderness = self.geometry.cavity_radius / 7.5 * 0.5 / thickness
-        levels = np.unique(history.loading.program().values)
+        levels = np.unique(history.load_levels)
         return np.asarray(12.5 * slenderness**1.15 * levels[levels > 0])

@@ -1,0 +1,106 @@
+"""Files as laboratories keep them, whose first reading went wrong: each is read right, or asked about."""
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import HistoryError
+
+SHEET = "Éprouvette;Température (°C);Contrainte (MPa);Déformation (%);Temps (h);Observations\n"
+LOGARITHMS = "Specimen,T (C),stress (MPa),log10(t_r/h),lg(minimum rate) (1/h)\nA1,600,200,2.5,-4\nA2,600,160,3,-5\n"
+HEAD = "Time (h),Strain (%),Temp (C)\n"
+BLOCKS = (
+    f"Specimen A,,\nStress 120 MPa,,\n{HEAD}0,0,650\n1,0.1,650\n5,0.3,650\n,,\n"
+    f"Specimen B,,\nStress 140 MPa,,\n{HEAD}0,0,650\n1,0.2,650\n5,0.5,650\n"
+)
+LISTING = """ LAB 3    RUN LISTING   PAGE 1
+ TEST NO {}   STRESS {} N/MM2   TEMP 550 C
+
+   DATE    TIME     HOURS    TEMP   STRAIN,%
+ 03/02/84  09:15      0.00   550.0    0.0000
+ 03/02/84  19:15     10.00   550.5    0.0200
+ LAB 3    RUN LISTING   PAGE 2
+ 04/02/84  09:15     24.00   550.4    0.0300
+ *** END OF TEST - UNLOADED
+"""
+TUBES = (
+    "# specimen: tube\n# includes_elastic: no\n"
+    "Specimen,OD (mm),Wall thickness (mm),Pressure (MPa),T (C),Time (h),diameter_growth_mm\n"
+    + "".join(f"T1,9.5,0.5,10,400,{time},{time / 1e4}\n" for time in (0, 10, 100))
+    + "".join(f"T2,11.2,0.5,10,400,{time},{time / 1e4}\n" for time in (0, 10, 100))
+)
+
+
+@pytest.fixture
+def read(tmp_path):
+    def one(text, name="x.csv"):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        return ck.read_histories(tmp_path / name)
+
+    return one
+
+
+def test_a_strain_and_its_time_in_the_row_of_a_test_are_no_frames(read):
+    """They are how far it went; where no remark says whether it broke then, that is asked for."""
+    tests = read(SHEET + "E1;600;180;5,2;1200;rompu\nE2;650;120;3,3;900;arrêté avant rupture\n")
+    assert [(one.rupture_time, one.unruptured) for one in tests] == [(1200 * 3600.0, False), (None, True)]
+    with pytest.raises(HistoryError, match=r"x.csv:2 \(and 1 more\): 'Temps \(h\)' .* ended = \"ruptured\" \(or ended"):
+        read(SHEET.replace(";Observations", "") + "E1;600;180;5,2;1200\nE2;650;120;3,3;900\n")
+
+
+def test_logarithms(read):
+    first, second = read(LOGARITHMS)
+    assert (first.rupture_time, second.rupture_time) == (pytest.approx(10**2.5 * 3600), 3.6e6)
+    assert first.minimum_rate == pytest.approx(1e-4 / 3600)
+    assert "'log10(t_r/h)' is a decimal logarithm" in first.labels["assumed"]
+    with pytest.raises(HistoryError, match="is a rate that is not understood; is it a minimum creep rate?"):
+        read(LOGARITHMS.replace("minimum rate", "rate"))
+
+
+def test_blocks_below_one_another(read):
+    tests = read(BLOCKS)
+    assert [f"{one.name}: {one.condition}" for one in tests] == ["A: 650 °C, 120 MPa", "B: 650 °C, 140 MPa"]
+    pages = read(LISTING.format(4471, 120) + LISTING.format(4472, 150).replace(" LAB 3    RUN LISTING   PAGE 1\n", ""))
+    found = [f"{one.name}: {one.condition}, {one.times[-1] / 3600:g} h" for one in pages]
+    assert found == ["4471: 550 °C, 120 MPa, 24 h", "4472: 550 °C, 150 MPa, 24 h"]
+
+
+def test_one_answer_for_all_files_of_a_folder(tmp_path):
+    for name in ("A1.csv", "A2.csv", "B9.csv"):
+        (tmp_path / name).write_text("Temp (C),Time (h),Strain (%)\n600,0,0\n600,1,0.1\n600,5,0.2\n")
+    with pytest.raises(HistoryError, match=r"A1.csv \(and 2 files more\): no loading .*: \[\"\*.csv\"\] stress_MPa = "):
+        ck.read_histories(tmp_path)
+    (tmp_path / "tests.toml").write_text('["*.csv"]\nstress_MPa = 120\n')
+    assert [one.condition for one in ck.read_histories(tmp_path)] == ["600 °C, 120 MPa"] * 3
+
+
+def ramp_and_creep(frames_of_ramp, modulus):
+    """Frames of a preload of six minutes, a ramp of one minute, and creep under 120 MPa; h, MPa, strain."""
+    ramp = np.linspace(0.0, 1.0, frames_of_ramp + 1)[1:]
+    after = np.geomspace(0.2, 200.0, 40)
+    times = np.concatenate([[0.0, 0.05, 0.1], 0.1 + ramp / 60.0, after])
+    stress = np.concatenate([[0.7] * 3, 0.7 + 119.3 * ramp, np.full(after.size, 120.0)])
+    creep = 1e-3 * np.maximum(times - 0.1 - 1 / 60, 0.0) ** 0.4
+    return times, stress, stress / modulus + creep, creep
+
+
+@pytest.mark.parametrize("frames_of_ramp", [1, 10])
+def test_a_preload_and_a_ramp_are_no_creep(read, frames_of_ramp):
+    """Time counts from the end of the preload; the strain of loading is told from creep by the record of the load."""
+    times, stress, strain, creep = ramp_and_creep(frames_of_ramp, 150e3)
+    rows = "".join(f"{t:.6f},{s:.3f},{e:.9f}\n" for t, s, e in zip(times, stress, strain, strict=True))
+    (test,) = read("# temperature_C: 600\nTime (h),Stress (MPa),Strain (1)\n" + rows)
+    assert test.times[0] == 0.0
+    assert "the end of a preload of 0.7 MPa at 360 s" in test.labels["assumed"]
+    elastic = 120.0 / test.elastic.E if test.includes_elastic else 0.0
+    assert test.includes_elastic == (frames_of_ramp == 10)
+    np.testing.assert_allclose((test.outputs["strain"] - elastic)[test.used][-30:], creep[-30:], atol=2e-6)
+
+
+def test_tubes_of_several_diameters(read):
+    """What their growth holds of the elastic part cannot be chosen, which is said."""
+    tests = read(TUBES)
+    assert [(one.name, one.geometry["outer_diameter"]) for one in tests] == [("T1", 9.5), ("T2", 11.2)]
+    assert "that of a tube always includes it" in tests[0].labels["assumed"]
+    with pytest.raises(HistoryError, match='specimen = "tube" \\(or specimen = "open-tube"\\)'):
+        read(TUBES.replace("# specimen: tube\n", ""))
