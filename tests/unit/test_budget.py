@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 5574,
     "records": 1996,
     "registry": 615,
-    "reports": 6182,
+    "reports": 6181,
     "rupture_assessment": 1869,
     "sampling": 1037,
     "screening": 683,

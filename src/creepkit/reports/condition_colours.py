@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-USED_SHARE = 0.86
-"""Of a colour map: its palest colours cannot be seen on white."""
+USED_SHARE, SAME, LABELS = 0.86, 1e-6, 5
+"""Of a colour map, whose palest colours cannot be seen on white; the relative difference of conditions that are one;
+and labels along a colour bar, its ends among them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ class ColourScale:
 
         transform: Callable[[Any], Any] = np.log if self.logarithmic else np.asarray
         low, high = (float(transform(end)) for end in self.ends)
-        share = (float(transform(value)) - low) / (high - low) if high > low else 0.0
+        share = (float(transform(value)) - low) / (high - low) if high - low > SAME * abs(high) else 0.0
         return colormaps[self.colour_map](USED_SHARE * share)
 
     @property
@@ -68,12 +69,8 @@ class ColourScale:
         colours = ListedColormap(colormaps[self.colour_map](np.linspace(0.0, USED_SHARE, 256)))
         bar = figure.colorbar(ScalarMappable(norm, colours), ax=list(panels), label=self.label, pad=0.01, aspect=30)
         ticks = (np.geomspace if self.logarithmic else np.linspace)(low, high, LABELS)
-        bar.set_ticks(list(ticks), labels=[f"{v:.3g}" if v < 1000 else f"{v:.0f}" for v in ticks])
+        bar.set_ticks(list(ticks), labels=[f"{float(f'{v:.3g}'):g}" for v in ticks])
         bar.ax.yaxis.set_minor_locator(NullLocator())
-
-
-LABELS = 5
-"""Along a colour bar, its ends among them."""
 
 
 def temperatures_celsius(histories: Sequence[History]) -> Floats:
