@@ -23,7 +23,7 @@ from creepkit.files.record_codec import RecordCodec
 from creepkit.inverse import identification_document, ranking_document
 from creepkit.inverse.identification import Identification
 from creepkit.language import CreepLaw, law_codec
-from creepkit.rupture_assessment import assessment_document
+from creepkit.rupture_assessment import assessment
 from creepkit.rupture_assessment.assessment import RuptureAssessment
 from creepkit.studies.tables import StudyTables
 
@@ -179,9 +179,7 @@ def schemas() -> dict[str, dict[str, Any]]:
         "ranking.schema.json": ranking_schema(),
         "law.schema.json": law,
         "valued-law.schema.json": valued_law_schema(),
-        "rupture-assessment.schema.json": document_schema(
-            assessment_document.ASSESSMENT, assessment_document.CODEC, RuptureAssessment
-        ),
+        "rupture-assessment.schema.json": document_schema(assessment.ASSESSMENT, assessment.CODEC, RuptureAssessment),
     }
 
 

@@ -14,7 +14,7 @@ from sphinx.application import Sphinx
 import creepkit as ck
 from creepkit.app.contents import page_contents
 from creepkit.app.page import page_fragment, shared_scripts
-from creepkit.exporters.mathml import MathmlExporter, MathmlPrinter
+from creepkit.exporters.documents import MathmlExporter, MathmlPrinter
 from creepkit.language.law_record import symbols_used
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import LawWithValues

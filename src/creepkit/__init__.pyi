@@ -15,8 +15,8 @@ from .dataset.storage import read_dataset as read_dataset
 from .dataset.storage import write_dataset as write_dataset
 from .discovery.discover import discover as discover
 from .discovery.discover import group_by_temperature as group_by_temperature
+from .discovery.discover import moduli as moduli
 from .discovery.discover import temperature_study as temperature_study
-from .discovery.elastic_moduli import moduli as moduli
 from .experiments.design import design as design
 from .experiments.rig import Rig as Rig
 from .exporters.exporting import export as export
@@ -38,15 +38,12 @@ from .inverse.goodness_of_fit import relative_squared_error as relative_squared_
 from .inverse.identification_document import load as load
 from .inverse.ranking_document import load_ranking as load_ranking
 from .inverse.reference_conditions import with_arrhenius as with_arrhenius
-from .inverse.search.derivative_free import CmaEs as CmaEs
-from .inverse.search.derivative_free import ParticleSwarm as ParticleSwarm
 from .inverse.search.multistart import MultiStart as MultiStart
+from .inverse.search.particle_swarm import ParticleSwarm as ParticleSwarm
 from .inverse.selection.ranking import rank as rank
 from .inverse.settings import IdentificationSettings as IdentificationSettings
 from .inverse.settings import default_nuisances as default_nuisances
 from .inverse.sparsity.penalties import L2 as L2
-from .inverse.sparsity.penalties import GroupL2 as GroupL2
-from .inverse.sparsity.penalties import Sqrt as Sqrt
 from .inverse.sparsity.penalties import Subsets as Subsets
 from .inverse.uncertainty.quantities import exponent_at as exponent_at
 from .inverse.uncertainty.quantities import rate_at as rate_at
@@ -107,7 +104,7 @@ from .registry.reading import read_record as read_record
 from .reports.report import report as report
 from .rupture_assessment.assess import rupture as rupture
 from .rupture_assessment.assessment import RuptureSettings as RuptureSettings
-from .rupture_assessment.assessment_document import load_rupture_assessment as load_rupture_assessment
+from .rupture_assessment.assessment import load_rupture_assessment as load_rupture_assessment
 from .sampling.conditions import TimeGrid as TimeGrid
 from .screening.screen import ScreeningOptions as ScreeningOptions
 from .screening.screen import screen as screen

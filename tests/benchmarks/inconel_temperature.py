@@ -22,8 +22,7 @@ from public_calls import cross_validated_tests
 
 import creepkit as ck
 from creepkit.discovery.discover import discover, group_by_temperature
-from creepkit.discovery.refitting import refit
-from creepkit.discovery.temperature_law import TemperatureLaw
+from creepkit.discovery.temperature_law import TemperatureLaw, refit
 from creepkit.inverse.cross_validation import CrossValidation
 from creepkit.inverse.identification import Identification, IdentificationSettings
 from creepkit.inverse.identify import identify

@@ -12,7 +12,7 @@ import creepkit as ck
 from creepkit.sampling.conditions import TimeGrid, planned_test
 from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion
 from creepkit.sampling.domains import SamplingDomain
-from creepkit.sampling.draws import Draws, additive_recurrence_step
+from creepkit.sampling.rates import Draws, additive_recurrence_step
 
 NORTON = ck.law("norton")
 BAR = ck.specimen("uniaxial")

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from packaging.tags import mac_platforms
 
 import creepkit as ck
-from creepkit.files.file_names import DEVICE_NAMES, file_stem, hashed_stem, numbered_stems
+from creepkit.files.writing import DEVICE_NAMES, file_stem, hashed_stem, numbered_stems
 from helpers import source_tree
 from helpers.paths import ROOT
 from helpers.source_tree import PACKAGE

@@ -22,9 +22,8 @@ from creepkit.app.contents import (
 )
 from creepkit.app.models import model_of
 from creepkit.errors import CreepkitError
+from creepkit.exporters.documents import expression_mathml, latex_unit, law_equations
 from creepkit.exporters.javascript import law_expression
-from creepkit.exporters.latex import latex_unit
-from creepkit.exporters.mathml import expression_mathml, law_equations
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.minimum_rates import measured_minimum_rate
 from creepkit.language.law import CreepLaw

@@ -133,8 +133,7 @@ def _readable_tests(
 def _write(histories: list[History], folder: Path) -> list[Path]:
     """Write each history; what cannot stand in the name of a file becomes a line."""
     import creepkit as ck
-    from creepkit.files.file_names import file_stem
-    from creepkit.files.writing import check_folder_target, made_from
+    from creepkit.files.writing import check_folder_target, file_stem, made_from
     from creepkit.readers.history_csv import history_text
     from creepkit.reports.figures import make_folder
 

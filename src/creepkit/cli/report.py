@@ -112,7 +112,7 @@ def _read(path: Path, histories: list[History]) -> Identification | ModelAverage
     import creepkit as ck
     from creepkit.files.json_documents import read_json
     from creepkit.files.reading import FileKind
-    from creepkit.rupture_assessment.assessment_document import ASSESSMENT
+    from creepkit.rupture_assessment.assessment import ASSESSMENT
 
     advice = "give an identification, a ranking.json or a rupture assessment that creepkit wrote"
     data = read_json(path, FileKind("a result", ReportError, advice))

@@ -23,7 +23,7 @@ from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion, Simulati
 if TYPE_CHECKING:
     from creepkit.records import Specimen
     from creepkit.sampling.domains import SamplingDomain
-    from creepkit.sampling.draws import Draws
+    from creepkit.sampling.rates import Draws
 
 
 def rejected_by_screening(design: SamplingDomain, samples: Dataset) -> Ints:

@@ -19,7 +19,7 @@ from creepkit.exporters.law_description import comment_lines, heading
 from creepkit.exporters.unit_conversion import reference_sentence
 from creepkit.kernels.log_form import in_one_sentence
 from creepkit.language.elastic import Elastic
-from creepkit.language.symbols import GAS_CONSTANT, strain, stress, temperature, time
+from creepkit.language.symbols import GAS_CONSTANT, principal_stress, strain, stress, temperature, time
 from creepkit.records import LawWithValues, Units
 
 _INVERSE_T = sympy.Symbol("per_T", positive=True)
@@ -232,7 +232,7 @@ class CodeInput:
 
     def text(self, source: LawWithValues) -> str:
         """Return heading and input; ExportError, with what to do, where the law is none of the code's."""
-        forms = creep_forms_of(source, self.code, self.alternative)
+        forms = creep_forms_of(source, self.code, self.way_out(source))
         comments, lines = self.content(source, forms)
         return "\n".join([*self.first_lines, *card_heading(source, self.marker, comments), *lines]) + "\n"
 
@@ -242,7 +242,12 @@ class CodeInput:
 
     def refusal(self, source: LawWithValues, reason: str) -> ExportError:
         """The error for a law, why, and what to do."""
-        return ExportError(f"law '{source.law.name}'{reason}; {self.alternative}")
+        return ExportError(f"law '{source.law.name}'{reason}; {self.way_out(source)}")
+
+    def way_out(self, source: LawWithValues) -> str:
+        """What to do with a law that the code does not have: a target that takes it."""
+        principal = source.without_inactive_terms().law.uses(principal_stress)
+        return "export it as 'mfront', which has the largest principal stress" if principal else self.alternative
 
 
 def exp_in_range(logarithm: float, quantity: str, source: LawWithValues) -> float:
@@ -260,10 +265,10 @@ def format_number(value: float) -> str:
     return f"{value:.13g}"
 
 
-def temperature_span(source: LawWithValues, low: float, high: float) -> tuple[float, float]:
-    """Ends of tables against temperature, K: what the tests covered and 25 K to each side, else `low` and `high`."""
+def temperature_span(source: LawWithValues) -> tuple[float, float]:
+    """Ends of tables against temperature, K: what the tests covered and 25 K to each side, else 873 K to 1273 K."""
     tested_range = source.ranges.get("temperature")
-    return (low, high) if tested_range is None else (tested_range[0] - 25.0, tested_range[1] + 25.0)
+    return (873.15, 1273.15) if tested_range is None else (tested_range[0] - 25.0, tested_range[1] + 25.0)
 
 
 def temperature_grid(low: float, high: float, step: float) -> list[float]:
@@ -293,16 +298,16 @@ def constant_elasticity(source: LawWithValues) -> ElasticConstants | None:
     return _elastic_constants_at(source, elastic, None)
 
 
-def elastic_table(source: LawWithValues, limits: tuple[float, float], step: float) -> list[ElasticConstants]:
+def elastic_table(source: LawWithValues, step: float, at: Sequence[float] = ()) -> list[ElasticConstants]:
     """The moduli in steps of temperature, or once where they do not depend on it; none where they are not given.
 
-    limits : K, of the table where no tests are known. step : K.
+    step : K. at : K, of the rows where another table decides.
     """
     elastic = source.elastic
-    if elastic is None or not elasticity_varies(elastic):
+    if elastic is None or not (at or elasticity_varies(elastic)):
         constant = constant_elasticity(source)
         return [constant] if constant else []
-    temperatures = temperature_grid(*temperature_span(source, *limits), step)
+    temperatures = at or temperature_grid(*temperature_span(source), step)
     return [_elastic_constants_at(source, elastic.at(T), T) for T in temperatures]
 
 

@@ -40,7 +40,7 @@ def export(
 
     source : a law, which needs `values` {parameter: value}, or an identification or a temperature law, whose intervals
         and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or the
-        record of law_with_values(), which may have elastic constants and notes as well.
+        record of law_with_values(), which may have moduli and notes as well.
     target : one of `available("exporters")`, or an exporter itself. units : of stress and time in the text,
         Units("Pa", "h") or {"stress": "Pa"}.
     temperature : K, puts a number in the place of the temperature, for targets that know none.

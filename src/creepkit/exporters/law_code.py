@@ -35,17 +35,20 @@ class Identifiers:
         self._max_length = max_length
         self.renamings: dict[str, str] = {}
 
-    def unique(self, requested: str) -> str:
-        """The identifier for a requested name: itself where the language allows it and it is free."""
+    def unique(self, requested: str, endings: Sequence[str] = ()) -> str:
+        """The identifier for a requested name: itself where the language allows it and it is free.
+
+        endings : what else is derived from it, each of which has to be free as well.
+        """
         ascii_name = unicodedata.normalize("NFKD", requested).encode("ascii", "ignore").decode()
         is_identifier = re.fullmatch(r"[A-Za-z]\w*", ascii_name)
         stem = ascii_name if is_identifier else re.sub(r"\W+", "_", ascii_name).strip("_") or "unnamed"
         stem = (stem if stem[0].isalpha() else f"x_{stem}")[: self._max_length]
         candidate, count = stem, 1
-        while self._normalise(candidate) in self._taken:
+        while not self._taken.isdisjoint(names := {self._normalise(f"{candidate}{end}") for end in ("", *endings)}):
             count += 1
             candidate = f"{stem[: self._max_length - 1 - len(str(count))]}_{count}"
-        self._taken.add(self._normalise(candidate))
+        self._taken |= names
         if candidate != requested:
             self.renamings[requested] = candidate
         return candidate

@@ -45,10 +45,10 @@ math material utilities exception glossary string cout cerr endl sigmaeq deviato
 perturbatedSystemEvaluation numerical_jacobian_epsilon maximum_increment_value_per_iteration
 jacobianComparisonCriterion etozz detozz sigzz computeMu computeLambda mfront_errno minimal_time_step_scaling_factor
 maximal_time_step_scaling_factor current_time_step_scaling_factor v_sound rho_m0 seq inverse_seq flow shear lame
-values axes first normal rate dyad_0 dyad_1 dyad_2 Damage Porosity Temperature Strain Stress ElasticStrain
-PlasticStrain ViscoplasticStrain EquivalentStrain EquivalentPlasticStrain EquivalentViscoplasticStrain
-EquivalentStress YoungModulus PoissonRatio ShearModulus BulkModulus Pressure HydrostaticPressure GrainSize MassDensity
-TimeUnderLoad
+values axes first normal principal_slope time_power rate dyad_0 dyad_1 dyad_2 Damage Porosity Temperature Strain
+Stress ElasticStrain PlasticStrain ViscoplasticStrain EquivalentStrain EquivalentPlasticStrain
+EquivalentViscoplasticStrain EquivalentStress YoungModulus PoissonRatio ShearModulus BulkModulus Pressure
+HydrostaticPressure GrainSize MassDensity TimeUnderLoad
 """
 """Names that MFront or TFEL keep, entries of its glossary that a law may come upon, and this block's own names."""
 
@@ -103,6 +103,8 @@ class IntegratorBlock:
                 "Stensor::computeEigenTensors(dyad_0, dyad_1, dyad_2, axes);",
                 "const int first = values[0] >= max(values[1], values[2]) ? 0 : (values[1] >= values[2] ? 1 : 2);",
                 "const Stensor normal = first == 0 ? dyad_0 : (first == 1 ? dyad_1 : dyad_2);",
+                # a tensor of its own: of the expression g++ -O2 loses the second part in the Jacobian
+                "const Stensor principal_slope = lame * Stensor::Id() + 2 * shear * normal;",
             ]
         return lines
 
@@ -112,7 +114,7 @@ class IntegratorBlock:
         texts = {
             stress: f"{megapascals}seq",
             strain: "p + theta * dp",
-            time: f"{seconds}({self.elapsed} + theta * dt)" if seconds else f"{self.elapsed} + theta * dt",
+            time: f"{seconds}{self._time_text}",
             temperature: "T + theta * dT",
             principal_stress: f"{megapascals}values[first]",
             mean_stress: f"{megapascals}trace(sig) / 3",
@@ -120,7 +122,26 @@ class IntegratorBlock:
         values = {symbol: texts[variable] for symbol, variable in zip(self.code.point, POINT_VARIABLES, strict=True)}
         for symbol, name, state in zip(self.code.states, self.states, self.law.states.values(), strict=True):
             values[symbol] = f"{f'{state.initial!r} + ' if state.initial else ''}{name} + theta * d{name}"
-        return [f"const real {s} = {text};" for s, text in values.items() if s in self._update_function.inputs]
+        power = f"const real time_power = {c_expression(self.time_power)};"
+        lines = [f"const real {s} = {text};" for s, text in values.items() if s in self._update_function.inputs]
+        return [power, *lines] if self.time_power != 0 and self.law.uses(time) else lines
+
+    @cached_property
+    def time_power(self) -> sympy.Expr:
+        """The exponent of time at which the law is singular at time zero, 0 where it is not."""
+        values = {ln: sympy.log(self.code.parameters[symbol]) for ln, symbol in self.code.logarithms.items()}
+        powers = [power for (power, _), _ in self.code.leading_exponents()]
+        lowest = min(powers, key=lambda power: float(power.subs(values | self.code.parameters)))
+        return lowest if float(lowest.subs(values | self.code.parameters)) < 0 else sympy.S.Zero
+
+    @property
+    def _time_text(self) -> str:
+        """The time whose power is the mean of that power over the increment; else that at t + theta dt."""
+        start, middle = self.elapsed, f"({self.elapsed} + theta * dt)"
+        if self.time_power == 0:
+            return middle
+        mean = f"(pow({start} + dt, 1 + time_power) - pow({start}, 1 + time_power)) / ((1 + time_power) * dt)"
+        return f"(dt > 0 && fabs(time_power) > 1e-3 ? pow({mean}, 1 / time_power) : {middle})"
 
     def rate_lines(self) -> list[str]:
         """The rate and each internal variable's, per unit of time, and what they change with."""
@@ -186,7 +207,7 @@ class IntegratorBlock:
 
 _ELASTIC_STRAIN_DERIVATIVES = {
     0: "{} * 2 * shear * flow",
-    4: "{} * (lame * Stensor::Id() + 2 * shear * normal)",
+    4: "{} * principal_slope",
     5: "{} * (lame + 2 * shear / 3) * Stensor::Id()",
 }
 """{column: derivative of a rate to the elastic strain through that stress, less theta}."""
@@ -251,12 +272,14 @@ def _header(behaviour: IntegratorBlock) -> Iterator[str]:
         "",
         f"Stress and Young's modulus are in {units.stress}, time in {units.time}, temperature in K.",
         "The creep strain p flows along the deviator of the stress; damage does not weaken the elasticity.",
-        "The midpoint rule (theta = 0.5) is of second order; theta = 1 is of first order and damps more.",
-        "Powers of time and strain stay finite at the start; if the rate falls steeply there, keep increments short.",
+        "The midpoint rule (theta = 0.5) is of second order. Where the stress relaxes by more than a tenth in an",
+        "increment it overshoots, and converges all the same: bound increments so, or set theta = 1 (first order).",
+        "Powers of strain stay finite at the start; if the rate falls steeply there, keep increments short.",
     ]
     if behaviour.law.uses(time):
         header_lines.append(
-            f"Time is counted in {behaviour.elapsed} from the first increment on, where the loading begins."
+            f"Time is counted in {behaviour.elapsed} from the first increment on, where the loading begins; a power "
+            "of it that is infinite there is integrated over the increment."
         )
     for state, symbol in zip(behaviour.law.states.values(), behaviour.states, strict=True):
         if state.initial:

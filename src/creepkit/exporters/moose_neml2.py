@@ -11,6 +11,7 @@ hyperbolic sine.
 
 from __future__ import annotations
 
+import keyword
 from collections.abc import Mapping, Sequence
 
 from creepkit.errors import ExportError
@@ -127,8 +128,11 @@ _NEML2_ARRHENIUS = (
 
 _NEML2_RESERVED = (
     *("mandel_stress", "vonmises", "flow", "normality", "flow_rate", "sum", "Eprate", "Erate", "Eerate", "elasticity"),
-    *("integrate_stress", "implicit_rate", "predictor", "model", "temperature"),
+    *("integrate_stress", "implicit_rate", "predictor", "model", "temperature", "E", "t", "stress", "yield_function"),
+    *("flow_direction", "E_rate", "strain_rate", "plastic_strain_rate", "stress_rate", "stress_residual", "equations"),
+    *("newton", "lu", *keyword.kwlist, *keyword.softkwlist),
 )
+"""Blocks and variables of the file itself, and words of Python, in whose expressions NEML2 takes names."""
 
 
 class Neml2Model(CodeInput):
@@ -150,7 +154,8 @@ class Neml2Model(CodeInput):
                 )
                 raise self.refusal(source, f", term '{form.label}': {reason}, {exponents}")
         names, labels = Identifiers(_NEML2_RESERVED), [form.label for form in forms]
-        rates = _flow_rate_blocks(source, dict(zip(names.unique_names(labels), forms, strict=True)))
+        unique = [names.unique(label, ("_rate", "_stress")) for label in labels]
+        rates = _flow_rate_blocks(source, dict(zip(unique, forms, strict=True)))
         arrhenius = [_NEML2_ARRHENIUS] if any(f.Q for f in forms) else []
         comments = [_NEML2_FORMULA, *arrhenius, *names.renaming_notes(labels)]
         return comments, hit_lines(_neml2_file(rates, _neml2_elasticity(source)))
@@ -186,7 +191,8 @@ def _neml2_elasticity(source: LawWithValues) -> HitBlock:
     moduli = constant_elasticity(source)
     if moduli is None:
         raise ExportError(
-            f"law '{source.law.name}': a NEML2 model needs the moduli; give elastic=Elastic(E=150e3, nu=0.3)"
+            f"law '{source.law.name}': a NEML2 model needs the moduli; give ck.law_with_values(..., "
+            "elastic=ck.Elastic(E=150e3, nu=0.3)), in a command --modulus-gpa"
         )
     coefficients = f"{format_number(moduli.E)} {format_number(moduli.nu)}"
     types = "YOUNGS_MODULUS POISSONS_RATIO"

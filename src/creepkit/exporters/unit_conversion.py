@@ -17,10 +17,10 @@ import mpmath
 import sympy
 
 from creepkit.errors import ExportError
+from creepkit.language.algebra import rate_coefficients
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import expression_text
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
-from creepkit.language.temperature_factors import rate_coefficients
 from creepkit.records import LawWithValues, Units
 
 STRESSES = (stress, principal_stress, mean_stress)

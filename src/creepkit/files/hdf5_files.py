@@ -15,8 +15,7 @@ from typing import Any
 import h5py
 
 from creepkit.errors import CreepkitError, quoted
-from creepkit.files.limits import how_to_raise, raised
-from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable
+from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, how_to_raise, raised
 from creepkit.files.writing import ADVICE, replace_on_success
 
 LARGEST_COMPRESSION = 100

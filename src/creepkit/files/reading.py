@@ -1,8 +1,12 @@
-"""Opening files that a user hands over: regular files only, of limited size, text in UTF-8, one clear error for all."""
+"""Opening files that a user hands over: regular files only, of limited size, text in UTF-8, one clear error for all.
+
+An environment variable, and that alone, allows more than the usual size.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import stat
 from collections.abc import Iterator
@@ -12,7 +16,36 @@ from io import BufferedReader
 from pathlib import Path
 
 from creepkit.errors import CreepkitError, quoted
-from creepkit.files.limits import how_to_raise, raised
+
+VARIABLE = "CREEPKIT_LIMITS"
+"""Environment variable: a number of 1 or more by which all limits on files that are read are multiplied."""
+
+
+LARGEST_FACTOR = 1e6
+
+
+def raised(limit: int) -> int:
+    """A limit on files as it holds in this process: the usual one, or larger where the environment says so."""
+    text = os.environ.get(VARIABLE, "").strip()
+    if not text:
+        return limit
+    try:
+        factor = float(text) if len(text) < 20 else math.nan
+    except ValueError:
+        factor = math.nan
+    if not 1.0 <= factor <= LARGEST_FACTOR:
+        raise CreepkitError(
+            f"the environment variable {VARIABLE} is '{quoted(text)}'; write a number from 1 to {LARGEST_FACTOR:g}"
+        )
+    return int(limit * factor)
+
+
+def how_to_raise(found: float, limit: int) -> str:
+    """What to do where more was found than `limit` allows today, as the end of a sentence."""
+    usual = limit / (raised(1_000_000) / 1e6)
+    needed = min(found / usual, LARGEST_FACTOR) if math.isfinite(found) else 10.0
+    return f"if it is right, {VARIABLE}={max(math.ceil(needed * 1.05), 2)} in the environment allows more"
+
 
 DEFAULT_MAXIMUM_BYTES = 50_000_000
 """Bytes; no document of creepkit is near it, and a reader must not load what memory cannot hold."""
@@ -28,7 +61,7 @@ class FileKind:
 
     noun : with its article, as messages name it: "an identification". error : what is raised for a file of this kind.
     advice : what to do about a file that is something else. maximum_bytes : largest size that is read, unless
-    `limits.VARIABLE` allows more.
+    VARIABLE allows more.
     """
 
     noun: str

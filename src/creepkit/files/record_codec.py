@@ -22,10 +22,106 @@ from pydantic_core import CoreConfig, CoreSchema, PydanticCustomError
 from pydantic_core import core_schema as schemas
 from pydantic_core.core_schema import no_info_plain_validator_function as plain
 
-from creepkit.errors import CreepkitError
-from creepkit.files import record_validators as validators
+from creepkit.errors import CreepkitError, printable, quoted, steering
+from creepkit.files.json_documents import check_keys
 
 Record = TypeVar("Record")
+
+_NEEDED = {"bool_type": "true or false", "dict_type": "an object", "list_type": "a list", "string_type": "a text"}
+
+
+def misfit(message: str) -> PydanticCustomError:
+    """What a validator raises; its message stands behind the place."""
+    return PydanticCustomError("misfit", message.encode(errors="backslashreplace").decode())
+
+
+def unknown_type(hint: Any, data: Any) -> Any:
+    """Refuse whatever stands in a field whose annotation no schema is known for."""
+    raise misfit(f" {shown(data)}, where nothing is known of {hint}")
+
+
+def foreign_value(from_json: Callable[[Any, str], Any], data: Any) -> Any:
+    """What the codec of a type that is no record reads."""
+    try:
+        return from_json(data, "")
+    except CreepkitError as error:
+        raise misfit(": " + str(error).removeprefix(": ")) from None
+
+
+def number(kind: type[float], problem_of: Callable[[float], str], data: Any) -> float:
+    """A number; null is NaN, and "inf" infinity, where numbers need not be whole."""
+    special = {None: math.nan, "inf": math.inf, "-inf": -math.inf}
+    value: Any = special.get(data, data) if kind is float and (data is None or type(data) is str) else data
+    if type(value) not in (int, kind):
+        raise misfit(f" {shown(data)}, where a {'' if kind is float else 'whole '}number is needed")
+    try:
+        problem = problem_of(float(value))
+    except OverflowError:
+        problem = "is a whole number too large"
+    if problem:
+        raise misfit(f" {problem}")
+    return kind(value)
+
+
+def kept_text(text: str) -> str:
+    """A text as files hold it: what must not reach a terminal as its code, so that the file can be read again."""
+    return "".join(one if one in "\n\r\t" else printable(one) for one in text) if steering(text) else text
+
+
+def shown_text(text: str) -> str:
+    """A text that may be shown on a terminal."""
+    if found := steering(text):
+        raise misfit(f" holds the character U+{ord(found):04X}, which cannot be printed; remove it from the text")
+    return text
+
+
+def as_tuple(length: int | None, data: Any) -> tuple[Any, ...]:
+    """A list of a length as a tuple; None stands for any."""
+    if not isinstance(data, list):
+        raise misfit(f" {shown(data)}, where a list is needed")
+    if length not in (None, len(data)):
+        raise misfit(f" is a list of {len(data)}, where {length} are needed")
+    return tuple(data)
+
+
+def built_record(record: type[Record], names: tuple[str, ...], data: Any, read: Callable[[Any], Any]) -> Record:
+    """A record from an object, by `read` of its values."""
+    if not isinstance(data, dict):
+        raise misfit(f" {shown(data)}, where an object is needed")
+    if problem := check_keys(data, names, "", optional=True):
+        raise misfit(problem)
+    values = read(data)
+    try:
+        return record(**values)
+    except CreepkitError as error:
+        raise misfit(f": {error}") from None
+    except (ValueError, TypeError, ArithmeticError, IndexError, KeyError) as error:
+        raise misfit(f" is no {record.__name__} ({quoted(' '.join(str(error).split()), 200)})") from None
+
+
+def sentence(error: ValidationError, place: str) -> str:
+    """The first problem, with its place."""
+    first = error.errors(include_url=False)[0]
+    kind, found = first["type"], shown(first["input"])
+    steps = [quoted(step, 40) for step in first["loc"] if not str(step).startswith("|")]
+    missing = steps.pop() if kind == "missing" else ""
+    where = ".".join([place, *steps]).strip(".") or "the document"
+    if kind == "misfit":
+        return where + first["msg"]
+    if kind == "missing":
+        return f"{where}: '{missing}' is missing"
+    if kind == "literal_error":
+        return f"{where} {found}; allowed are {first['ctx']['expected'].replace(' or ', ', ')}"
+    if kind.startswith("union_tag"):
+        return f"{where} {found}, which is none of its kinds"
+    return f"{where} {found}, " + (f"where {_NEEDED[kind]} is needed" if kind in _NEEDED else first["msg"])
+
+
+def shown(data: Any) -> str:
+    """What was found, in a few words."""
+    if isinstance(data, dict | list):
+        return "is an object" if isinstance(data, dict) else "is a list"
+    return "is null" if data is None else f"is {quoted(repr(data), 57)}"
 
 
 class RecordError(CreepkitError):
@@ -102,7 +198,7 @@ class RecordCodec:
         if isinstance(value, enum.Enum):
             return value.name
         if isinstance(value, str):
-            return validators.kept_text(value)
+            return kept_text(value)
         if value is None or isinstance(value, bool | int):
             return value
         if isinstance(value, float | np.floating):
@@ -141,9 +237,7 @@ class RecordCodec:
 
         names = tuple(f.name for f in self._stored_fields(record))
         try:
-            result: Record = validators.built_record(
-                record, names, data, lambda _: values | {k: value(k, data[k]) for k in data}
-            )
+            result: Record = built_record(record, names, data, lambda _: values | {k: value(k, data[k]) for k in data})
             return result
         except PydanticCustomError as error:
             raise RecordError((place or "the document") + error.message()) from None
@@ -152,7 +246,7 @@ class RecordCodec:
         try:
             return self._adapter(hint, allowed).validate_python(data)
         except ValidationError as error:
-            raise RecordError(validators.sentence(error, place)) from None
+            raise RecordError(sentence(error, place)) from None
 
     def _adapter(self, hint: Any, allowed: NumberRange) -> TypeAdapter[Any]:
         """What validates data of values with an annotation; made when the first is read."""
@@ -167,9 +261,9 @@ class RecordCodec:
         hint = _without_alias(hint)
         origin, arguments = get_origin(hint), get_args(hint)
         if hint in self.values:
-            return plain(partial(validators.foreign_value, self.values[hint].from_json))
+            return plain(partial(foreign_value, self.values[hint].from_json))
         if hint in (float, int):
-            return plain(partial(validators.number, hint, allowed.problem))
+            return plain(partial(number, hint, allowed.problem))
         if hint in _SCHEMAS:
             return _SCHEMAS[hint]
         if origin in (Union, UnionType):
@@ -198,10 +292,10 @@ class RecordCodec:
                 return schemas.list_schema(items[0], fail_fast=True)
             length = None if origin is not tuple or arguments[-1] is ... else len(items)
             values = schemas.tuple_schema(items, variadic_item_index=0 if length is None else None, fail_fast=True)
-            return schemas.no_info_before_validator_function(partial(validators.as_tuple, length), values)
+            return schemas.no_info_before_validator_function(partial(as_tuple, length), values)
         if is_dataclass(hint) and isinstance(hint, type):
             return self._record_schema(hint)
-        return plain(partial(validators.unknown_type, hint))
+        return plain(partial(unknown_type, hint))
 
     def _record_schema(self, record: type[Any]) -> CoreSchema:
         hints, keys = self._hints(record), {}
@@ -210,7 +304,7 @@ class RecordCodec:
             value = self._schema(hints[f.name], self._range(record, f.name))
             keys[f.name] = schemas.typed_dict_field(value, required=required)
         data = schemas.typed_dict_schema(keys, config=CoreConfig(strict=True, extra_fields_behavior="forbid"))
-        return schemas.no_info_wrap_validator_function(partial(validators.built_record, record, tuple(keys)), data)
+        return schemas.no_info_wrap_validator_function(partial(built_record, record, tuple(keys)), data)
 
     def _array(self, kind: np.dtype[Any], allowed: NumberRange, data: Any) -> Any:
         """An array from lists, as deep within one another as the first of them are."""
@@ -222,7 +316,7 @@ class RecordCodec:
         try:
             return np.array(values, dtype=kind)
         except (ValueError, OverflowError):
-            raise validators.misfit(" holds lists of different lengths, where an array is needed") from None
+            raise misfit(" holds lists of different lengths, where an array is needed") from None
 
     def _stored_fields(self, record: type) -> list[Field[Any]]:
         omitted = {name for kind, names in self.omitted.items() if issubclass(record, kind) for name in names}
@@ -238,7 +332,7 @@ class RecordCodec:
 
 _MAX_DIMENSIONS = 8
 _SCHEMAS: dict[Any, CoreSchema] = dict.fromkeys((Any, object), schemas.any_schema())
-_TEXT = schemas.no_info_after_validator_function(validators.shown_text, schemas.str_schema())
+_TEXT = schemas.no_info_after_validator_function(shown_text, schemas.str_schema())
 _SCHEMAS |= {bool: schemas.bool_schema(), str: _TEXT}
 
 

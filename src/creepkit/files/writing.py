@@ -1,28 +1,101 @@
 """Writing files: whole or not at all, never through links or into devices, and never over what creepkit did not write.
 
-What is written takes a temporary name in the same folder, then its own. RECORD lists what creepkit wrote in a folder,
-a line of JSON for each content: [name, bytes and SHA-256, what it was made from]. A file is creepkit's own while its
+What is written takes a temporary name in the same folder, then its own. RECORD lists what creepkit wrote in a folder, a
+line of JSON for each content: [name, bytes and SHA-256, what it was made from]. A file is creepkit's own while its
 content is listed under its name; any other file is replaced by force alone, and so is one that was made from another
 study or measured file than the new one. Without the list nothing is lost: its files then need force.
 
 Files in folders that creepkit keeps for itself (shards, caches) are `internal`: always replaced, and listed nowhere.
+
+Names of files from names of laws, tests and alloys are such that any system can save and tell apart: Windows has names
+of devices that no file may have, whatever its suffix, drops dots and blanks at the end, and, as macOS does, takes
+`Norton` and `norton` for one file.
+
+The cache folder, whose compiled code is executed, is used only where it is ours alone to write to: a folder or file
+that another user made or can write to may hold what they want us to run. It is left alone, which is said once: laws are
+then compiled anew by every process. On Windows, where files have no such owners, a user's folder counts as the user's.
 """
 
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import os
+import re
 import secrets
 import shutil
 import stat
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from functools import cache
 from pathlib import Path
 
-from creepkit.errors import CreepkitError, quoted
+from creepkit.errors import CacheWarning, CreepkitError, quoted
 from creepkit.files.reading import FileKind, read_text, sha256_of
+
+DEVICE_NAMES = frozenset(
+    [
+        "con",
+        "prn",
+        "aux",
+        "nul",
+        "conin$",
+        "conout$",
+        *(f"{port}{k}" for port in ("com", "lpt") for k in "0123456789¹²³"),
+    ]
+)
+"""Names of devices on Windows."""
+
+
+MOST_SIGNS = 80
+"""Signs of a name: folders, a suffix and temporary additions have to fit into 255 as well."""
+
+
+PLAIN_SIGNS = "A-Za-z0-9._=+-"
+"""What may stand in a name, as a set of a regular expression."""
+
+
+LAW_SIGNS = "A-Za-z0-9._=-"
+"""Those of laws: a sum of laws, norton+dorn, is saved as norton-dorn."""
+
+
+def file_stem(text: str, default: str = "file", signs: str = PLAIN_SIGNS, gap: str = "-") -> str:
+    """A name without suffix that any system can save; different texts may get the same.
+
+    default : the name of a text of which nothing is left. gap : what stands for signs that are none of `signs`.
+    """
+    plain = re.sub(f"[^{signs}]+", gap, text).strip("._-")[:MOST_SIGNS].rstrip("._-") or default
+    return f"{default}-{plain}" if plain.split(".")[0].casefold() in DEVICE_NAMES else plain
+
+
+def hashed_stem(text: str, default: str = "x", others: Iterable[str] = ()) -> str:
+    """The text itself where any system can save it, else with the beginning of a hash, so that it stays apart.
+
+    others : texts of other files in the same folder; one that differs by case alone makes the hash necessary.
+    """
+    plain = file_stem(text, default)
+    unlike = all(other == text or other.casefold() != text.casefold() for other in others)
+    if plain == text and unlike:
+        return plain
+    return f"{plain}_{hashlib.sha256(text.encode('utf-8', 'replace')).hexdigest()[:6]}"
+
+
+def numbered_stems(texts: Sequence[str], default: str = "file", signs: str = PLAIN_SIGNS) -> list[str]:
+    """A name for each text; later ones that a system might take for an earlier one get a number."""
+    names: list[str] = []
+    taken: set[str] = set()
+    for text in texts:
+        plain = name = file_stem(text, default, signs)
+        number = 2
+        while name.casefold() in taken:
+            name, number = f"{plain}-{number}", number + 1
+        taken.add(name.casefold())
+        names.append(name)
+    return names
+
 
 RECORD = ".creepkit-written"
 """The list of what creepkit wrote in a folder."""
@@ -226,3 +299,42 @@ def _note_written(path: Path, content: str) -> None:
     if _written(path.parent).get(path.name, {}).get(content) != origin:
         with suppress(OSError), open(path.parent / RECORD, "a", encoding="utf-8") as record:
             record.write(json.dumps([path.name, content, origin]) + "\n")
+
+
+ENVIRONMENT_VARIABLE = "CREEPKIT_CACHE"
+
+
+def cache_folder(name: str) -> Path | None:
+    """The cache folder of a kind of files, made where it is missing; None where none can be used.
+
+    It lies in CREEPKIT_CACHE, an absolute path, else in `creepkit` in the user's cache folder.
+    """
+    try:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folder = Path(os.environ.get(ENVIRONMENT_VARIABLE) or Path(base) / "creepkit") / name
+        if not folder.is_absolute():
+            raise OSError(f"{folder} is not an absolute path")
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if is_ours_alone(folder):
+            return folder
+        problem = f"{folder} belongs to another user, or others can write to it"
+    except (OSError, RuntimeError) as error:  # RuntimeError: a user without a home folder
+        problem = f"the cache folder cannot be used ({error})"
+    warn_once(f"{problem}, so that laws are compiled anew; set {ENVIRONMENT_VARIABLE} to a folder of your own")
+    return None
+
+
+def is_ours_alone(path: Path) -> bool:
+    """Whether a regular file or folder is this user's or root's, and nobody else can write to it; OSError if none."""
+    status = os.lstat(path)
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+        return False
+    if not hasattr(os, "geteuid"):
+        return True
+    return status.st_uid in (os.geteuid(), 0) and not status.st_mode & 0o022
+
+
+@cache
+def warn_once(sentence: str) -> None:
+    """Warn of a cache that is not used."""
+    warnings.warn(sentence, CacheWarning, stacklevel=3)

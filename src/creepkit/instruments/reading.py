@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest, quoted
-from creepkit.files.limits import how_to_raise, raised
+from creepkit.files.reading import how_to_raise, raised
 from creepkit.files.time_stamps import DAY, ClockColumn, ResolvedTimes, is_clock_time, resolve
 from creepkit.instruments.column_heads import (
     KNOWN_UNITS,

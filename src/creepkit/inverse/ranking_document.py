@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
-from creepkit.files.file_names import LAW_SIGNS, numbered_stems
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind, sha256_of
 from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError
+from creepkit.files.writing import LAW_SIGNS, numbered_stems
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json, load
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage

@@ -26,7 +26,7 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from creepkit.arrays import Floats, frozen
-from creepkit.files.cache_folders import cache_folder, is_ours_alone
+from creepkit.files.writing import cache_folder, is_ours_alone
 from creepkit.kernels.interface import CompiledEntry, CompiledLaw
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, expression_source, law_comments
 from creepkit.kernels.llvm_code import Module, add_entry

@@ -8,9 +8,9 @@ from typing import Any
 
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.language import algebra
+from creepkit.language.algebra import times
 from creepkit.language.law_record import LawRecord
 from creepkit.language.printing import law_latex, law_text
-from creepkit.language.temperature_factors import times
 from creepkit.presentation import present
 
 

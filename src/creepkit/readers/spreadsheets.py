@@ -22,8 +22,7 @@ from xml.etree import ElementTree
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
-from creepkit.files.limits import how_to_raise, raised
-from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
+from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, how_to_raise, raised, read_bytes
 from creepkit.readers.columns_of_tests import column_called, head_of_tests
 from creepkit.readers.frames import unknown_text
 from creepkit.readers.history_csv import histories_of_tests

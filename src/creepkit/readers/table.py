@@ -31,7 +31,7 @@ from creepkit.files.delimited_text import (
     parse_number,
     parse_numbers,
 )
-from creepkit.files.limits import how_to_raise, raised
+from creepkit.files.reading import how_to_raise, raised
 from creepkit.readers.vocabulary import plain_name, split_written_name, unit_suffix
 
 MAXIMUM_COLUMNS, MAXIMUM_CELL = 2000, 10_000

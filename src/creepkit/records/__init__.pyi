@@ -3,6 +3,9 @@
 from .camera_format import CameraFormat as CameraFormat
 from .camera_frames import CameraFrame as CameraFrame
 from .camera_frames import Frames as Frames
+from .camera_frames import SurfaceObservation as SurfaceObservation
+from .camera_frames import SurfacePoints as SurfacePoints
+from .camera_frames import SurfaceRegion as SurfaceRegion
 from .clock_alignment import ClockAlignment as ClockAlignment
 from .history import EVERY_FRAME as EVERY_FRAME
 from .history import UNKNOWN_DURATION as UNKNOWN_DURATION
@@ -88,9 +91,6 @@ from .specimen_lookup import specimen_of as specimen_of
 from .specimen_record import Dimension as Dimension
 from .specimen_record import Load as Load
 from .specimen_record import Output as Output
-from .surface_observation import SurfaceObservation as SurfaceObservation
-from .surface_observation import SurfacePoints as SurfacePoints
-from .surface_observation import SurfaceRegion as SurfaceRegion
 from .typical_tests import typical_history as typical_history
 from .units import SECONDS_PER_HOUR as SECONDS_PER_HOUR
 from .units import ZERO_CELSIUS as ZERO_CELSIUS

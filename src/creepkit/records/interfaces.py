@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
     from creepkit.language.law import CreepLaw
+    from creepkit.records.camera_frames import SurfaceObservation, SurfacePoints, SurfaceRegion
     from creepkit.records.history import History
     from creepkit.records.law_with_values import LawWithValues
     from creepkit.records.prediction import NuisanceValues, Prediction
-    from creepkit.records.surface_observation import SurfaceObservation, SurfacePoints, SurfaceRegion
 
 
 @runtime_checkable

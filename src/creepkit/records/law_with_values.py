@@ -98,12 +98,16 @@ class LawWithValues:
         return replace(self, law=law, values={name: self.values[name] for name in law.names}, elastic=elastic)
 
     def without_inactive_terms(self) -> LawWithValues:
-        """The same without what is switched off: terms of a zero coefficient, exponents that are 0.
+        """The same without what is switched off: terms of a zero coefficient, exponents and shares that are 0.
 
         ExportError when no term is left.
         """
         table = self.law.table
-        inactive = {name: value for name, value in self.values.items() if value == table[name].off}
+        inactive = {
+            name: value
+            for name, value in self.values.items()
+            if value == table[name].off or (value == 0 and table[name].within_bounds(value))
+        }
         if not inactive:
             return self
         try:

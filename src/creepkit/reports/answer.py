@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from markupsafe import Markup
 
-from creepkit.exporters.mathml import expression_mathml, law_equations
+from creepkit.exporters.documents import expression_mathml, law_equations
 from creepkit.inverse.adequacy import SHAPE_MISFIT, UNDETECTED_SCATTER
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.inverse.perturbation import combined_change_text

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.files.file_names import LAW_SIGNS, numbered_stems
+from creepkit.files.writing import LAW_SIGNS, numbered_stems
 from creepkit.reports.blocks import printable
 from creepkit.reports.contents import ExportedFile
 

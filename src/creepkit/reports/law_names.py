@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import sympy
 
-from creepkit.exporters.latex import equations_in_latex
+from creepkit.exporters.documents import equations_in_latex, expression_mathml
 from creepkit.exporters.law_description import comment_lines
-from creepkit.exporters.mathml import expression_mathml
 from creepkit.language import CreepLaw, mean_stress, principal_stress, strain, stress, temperature, time
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.language.symbols import GAS_CONSTANT

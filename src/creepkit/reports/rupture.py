@@ -14,8 +14,8 @@ from creepkit.reports.figures import draw_parity, empty_figure, save_figure, spa
 from creepkit.reports.json_values import fields_to_json
 from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
-from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 from creepkit.rupture_assessment.methods import METHODS, THERMAL, Conditions
+from creepkit.rupture_assessment.rupture_fit import power_of_ten
 from creepkit.rupture_assessment.strength import LONGEST_EXTRAPOLATION, bound_curves, mixed
 
 if TYPE_CHECKING:

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.discovery.combinations import FormWeight
-    from creepkit.discovery.discover import TemperatureStudy
-    from creepkit.discovery.elastic_moduli import ModulusEstimates
+    from creepkit.discovery.discover import ModulusEstimates, TemperatureStudy
     from creepkit.discovery.regression import FormCombination
     from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.reports.svg import PageFigures

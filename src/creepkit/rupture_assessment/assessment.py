@@ -1,4 +1,7 @@
-"""RuptureAssessment: methods with weights, strengths with bounds, checks, and a verdict no stronger than they are."""
+"""RuptureAssessment: methods with weights, strengths with bounds, checks, and a verdict no stronger than they are.
+
+Assessments are written as JSON files, and read back.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,9 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest, quoted
+from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
+from creepkit.files.reading import FileKind
+from creepkit.files.record_codec import ANY_NUMBER, NumberRange, RecordCodec, RecordError
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.limits import PROBABILITY, SEED, Limits, numbers
 from creepkit.options import CELSIUS, Options, option
@@ -19,12 +25,10 @@ from creepkit.presentation import Presentable, present
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.checks import AssessmentCheck
-from creepkit.rupture_assessment.likelihood import Distribution
-from creepkit.rupture_assessment.log_time_distributions import power_of_ten
-from creepkit.rupture_assessment.methods import METHODS, Conditions
+from creepkit.rupture_assessment.methods import METHODS, Conditions, Distribution
 from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
 from creepkit.rupture_assessment.observed_tests import RuptureTests
-from creepkit.rupture_assessment.rupture_fit import RuptureFit
+from creepkit.rupture_assessment.rupture_fit import RuptureFit, RuptureParameter, VarianceFreedom, power_of_ten
 from creepkit.rupture_assessment.strength import (
     BOUND_KINDS,
     StrengthEstimate,
@@ -287,7 +291,7 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
 
     def save(self, path: str | Path) -> Path:
         """Write the assessment to a JSON file."""
-        return present("rupture_assessment.assessment_document:write_assessment", self, path)
+        return present("rupture_assessment.assessment:write_assessment", self, path)
 
 
 ISOTHERMAL_TOLERANCE = 5.0
@@ -318,3 +322,79 @@ def check_conditions(temperatures: Sequence[float] | None, hours: Sequence[float
         for one in () if given is None else given:
             if not 0 < one < highest:
                 raise FitError(f"{name} holds {one!r}; give {unit}, above 0 and below {highest:g}")
+
+
+ASSESSMENT = DocumentFormat(
+    "creepkit-rupture-assessment",
+    1,
+    FileKind("a rupture assessment", FitError, "give a file that RuptureAssessment.save wrote"),
+    remedy="assess the tests again",
+)
+
+POSITIVE = NumberRange(low=0.0, open_low=True)
+POSITIVE_OR_NAN = NumberRange(low=0.0, open_low=True, nan=True)
+
+CODEC = RecordCodec(
+    ranges={
+        RuptureTests: {
+            "stress": POSITIVE,
+            "temperature": POSITIVE,
+            "tensile_strength": POSITIVE_OR_NAN,
+            "minimum_rate": POSITIVE_OR_NAN,
+        },
+        RankedRuptureFit: {"excess": NumberRange(low=0.0), "weight": NumberRange(low=0.0, high=1.0)},
+        RuptureFit: {"scale": POSITIVE, "scale_corrected": POSITIVE},
+        VarianceFreedom: {"most": NumberRange(low=1.0)},
+        RuptureParameter: dict.fromkeys(("value", "low", "high"), ANY_NUMBER),
+    }
+)
+
+
+def write_assessment(assessment: RuptureAssessment, path: str | Path) -> Path:
+    """Write the assessment; the file is whole or absent."""
+    return write_json({**ASSESSMENT.heading, **CODEC.to_json(assessment)}, Path(path), ASSESSMENT.kind)
+
+
+@checked
+def load_rupture_assessment(path: str | Path) -> RuptureAssessment:
+    """Return the rupture assessment saved in a JSON file: its fits predict, plot and state strengths as before.
+
+    FitError, in one sentence, says what is wrong with other files.
+    """
+    data = read_json(Path(path), ASSESSMENT.kind)
+    content = check_heading(data, str(path), ASSESSMENT)
+    try:
+        assessment = CODEC.from_json(RuptureAssessment, content)
+    except RecordError as error:
+        raise FitError(f"{path}: {error}; it is not a rupture assessment of this version") from None
+    problem = _problem(assessment)
+    if problem:
+        raise FitError(f"{path}: {problem}; the file is damaged")
+    return assessment
+
+
+def _problem(assessment: RuptureAssessment) -> str:
+    """What of an assessment contradicts the rest, "" where nothing does."""
+    tests = assessment.tests
+    sizes = {len(getattr(tests, name)) for name in ("log_time", "censored", "stress", "temperature")}
+    sizes |= {len(tests.tensile_strength), len(tests.minimum_rate), *map(len, tests.groups.values())}
+    if sizes != {len(tests)} or not len(tests):
+        return "the tests have arrays of different lengths"
+    if not assessment.ranked:
+        return "no method is ranked"
+    if len(assessment.tensile_temperatures) != len(assessment.tensile_strengths):
+        return "tensile strengths and their temperatures differ in number"
+    fits: list[Any] = [one.fit for one in assessment.ranked]
+    if assessment.relation is not None:
+        fits += [assessment.relation.times, assessment.relation.rates]
+    for fit in fits:
+        if fit.method not in METHODS:
+            return f"there is no method '{fit.method}'"
+        count = len(fit.coefficients) + METHODS[fit.method].bilinear + 1 + len(fit.scatter)
+        if fit.covariance.shape != (count, count):
+            return f"the covariance of {fit.name} does not belong to its {count} estimates"
+        freedom, location = fit.variance_freedom, count - 1 - len(fit.scatter)
+        kinds = len(freedom.variances)
+        if freedom.derivatives.shape != (kinds, location, location) or freedom.uncertainty.shape != (kinds, kinds):
+            return f"the degrees of freedom of {fit.name} do not belong to its {location} location parameters"
+    return ""

@@ -31,10 +31,9 @@ from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records.units import celsius_text
-from creepkit.rupture_assessment.log_time_distributions import power_of_ten
 from creepkit.rupture_assessment.methods import METHODS, Conditions
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
-from creepkit.rupture_assessment.rupture_fit import RuptureFit
+from creepkit.rupture_assessment.rupture_fit import RuptureFit, power_of_ten
 
 LEAST_SLOPE = 1.5
 """-d log t / d log s."""

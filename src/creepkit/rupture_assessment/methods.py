@@ -24,15 +24,18 @@ tests and the yield stress at each temperature.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import SECONDS_PER_HOUR
+
+Distribution = Literal["lognormal", "weibull"]
+"""Of rupture times at one condition."""
 
 LN10 = float(np.log(10.0))
 
@@ -73,190 +76,158 @@ class Basis:
     bilinear: Floats | None = None
 
 
+Columns = dict[str, Floats]
+"""{constant: (points,) what it is multiplied by}, in the order of the coefficients."""
+
+
 @dataclass(frozen=True)
 class RuptureMethod:
-    """A time-temperature method.
+    """A time-temperature method: log10 of the time is a sum of columns times constants, some of which may be fixed.
 
-    equation : of the median rupture time, in words of the list above. fixable : constants that may be given in the
-    place of fitted ones. degrees : whether its stress function is a polynomial whose degree is chosen.
-    basis : (conditions, degree, fixed, centre) -> Basis.
-    parameters : (coefficients, k, degree, fixed, centre) -> {name: value}, as the literature writes them.
+    equation : of the median rupture time, in words of the list above. columns : (conditions, degree, centre) ->
+    Columns. units : of constants by name, for t in h, T in K and x of MPa; "a" of all a_0, a_1 ...; the others have
+    none. fixable : constants that may be given in the place of fitted ones. degrees : whether its stress function is a
+    polynomial whose degree is chosen. bilinear : whether all but the first two columns grow with the temperature by k.
+    literature : (constants, k, centre) -> {name: value} as the literature writes them; by default the constants.
     needs : what of a test it needs beside stress and temperature: "", "tensile_strength" or "rate".
-    units : of constants by name, for t in h, T in K and x of MPa; "a" of all a_0, a_1 ...; the others have none.
     """
 
     name: str
     equation: str
-    basis: Callable[[Conditions, int, Mapping[str, float], Centre], Basis]
-    parameters: Callable[[Floats, float, int, Mapping[str, float], Centre], dict[str, float]]
-    units: Mapping[str, str]
+    columns: Callable[[Conditions, int, Centre], Columns]
+    units: Mapping[str, str] = field(default_factory=dict)
     fixable: tuple[str, ...] = ()
     degrees: bool = True
     bilinear: bool = False
     thermal: bool = True
     needs: str = ""
+    literature: Callable[[dict[str, float], float, Centre], dict[str, float]] = lambda constants, *_: constants
+
+    def basis(self, at: Conditions, degree: int, fixed: Mapping[str, float], centre: Centre) -> Basis:
+        """Offset and columns at conditions (points,)."""
+        columns = self.columns(at, degree, centre)
+        offset: Floats = sum((value * columns.pop(name) for name, value in fixed.items()), np.zeros(at.stress.shape))
+        linear, bilinear = np.column_stack([*columns.values()]), None
+        if self.bilinear:
+            bilinear = (at.temperature - centre.temperature)[:, None] * linear
+            bilinear[:, :2] = 0.0
+        return Basis(offset, linear, bilinear)
+
+    def parameters(
+        self, coefficients: Floats, k: float, degree: int, fixed: Mapping[str, float], centre: Centre
+    ) -> dict[str, float]:
+        """{name: value} of the constants that were fitted, as the literature writes them.
+
+        coefficients : (constants,) in the order of the columns.
+        """
+        names = [name for name in self.columns(_ANY_CONDITION, degree, centre) if name not in fixed]
+        return self.literature(dict(zip(names, map(float, coefficients), strict=True)), k, centre)
 
     def unit(self, name: str) -> str:
         """Of a constant."""
         return self.units.get("a" if name.startswith("a_") else name, "")
 
 
-def _powers(x: Floats, degree: int) -> Floats:
-    """(points, degree + 1)."""
-    return np.asarray(x)[..., None] ** np.arange(degree + 1)
+_ANY_CONDITION = Conditions(*(np.full(1, value) for value in (1.0, 1000.0, 2.0, 1e-8)))
 
 
-def _coefficient_names(values: Floats, *_: Any) -> dict[str, float]:
-    return {f"a_{k}": float(v) for k, v in enumerate(values)}
+def _polynomial(at: Conditions, degree: int, centre: float = 0.0) -> Columns:
+    """Powers of log10 of the stress, a_0 and so on."""
+    x = np.log10(at.stress) - centre
+    return {f"a_{k}": x**k for k in range(degree + 1)}
 
 
-def _constant_first(name: str) -> Callable[..., dict[str, float]]:
-    """The parameters of a polynomial that stands after one constant, which may be fixed."""
-
-    def parameters(c: Floats, _k: float, _degree: int, fixed: Mapping[str, float], _: Centre) -> dict[str, float]:
-        return _coefficient_names(c) if name in fixed else {name: float(c[0]), **_coefficient_names(c[1:])}
-
-    return parameters
+def _inverse_energy(at: Conditions) -> Floats:
+    return np.asarray(1.0 / (THERMAL * at.temperature))
 
 
-def _with_constant(value: float | None, column: Floats, before: Sequence[Floats], after: Sequence[Floats]) -> Basis:
-    """Columns before and after that of a constant, which is estimated where no value is given."""
-    if value is not None:
-        return Basis(value * column, np.column_stack([*before, *after]))
-    return Basis(np.zeros(column.shape), np.column_stack([*before, column, *after]))
+def _larson_miller(at: Conditions, degree: int, _: Centre) -> Columns:
+    divided = {name: column / at.temperature for name, column in _polynomial(at, degree).items()}
+    return {"C": -np.ones(at.stress.shape), **divided}
 
 
-def _larson_miller(at: Conditions, degree: int, fixed: Mapping[str, float], _: Centre) -> Basis:
-    columns = _powers(np.log10(at.stress), degree) / at.temperature[:, None]
-    return _with_constant(fixed.get("C"), -np.ones(at.stress.shape), (), (columns,))
+def _manson_haferd(at: Conditions, degree: int, centre: Centre) -> Columns:
+    polynomial = _polynomial(at, degree, centre.log_stress)
+    return {"m_0": polynomial.pop("a_0"), "m_1": at.temperature - centre.temperature, **polynomial}
 
 
-def _orr_sherby_dorn(at: Conditions, degree: int, fixed: Mapping[str, float], _: Centre) -> Basis:
-    inverse = 1.0 / (THERMAL * at.temperature)
-    return _with_constant(fixed.get("Q"), inverse, (), (_powers(np.log10(at.stress), degree),))
-
-
-def _manson_haferd(at: Conditions, degree: int, _: Mapping[str, float], centre: Centre) -> Basis:
-    shape = _powers(np.log10(at.stress) - centre.log_stress, degree)[:, 1:]
-    warmer = at.temperature - centre.temperature
-    linear = np.column_stack([np.ones(at.stress.shape), warmer, shape])
-    bilinear = np.column_stack([np.zeros((at.stress.size, 2)), warmer[:, None] * shape])
-    return Basis(np.zeros(at.stress.shape), linear, bilinear)
-
-
-def _manson_haferd_parameters(
-    c: Floats, k: float, _degree: int, _: Mapping[str, float], centre: Centre
-) -> dict[str, float]:
-    inverse = 1.0 / k if k else np.inf
-    about_centre = np.array([c[1], *(k * c[2:])])
-    shifted = np.zeros(about_centre.size)
-    power = np.ones(1)
-    for value in about_centre:
+def _of_manson_haferd(constants: dict[str, float], k: float, centre: Centre) -> dict[str, float]:
+    m_0, m_1, *of_stress = constants.values()
+    inverse, shifted, power = 1.0 / k if k else np.inf, np.zeros(1 + len(of_stress)), np.ones(1)
+    for value in (m_1, *(k * c for c in of_stress)):
         shifted[: power.size] += value * power
         power = np.convolve(power, [-centre.log_stress, 1.0])
-    ends = {"log10 t_a": float(c[0] - c[1] * inverse), "T_a": float(centre.temperature - inverse)}
-    return {**ends, **_coefficient_names(shifted)}
+    ends = {"log10 t_a": float(m_0 - m_1 * inverse), "T_a": float(centre.temperature - inverse)}
+    return {**ends, **{f"a_{n}": float(value) for n, value in enumerate(shifted)}}
 
 
-def _wilshire(at: Conditions, _degree: int, fixed: Mapping[str, float], _: Centre) -> Basis:
+def _wilshire(at: Conditions, _degree: int, _: Centre) -> Columns:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.log(-np.log(at.stress / at.tensile_strength)) / LN10
-    inverse = 1.0 / (THERMAL * at.temperature)
-    return _with_constant(fixed.get("Q"), inverse, (ratio, -np.ones(at.stress.shape)), ())
+    return {"1/u": ratio, "log10 k_1 / u": -np.ones(at.stress.shape), "Q": _inverse_energy(at)}
 
 
-def _wilshire_parameters(c: Floats, _k: float, _degree: int, fixed: Mapping[str, float], _: Centre) -> dict[str, float]:
-    values = {"u": 1.0 / float(c[0]), "ln k_1": float(LN10 * c[1] / c[0])}
-    return values if "Q" in fixed else {**values, "Q": float(c[2])}
-
-
-def _monkman_grant(at: Conditions, _degree: int, _fixed: Mapping[str, float], _: Centre) -> Basis:
-    log_rate = np.log10(at.rate * SECONDS_PER_HOUR)
-    return Basis(np.zeros(at.rate.shape), np.column_stack([np.ones(at.rate.shape), -log_rate]))
-
-
-def _monkman_grant_parameters(
-    c: Floats, _k: float, _degree: int, _fixed: Mapping[str, float], _: Centre
-) -> dict[str, float]:
-    return {"c": float(c[0]), "m": float(c[1])}
-
-
-def _minimum_rate(at: Conditions, _degree: int, fixed: Mapping[str, float], _: Centre) -> Basis:
-    columns = np.column_stack([np.full(at.stress.shape, 1.0 / LN10), np.log10(at.stress)])
-    if "Q" in fixed:
-        return Basis(-fixed["Q"] / (THERMAL * at.temperature), columns)
-    return Basis(np.zeros(at.stress.shape), np.column_stack([columns, -1.0 / (THERMAL * at.temperature)]))
-
-
-def _minimum_rate_parameters(
-    c: Floats, _k: float, _degree: int, fixed: Mapping[str, float], _: Centre
-) -> dict[str, float]:
-    values = {"a": float(c[0]), "n": float(c[1])}
-    return values if "Q" in fixed else {**values, "Q": float(c[2])}
-
-
-def _isothermal(at: Conditions, degree: int, _fixed: Mapping[str, float], _: Centre) -> Basis:
-    return Basis(np.zeros(at.stress.shape), _powers(np.log10(at.stress), degree))
+def _of_wilshire(constants: dict[str, float], _k: float, _: Centre) -> dict[str, float]:
+    inverse, shift, *energy = constants.values()
+    return {"u": 1.0 / inverse, "ln k_1": LN10 * shift / inverse, **dict(zip(["Q"], energy, strict=False))}
 
 
 ENERGY = {"Q": "J/mol"}
 
 LARSON_MILLER = RuptureMethod(
-    "larson-miller",
-    "log10 t = -C + (a_0 + a_1 x + ...) / T",
-    _larson_miller,
-    _constant_first("C"),
-    {"a": "K"},
-    fixable=("C",),
+    "larson-miller", "log10 t = -C + (a_0 + a_1 x + ...) / T", _larson_miller, {"a": "K"}, fixable=("C",)
 )
+
 ORR_SHERBY_DORN = RuptureMethod(
     "orr-sherby-dorn",
     "log10 t = Q / (R T ln 10) + a_0 + a_1 x + ...",
-    _orr_sherby_dorn,
-    _constant_first("Q"),
+    lambda at, degree, _: {"Q": _inverse_energy(at), **_polynomial(at, degree)},
     ENERGY,
     fixable=("Q",),
 )
+
 MANSON_HAFERD = RuptureMethod(
     "manson-haferd",
     "log10 t = log10 t_a + (T - T_a) (a_0 + a_1 x + ...)",
     _manson_haferd,
-    _manson_haferd_parameters,
     {"T_a": "K", "a": "1/K"},
     bilinear=True,
+    literature=_of_manson_haferd,
 )
+
 WILSHIRE = RuptureMethod(
     "wilshire",
     "stress / tensile strength = exp(-k_1 (t exp(-Q / (R T)))^u)",
     _wilshire,
-    _wilshire_parameters,
     {**ENERGY, "ln k_1": "k_1 in h^-u"},
     fixable=("Q",),
     degrees=False,
     needs="tensile_strength",
+    literature=_of_wilshire,
 )
+
 MONKMAN_GRANT = RuptureMethod(
     "monkman-grant",
     "log10 t = c - m log10 of the minimum creep rate in 1/h",
-    _monkman_grant,
-    _monkman_grant_parameters,
-    {},
+    lambda at, *_: {"c": np.ones(at.rate.shape), "m": -np.log10(at.rate * SECONDS_PER_HOUR)},
     degrees=False,
     thermal=False,
     needs="rate",
 )
+
 MINIMUM_RATE = RuptureMethod(
     "minimum-rate",
     "ln of the minimum creep rate in 1/h = a + n ln(stress) - Q / (R T)",
-    _minimum_rate,
-    _minimum_rate_parameters,
+    lambda at, *_: {"a": np.full(at.stress.shape, 1.0 / LN10), "n": np.log10(at.stress), "Q": -_inverse_energy(at)},
     ENERGY,
     degrees=False,
 )
 """No method of rupture times: the rate law that predicts minimum rates for Monkman-Grant's."""
+
 ISOTHERMAL = RuptureMethod(
-    "isothermal", "log10 t = a_0 + a_1 x + ...", _isothermal, _coefficient_names, {}, thermal=False
+    "isothermal", "log10 t = a_0 + a_1 x + ...", lambda at, degree, _: _polynomial(at, degree), thermal=False
 )
+
 
 METHODS = {
     m.name: m

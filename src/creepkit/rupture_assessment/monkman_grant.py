@@ -10,10 +10,9 @@ from creepkit.arrays import Floats, frozen
 from creepkit.errors import FitError
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.rupture_assessment.fitting import fit_method
-from creepkit.rupture_assessment.log_time_distributions import LogTimeDistribution, StudentLogTime
 from creepkit.rupture_assessment.methods import MINIMUM_RATE, MONKMAN_GRANT, Conditions
 from creepkit.rupture_assessment.observed_tests import RuptureTests
-from creepkit.rupture_assessment.rupture_fit import RuptureFit
+from creepkit.rupture_assessment.rupture_fit import LogTimeDistribution, RuptureFit, StudentLogTime
 
 UNUSED_ENERGY = 300e3
 """J/mol, of a rate law of tests at one temperature; it is used at that temperature alone."""

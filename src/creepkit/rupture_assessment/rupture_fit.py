@@ -1,23 +1,228 @@
-"""RuptureFit: one method with its estimates, and the distributions of the times that it predicts."""
+"""RuptureFit: one method with its estimates, and the distributions of the times that it predicts.
+
+The degrees of freedom of the variances that it adds up are Satterthwaite's for mixed models.
+
+A predicted log time has a variance V(theta) that depends on the variances theta = (of a test, of each kind of effect),
+through the covariance C of the location parameters as well as directly. With A the covariance of the estimated theta,
+V has 2 V^2 / (g' A g) degrees of freedom, g = dV / dtheta (Giesbrecht, Burns (1985), Biometrics 41, 477; Fai, Cornelius
+(1996), J. Stat. Comput. Simul. 54, 363; for a sum of independent variances this is Satterthwaite (1946), Biometrics
+Bull. 2, 110). So a median time whose error comes from a few heats has about as many degrees of freedom as there are
+heats less one, however many tests there are.
+
+C, its derivatives and A (by the restricted likelihood) are those of the normal model of the tests that broke: with
+Z the members of the effects, V = theta_0 I + sum theta_g Z_g Z_g'.
+
+log10 of a time is Student's, with a Weibull test, or a mixture of such.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
+from scipy.special import chdtri, stdtr, stdtrit
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Floats, frozen
 from creepkit.errors import FitError
-from creepkit.rupture_assessment.degrees_of_freedom import VarianceFreedom
-from creepkit.rupture_assessment.likelihood import Distribution
-from creepkit.rupture_assessment.log_time_distributions import (
-    WEIBULL_MEDIAN,
-    LogTimeDistribution,
-    StudentLogTime,
-    WeibullLogTime,
-)
-from creepkit.rupture_assessment.methods import METHODS, Centre, Conditions
+from creepkit.rupture_assessment.methods import METHODS, Centre, Conditions, Distribution
+
+MOST_LEVELS = 400
+"""Of one kind of effect: with more its variance is taken for known."""
+
+LEAST_INFORMATION = 1e-10
+"""Of the largest: combinations of variances that the tests do not tell apart are left out of A."""
+
+
+@dataclass(frozen=True, eq=False)
+class VarianceFreedom:
+    """What degrees of freedom are found from, for kinds 0 (tests of one heat) and 1, 2 ... (effects).
+
+    variances : (kinds,) of log10 of time. uncertainty : (kinds, kinds), their covariance A.
+    derivatives : (kinds, location, location), of the covariance of the location parameters by each variance.
+    most : tests that broke less location parameters.
+    """
+
+    variances: Floats
+    uncertainty: Floats
+    derivatives: Floats
+    most: float
+
+    def of(self, location: Floats, *, between: bool = False, within: bool = False) -> Floats:
+        """(points,) of the variance of a prediction, with that between effects and within heats where included.
+
+        location : (points, location), derivatives of the prediction by the location parameters.
+        """
+        gradient = np.einsum("pi,kij,pj->pk", location, self.derivatives, location)
+        gradient[:, 1:] += between
+        gradient[:, 0] += within
+        variance = gradient @ self.variances
+        error = np.einsum("pk,kl,pl->p", gradient, self.uncertainty, gradient)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            freedom = 2.0 * variance**2 / error
+        return np.asarray(np.clip(np.where(np.isfinite(freedom), freedom, self.most), 1.0, self.most))
+
+    def transformed(self, jacobian: Floats) -> VarianceFreedom:
+        """The same for other location parameters, jacobian @ those of now.
+
+        jacobian : (others, parameters).
+        """
+        derivatives = np.einsum("mi,kij,nj->kmn", jacobian, self.derivatives, jacobian)
+        return VarianceFreedom(self.variances, self.uncertainty, frozen(derivatives), self.most)
+
+
+def variance_freedom(
+    columns: Floats, members: Sequence[Floats], within: float, between: Sequence[float]
+) -> VarianceFreedom:
+    """Of a linear model with effects.
+
+    columns : (tests, location). members : (tests, levels) of zeros and ones, one for each kind. within : variance of a
+    test. between : variances of effects.
+    """
+    kept = [(Z, v) for Z, v in zip(members, between, strict=True) if Z.shape[1] <= MOST_LEVELS]
+    levels = [Z.shape[1] for Z, _ in kept]
+    Z = np.column_stack([np.zeros((len(columns), 0)), *(Z for Z, _ in kept)])
+    spread = np.repeat([v for _, v in kept], levels) if kept else np.zeros(0)
+    parts = [slice(end - count, end) for count, end in zip(levels, np.cumsum(levels), strict=True)]
+
+    def solved(right: Floats) -> Floats:
+        """V^-1 right, by Woodbury's identity."""
+        inner = within * np.eye(spread.size) + spread[:, None] * (Z.T @ Z)
+        return np.asarray((right - Z @ np.linalg.solve(inner, spread[:, None] * (Z.T @ right))) / within)
+
+    VX, VZ = solved(columns), solved(Z)
+    C = np.linalg.pinv(columns.T @ VX, hermitian=True)
+    PZ = VZ - VX @ (C @ (columns.T @ VZ))
+    ZPZ = Z.T @ PZ
+    # P V P = P and tr(P V) = tests - location give the traces that tests alone would need a square matrix for.
+    mixed = [float((PZ[:, part] ** 2).sum()) for part in parts]
+    free = float(max(len(columns) - columns.shape[1], 1))
+    trace = (free - float(spread @ np.diag(ZPZ))) / within
+    square = (trace - sum(v * m for (_, v), m in zip(kept, mixed, strict=True))) / within
+    information = np.empty((len(kept) + 1, len(kept) + 1))
+    information[0, 0] = square
+    information[0, 1:] = information[1:, 0] = mixed
+    for i, one in enumerate(parts):
+        for j, other in enumerate(parts):
+            information[i + 1, j + 1] = float((ZPZ[one, other] ** 2).sum())
+    slopes = [C @ (VX.T @ VX) @ C]
+    for part in parts:
+        side = C @ (columns.T @ VZ[:, part])
+        slopes.append(side @ side.T)
+    uncertainty = np.linalg.pinv(0.5 * information, rcond=LEAST_INFORMATION, hermitian=True)
+    return VarianceFreedom(frozen([within, *(v for _, v in kept)]), frozen(uncertainty), frozen(np.array(slopes)), free)
+
+
+BISECTIONS = 50
+"""Of a bracket some units of log10 wide: to 1e-14."""
+
+NODES = 21
+"""Of the quadrature over the normal part of a Weibull test's time."""
+
+WEIBULL_MEDIAN = float(np.log(np.log(2.0)))
+"""Of the smallest extreme value."""
+
+_places, _lengths = np.polynomial.legendre.leggauss(15)
+CHI_PROBABILITIES, CHI_WEIGHTS = 0.5 * (1.0 + _places), 0.5 * _lengths
+"""Of the quadrature over chi^2."""
+
+
+class LogTimeDistribution(Protocol):
+    """Of log10 of a time in hours, at each point."""
+
+    def cumulative(self, log_time: Floats) -> Floats:
+        """(points,) probability of less than log_time (points,)."""
+        ...
+
+    def quantile(self, probability: float) -> Floats:
+        """(points,) the log time that is not reached with a probability."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class StudentLogTime:
+    """median, spread, freedom : (points,)."""
+
+    median: Floats
+    spread: Floats
+    freedom: Floats
+
+    def cumulative(self, log_time: Floats) -> Floats:
+        """(points,) probability of less than log_time (points,)."""
+        return np.asarray(stdtr(self.freedom, (log_time - self.median) / self.spread))
+
+    def quantile(self, probability: float) -> Floats:
+        """(points,) the log time that is not reached with a probability."""
+        return np.asarray(self.median + self.spread * stdtrit(self.freedom, probability))
+
+
+@dataclass(frozen=True, eq=False)
+class WeibullLogTime:
+    """A median that is normal plus a scale times the smallest extreme value about its median.
+
+    All deviations from the median are times sqrt(freedom / chi^2), as in Student's distribution, which this is where
+    the extreme value is normal.
+    median, spread, freedom : (points,). scale : of log10 of time.
+    """
+
+    median: Floats
+    spread: Floats
+    scale: float
+    freedom: Floats
+
+    def cumulative(self, log_time: Floats) -> Floats:
+        """(points,) probability of less than log_time (points,)."""
+        nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+        deviation = np.asarray(log_time - self.median)[:, None, None] * self._contractions[:, :, None]
+        z = (deviation - self.spread[:, None, None] * nodes) / self.scale + WEIBULL_MEDIAN
+        by_chi = -np.expm1(-np.exp(np.clip(z, -700.0, 50.0))) @ (weights / weights.sum())
+        return np.asarray(by_chi @ CHI_WEIGHTS)
+
+    @cached_property
+    def _contractions(self) -> Floats:
+        """(points, nodes) of sqrt(chi^2 / freedom)."""
+        return np.asarray(np.sqrt(chdtri(self.freedom[:, None], CHI_PROBABILITIES) / self.freedom[:, None]))
+
+    def quantile(self, probability: float) -> Floats:
+        """(points,) the log time that is not reached with a probability."""
+        reach = (40.0 * self.scale + 10.0 * self.spread) / self._contractions.min(axis=1)
+        return _halved(self, probability, self.median - reach, self.median + reach)
+
+
+@dataclass(frozen=True, eq=False)
+class MixedLogTime:
+    """Several distributions with weights that add up to one."""
+
+    parts: Sequence[LogTimeDistribution]
+    weights: Sequence[float]
+
+    def cumulative(self, log_time: Floats) -> Floats:
+        """(points,) probability of less than log_time (points,)."""
+        shares = [w * part.cumulative(log_time) for w, part in zip(self.weights, self.parts, strict=True)]
+        return np.asarray(np.sum(shares, axis=0))
+
+    def quantile(self, probability: float) -> Floats:
+        """(points,) the log time that is not reached with a probability."""
+        quantiles = np.array([part.quantile(probability) for part in self.parts])
+        if len(self.parts) == 1:
+            return np.asarray(quantiles[0])
+        return _halved(self, probability, quantiles.min(axis=0), quantiles.max(axis=0))
+
+
+def power_of_ten(exponent: float) -> float:
+    """10 to a power, infinite where that is beyond a double."""
+    return 10.0 ** float(exponent) if exponent < 300.0 else float("inf")
+
+
+def _halved(distribution: LogTimeDistribution, probability: float, low: Floats, high: Floats) -> Floats:
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        below = distribution.cumulative(middle) < probability
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(0.5 * (low + high))
+
 
 LEAST_SCALE = 1e-6
 """Standard deviation of log10 of times at which a fit is taken for exact."""

@@ -17,9 +17,9 @@ from scipy.interpolate import PchipInterpolator
 
 from creepkit.arrays import Floats
 from creepkit.records.units import celsius_text
-from creepkit.rupture_assessment.log_time_distributions import LogTimeDistribution, MixedLogTime, power_of_ten
 from creepkit.rupture_assessment.methods import Conditions
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
+from creepkit.rupture_assessment.rupture_fit import LogTimeDistribution, MixedLogTime, power_of_ten
 
 BOUND_KINDS = ("mean", "heat", "test")
 """Of the median time of the average heat; of the median time of a new heat; of one test of a new heat."""

@@ -20,8 +20,7 @@ from creepkit.language import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import Specimen, Status
 from creepkit.sampling.conditions import ROOM_TEMPERATURE, creep_output
-from creepkit.sampling.draws import Draws
-from creepkit.sampling.rates import RateArguments, log10_rate
+from creepkit.sampling.rates import Draws, RateArguments, log10_rate
 
 TIME_FRACTIONS = np.concatenate([np.zeros(1), np.geomspace(1e-3, 1.0, 60)])
 """Times at which the constraints of a law are evaluated, as fractions of the end of a test."""

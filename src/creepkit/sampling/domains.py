@@ -38,20 +38,18 @@ from creepkit.sampling.conditions import (
     specimen_conditions,
 )
 from creepkit.sampling.criteria import Criterion, DrawCriterion, conditioned_criteria, paper_criteria
-from creepkit.sampling.draws import (
+from creepkit.sampling.rates import (
     SELECTION_DIMENSIONS,
     Draws,
-    active_terms,
-    additive_recurrence_step,
-    ln_term_fractions,
-    sobol_rows,
-)
-from creepkit.sampling.rates import (
     RateEvaluationPoints,
     ReferenceStress,
+    active_terms,
+    additive_recurrence_step,
     author_parameters,
+    ln_term_fractions,
     mean_ln_rate,
     reference_stress_of,
+    sobol_rows,
 )
 
 CODEC = RecordCodec(

@@ -28,10 +28,10 @@ from creepkit.fem.reduced_order_model import ReducedBasis
 from creepkit.fem.reduced_order_training import TrainingRun, snapshots, train
 from creepkit.fem.simulation import LoadHistory, simulate
 from creepkit.fem.solver import SolverSettings
-from creepkit.files.cache_folders import cache_folder
 from creepkit.files.json_documents import DocumentFormat
 from creepkit.files.reading import FileKind
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
+from creepkit.files.writing import cache_folder
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw, Param, parameters, principal_stress, stress
 from creepkit.records import Program

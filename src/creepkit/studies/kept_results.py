@@ -10,11 +10,10 @@ from typing import Any
 
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.extraction.extraction import Extraction
-from creepkit.files.file_names import hashed_stem
 from creepkit.files.json_documents import DocumentFormat, canonical_json, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, ValueCodec
-from creepkit.files.writing import write_text
+from creepkit.files.writing import hashed_stem, write_text
 from creepkit.inverse.fingerprints import short_hash
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.checked_arguments import checked
-from creepkit.files.file_names import hashed_stem
 from creepkit.files.json_documents import json_text
 from creepkit.files.reading import read_bytes
+from creepkit.files.writing import hashed_stem
 from creepkit.reports.attachments import problem_of_names
 from creepkit.reports.contents import (
     Attachment,

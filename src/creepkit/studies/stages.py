@@ -12,8 +12,8 @@ import creepkit as ck
 from creepkit.api.options import ExportOptions, ForecastOptions, elastic_of
 from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.files.file_names import hashed_stem
 from creepkit.files.record_codec import record_to_json
+from creepkit.files.writing import hashed_stem
 from creepkit.inverse.fingerprints import predictor_fingerprint, short_hash
 from creepkit.inverse.kept_fits import history_digest
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE

@@ -40,9 +40,8 @@ from creepkit.records import (
 )
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid, specimen_conditions
-from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.network_evaluation import SampleArrays, Weights
-from creepkit.surrogates.parameter_gru import ParameterGru, SurrogateMetadata
+from creepkit.surrogates.parameter_gru import ApplicabilityDomain, ParameterGru, SurrogateMetadata
 from creepkit.surrogates.parameter_inputs import (
     LawInputs,
     LoadHistoryInputs,

@@ -1,21 +1,35 @@
-"""Checks of what kernels make of a law: finite, monotonic, equal to 50 digits, with its switches."""
+"""Checks of a law: what its author states, what kernels make of it, and what it does.
+
+Stated are name, texts, units, examples, signs and temperature. Kernels must be finite, monotonic and equal to 50
+digits, with their switches. What the law does is tried along rays of stress, time and strain, at zero time, and on its
+internal variables.
+"""
 
 from __future__ import annotations
 
+import pickle
+import re
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import mpmath
 import numpy as np
 import sympy
 
 from creepkit.arrays import Bools, Floats
+from creepkit.errors import CreepkitError
 from creepkit.kernels.interface import call_entry
 from creepkit.kernels.log_form import log_form
 from creepkit.kernels.lowering import lower
 from creepkit.kernels.multiprecision import MultiprecisionLaw
+from creepkit.kernels.rate_jumps import find_rate_jump
+from creepkit.language.elastic import Elastic
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT_VARIABLES, strain, time
+from creepkit.language.symbols import POINT_VARIABLES, strain, stress, temperature, time
+from creepkit.records import History, PointLoading, Status
+from creepkit.registry import default_registry
+from creepkit.specimens.material_point import MaterialPoint
+from creepkit.testing.law_dimensions import check_dimensions
 from creepkit.testing.parity import (
     DERIVATIVE_TOLERANCE,
     KERNEL_EVALUATORS,
@@ -26,7 +40,128 @@ from creepkit.testing.parity import (
     largest_differences,
 )
 from creepkit.testing.reports import finding
-from creepkit.testing.sample_points import STRESS_COLUMNS, LawSamples, constraints_hold, log_rate, point_text
+from creepkit.testing.sample_points import (
+    STRAIN_RANGE,
+    STRESS_COLUMNS,
+    STRESS_RANGE,
+    TIME_RANGE,
+    LawSamples,
+    constraints_hold,
+    log_rate,
+    point_text,
+)
+
+NAME_OF_LAW = re.compile(r"[a-z0-9]+([-_][a-z0-9]+)*([+*(\[@].*)?")
+"""Words in small letters joined by hyphens; what sums and temperature add may follow."""
+
+
+FEWEST_SAMPLES = 8
+"""At which the constraints must hold for a verdict to mean something."""
+
+
+EXAMPLE_TOLERANCE = 1e-6
+
+
+@finding("constraints", needed=True)
+def check_constraints(_: CreepLaw, samples: LawSamples) -> str:
+    """The constraints hold at enough points of the bounds."""
+    assert len(samples) >= FEWEST_SAMPLES, (
+        f"the constraints hold at {len(samples)} of the samples; widen them or narrow the bounds"
+    )
+    return f"{len(samples)} points"
+
+
+@finding("name")
+def check_name(law: CreepLaw, _: LawSamples) -> str:
+    """The name has the stated pattern, and no other plugin has it."""
+    assert NAME_OF_LAW.fullmatch(law.name), (
+        f"'{law.name}' is not in small letters and digits joined by hyphens, such as my-law; rename it"
+    )
+    for plugin in default_registry().plugins():
+        other = plugin.contributions.get("law", {}).get(law.name)
+        taken = other is not None and other != law
+        assert not taken, f"'{law.name}' is taken, by {plugin.provenance}; give the law another name"
+    return law.name
+
+
+@finding("title, references, units")
+def check_texts(law: CreepLaw, _: LawSamples) -> str:
+    """Title, references and units are there, and each reference says who and when."""
+    assert law.title.strip(), "missing title, such as title='Norton power law'"
+    example = "references=('Norton (1929), The Creep of Steel at High Temperatures',)"
+    assert law.references, f"missing references, such as {example}"
+    short = [reference for reference in law.references if len(reference.strip()) < 2]
+    assert not short, f"{short[0]!r} is no reference; write a tuple of texts, {example}"
+    missing = [name for name, param in law.table.items() if not param.unit]
+    assert not missing, f"missing unit of {', '.join(missing)}"
+    return "present"
+
+
+@finding("dimensions")
+def check_units(law: CreepLaw, _: LawSamples) -> str:
+    """The units of parameters make rates in 1/s and arguments of functions without a unit."""
+    check_dimensions(law)
+    return "rates in 1/s"
+
+
+@finding("LaTeX, source and copies")
+def check_printing(law: CreepLaw, _: LawSamples) -> str:
+    """LaTeX and source print, and the law survives pickling."""
+    text, source, copy = law.latex(), lower(law, "numpy").source, pickle.loads(pickle.dumps(law))
+    assert text.count("{") == text.count("}") and text.count(r"\left") == text.count(r"\right"), text
+    assert "def rate" in source, source
+    assert copy == law and copy.fingerprint == law.fingerprint, "a copy in another process is another law"
+    return f"{len(text)} and {len(source)} characters"
+
+
+@finding("rate grows with temperature")
+def check_temperature(law: CreepLaw, samples: LawSamples) -> str | None:
+    """The rate grows with temperature at most points, or the law declares that it falls."""
+    if not law.uses(temperature):
+        return None
+    warmer = samples.scaled([POINT_VARIABLES.index(temperature)], 1.01)
+    before, after = (log_rate(lower(law, "numpy"), one) for one in (samples, warmer))
+    counted = np.isfinite(before) & np.isfinite(after) & constraints_hold(law, warmer.points, warmer.theta)
+    falling, rising = int((after < before)[counted].sum()), int((after > before)[counted].sum())
+    assert falling <= rising or law.falls_with_temperature, (
+        f"a higher temperature lowers it at {falling} of {int(counted.sum())} points; check the sign of the activation "
+        "energy, exp(-Q/(R T)), or declare falls_with_temperature=True"
+    )
+    return f"at {rising} of {int(counted.sum())} points"
+
+
+@finding("example {}", each=lambda law, _: range(1, len(law.examples) + 1))
+def check_example(law: CreepLaw, _: LawSamples, number: int) -> str:
+    """An example of the author has the rate that he states."""
+    variables, given = (*POINT_VARIABLES, *law.states), dict(law.examples[number - 1])
+    stated = float(given.pop("rate"))
+    missing = [key for key in law.names if key not in given]
+    missing += [s.name for s in variables if law.uses(s) and s.name not in given]
+    remedy = "give every parameter and what the rates use of the point"
+    assert not missing, f"it has no {missing[0]}; {remedy}"
+    unknown = given.keys() - {s.name for s in variables} - {*law.names}
+    assert not unknown, f"it has {min(unknown)}, which the law does not know; {remedy}"
+    theta = law.to_internal(law.values({key: given[key] for key in law.names}))[0]
+    point = np.array([float(given.get(s.name, 0.0)) for s in variables])
+    found = float(sum(MultiprecisionLaw(law).terms(point, theta)))
+    assert abs(found - stated) <= EXAMPLE_TOLERANCE * abs(stated), (
+        f"{found:.7g} 1/s, and the example states {stated:.7g}; correct one of them"
+    )
+    return f"{found:.7g} 1/s"
+
+
+@finding("no term is negative", needed=True)
+def check_signs(law: CreepLaw, samples: LawSamples) -> str:
+    """Each term is evaluated as the author wrote it."""
+    exact = MultiprecisionLaw(law)
+    for point, theta in zip(samples.points, samples.theta, strict=True):
+        for label, value in zip(law.terms, exact.terms(point, theta), strict=True):
+            assert mpmath.im(value) == 0 and value >= 0, (
+                f"term '{label}' is {mpmath.nstr(value, 4)} 1/s at {point_text(law, point)}; say in constraints where "
+                "the law holds, constraints=(stress > s0,), or use Max(stress - s0, 0)"
+            )
+    return f"{len(samples)} points"
+
 
 _SMALLEST_ACCURATE = 1e-290
 """Numbers below this may have lost digits."""
@@ -206,3 +341,126 @@ def log_log_derivatives(exact: MultiprecisionLaw, point: Floats, theta: Floats, 
         width = mpmath.log(mpmath.mpf(up[column]) / mpmath.mpf(down[column]))
         pairs = zip(exact.terms(up, theta), exact.terms(down, theta), strict=True)
         return [float(mpmath.log(a / b) / width) if a > 0 and b > 0 else np.inf for a, b in pairs]
+
+
+RAYS = 4
+"""Samples whose rays are followed; each is some 10 000 evaluations of a kernel."""
+
+
+MOST_CORNERS = 32
+
+
+EARLY = 1e-40
+"""s, where powers of time are read off."""
+
+
+_RAYS = {stress: (STRESS_COLUMNS, STRESS_RANGE, "MPa"), time: ([2], TIME_RANGE, "s"), strain: ([1], STRAIN_RANGE, "")}
+"""{variable: (columns of a point that grow together, range, unit)}."""
+
+
+@finding("rate is continuous in {}", each=lambda law, _: filter(law.uses, _RAYS))
+def check_continuity(law: CreepLaw, samples: LawSamples, symbol: sympy.Symbol) -> str:
+    """The rate does not jump as stress, time or strain grow; an equilibrium that jumps has no solution."""
+    columns, (low, high), unit = _RAYS[symbol]
+    for k in range(min(RAYS, len(samples))):
+        jump = find_rate_jump(partial(_along, law, samples.points[k], samples.theta[k], columns), low, high)
+        if jump is not None:
+            ratio = float(np.exp(np.clip(jump.after - jump.before, -700, 700)))
+            place = f"{symbol} {jump.place:.6g} {unit}".rstrip()
+            raise AssertionError(
+                f"it jumps by a factor of {ratio:.3g} at {place}; let the branches meet there, or blend them, for "
+                "example by tanh"
+            )
+    return f"{RAYS} rays"
+
+
+def _along(law: CreepLaw, point: Floats, theta: Floats, columns: list[int], places: Floats) -> Floats:
+    """ln rate, (places,), where the first of the columns of a point is at these places; NaN outside the constraints."""
+    points, thetas = np.repeat(point[None], places.size, axis=0), np.repeat(theta[None], places.size, axis=0)
+    points[:, columns] = places[:, None] * (point[columns] / point[columns[0]])
+    rates = np.broadcast_to(lower(law, "numpy").internal_log_rate(*points.T, *thetas.T), places.shape)
+    return np.where(constraints_hold(law, points, thetas), rates, np.nan)
+
+
+@finding("exponents of time")
+def check_time_exponents(law: CreepLaw, samples: LawSamples) -> str | None:
+    """No term grows as fast as 1/time at zero time, at any corner of the bounds: its strain would be infinite."""
+    if not law.uses(time):
+        return None
+    exact, point = MultiprecisionLaw(law), samples.points[0].copy()
+    point[POINT_VARIABLES.index(time)], point[POINT_VARIABLES.index(strain)] = EARLY, 1e-3
+    for theta in corners(law, point):
+        for label, exponent in zip(law.terms, log_log_derivatives(exact, point, theta, time), strict=True):
+            assert not (np.isfinite(exponent) and exponent <= -1.0 + 1e-9), (
+                f"term '{label}' goes as time^{exponent:.3g} at zero time with {_values_text(law, theta)}, so that "
+                "creep strain is infinite at once; narrow the bounds so that the power stays above -1"
+            )
+    return "above -1 at the corners of the bounds"
+
+
+@finding(
+    "state {} moves towards its limit", each=lambda law, _: [s for s, z in law.states.items() if z.limit is not None]
+)
+def check_state(law: CreepLaw, samples: LawSamples, symbol: sympy.Symbol) -> str:
+    """An internal variable leaves its start towards its limit."""
+    state, position = law.states[symbol], list(law.states).index(symbol)
+    limit = float(state.limit or 0.0)
+    points = samples.points.copy()
+    points[:, len(POINT_VARIABLES) + position] = state.initial
+    rates = np.asarray(lower(law, "numpy").internal_rates(*points.T, *samples.theta.T)[1 + position], float)
+    wrong = np.flatnonzero(np.broadcast_to(rates * (limit - state.initial) < 0, (len(samples),)))
+    assert not wrong.size, (
+        f"it leaves its start, {state.initial:g}, away from its limit, {limit:g}, at "
+        f"{point_text(law, points[wrong[0]])}; correct the sign of its rate, or exchange initial and limit"
+    )
+    return f"{len(samples)} points"
+
+
+@finding("states in a short integration")
+def check_short_integration(law: CreepLaw, samples: LawSamples) -> str | None:
+    """States stay finite, to a creep strain of about 1 % under 100 MPa at corners of the bounds."""
+    if not law.states:
+        return None
+    kernel, point, finished = lower(law, "compiled"), samples.points[0].copy(), 0
+    point[:6] = 100.0, 1e-6, 1.0, 1000.0, 100.0, 100.0 / 3
+    point[6:] = [state.initial for state in law.states.values()]
+    chosen = corners(law, point)
+    for theta in chosen:
+        ln_rate = float(np.asarray(lower(law, "numpy").internal_log_rate(*point, *theta)))
+        times = np.linspace(0.0, np.clip(1e-2 * np.exp(-np.clip(ln_rate, -60.0, 60.0)), 1e-3, 1e9), 12)[1:]
+        loading, values = PointLoading(stress={"11": 100.0}), _values_text(law, theta)
+        plan = History("states", times, {}, loading, 1000.0, specimen="point", elastic=Elastic(150e3))
+        try:
+            run = MaterialPoint().simulate(kernel, theta, plan)
+        except CreepkitError as error:
+            raise AssertionError(f"{error}; {values}") from None
+        for (symbol, state), path in zip(law.states.items(), run.states.T, strict=True):
+            low, high = sorted((state.initial, np.inf if state.limit is None else state.limit))
+            margin = 1e-6 * max(1.0, abs(state.initial))
+            inside = state.limit is None or ((path >= low - margin) & (path <= high + margin)).all()
+            assert np.isfinite(path).all() and inside, (
+                f"'{symbol}' reaches {path[np.argmax(np.abs(path - state.initial))]:.4g}, outside {low:g} to {high:g}, "
+                f"with {values}; correct its rate, or narrow the bounds"
+            )
+        finished += run.status in (Status.COMPLETE, Status.RUPTURED)
+    return f"within start and limit at {len(chosen)} corners of the bounds, {finished} of them to the end"
+
+
+def corners(law: CreepLaw, point: Floats) -> list[Floats]:
+    """Corners of the bounds at which the constraints hold, (parameters,) internal values each; 32 at most.
+
+    point : (6 + states,) MPa, s and K, at which the constraints are asked.
+    """
+    (low, high), count = law.internal_bounds, len(law.params)
+    if 2**count <= MOST_CORNERS:
+        which = (np.arange(2**count)[:, None] >> np.arange(count)) & 1
+    else:
+        which = np.random.default_rng(0).integers(0, 2, (MOST_CORNERS, count))
+        which[0], which[1] = 0, 1
+    thetas = np.where(which == 1, high, low)
+    return list(thetas[constraints_hold(law, np.repeat(point[None], len(thetas), axis=0), thetas)])
+
+
+def _values_text(law: CreepLaw, theta: Floats) -> str:
+    pairs = zip(law.params.items(), theta, strict=True)
+    return ", ".join(f"{symbol} = {param.from_internal(float(value)):.3g}" for (symbol, param), value in pairs)

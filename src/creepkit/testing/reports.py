@@ -62,11 +62,17 @@ class ConformanceReport:
 Checking = Callable[..., "str | None"]
 
 
-def finding(name: str, each: Callable[..., Iterable[Any]] | None = None) -> Callable[[Checking], Checking]:
-    """Mark a function as a check. name : of what it finds. each : gives the items for each of which it is run."""
+def finding(
+    name: str, each: Callable[..., Iterable[Any]] | None = None, *, needed: bool = False
+) -> Callable[[Checking], Checking]:
+    """Mark a function as a check.
+
+    name : of what it finds. each : gives the items for each of which it is run. needed : whether those that follow mean
+    nothing where it fails.
+    """
 
     def decorate(check: Checking) -> Checking:
-        check.__dict__.update(finding=name, each=each)
+        check.__dict__.update(finding=name, each=each, needed=needed)
         return check
 
     return decorate
@@ -77,7 +83,12 @@ def run(checks: ModuleType | Iterable[Checking], *case: Any) -> list[Conformance
     if not __debug__:
         raise PluginError("checks are assertions, which python -O leaves out; run them without -O")
     listed: Iterable[Any] = vars(checks).values() if isinstance(checks, ModuleType) else checks
-    return [found for check in listed if hasattr(check, "finding") for found in _findings(check, case)]
+    found: list[ConformanceCheck] = []
+    for check in (one for one in listed if hasattr(one, "finding")):
+        found += _findings(check, case)
+        if check.needed and not found[-1].passed:
+            break
+    return found
 
 
 def _findings(check: Any, case: tuple[Any, ...]) -> list[ConformanceCheck]:

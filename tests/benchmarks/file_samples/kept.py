@@ -24,7 +24,7 @@ from creepkit.inverse.kept_fits import KEPT_FIT, FitFolder, kept_to_json
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.reports.attachments import embed
 from creepkit.reports.contents import Attachment
-from creepkit.rupture_assessment.assessment_document import load_rupture_assessment
+from creepkit.rupture_assessment.assessment import load_rupture_assessment
 from creepkit.screening.files import read_result, write_result
 from creepkit.screening.results import AlloyResult, WeightedLaw
 from creepkit.studies.execution import Execution, Stage

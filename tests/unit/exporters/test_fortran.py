@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from creepkit.errors import ExportError
-from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine
-from creepkit.exporters.fortran_code import FORTRAN_RESERVED, law_subroutine
+from creepkit.exporters import creep_subroutine
+from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine, law_subroutine
 from creepkit.exporters.law_code import Identifiers, LawCode
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
 from creepkit.language.symbols import POINT_VARIABLES
@@ -30,7 +30,7 @@ def law(term, params, name="foreign", **more):
 
 
 def routine_of(values, name):
-    return law_subroutine(LawCode(values, Identifiers(FORTRAN_RESERVED, ignore_case=True)), name)
+    return law_subroutine(LawCode(values, Identifiers(creep_subroutine.FORTRAN_RESERVED, ignore_case=True)), name)
 
 
 # ---- the law -------------------------------------------------------------------------------------------------------
@@ -70,7 +70,7 @@ def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path, gfor
         "double precision, intent(out) :: out(6)",
         *(f"out({k}) = {name}(a)" for k, name in enumerate(PROBED, 1)),
     ]
-    from creepkit.exporters.fortran_code import fortran_statements, stable_function_definitions
+    from creepkit.exporters.creep_subroutine import fortran_statements, stable_function_definitions
 
     text = fortran_statements([*lines, "contains", *stable_function_definitions(PROBED), "end subroutine probe"])
     library = compile_fortran(gfortran, "\n".join(text) + "\n", tmp_path, "probe")[0]
@@ -202,5 +202,12 @@ def test_what_creep_is_not_told_is_refused():
         AbaqusCreepSubroutine().text(LawWithValues(first, NORTON_VALUES))
     mean = law(A * (stress + mean_stress) ** n, {A: RATE, n: POWER})
     assert "-p*mpa" in AbaqusCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
-    with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass"):
+    with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass.*export it as 'mfront'"):
         CalculixCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
+    shared = law(A * (a * principal_stress + (1 - a) * stress) ** n, {A: RATE, n: POWER, a: Param("share", (0, 1))})
+    text = AbaqusCreepSubroutine().text(LawWithValues(shared, {**NORTON_VALUES, "a": 0.0}))
+    assert "switched off and left out: a = 0" in text, "a share that is zero by value leaves the von Mises stress"
+    calculix = CalculixCreepSubroutine().text(LawWithValues(NORTON, NORTON_VALUES))
+    head = " ".join(re.sub(r"^! *", "", calculix, flags=re.MULTILINE).split())
+    assert "ignores a preloaded CREEP" in head
+    assert "insists on CETOL" in head

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from creepkit import available
 from creepkit.errors import CreepkitError, ExportError, LawError
+from creepkit.exporters import documents
+from creepkit.exporters.documents import LatexExporter, MarkdownExporter, MathmlExporter, MathmlPrinter, latex_number
 from creepkit.exporters.exporting import export
-from creepkit.exporters.latex import LatexExporter, MarkdownExporter, latex_number
 from creepkit.exporters.law_files import JsonExporter, read_valued_law
-from creepkit.exporters.mathml import MATHML_NAMESPACE, MathmlExporter, MathmlPrinter
 from creepkit.language import CreepLaw, Param, State, activated, arrhenius, linear, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
@@ -33,7 +33,7 @@ SHEETS = [MarkdownExporter(), MathmlExporter(), LatexExporter()]
 def page(law, **more):
     """The page of MathML, parsed, and its <math> elements."""
     root = ET.fromstring(MathmlExporter().text(LawWithValues(law, law.center(), NOTES, **more)))
-    return root, root.findall(f".//{{{MATHML_NAMESPACE}}}math")
+    return root, root.findall(f".//{{{documents.MATHML_NAMESPACE}}}math")
 
 
 def flat(element) -> str:
@@ -56,7 +56,7 @@ def check_mathml(law):
     assert root.tag == "{http://www.w3.org/1999/xhtml}html"
     assert len(found) == 1 + len(law.states) + 2 * (len(law.params) + len(law.states)) + len(law.constraints)
     for element in (e for one in found for e in one.iter()):
-        tag = element.tag.removeprefix(f"{{{MATHML_NAMESPACE}}}")
+        tag = element.tag.removeprefix(f"{{{documents.MATHML_NAMESPACE}}}")
         assert tag[0] == "m"
         assert tag not in ARITY or len(element) == ARITY[tag]
         assert bool((element.text or "").strip()) == (tag in ("mi", "mn", "mo", "mtext")) or not len(element)
@@ -64,7 +64,7 @@ def check_mathml(law):
 
 def test_mathml_reads_as_the_equation():
     _, (rate, *_) = page(COMBINED)
-    first, second, third = rate.findall(f".//{{{MATHML_NAMESPACE}}}mtr")
+    first, second, third = rate.findall(f".//{{{documents.MATHML_NAMESPACE}}}mtr")
     assert flat(first) == "ε˙cr=A1sinh(σeB)n1"
     assert flat(second) == "+A2εcrm1σen2"
     assert flat(third) == "+A3σen3tm2"

@@ -18,6 +18,7 @@ from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import Units
 from helpers.export_cases import LAWS, disagreements, labelled_values, renamed
 from helpers.mfront_integrator import ELASTIC, Block, compile_cpp, declared, exported, scalar_function
@@ -104,6 +105,16 @@ def test_the_first_increment_from_zero_strain_converges(m, tmp_path, gxx):
     _, state, iterations = block.step(eel, np.zeros(1), 60.0, guess=1e-6)
     assert state[0] == pytest.approx((60 * 1e-22 * stress_**5 * 2**-m) ** (1 / (1 - m)), rel=0.05)
     assert iterations < 40
+
+
+def test_a_power_of_time_is_integrated_over_equal_increments_from_zero(tmp_path, gxx):
+    """At a stress that hardly relaxes p = A s^n t^(1+m)/(1+m); the middle of an increment would be 4 % low."""
+    block = Block(gxx, tmp_path, TIME_HARDENING, {"A": 1e-25, "n": 5.0, "m": -0.6})
+    eel, state, dt = np.array([0, 0, 0, 1e-3 * np.sqrt(2), 0, 0]), np.zeros(1), 720.0
+    held = ELASTIC.E / 1.3 * 1e-3 * np.sqrt(3)
+    for k in range(50):
+        _, state, _ = block.step(eel, state, dt, elapsed=k * dt)
+    assert state[0] == pytest.approx(1e-25 * held**5 * (50 * dt) ** 0.4 / 0.4, rel=1e-5)
 
 
 # ---- the grammar ---------------------------------------------------------------------------------------------------

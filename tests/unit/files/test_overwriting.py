@@ -10,8 +10,17 @@ from pathlib import Path
 import pytest
 
 from creepkit.errors import CacheWarning, ExportError
-from creepkit.files.cache_folders import cache_folder, is_ours_alone, warn_once
-from creepkit.files.writing import RECORD, check_target, is_foreign, made_from, overwriting, write_bytes, write_text
+from creepkit.files import writing
+from creepkit.files.writing import (
+    RECORD,
+    check_folder_target,
+    check_target,
+    is_foreign,
+    made_from,
+    overwriting,
+    write_bytes,
+    write_text,
+)
 from helpers.command_line import creepkit
 
 FOREIGN = "creepkit did not write it as it is now"
@@ -120,6 +129,15 @@ def test_a_received_file_does_not_choose_which_converted_test_is_lost(tmp_path, 
     assert creepkit("read", "received.csv", "--to", "tests", "--force").exit_code == 0
 
 
+def test_a_folder_is_checked_with_what_goes_into_it(tmp_path):
+    check_folder_target(tmp_path / "new" / "deeper", ExportError, ("a",))
+    (tmp_path / "a").write_text("mine")
+    with pytest.raises(ExportError, match=FOREIGN):
+        check_folder_target(tmp_path, ExportError, ("a",))
+    with pytest.raises(ExportError, match="is no folder; name a folder for the results"):
+        check_folder_target(tmp_path / "a" / "b", ExportError)
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of a process are those of Linux")
 def test_a_full_disk_leaves_the_old_file(tmp_path):
     """A limit on the size of files stands for the disk: both are OSErrors of write()."""
@@ -162,7 +180,7 @@ OWNERS = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes of files s
 @pytest.fixture(autouse=True)
 def _nothing_decided(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No warning given yet, and a home of its own."""
-    warn_once.cache_clear()
+    writing.warn_once.cache_clear()
     for name in ("CREEPKIT_CACHE", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -171,26 +189,26 @@ def _nothing_decided(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def refused(message: str) -> None:
     """No folder is used, which is said once."""
     with pytest.warns(CacheWarning, match=message) as warned:
-        assert cache_folder("kernels") is None
+        assert writing.cache_folder("kernels") is None
     assert "set CREEPKIT_CACHE to a folder of your own" in str(warned[0].message)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert cache_folder("kernels") is None
+        assert writing.cache_folder("kernels") is None
 
 
 def test_the_folder_is_that_of_the_variables_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert cache_folder("a") == tmp_path / ".cache" / "creepkit" / "a"
+    assert writing.cache_folder("a") == tmp_path / ".cache" / "creepkit" / "a"
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert cache_folder("a") == tmp_path / "xdg" / "creepkit" / "a"
+    assert writing.cache_folder("a") == tmp_path / "xdg" / "creepkit" / "a"
     monkeypatch.setenv("CREEPKIT_CACHE", str(tmp_path / "mine"))
-    assert cache_folder("a") == tmp_path / "mine" / "a"
+    assert writing.cache_folder("a") == tmp_path / "mine" / "a"
 
 
 @OWNERS
 def test_what_is_made_is_for_its_owner_alone_and_used_while_no_other_can_write_to_it() -> None:
     before = os.umask(0)
     try:
-        folder = cache_folder("kernels")
+        folder = writing.cache_folder("kernels")
     finally:
         os.umask(before)
     assert folder.stat().st_mode & 0o777 == 0o700
@@ -202,11 +220,11 @@ def test_what_is_made_is_for_its_owner_alone_and_used_while_no_other_can_write_t
 def test_a_link_or_a_file_of_another_user_is_not_ours(tmp_path: Path) -> None:
     (tmp_path / "own").touch(mode=0o600)
     (tmp_path / "link").symlink_to("own")
-    assert is_ours_alone(tmp_path / "own")
-    assert not is_ours_alone(tmp_path / "link")
+    assert writing.is_ours_alone(tmp_path / "own")
+    assert not writing.is_ours_alone(tmp_path / "link")
     if os.geteuid() == 0:  # only root gives files away
         os.chown(tmp_path / "own", 12345, 12345)
-        assert not is_ours_alone(tmp_path / "own")
+        assert not writing.is_ours_alone(tmp_path / "own")
 
 
 def test_a_relative_folder_would_lie_beside_the_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

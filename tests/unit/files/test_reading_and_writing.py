@@ -48,17 +48,13 @@ def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path, monkeypatc
         check_readable(tmp_path / "pipe", NOTE)
 
 
-def test_a_large_file_is_refused_but_for_its_beginning(tmp_path):
+def test_a_large_file_is_refused_but_for_its_beginning_and_what_is_no_text_with_its_line(tmp_path):
     path = tmp_path / "note"
     path.write_bytes(b"x" * 101)
     assert "larger than 0.0001 MB, which a note never is" in refused(path)
     assert read_bytes(path, NOTE, first=3) == b"xxx"
     path.write_bytes(b"x" * 100)
     assert len(read_text(path, NOTE)) == 100
-
-
-def test_bytes_that_are_no_text_are_named_with_their_line(tmp_path):
-    path = tmp_path / "note"
     path.write_bytes(b"one\ntwo \xff\n")
     with pytest.raises(FitError, match="note:2: byte 0xff is not text in UTF-8; give a note"):
         read_text(path, NOTE)
@@ -99,9 +95,6 @@ def test_a_text_reads_the_same_in_every_encoding():
     read = {one: decode_text(text.encode(one), PATH) for one in ("utf-8", "utf-8-sig", "utf-16", "cp1252", "latin-1")}
     assert set(read.values()) == {text}
     assert decode_text(b"\xff\xfea\0", PATH) == decode_text(b"\xfe\xff\0a", PATH) == "a"
-
-
-def test_what_is_no_text_is_told_with_its_line():
     cases = (
         (b"time\n\x01\xff", "x.csv:2: byte 0x01 is not text in UTF-8 or Latin-1"),
         (b"t\0i\0m\0", "x.csv:1: byte 0x00 is not text"),
@@ -146,13 +139,16 @@ def test_cells():
         split_line('0,"1', Dialect(), "x.csv:4")
 
 
-def test_numbers():
+def test_numbers_and_lost_values():
     for text, decimal, value in (
         ("1,5E-3", ",", 1.5e-3), ("-1.5d+3", ".", -1500.0), (",5", ",", 0.5), ("3.", ".", 3.0), ("+7", ",", 7.0),
     ):  # fmt: skip
         dialect = Dialect(";", decimal)
         assert parse_number(text, dialect, "x.csv:1", "strain") == value
         assert parse_numbers([text, "1"], dialect, str, "strain").tolist() == [value, 1.0]
+    values = parse_numbers(["1,5", "", "NaN"], Dialect(";", ","), str, "sigma", missing=("", "NaN"))
+    assert values[0] == 1.5
+    assert np.isnan(values[1:]).all()
 
 
 def test_what_is_no_number():
@@ -172,12 +168,6 @@ def test_what_is_no_number():
         one = partial(parse_number, text, dialect, "x:2", "strain")
         many = partial(parse_numbers, ["1", text], dialect, lambda k: f"x:{k + 1}", "strain")
         assert said_otherwise([(one, message), (many, message)], HistoryError) == []
-
-
-def test_lost_values_become_nan():
-    values = parse_numbers(["1,5", "", "NaN"], Dialect(";", ","), str, "sigma", missing=("", "NaN"))
-    assert values[0] == 1.5
-    assert np.isnan(values[1:]).all()
 
 
 def test_hostile_lines_cost_linear_time():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.discovery.elastic_moduli import fit_wachtman, moduli
+from creepkit.discovery.discover import fit_wachtman, moduli
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON

@@ -111,6 +111,7 @@ def test_history_keeps_its_own_copies():
     made = history(times=times)
     times[0] = -1.0
     assert made.times[0] == 0.0
+    assert history(standard_deviation={"strain": 1e-5}).standard_deviation["strain"].tolist() == [1e-5] * 3
     with pytest.raises(ValueError, match="read-only"):
         made.outputs["strain"][0] = 1.0
     with pytest.raises(TypeError):
@@ -147,12 +148,9 @@ def test_factors_and_offsets_are_those_of_the_definitions():
     assert [kelvin.factor * F + kelvin.offset for F in (212.0, -40.0)] == pytest.approx([373.15, 233.15], abs=1e-9)
 
 
-def test_no_spelling_means_two_units():
+def test_no_spelling_means_two_units_and_readers_cameras_and_instruments_agree():
     written = Counter(text for symbol, unit in UNITS.items() for text in (symbol, *unit.spellings))
     assert [text for text, count in written.items() if count > 1] == []
-
-
-def test_readers_cameras_and_instruments_agree():
     for symbol in (s for s, unit in UNITS.items() if unit.quantity in ("time", "length")):
         unit = UNITS[symbol]
         for text in (symbol, *unit.spellings):
@@ -161,16 +159,13 @@ def test_readers_cameras_and_instruments_agree():
             known = [LENGTH_UNITS.get(text), TIME_UNITS.get(text), channel and channel.factor]
             known += [kind.units[suffix].factor for kind in (LENGTH, TIME) if suffix in kind.units]
             assert {one for one in known if one is not None} <= {factor}, text
-
-
-def test_instruments_and_tables_take_the_same_spellings():
     for text in ("n/mm2", "N/mm²", "MPA", "psi", "Kelvin", "°C", "deg F", "Fahrenheit"):
         channel, suffix = channel_unit(text), unit_suffix(text)
         conversion = (STRESS if suffix in STRESS.units else TEMPERATURE).units[suffix]
         assert (channel.factor, channel.offset) == (conversion.factor, conversion.offset), text
 
 
-def test_temperatures_are_written_in_degrees_of_celsius():
+def test_temperatures_are_written_in_degrees_of_celsius_and_times_in_hours():
     """The ice point is 273.15 K; one temperature has one text, and 550 °C does not round to two numbers of kelvin."""
     assert celsius_text(823.15) == "550 °C"
     assert celsius_text(273.15) == celsius_text(273.1499) == "0 °C"

@@ -15,8 +15,7 @@ import sympy
 
 import creepkit as ck
 from creepkit.errors import ReportError
-from creepkit.exporters.latex import equations_in_latex
-from creepkit.exporters.mathml import law_equations
+from creepkit.exporters.documents import equations_in_latex, law_equations
 from creepkit.inverse.identify import identify
 from creepkit.inverse.perturbation import Perturbation, combined_change_text
 from creepkit.inverse.selection.discrimination import chi_square_by_test

@@ -5,12 +5,10 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import gumbel_l, multivariate_normal, norm, t
 
-from creepkit.rupture_assessment.degrees_of_freedom import variance_freedom
-from creepkit.rupture_assessment.fitting import conditions_of, fit_method
-from creepkit.rupture_assessment.likelihood import GroupedTimes
-from creepkit.rupture_assessment.log_time_distributions import WeibullLogTime
-from creepkit.rupture_assessment.methods import METHODS, Basis, RuptureMethod
+from creepkit.rupture_assessment.fitting import GroupedTimes, conditions_of, fit_method
+from creepkit.rupture_assessment.methods import METHODS, RuptureMethod
 from creepkit.rupture_assessment.observed_tests import rupture_tests
+from creepkit.rupture_assessment.rupture_fit import WeibullLogTime, variance_freedom
 from helpers.planted_rupture import MOTORETTES, larson_miller, planted, rupture_test
 
 LN10 = np.log(10.0)
@@ -104,11 +102,7 @@ def test_effects_of_run_outs_are_integrated(distribution):
 def motorettes(function):
     """A method of one function of the temperature, and the motorette tests."""
     method = RuptureMethod(
-        "motorettes",
-        "",
-        lambda at, *_: Basis(np.zeros(at.stress.shape), np.column_stack([np.ones(40), function(at.temperature)])),
-        lambda c, *_: {"b_0": float(c[0]), "b_1": float(c[1])},
-        {},
+        "motorettes", "", lambda at, *_: {"b_0": np.ones(at.stress.size), "b_1": function(at.temperature)}
     )
     tests = [
         rupture_test(f"{T:g} {k}", 1.0, T + 273.2, abs(h), end=abs(h) if h < 0 else np.inf)

@@ -10,7 +10,7 @@ from scipy.stats import t as student
 import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.rupture_assessment.checks import physical_realism
-from creepkit.rupture_assessment.likelihood import GroupedTimes, _shared_tests
+from creepkit.rupture_assessment.fitting import GroupedTimes, _shared_tests
 from creepkit.rupture_assessment.observed_tests import rupture_tests
 from creepkit.rupture_assessment.strength import _bound
 from helpers.mistakes import said_otherwise

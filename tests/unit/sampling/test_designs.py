@@ -16,7 +16,7 @@ from creepkit.records import PressureJump, Status
 from creepkit.sampling.conditions import TimeGrid, hold_times, planned_test
 from creepkit.sampling.criteria import SimulationOutcome, conditioned_criteria, paper_criteria
 from creepkit.sampling.domains import SamplingDomain, acceptance, sampling_design
-from creepkit.sampling.draws import Draws, sobol_rows
+from creepkit.sampling.rates import Draws, sobol_rows
 from helpers.mistakes import said_otherwise
 
 DIMPLE, BAR = ck.specimen("bulge"), ck.specimen("uniaxial")

@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from creepkit.errors import CreepkitError, SurrogateError
-from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.network_evaluation import FRAMES_IN_BLOCK, ParameterNetwork
+from creepkit.surrogates.parameter_gru import ApplicabilityDomain
 from creepkit.surrogates.parameter_network import ParameterModule, weights_of
 from creepkit.surrogates.surrogate import CODEC
 from helpers import source_tree

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from creepkit.files.file_names import file_stem
+from creepkit.files.writing import file_stem
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.reports.attachments import problem_of_name
 from creepkit.reports.blocks import (
