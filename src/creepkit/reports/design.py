@@ -223,9 +223,7 @@ def design_figure(design: Design, path: str | Path | None = None) -> Figure:
         panel.set_title(title)
         for k, test in enumerate(t for t in design.plan if _is_constant(t) == (title == "constant load")):
             label = "plan" if k == 0 else None
-            panel.plot(
-                test.first_level, test.candidate.duration / 3600.0, "s", ms=24, mfc="none", mec="r", mew=2, label=label
-            )
+            panel.plot(test.first_level, test.duration / 3600.0, "s", ms=24, mfc="none", mec="r", mew=2, label=label)
         if any(_is_constant(t) == (title == "constant load") for t in design.plan):
             panel.legend(loc="best", frameon=True, markerscale=0.4)
         panel.set_xlabel(_load_label(design))
@@ -252,7 +250,7 @@ def _draw_map(panel: Axes, tests: list[PlannedTest], largest: float) -> QuadMesh
         return None
     best: dict[tuple[float, float], PlannedTest] = {}
     for test in tests:
-        place = round(test.first_level, 6), round(test.candidate.duration / 3600.0, 6)
+        place = round(test.first_level, 6), round(test.duration / 3600.0, 6)
         best.setdefault(place, test)
     loads, durations = (sorted({place[k] for place in best}) for k in (0, 1))
     values = np.full((len(durations), len(loads)), np.nan)
