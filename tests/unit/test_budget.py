@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1412,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 11468,
+    "inverse": 11181,
     "jobs": 251,
     "kernels": 1703,
     "language": 1494,
@@ -37,7 +37,7 @@ BUDGET = {
     "modules": 781,
     "quality": 1470,
     "readers": 5574,
-    "records": 1977,
+    "records": 1996,
     "registry": 615,
     "reports": 6354,
     "rupture_assessment": 1787,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30052
+TESTS = 29951
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
