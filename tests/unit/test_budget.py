@@ -37,7 +37,7 @@ BUDGET = {
     "modules": 781,
     "quality": 1470,
     "readers": 5574,
-    "records": 1996,
+    "records": 1991,
     "registry": 615,
     "reports": 6354,
     "rupture_assessment": 1787,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29951
+TESTS = 29895
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
