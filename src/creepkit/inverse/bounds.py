@@ -81,16 +81,12 @@ class Bounds:
         return 0.5 * (self.lower + self.upper)
 
 
-MOST_WIDENINGS = 4
-"""How often bounds of a search are widened."""
-
-
 WIDER_FACTOR, WIDER_SHARE = 100.0, 1.0 / 3.0
 """By what a bound is widened: that of a coefficient, and the larger end of an exponent, by a share of itself."""
 
 
-NEAR_BOUND = 1e-3
-"""Of the width of the bounds: a value nearer to a bound than this ends at it."""
+MOST_WIDENINGS, NEAR_BOUND = 4, 1e-3
+"""How often bounds are widened, and the share of their width within which a value ends at one."""
 
 
 def widened(law: CreepLaw, theta: Floats) -> CreepLaw | None:
@@ -108,10 +104,8 @@ def widened(law: CreepLaw, theta: Floats) -> CreepLaw | None:
                 bounds[k] *= WIDER_FACTOR**sign
             elif reached[k] and sign * ends[k] >= max(map(abs, ends)):
                 bounds[k] += WIDER_SHARE * bounds[k]
-        if param.widens and param.limits is not None:
-            bounds = list(np.clip(bounds, *param.limits))
-        if param.widens and tuple(bounds) != param.bounds:
-            params[symbol] = replace(param, bounds=(bounds[0], bounds[1]))
+        if param.widens:
+            params[symbol] = replace(param, bounds=tuple(np.clip(bounds, *(param.limits or (-np.inf, np.inf)))))
     return replace(law, params=params) if params != dict(law.params) else None
 
 

@@ -134,9 +134,8 @@ def describing(fit: Identification) -> Identification:
         return fit
     start, settings = StartingEstimate.from_identification(fit), replace(fit.settings, weights="noise")
     values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
-    kept = {name: fit.provenance[name] for name in fit.provenance if name not in values.provenance}
     notes = dict.fromkeys((*values.notes, *(note for note in fit.notes if "were not used" in note)))
-    return replace(values, notes=tuple(notes), provenance={**values.provenance, **kept})
+    return replace(values, notes=tuple(notes), provenance={**fit.provenance, **values.provenance})
 
 
 def _without_one_test(fit: Identification) -> Identification:
@@ -192,12 +191,8 @@ def identify_values(
 ) -> Identification:
     """As identify(), without samples of the posterior where a value is at its bound."""
     settings = settings or IdentificationSettings()
-    known, through, notes = predictors_for_law(law, using, through)
+    using, through, notes = predictors_for_law(law, using, through)
     histories, left_out = compared_tests(law, histories, settings)
-    if notes:
-        how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
-        fit = identify_values(law, histories, known, through=through, **how)
-        return replace(fit, notes=(*fit.notes, *notes))
     with single_threaded_blas():
         problem = LeastSquaresProblem.from_histories(
             law, histories, using, settings, None if start is None else start.reference
@@ -208,9 +203,10 @@ def identify_values(
         else:
             search_outcome = initial_search(problem, through, search or MultiStart(), progress)
         start = start or StartingEstimate(None)
+        count, reference = len(law.params), problem.coordinates.reference
         best, numerical_error = _best_estimate(problem, search_outcome, through, start, progress)
         for _ in range(MOST_WIDENINGS):
-            u, reference = best.minimum.x[: len(law.params)], problem.coordinates.reference
+            u = best.minimum.x[:count]
             wider = widened(problem.law, problem.coordinates.theta(u))
             if wider is None:
                 break
@@ -218,13 +214,11 @@ def identify_values(
             problem = replace(wider_problem, evaluations=problem.evaluations)
             start, search_outcome = StartingEstimate(u, (), reference), search_outcome._replace(starts=[u])
             best, numerical_error = _best_estimate(problem, search_outcome, through, start, progress)
-        gradient = _gradient(best)[: len(law.params)]
-        check_bounds(
-            best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
-        )
+        u, gradient = best.minimum.x[:count], _gradient(best)[:count]
+        check_bounds(best.problem.bound_penalties, u, gradient, problem.observations.count)
         best = under_errors_of_tests(best)
         fit = _result(histories, best, search_outcome, numerical_error)
-    return replace(fit, notes=(*left_out, *fit.notes, *widened_notes(law, fit.law)))
+    return replace(fit, notes=(*left_out, *fit.notes, *widened_notes(law, fit.law), *notes))
 
 
 def _gradient(best: EstimationResult) -> Floats:
@@ -295,15 +289,14 @@ def _best_of(
     estimator: WorkingNoiseEstimator,
     limits: IterationLimits,
     progress: IterationCallback | None,
-    working_noise: NoiseModel | None = None,
+    noise: NoiseModel | None = None,
 ) -> EstimationResult:
     """The likeliest of the estimates from starts (unknowns,); by likelihood the start that is best after one round."""
     if len(starts) > 1 and estimator.by_likelihood:
-        first = replace(limits, rounds=1)
-        ends = [estimate_iteratively(problem, x, estimator, first, None, working_noise) for x in starts]
+        ends = [estimate_iteratively(problem, x, estimator, replace(limits, rounds=1), None, noise) for x in starts]
         best = max(ends, key=lambda end: end.log_likelihood)
-        problem, starts, working_noise = best.problem, [best.minimum.x], best.working_noise
-    ends = [estimate_iteratively(problem, x, estimator, limits, progress, working_noise) for x in starts]
+        problem, starts, noise = best.problem, [best.minimum.x], best.working_noise
+    ends = [estimate_iteratively(problem, x, estimator, limits, progress, noise) for x in starts]
     return max(ends, key=lambda end: end.log_likelihood)
 
 

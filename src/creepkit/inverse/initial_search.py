@@ -68,10 +68,9 @@ def initial_search(
     searched = search_problem(problem, search_predictor_of(reduced_order_model or predictor))
     search_result = search.minima(searched, progress)
     equal = EQUAL_PREDICTIONS if reduced_order_model is None else EQUAL_REDUCED_ORDER_PREDICTIONS
-    distinct_minima = distinct(search_result.minima, searched.bounds, equal_predictions=equal)
+    apart = distinct(search_result.minima, searched.bounds, equal_predictions=equal)
     counts = minima_counts(search_result.minima, searched.bounds, equal_predictions=equal)
-    starts = [minimum.x for minimum in distinct_minima]
-    return SearchOutcome(starts, searched.evaluations.count, search_result.trace, counts)
+    return SearchOutcome([minimum.x for minimum in apart], searched.evaluations.count, search_result.trace, counts)
 
 
 def search_problem(problem: LeastSquaresProblem, predictor: Predictor) -> LeastSquaresProblem:

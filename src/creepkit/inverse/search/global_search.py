@@ -64,12 +64,8 @@ SAME_BASIN = 0.1
 """Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
 
 
-FIRST_STEPS = Tolerances(max_steps=3)
-"""Of every start of least squares, before the best of them are refined to the end."""
-
-
-CONTINUED = 2
-"""Of the ends of the first steps, how many are refined to the end."""
+FIRST_STEPS, CONTINUED = Tolerances(max_steps=3), 2
+"""Of every start of least squares, and how many of the best ends of these steps are refined to the end."""
 
 
 def refined(
@@ -84,8 +80,7 @@ def refined(
     ends.sort(key=lambda end: end.cost)
     for k, end in enumerate(ends[:CONTINUED]):
         if not end.converged:
-            further = problem.minimise(end.x)
-            ends[k] = replace(further, evaluations=further.evaluations + end.evaluations)
+            ends[k] = problem.minimise(end.x)
     return sorted(ends, key=lambda end: end.cost)
 
 
@@ -104,8 +99,8 @@ def refine_candidates(
     selected = _most_different(u, costs, problem.bounds.width, max(max_count, 1))
     problem.check_predicted(u[selected])
     if max_count == 0:
-        best = selected[0]
-        return SearchResult((Minimum(u[best], float(costs[best]), converged=False, evaluations=0),), trace)
+        best = Minimum(u[selected[0]], float(costs[selected[0]]), converged=False, evaluations=0)
+        return SearchResult((best,), trace)
     minima = []
     for done, k in enumerate(selected):
         minima.append(problem.minimise(u[k]))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -20,10 +20,6 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED
 from creepkit.presentation import Presentable
 from creepkit.records.units import celsius_text
-
-if TYPE_CHECKING:
-    pass
-
 
 CoordinateSystem = Literal["author", "conditioned"]
 

@@ -15,7 +15,6 @@ uncertainty.profile_likelihood).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,10 +24,6 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals
-
-if TYPE_CHECKING:
-    pass
-
 
 TESTS_ALONE = "by the tests alone: their temperatures, loads and dimensions are taken as exactly known"
 """What is said of intervals that do not include the errors which tests usually have."""
