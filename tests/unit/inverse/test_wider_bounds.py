@@ -3,7 +3,6 @@
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.bounds import widened
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import constant_stress
@@ -22,9 +21,3 @@ def test_a_search_goes_on_beyond_bounds_that_nobody_stated(truth, stresses):
     assert any(note.startswith("n was searched from 1 to 14.2") for note in fit.notes)
     kept = identify(NORTON.with_bounds(n=(1, 8), A=(1e-40, 1e-5)), tests, BAR, settings=QUICK)
     assert kept.values["n"] < 8.0 + 1e-6
-
-
-def test_only_the_larger_end_of_an_exponent_widens():
-    low, high = (NORTON.to_internal({"A": A, "n": n})[0] for A, n in ((1e-12, 1.0), (1e-5, 8.0)))
-    assert widened(NORTON, low) is None
-    assert widened(NORTON, high).table["n"].bounds == pytest.approx((1.0, 32 / 3))
