@@ -37,7 +37,7 @@ BUDGET = {
     "modules": 781,
     "quality": 1470,
     "readers": 5573,
-    "records": 1991,
+    "records": 1990,
     "registry": 615,
     "reports": 6169,
     "rupture_assessment": 1787,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29889
+TESTS = 29877
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
