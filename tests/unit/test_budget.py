@@ -17,7 +17,7 @@ BUDGET = {
     "api": 322,
     "app": 611,
     "cameras": 931,
-    "cli": 2350,
+    "cli": 2348,
     "core": 67,
     "dataset": 765,
     "discovery": 1402,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29889
+TESTS = 29888
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
