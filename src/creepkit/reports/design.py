@@ -238,7 +238,7 @@ def cells_text(design: Design) -> str:
 
 def _place(test: PlannedTest) -> tuple[float, float]:
     """First load, and duration in h."""
-    return round(test.first_level, 6), round(test.candidate.duration / SECONDS_PER_HOUR, 6)
+    return round(test.first_level, 6), round(test.duration / SECONDS_PER_HOUR, 6)
 
 
 def _draw_map(panel: Axes, tests: list[PlannedTest], plan: list[PlannedTest], largest: float) -> list[Any]:
