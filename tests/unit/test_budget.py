@@ -17,7 +17,7 @@ BUDGET = {
     "api": 322,
     "app": 611,
     "cameras": 931,
-    "cli": 2350,
+    "cli": 2348,
     "core": 67,
     "dataset": 765,
     "discovery": 1402,
@@ -43,14 +43,14 @@ BUDGET = {
     "rupture_assessment": 1787,
     "sampling": 1027,
     "screening": 683,
-    "specimens": 3592,
+    "specimens": 3591,
     "studies": 3055,
     "surrogates": 1668,
     "testing": 1850,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29889
+TESTS = 29888
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
