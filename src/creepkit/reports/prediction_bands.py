@@ -20,7 +20,7 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.held_levels import holds, is_isothermal, temperature_holds
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE, reference_stresses
-from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.records import SECONDS_PER_HOUR, History, Prediction, is_logarithmic, output_unit
 from creepkit.reports.figures import set_range
 
@@ -80,8 +80,7 @@ def _fitted_curves(fit: Identification) -> FittedCurves:
     for k, test in enumerate(fit.tests):
         for output_fit in test.outputs:
             prediction.values[:, k, :, prediction.outputs.index(output_fit.output)] += output_fit.offset
-    quantile = interval_quantile(fit.freedom)
-    return FittedCurves(prediction, quantile * np.sqrt(np.maximum(variance, 0.0)))
+    return FittedCurves(prediction, NORMAL_QUANTILE * np.sqrt(np.maximum(variance, 0.0)))
 
 
 def _nuisance_jacobian(fit: Identification, prediction: Prediction) -> Floats:
