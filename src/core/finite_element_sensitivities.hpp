@@ -11,56 +11,29 @@ public:
     void take(Workspace& memory, const FiniteElements& system, int64_t padded) {
         matrix = memory.doubles(2 * system.shape.numbers() + 1);
         right = memory.doubles(system.shape.rows() * padded);
-        places = memory.array<int64_t>(system.model.elements * 16 * 16);
+        places = memory.array<int64_t>(system.model.elements * 4 * TILE);
         const bool controlled = system.model.controlled >= 0;
         controlled_row = memory.doubles(controlled ? system.shape.size : 0);
         controlled_right = memory.doubles(controlled ? padded : 0);
         border = memory.doubles(system.model.bordered >= 0 ? system.shape.rows() : 0);
-        border_solution = memory.doubles(system.model.bordered >= 0 ? system.shape.rows() * EIGHT : 0);
+        border_solution = memory.doubles(system.model.bordered >= 0 ? system.shape.rows() * LANES : 0);
         places_known = false;
     }
 
     void clear(const FiniteElements& system) {
         if (!places_known) set_places(system);
-        memset(matrix, 0, sizeof(double) * size_t(2 * system.shape.numbers() + 1));
+        system.shape.clear(matrix);
+        system.shape.clear(matrix + system.shape.numbers());
         right_is_clear = false;
     }
 
     // Add the tangent A (25, 8 points), which carries the weights, of a pair of elements.
     void add_tangent(const FiniteElements& system, int64_t pair, const double A[25][EIGHT]) {
+        alignas(64) double blocks[4][TILE];
         for (int half = 0; half < 2; ++half) {
-            const int64_t element = 2 * pair + half;
-            Eight products[4][10];
-            for (int g = 0; g < 4; ++g) {
-                const int64_t row = (4 * element + g) * EIGHT;
-                const int lane = 4 * half + g;
-                const Eight x = load(system.model.by_radius + row), y = load(system.model.by_height + row);
-                const Eight h = load(system.model.over_radius + row);
-                for (int j = 0; j < 5; ++j) {
-                    products[g][j] = A[5 * j][lane] * x + A[5 * j + 1][lane] * y + A[5 * j + 4][lane] * h;
-                    products[g][5 + j] = A[5 * j + 2][lane] * x + A[5 * j + 3][lane] * y;
-                }
-            }
-            const int64_t* place = places + element * 256;
-            for (int a = 0; a < EIGHT; ++a) {
-                Eight rr(0.0), rz(0.0), zr(0.0), zz(0.0);
-                for (int g = 0; g < 4; ++g) {
-                    const int64_t row = (4 * element + g) * EIGHT + a;
-                    const double x = system.model.by_radius[row], y = system.model.by_height[row];
-                    const double h = system.model.over_radius[row];
-                    const Eight* p = products[g];
-                    rr += x * p[0] + y * p[1] + h * p[4];
-                    rz += x * p[5] + y * p[6] + h * p[9];
-                    zr += x * p[2] + y * p[3];
-                    zz += x * p[7] + y * p[8];
-                }
-                for (int b = 0; b < EIGHT; ++b) {
-                    matrix[place[(2 * a) * 16 + 2 * b]] += rr[b];
-                    matrix[place[(2 * a) * 16 + 2 * b + 1]] += rz[b];
-                    matrix[place[(2 * a + 1) * 16 + 2 * b]] += zr[b];
-                    matrix[place[(2 * a + 1) * 16 + 2 * b + 1]] += zz[b];
-                }
-            }
+            system.template element_blocks<false>(2 * pair + half, 4 * half, A, blocks);
+            const int64_t* place = places + (2 * pair + half) * 4 * TILE;
+            for (int k = 0; k < 4 * TILE; ++k) matrix[place[k]] += blocks[k / TILE][k % TILE];
         }
     }
 
@@ -72,14 +45,15 @@ public:
             const int64_t* nodes = system.model.connectivity + EIGHT * element;
             for (int a = 0; a < EIGHT; ++a) {
                 const int64_t r = system.model.equations[2 * nodes[a]], z = system.model.equations[2 * nodes[a] + 1];
-                for (int64_t block = 0; block < padded; block += EIGHT) {
-                    Eight radial(0.0), axial(0.0);
+                for (int64_t block = 0; block < padded; block += LANES) {
+                    Vector radial{}, axial{};
                     for (int g = 0; g < 4; ++g) {
                         const int64_t row = (4 * element + g) * EIGHT + a;
                         const double* P = stresses + (4 * half + g) * 5 * padded + block;
                         const double x = system.model.by_radius[row], y = system.model.by_height[row];
-                        radial += x * load(P) + y * load(P + padded) + system.model.over_radius[row] * load(P + 4 * padded);
-                        axial += x * load(P + 2 * padded) + y * load(P + 3 * padded);
+                        const double h = system.model.over_radius[row];
+                        radial = radial + x * load(P) + y * load(P + padded) + h * load(P + 4 * padded);
+                        axial = axial + x * load(P + 2 * padded) + y * load(P + 3 * padded);
                     }
                     if (r >= 0) store(right + r * padded + block, load(right + r * padded + block) - radial);
                     if (z >= 0) store(right + z * padded + block, load(right + z * padded + block) - axial);
@@ -146,14 +120,14 @@ public:
         for (int half = 0; half < 2; ++half) {
             const int64_t element = 2 * pair + half;
             const int64_t* nodes = system.model.connectivity + EIGHT * element;
-            for (int64_t block = 0; block < padded; block += EIGHT) {
-                Eight F[4][5];
+            for (int64_t block = 0; block < padded; block += LANES) {
+                Vector F[4][5];
                 for (int g = 0; g < 4; ++g)
-                    for (int c = 0; c < 5; ++c) F[g][c] = Eight(0.0);
+                    for (int c = 0; c < 5; ++c) F[g][c] = Vector{};
                 for (int a = 0; a < EIGHT; ++a) {
                     const int64_t r = system.model.equations[2 * nodes[a]], z = system.model.equations[2 * nodes[a] + 1];
-                    const Eight u = r >= 0 ? load(right + r * padded + block) : Eight(0.0);
-                    const Eight w = z >= 0 ? load(right + z * padded + block) : Eight(0.0);
+                    const Vector u = r >= 0 ? load(right + r * padded + block) : Vector{};
+                    const Vector w = z >= 0 ? load(right + z * padded + block) : Vector{};
                     for (int g = 0; g < 4; ++g) {
                         const int64_t row = (4 * element + g) * EIGHT + a;
                         const double x = system.model.by_radius[row], y = system.model.by_height[row];
@@ -187,9 +161,9 @@ public:
 
 private:
     double *matrix = nullptr, *right = nullptr;  // lower and upper triangle and one place behind; (rows, padded)
-    int64_t* places = nullptr;                   // (elements, 16, 16) of the tangent of an element, r and z in turn
+    int64_t* places = nullptr;                   // (elements, 4, 8, 8) of the blocks rr, rz, zz, zr of an element
     double *controlled_row = nullptr, *controlled_right = nullptr;  // (size,), (padded,) of the controlled equation
-    double *border = nullptr, *border_solution = nullptr;  // (rows,) of the bordered equation, symmetric; (rows, 8)
+    double *border = nullptr, *border_solution = nullptr;  // (rows,) of the bordered equation, symmetric; (rows, LANES)
     double border_stiffness = 0.0;
     bool places_known = false, right_is_clear = false;
 
@@ -232,20 +206,20 @@ private:
     // As `solve`, with the equation that borders the band; the factors are made.
     bool solve_bordered(const FiniteElements& system, const double* upper, int64_t padded) {
         const int64_t last = system.model.bordered, size = system.model.size;
-        memset(border_solution, 0, sizeof(double) * size_t(system.shape.rows() * EIGHT));
-        for (int64_t k = 0; k < size; ++k) border_solution[k * EIGHT] = border[k];
-        solve_general(system.shape, matrix, upper, border_solution, EIGHT);
+        memset(border_solution, 0, sizeof(double) * size_t(system.shape.rows() * LANES));
+        for (int64_t k = 0; k < size; ++k) border_solution[k * LANES] = border[k];
+        solve_general(system.shape, matrix, upper, border_solution, LANES);
         double pivot = border_stiffness;
-        for (int64_t k = 0; k < size; ++k) pivot -= border[k] * border_solution[k * EIGHT];
+        for (int64_t k = 0; k < size; ++k) pivot -= border[k] * border_solution[k * LANES];
         if (pivot == 0.0) return false;
         solve_general(system.shape, matrix, upper, right, padded);  // with a unit row for the bordered equation
-        for (int64_t block = 0; block < padded; block += EIGHT) {
-            Eight change = load(right + last * padded + block);
+        for (int64_t block = 0; block < padded; block += LANES) {
+            Vector change = load(right + last * padded + block);
             for (int64_t k = 0; k < size; ++k) change -= border[k] * load(right + k * padded + block);
             change = change * (1.0 / pivot);
             for (int64_t k = 0; k < size; ++k) {
                 double* row = right + k * padded + block;
-                store(row, load(row) - border_solution[k * EIGHT] * change);
+                store(row, load(row) - border_solution[k * LANES] * change);
             }
             store(right + last * padded + block, change);
         }
@@ -257,8 +231,8 @@ private:
                          int64_t parameters, int64_t padded) {
         const int64_t own = system.model.controlled;
         for (int64_t j = 0; j < system.model.size; ++j) {
-            const int64_t distance = own / EIGHT - j / EIGHT;
-            const bool inside = distance < system.shape.diagonals && -distance < system.shape.diagonals;
+            const int64_t row = j > own ? j : own, column = j > own ? own : j;
+            const bool inside = system.shape.first[row / EIGHT] <= column / EIGHT;
             controlled_row[j] = inside ? matrix[place(system, own, j)] : 0.0;
             if (inside) matrix[place(system, own, j)] = j == own ? 1.0 : 0.0;
         }
@@ -286,12 +260,12 @@ private:
         const FiniteElementModel& model = system.model;
         const int64_t nowhere = 2 * system.shape.numbers();
         for (int64_t e = 0; e < model.elements; ++e)
-            for (int p = 0; p < 16; ++p)
-                for (int q = 0; q < 16; ++q) {
-                    const int64_t row = model.equations[2 * model.connectivity[EIGHT * e + p / 2] + p % 2];
-                    const int64_t column = model.equations[2 * model.connectivity[EIGHT * e + q / 2] + q % 2];
-                    places[(e * 16 + p) * 16 + q] =
-                        row >= 0 && column >= 0 ? place(system, row, column) : nowhere;
+            for (int block = 0; block < 4; ++block)
+                for (int k = 0; k < TILE; ++k) {
+                    const int64_t* nodes = model.connectivity + EIGHT * e;
+                    const int64_t row = model.equations[2 * nodes[k / EIGHT] + (block > 1)];
+                    const int64_t column = model.equations[2 * nodes[k % EIGHT] + (block == 1 || block == 2)];
+                    places[(e * 4 + block) * TILE + k] = row >= 0 && column >= 0 ? place(system, row, column) : nowhere;
                 }
         places_known = true;
     }

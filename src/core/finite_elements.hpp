@@ -12,20 +12,12 @@
 
 namespace creepkit {
 
-// The same number for the four points of each of two elements.
-CREEPKIT_INLINE Eight of_two_elements(double first, double second) {
-    Eight r;
-    for (int i = 0; i < VECTORS; ++i) {
-        const Vector a = Vector{} + first, b = Vector{} + second;
-        if (LANES == EIGHT) {
-            Integers upper{};
-            for (int k = 0; k < LANES; ++k) upper[k] = k >= 4 ? -1 : 0;
-            r.part[i] = upper ? b : a;
-        } else {
-            r.part[i] = i * LANES < 4 ? a : b;
-        }
-    }
-    return r;
+// What the points of vector v of a pair of elements have of numbers of the two elements.
+CREEPKIT_INLINE Vector of_elements(int v, double first, double second) {
+    if constexpr (LANES < EIGHT) return splat(v * LANES < 4 ? first : second);
+    Mask upper{};
+    for (int k = 4; k < LANES; ++k) upper[k] = -1;
+    return select(upper, splat(second), splat(first));
 }
 
 class FiniteElementSensitivities;
@@ -35,14 +27,16 @@ public:
     using SensitivityMemory = FiniteElementSensitivities;
 
     explicit FiniteElements(const FiniteElementModel& model)
-        : model(model), shape(BandShape::of(model.size, model.half_bandwidth)), quadrature(side_quadrature()) {}
+        : model(model), shape(model.size, model.half_bandwidth), quadrature(side_quadrature()) {}
 
     const FiniteElementModel& model;
-    const BandShape shape;
+    BandShape shape;
     const SideQuadrature quadrature;
     double *tangent = nullptr, *residual = nullptr;  // the lower triangle in tiles, one place behind it; (shape.rows(),)
 
     void take(Workspace& memory) {
+        shape.take(memory, false);
+        if (shape.first) set_envelope();
         tangent = memory.doubles(shape.numbers() + 1);
         residual = memory.doubles(shape.rows());
         controlled_row = memory.doubles(model.controlled >= 0 ? model.size : 0);
@@ -63,19 +57,19 @@ public:
         for (int64_t k = 0; model.controlled >= 0 && k < model.size; ++k) total -= controlled_row[k] * residual[k];
         return fabs(total);
     }
-    Eight weights(int64_t pair) const { return load(model.weights + EIGHT * pair); }
 
-    // Deformation gradient of the points of a pair of elements.
-    CREEPKIT_INLINE void deform(int64_t pair, const double* u, Kinematics& at) const {
+    // Deformation gradient of the points of a vector, of which `point` is the first.
+    CREEPKIT_INLINE void deform(int64_t point, const double* u, Kinematics& at) const {
+        const int64_t pair = point / EIGHT, v = point % EIGHT / LANES;
         const int64_t *one = model.connectivity + 16 * pair, *other = one + EIGHT;
-        const double* shapes = model.points_first + pair * 3 * EIGHT * EIGHT;
-        at.f11 = at.f22 = at.f33 = Eight(1.0);
-        at.f12 = at.f21 = Eight(0.0);
+        const double* shapes = model.points_first + pair * 3 * EIGHT * EIGHT + v * LANES;
+        at.f11 = at.f22 = at.f33 = splat(1.0);
+        at.f12 = at.f21 = Vector{};
         for (int a = 0; a < EIGHT; ++a) {
-            const Eight u_r = of_two_elements(u[2 * one[a]], u[2 * other[a]]);
-            const Eight u_z = of_two_elements(u[2 * one[a] + 1], u[2 * other[a] + 1]);
+            const Vector u_r = of_elements(int(v), u[2 * one[a]], u[2 * other[a]]);
+            const Vector u_z = of_elements(int(v), u[2 * one[a] + 1], u[2 * other[a] + 1]);
             const double* at_node = shapes + 3 * EIGHT * a;
-            const Eight by_r = load(at_node), by_z = load(at_node + EIGHT), over_r = load(at_node + 2 * EIGHT);
+            const Vector by_r = load(at_node), by_z = load(at_node + EIGHT), over_r = load(at_node + 2 * EIGHT);
             at.f11 += by_r * u_r;
             at.f12 += by_z * u_r;
             at.f33 += over_r * u_r;
@@ -84,27 +78,55 @@ public:
         }
     }
 
+    // Blocks rr, rz, zz and, unless SYMMETRIC, zr of the tangent of an element whose points are the four lanes from
+    // `first` on, by rows; A carries the weights.
+    template <bool SYMMETRIC>
+    CREEPKIT_INLINE void element_blocks(int64_t element, int first, const double A[25][EIGHT],
+                                        double blocks[4][TILE]) const {
+        const double *by_r = model.by_radius + 4 * element * EIGHT, *by_z = model.by_height + 4 * element * EIGHT;
+        const double* over_r = model.over_radius + 4 * element * EIGHT;
+        for (int v = 0; v < EIGHT; v += LANES) {
+            Vector of_r[4][5], of_z[4][5];  // what u_r and u_z of the nodes change of P at the points
+            CREEPKIT_UNROLL for (int g = 0; g < 4; ++g) {
+                const int lane = first + g, row = EIGHT * g + v;
+                const Vector x = load(by_r + row), y = load(by_z + row), h = load(over_r + row);
+                CREEPKIT_UNROLL for (int i = 0; i < 5; ++i) {
+                    of_r[g][i] = A[5 * i][lane] * x + A[5 * i + 1][lane] * y + A[5 * i + 4][lane] * h;
+                    of_z[g][i] = A[5 * i + 2][lane] * x + A[5 * i + 3][lane] * y;
+                }
+            }
+            for (int a = 0; a < EIGHT; ++a) {
+                Vector rr{}, rz{}, zz{}, zr{};
+                CREEPKIT_UNROLL for (int g = 0; g < 4; ++g) {
+                    const double x = by_r[EIGHT * g + a], y = by_z[EIGHT * g + a], h = over_r[EIGHT * g + a];
+                    const Vector *r = of_r[g], *z = of_z[g];
+                    rr = rr + x * r[0] + y * r[1] + h * r[4];  // in this order each is one instruction
+                    rz = rz + x * z[0] + y * z[1] + h * z[4];
+                    zz = zz + x * z[2] + y * z[3];
+                    if (!SYMMETRIC) zr = zr + x * r[2] + y * r[3];
+                }
+                const Vector found[4] = {rr, rz, zz, zr};
+                CREEPKIT_UNROLL for (int i = 0; i < (SYMMETRIC ? 3 : 4); ++i) store(blocks[i] + EIGHT * a + v, found[i]);
+            }
+        }
+    }
+
     // Out-of-balance forces into `residual`; if STIFF the tangent, made symmetric, into `tangent`.
     template <bool STIFF>
     PointFlag assemble(const PointLaw& law, const StageConditions& stage, const double* u, PointStates& points,
                        double tolerance) {
         clear(residual, shape.rows());
-        if (STIFF) clear(tangent, shape.numbers() + 1);
+        if (STIFF) shape.clear(tangent);
         alignas(64) double P[5][EIGHT], A[25][EIGHT];
-        for (int64_t pair = 0; pair < model.elements / 2; ++pair) {
-            Kinematics at;
-            deform(pair, u, at);
-            Eight stress[5], moduli[25];
+        for (int64_t first = 0; first < points.count; first += EIGHT) {
+            Kinematics at[VECTORS];
+            for (int v = 0; v < VECTORS; ++v) deform(first + v * LANES, u, at[v]);
             const PointFlag flag =
-                update_points<STIFF>(law, stage, points, EIGHT * pair, at, tolerance, stress, moduli);
+                update_points<STIFF>(law, stage, points, first, at, model.weights + first, tolerance, P[0], A[0]);
             if (flag != POINTS_SOLVED) return flag;
-            const Eight weight = load(model.weights + EIGHT * pair);
-            for (int i = 0; i < 5; ++i) store(P[i], stress[i] * weight);
-            if (STIFF)
-                for (int i = 0; i < 25; ++i) store(A[i], moduli[i] * weight);
             for (int half = 0; half < 2; ++half) {
-                add_forces(2 * pair + half, 4 * half, P);
-                if (STIFF) add_stiffness(2 * pair + half, 4 * half, A);
+                add_forces(first / 4 + half, 4 * half, P);
+                if (STIFF) add_stiffness(first / 4 + half, 4 * half, A);
             }
         }
         press<STIFF>(stage.pressure, u);
@@ -118,16 +140,17 @@ public:
     void error_forces(const double* u, const PointStates& points, const double weights[STAGES]) {
         clear(residual, shape.rows());
         alignas(64) double P[5][EIGHT];
-        for (int64_t pair = 0; pair < model.elements / 2; ++pair) {
-            Kinematics at;
-            deform(pair, u, at);
-            if (!set_strains(at)) continue;  // never: the stage has just converged here
-            const int64_t k = EIGHT * pair;
-            Eight stress[5];
-            stress_of_creep_change(points, k, at, weights, stress);
-            const Eight weight = load(model.weights + k);
-            for (int i = 0; i < 5; ++i) store(P[i], stress[i] * weight);
-            for (int half = 0; half < 2; ++half) add_forces(2 * pair + half, 4 * half, P);
+        for (int64_t first = 0; first < points.count; first += EIGHT) {
+            for (int v = 0; v < VECTORS; ++v) {
+                const int64_t k = first + v * LANES;
+                Kinematics at;
+                Vector stress[5];
+                deform(k, u, at);
+                if (!set_strains(at)) continue;  // never: the stage has just converged here
+                stress_of_creep_change(points, k, at, weights, stress);
+                for (int i = 0; i < 5; ++i) store(P[i] + v * LANES, stress[i] * load(model.weights + k));
+            }
+            for (int half = 0; half < 2; ++half) add_forces(first / 4 + half, 4 * half, P);
         }
         if (model.controlled < 0) return;
         controlled_error = residual[model.controlled];
@@ -244,6 +267,20 @@ private:
     double *border = nullptr, *border_solution = nullptr;  // (rows,) column of the bordered equation; K^-1 times it
     double border_stiffness = 0.0, border_pivot = 0.0;     // N/(rad mm), its diagonal; less border K^-1 border
 
+    // All equations of an element are coupled.
+    void set_envelope() {
+        for (int64_t e = 0; e < model.elements; ++e) {
+            const int64_t* nodes = model.connectivity + EIGHT * e;
+            for (int i = 0; i < 2 * EIGHT; ++i)
+                for (int j = 0; j < 2 * EIGHT; ++j) {
+                    const int64_t row = model.equations[2 * nodes[i / 2] + i % 2];
+                    const int64_t column = model.equations[2 * nodes[j / 2] + j % 2];
+                    if (column >= 0 && row >= column) shape.include(row, column);
+                }
+        }
+        shape.close_envelope();
+    }
+
     // Add the forces of contact and, if STIFF, their tangent; that of the bordered equation stays beside the band.
     template <bool STIFF>
     void touch(const double* u) {
@@ -282,7 +319,7 @@ private:
         if (!STIFF) return;
         for (int64_t k = 0; k < model.size; ++k) {
             const int64_t row = k > own ? k : own, column = k > own ? own : k;
-            const bool inside = row / EIGHT - column / EIGHT < shape.diagonals;
+            const bool inside = shape.first[row / EIGHT] <= column / EIGHT;
             controlled_row[k] = inside && k != own ? tangent[shape.place(row, column)] : 0.0;
             if (inside) tangent[shape.place(row, column)] = k == own ? 1.0 : 0.0;
         }
@@ -292,13 +329,18 @@ private:
 
     // Nodal forces of an element whose points are the four lanes from `first` on; P carries the weights.
     CREEPKIT_INLINE void add_forces(int64_t element, int first, const double P[5][EIGHT]) {
-        Eight radial(0.0), axial(0.0);
-        for (int g = 0; g < 4; ++g) {
-            const int64_t row = (4 * element + g) * EIGHT;
-            const int lane = first + g;
-            const Eight x = load(model.by_radius + row), y = load(model.by_height + row);
-            radial += x * P[0][lane] + y * P[1][lane] + load(model.over_radius + row) * P[4][lane];
-            axial += x * P[2][lane] + y * P[3][lane];
+        alignas(64) double radial[EIGHT], axial[EIGHT];
+        for (int v = 0; v < EIGHT; v += LANES) {
+            Vector along_r{}, along_z{};
+            CREEPKIT_UNROLL for (int g = 0; g < 4; ++g) {
+                const int64_t row = (4 * element + g) * EIGHT + v;
+                const int lane = first + g;
+                const Vector x = load(model.by_radius + row), y = load(model.by_height + row);
+                along_r = along_r + x * P[0][lane] + y * P[1][lane] + load(model.over_radius + row) * P[4][lane];
+                along_z = along_z + x * P[2][lane] + y * P[3][lane];
+            }
+            store(radial + v, along_r);
+            store(axial + v, along_z);
         }
         const int64_t* nodes = model.connectivity + EIGHT * element;
         for (int a = 0; a < EIGHT; ++a) {
@@ -308,42 +350,19 @@ private:
         }
     }
 
-    // Blocks rr, rz, zz of an element into the tangent; A carries the weights.
+    // An element's tangent into that of the body; A carries the weights.
     CREEPKIT_INLINE void add_stiffness(int64_t element, int first, const double A[25][EIGHT]) {
-        Eight products[4][8];  // tangent times shape gradients of a point, by node
-        const double *by_r = model.by_radius + 4 * element * EIGHT, *by_z = model.by_height + 4 * element * EIGHT;
-        const double* over_r = model.over_radius + 4 * element * EIGHT;
-        for (int g = 0; g < 4; ++g) {
-            const int lane = first + g;
-            const auto a = [&](int i, int j) { return A[5 * i + j][lane]; };
-            const Eight x = load(by_r + EIGHT * g), y = load(by_z + EIGHT * g), h = load(over_r + EIGHT * g);
-            Eight* p = products[g];
-            p[0] = a(0, 0) * x + a(0, 1) * y + a(0, 4) * h;
-            p[1] = a(1, 0) * x + a(1, 1) * y + a(1, 4) * h;
-            p[2] = a(4, 0) * x + a(4, 1) * y + a(4, 4) * h;
-            p[3] = a(0, 2) * x + a(0, 3) * y;
-            p[4] = a(1, 2) * x + a(1, 3) * y;
-            p[5] = a(4, 2) * x + a(4, 3) * y;
-            p[6] = a(2, 2) * x + a(2, 3) * y;
-            p[7] = a(3, 2) * x + a(3, 3) * y;
-        }
-        const int64_t* places = model.places + 192 * element;
-        for (int a = 0; a < EIGHT; ++a) {
-            Eight rr(0.0), rz(0.0), zz(0.0);
-            for (int g = 0; g < 4; ++g) {
-                const double x = by_r[EIGHT * g + a], y = by_z[EIGHT * g + a], h = over_r[EIGHT * g + a];
-                const Eight* p = products[g];
-                rr += x * p[0] + y * p[1] + h * p[2];
-                rz += x * p[3] + y * p[4] + h * p[5];
-                zz += x * p[6] + y * p[7];
+        alignas(64) double blocks[4][TILE];
+        element_blocks<true>(element, first, A, blocks);
+        // the other half of rr and zz is the same, but of displacements that share an equation both are on the diagonal
+        const bool tied = model.tied[element] != 0;
+        const int64_t* places = model.places + 3 * TILE * element;
+        for (int a = 0; a < EIGHT; ++a)
+            for (int b = tied ? 0 : a; b < EIGHT; ++b) {
+                tangent[places[EIGHT * a + b]] += blocks[0][EIGHT * a + b];
+                tangent[places[2 * TILE + EIGHT * a + b]] += blocks[2][EIGHT * a + b];
             }
-            // the other half is the same, but of displacements that share an equation both halves are on the diagonal
-            for (int b = model.tied[element] ? 0 : a; b < EIGHT; ++b) {
-                tangent[places[EIGHT * a + b]] += rr[b];
-                tangent[places[128 + EIGHT * a + b]] += zz[b];
-            }
-            for (int b = 0; b < EIGHT; ++b) tangent[places[64 + EIGHT * a + b]] += rz[b];
-        }
+        for (int k = 0; k < TILE; ++k) tangent[places[TILE + k]] += blocks[1][k];
     }
 
     // Take the pressure's force off the internal one, and its stiffness (made symmetric) off the tangent.

@@ -65,7 +65,7 @@ inline AngularFactor angular_factor(const PolarGrid& grid, double p, int64_t j) 
 
 // q at the distance `far` = ln(r/S).
 inline Vector exponent(Vector far, double p, double g) {
-    const Vector farthest = Vector{} + FARTHEST, power = p * far;
+    const Vector farthest = splat(FARTHEST), power = p * far;
     return g * exponential(power > farthest ? farthest : power);
 }
 
@@ -75,10 +75,10 @@ inline double best_amplitude(const PolarGrid& grid, const double* y, const doubl
     Vector product{}, square{};
     for (int64_t j = 0; j < grid.angles; ++j) {
         const double g = angular_factor(grid, p, j).g;
-        for (int64_t i = 0; i < grid.size; i += CREEPKIT_LANES) {
-            const Vector m = exponential(-exponent(load_vector(grid.log_radius + i) - x[1], p, g));
-            const Vector weighted = grid.angular[j] * load_vector(grid.radial + i) * m;
-            product += weighted * load_vector(y + i);
+        for (int64_t i = 0; i < grid.size; i += LANES) {
+            const Vector m = exponential(-exponent(load(grid.log_radius + i) - x[1], p, g));
+            const Vector weighted = grid.angular[j] * load(grid.radial + i) * m;
+            product += weighted * load(y + i);
             square += weighted * m;
         }
     }
@@ -91,10 +91,10 @@ inline void sum_up(const PolarGrid& grid, const double* y, const double* x, Norm
     Vector squares{}, slope[3]{}, diagonal[3]{}, m01{}, m02{}, m11{}, m12{}, m22{};
     for (int64_t j = 0; j < grid.angles; ++j) {
         const AngularFactor angle = angular_factor(grid, p, j);
-        for (int64_t i = 0; i < grid.size; i += CREEPKIT_LANES) {
-            const Vector weight = grid.angular[j] * load_vector(grid.radial + i), far = load_vector(grid.log_radius + i) - x[1];
+        for (int64_t i = 0; i < grid.size; i += LANES) {
+            const Vector weight = grid.angular[j] * load(grid.radial + i), far = load(grid.log_radius + i) - x[1];
             const Vector q = exponent(far, p, angle.g), m = exponential(-q);
-            const Vector residual = D * m - load_vector(y + i), left = weight * residual;
+            const Vector residual = D * m - load(y + i), left = weight * residual;
             const Vector steep = p * (far + angle.first);  // d ln q / d ln p
             const Vector fq = D * m * q, fs = fq * p, fp = -fq * steep;
             squares += left * residual;
@@ -157,12 +157,12 @@ inline void derivatives_to_profile(const PolarGrid& grid, const double* x, const
     const double p = exp(x[2]);
     for (int64_t j = 0; j < grid.angles; ++j) {
         const AngularFactor angle = angular_factor(grid, p, j);
-        for (int64_t i = 0; i < grid.size; i += CREEPKIT_LANES) {
-            const Vector far = load_vector(grid.log_radius + i) - x[1], q = exponent(far, p, angle.g);
-            const Vector weight = grid.angular[j] * load_vector(grid.radial + i) * exponential(-q), fq = x[0] * q * p;
+        for (int64_t i = 0; i < grid.size; i += LANES) {
+            const Vector far = load(grid.log_radius + i) - x[1], q = exponent(far, p, angle.g);
+            const Vector weight = grid.angular[j] * load(grid.radial + i) * exponential(-q), fq = x[0] * q * p;
             for (int v = 0; v < 3; ++v) {
                 double* to = derivatives + v * grid.size + i;
-                store(to, load_vector(to) + weight * (inverse[v][0] +
+                store(to, load(to) + weight * (inverse[v][0] +
                                                fq * (inverse[v][1] - inverse[v][2] * (far + angle.first))));
             }
         }
@@ -255,7 +255,7 @@ struct FitWorkspace {
 };
 
 inline FitWorkspace fit_workspace(Workspace& memory, int64_t radii) {
-    const int64_t size = padded(radii);
+    const int64_t size = whole_vectors(radii);
     return {memory.doubles(size), memory.doubles(size), memory.doubles(size), memory.doubles(3 * size)};
 }
 
@@ -271,7 +271,7 @@ inline void fit_frames(const int64_t* counts, const double* places, const FitWor
     const double* around = places + 2 * radii;
     memcpy(work.log_radius, places, sizeof(double) * size_t(radii));
     memcpy(work.radial, places + radii, sizeof(double) * size_t(radii));
-    const PolarGrid grid{radii,       angles, padded(radii),   work.log_radius,    work.radial,
+    const PolarGrid grid{radii,       angles, whole_vectors(radii),   work.log_radius,    work.radial,
                          around, around + angles, around + 2 * angles};
     double x[3], last[3] = {0.0, NAN, 0.0};
     gaussian::NormalEquations normal;

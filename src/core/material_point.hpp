@@ -1,4 +1,5 @@
-// The material points of a finite element: Hencky elasticity, von Mises creep by the Cauchy stress, eight at a time.
+// The material points of a finite element: Hencky elasticity, von Mises creep by the Cauchy stress, for the eight points of
+// one call of the law.
 //
 // w = (E33 - tr E/3, E11 - E22, 2 E12) less the creep components of the same form is the elastic deviator, and
 // e^2 = w1^2 + (w2^2 + w3^2)/3. The trial stress 3G e/J and the creep increment D give the von Mises stress
@@ -59,15 +60,15 @@ struct PointStates {
     }
 };
 
-// The elastic predictor: w, its size e and 1/e (0 where it is 0), tr E, J, mean Cauchy stress in MPa, and the largest
-// principal value of the unit deviator over its von Mises stress.
+// The elastic predictor: w, its size e and 1/e (0 where it is 0), tr E, 3G/J and mean Cauchy stress in MPa, and the
+// largest principal value of the unit deviator over its von Mises stress.
 struct ElasticPredictor {
-    Eight hoop, difference, shear, equivalent, inverse, trace, volume, mean, top;
+    Vector hoop, difference, shear, equivalent, inverse, trace, stiffness, mean, top;
 };
 
 // Derivatives of D to the trial stress, and to shifts of the largest principal and of the mean stress.
 struct CreepDerivatives {
-    Eight by_trial, by_principal, by_mean;
+    Vector by_trial, by_principal, by_mean;
 };
 
 // base : (3, stride) creep components of these points.
@@ -78,20 +79,20 @@ CREEPKIT_INLINE ElasticPredictor elastic_predictor(const StageConditions& stage,
     p.hoop = at.strain[HOOP] - p.trace * (1.0 / 3.0) - load(base);
     p.difference = at.strain[DIFFERENCE] - load(base + stride);
     p.shear = at.strain[SHEAR] - load(base + 2 * stride);
-    const Eight radius2 = p.difference * p.difference + p.shear * p.shear;
+    const Vector radius2 = p.difference * p.difference + p.shear * p.shear;
     p.equivalent = square_root(p.hoop * p.hoop + radius2 * (1.0 / 3.0));
-    p.inverse = select(p.equivalent > Eight(0.0), 1.0 / p.equivalent, Eight(0.0));
-    p.volume = at.volume;
-    p.mean = stage.bulk * p.trace / at.volume;
+    p.inverse = select(p.equivalent > Vector{}, 1.0 / p.equivalent, Vector{});
+    p.stiffness = 3.0 * stage.shear * at.inverse_volume;
+    p.mean = stage.bulk * p.trace * at.inverse_volume;
     p.top = larger(2.0 * p.hoop, square_root(radius2) - p.hoop) * p.inverse * (1.0 / 3.0);
     return p;
 }
 
 // The log-conjugate stress.
-CREEPKIT_INLINE void log_stress(const StageConditions& stage, const ElasticPredictor& p, const Eight& increment,
-                                Eight stress[4]) {
-    const Eight left = 1.0 - increment * p.inverse, pressure = stage.bulk * p.trace, shear = stage.shear * left;
-    const Eight hoop = shear * p.hoop;
+CREEPKIT_INLINE void log_stress(const StageConditions& stage, const ElasticPredictor& p, Vector increment,
+                                Vector stress[4]) {
+    const Vector left = 1.0 - increment * p.inverse, pressure = stage.bulk * p.trace, shear = stage.shear * left;
+    const Vector hoop = shear * p.hoop;
     stress[SUM] = pressure - hoop;
     stress[DIFFERENCE] = shear * p.difference;
     stress[HOOP] = pressure + 2.0 * hoop;
@@ -101,25 +102,24 @@ CREEPKIT_INLINE void log_stress(const StageConditions& stage, const ElasticPredi
 // Derivatives (4,) of what depends on trial, largest principal and mean stress to w (three) and to tr E.
 //
 // The largest principal Cauchy stress is the mean plus top times the von Mises stress.
-CREEPKIT_INLINE void strain_derivatives(const StageConditions& stage, const ElasticPredictor& p, const Eight& increment,
-                                        const CreepDerivatives& by, Eight follow[4]) {
-    const Eight stiffness = 3.0 * stage.shear / p.volume, stress = stiffness * (p.equivalent - increment);
-    const Eight along = by.by_trial * stiffness * p.inverse;
+CREEPKIT_INLINE void strain_derivatives(const StageConditions& stage, const ElasticPredictor& p, Vector increment,
+                                        const CreepDerivatives& by, Vector follow[4]) {
+    const Vector stress = p.stiffness * (p.equivalent - increment), along = by.by_trial * p.stiffness * p.inverse;
     follow[0] = along * p.hoop;
     follow[1] = along * p.difference * (1.0 / 3.0);
     follow[2] = along * p.shear * (1.0 / 3.0);
     follow[3] = -(by.by_trial * stress);
-    const Eight zero(0.0);
+    const Vector zero{};
     if (!any((by.by_principal < zero) | (by.by_principal > zero) | (by.by_mean < zero) | (by.by_mean > zero))) return;
-    const Eight radius = square_root(p.difference * p.difference + p.shear * p.shear);
-    const Eight turned = by.by_principal * stress * p.inverse * (1.0 / 3.0);
-    const Eight shrink = by.by_principal * stress * p.top * p.inverse * p.inverse;
+    const Vector radius = square_root(p.difference * p.difference + p.shear * p.shear);
+    const Vector turned = by.by_principal * stress * p.inverse * (1.0 / 3.0);
+    const Vector shrink = by.by_principal * stress * p.top * p.inverse * p.inverse;
     const Mask hoop_is_largest = 2.0 * p.hoop > radius - p.hoop;
-    const Eight over_radius = select(radius > zero, 1.0 / radius, zero);
+    const Vector over_radius = select(radius > zero, 1.0 / radius, zero);
     follow[0] += select(hoop_is_largest, 2.0 * turned, -turned) - shrink * p.hoop;
     follow[1] += select(hoop_is_largest, zero, turned * p.difference * over_radius) - shrink * p.difference * (1.0 / 3.0);
     follow[2] += select(hoop_is_largest, zero, turned * p.shear * over_radius) - shrink * p.shear * (1.0 / 3.0);
-    follow[3] += (by.by_mean + by.by_principal) * (stage.bulk / p.volume - p.mean);
+    follow[3] += (by.by_mean + by.by_principal) * (p.stiffness * (stage.bulk / (3.0 * stage.shear)) - p.mean);
 }
 
 // Consistent tangent dT/dE, exact or its symmetric part, and the derivatives dy/dw of the stresses conjugate to w.
@@ -127,13 +127,13 @@ CREEPKIT_INLINE void strain_derivatives(const StageConditions& stage, const Elas
 // follow : derivatives of D to w and to tr E. y_i = 3G (1 - D/e) g_i w_i is conjugate to w_i, g = (1, 1/3, 1/3), and
 // dy_i = 3G (1 - D/e) g_i dw_i + g_i w_i (v_j dw_j + v_t dtr).
 template <bool SYMMETRIC>
-CREEPKIT_INLINE void tangent_moduli(const StageConditions& stage, const ElasticPredictor& p, const Eight& increment,
-                                    const Eight follow[4], Eight moduli[4][4], Eight by_w[3][3]) {
+CREEPKIT_INLINE void tangent_moduli(const StageConditions& stage, const ElasticPredictor& p, Vector increment,
+                                    const Vector follow[4], Vector moduli[4][4], Vector by_w[3][3]) {
     const double shear3 = 3.0 * stage.shear, third = 1.0 / 3.0, bulk = stage.bulk;
-    const Eight left = 1.0 - increment * p.inverse, factor = shear3 * p.inverse;
-    const Eight d[3] = {p.hoop, p.difference * third, p.shear * third};
-    const Eight bend = factor * increment * p.inverse * p.inverse, vt = -(factor * follow[3]);
-    const Eight stiffness[3] = {shear3 * left, stage.shear * left, stage.shear * left};
+    const Vector left = 1.0 - increment * p.inverse, factor = shear3 * p.inverse;
+    const Vector d[3] = {p.hoop, p.difference * third, p.shear * third};
+    const Vector bend = factor * increment * p.inverse * p.inverse, vt = -(factor * follow[3]);
+    const Vector stiffness[3] = {shear3 * left, stage.shear * left, stage.shear * left};
     for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 3; ++j) by_w[i][j] = d[i] * (bend * d[j] - factor * follow[j]);
         by_w[i][i] += stiffness[i];
@@ -141,9 +141,9 @@ CREEPKIT_INLINE void tangent_moduli(const StageConditions& stage, const ElasticP
     if (SYMMETRIC)
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < i; ++j) by_w[i][j] = by_w[j][i] = 0.5 * (by_w[i][j] + by_w[j][i]);
-    const Eight t0 = d[0] * vt, t1 = d[1] * vt, t2 = d[2] * vt;
+    const Vector t0 = d[0] * vt, t1 = d[1] * vt, t2 = d[2] * vt;
     // w1 changes by -1/3 with E11 + E22 and by 2/3 with E33; the trace by one with both
-    const Eight s = t0 - third * by_w[0][0], h = t0 + 2.0 * third * by_w[0][0];
+    const Vector s = t0 - third * by_w[0][0], h = t0 + 2.0 * third * by_w[0][0];
     moduli[SUM][SUM] = bulk - third * s;
     moduli[SUM][HOOP] = bulk - third * h;
     moduli[HOOP][SUM] = bulk + 2.0 * third * s;
@@ -167,10 +167,21 @@ CREEPKIT_INLINE void tangent_moduli(const StageConditions& stage, const ElasticP
 
 enum PointFlag { POINTS_SOLVED, INVERTED, POINT_FAILED, RATE_UNDEFINED };
 
-// One point of the eight by the solver for any guess and any law; writes D, the states and the law's output there.
+// What one point alone needs of the elastic predictors of eight.
+struct PointPredictor {
+    double equivalent, stiffness, mean, top;
+
+    PointPredictor(const ElasticPredictor predictors[VECTORS], int point) {
+        const ElasticPredictor& p = predictors[point / LANES];
+        const int lane = point % LANES;
+        equivalent = p.equivalent[lane], stiffness = p.stiffness[lane], mean = p.mean[lane], top = p.top[lane];
+    }
+};
+
+// Point k by the solver for any guess and any law; writes D, the states and the law's output there.
 //
 // out : (1 + S) (7 + S) numbers of the last evaluation.
-inline PointFlag solve_point(const PointLaw& law, const StageConditions& stage, const ElasticPredictor& p, int lane,
+inline PointFlag solve_point(const PointLaw& law, const StageConditions& stage, const PointPredictor& p,
                              PointStates& points, int64_t k, double tolerance, double* out) {
     double row[POINT_SIZE + MAX_STATES], history[MAX_STATES];
     row[TIME] = stage.time;
@@ -179,12 +190,11 @@ inline PointFlag solve_point(const PointLaw& law, const StageConditions& stage, 
         row[POINT_SIZE + i] = points.state[i * points.count + k];
         history[i] = points.base[(EQUIVALENT_STRAIN + 1 + i) * points.count + k];
     }
-    const double stiffness = 3.0 * stage.shear / p.volume[lane];
-    const Axes axes = {p.mean[lane], p.top[lane], p.mean[lane], 0.0};
-    const StageProblem problem = {stiffness * p.equivalent[lane], stiffness, 0.0, stage.weight,
+    const Axes axes = {p.mean, p.top, p.mean, 0.0};
+    const StageProblem problem = {p.stiffness * p.equivalent, p.stiffness, 0.0, stage.weight,
                                   points.base[EQUIVALENT_STRAIN * points.count + k]};
     double guess = points.increments[k];
-    if (!(guess > 0.0)) guess = 1e-6 * problem.trial / stiffness;
+    if (!(guess > 0.0)) guess = 1e-6 * p.equivalent;
     const StageSolution solution = solve_stage(law.update, law.theta, axes, problem, history, law.states, row, out,
                                                guess, tolerance);
     if (solution.flag != SOLVED) return solution.flag == NOT_FINITE ? RATE_UNDEFINED : POINT_FAILED;
@@ -193,146 +203,167 @@ inline PointFlag solve_point(const PointLaw& law, const StageConditions& stage, 
     return POINTS_SOLVED;
 }
 
-// Creep increments of eight points of a law without states, and the derivatives of D.
+// The unknown of Newton's method at the points of a vector, D over the equivalent strain of the predictor, and what
+// does not change in its course; of points at rest, where that is zero, it is one.
+struct CreepIteration {
+    Vector equivalent, trial, strain, guess, share;
+    Mask resting;
+
+    CREEPKIT_INLINE void begin(const ElasticPredictor& p, const PointStates& points,
+                               int64_t k) {
+        const Vector zero{};
+        resting = ~(p.equivalent > zero);
+        equivalent = select(resting, splat(1.0), p.equivalent);
+        trial = p.stiffness * equivalent;
+        strain = load(points.base + EQUIVALENT_STRAIN * points.count + k);
+        // first guess: the last increment, moved along the last tangent with the trial stress
+        const Vector last = load(points.increments + k), before = load(points.trials + k);
+        const Vector moved = last + load(points.by_trial + k) * (trial - before);
+        guess = select((before >= zero) & (moved > zero), moved, last);
+        guess = select(guess > zero, guess, 1e-6 * equivalent);
+        share = smaller(guess / equivalent, splat(0.9999));
+        share = select((share > splat(1e-280)) & ~resting, share, splat(1e-6));
+    }
+};
+
+// Creep increments of eight points of a law without states, into points.increments, and the derivatives of D.
 //
-// Newton's method in ln[D/(1 - k D/trial)], on all eight side by side; a point that leaves its range or does not settle
-// is solved alone.
-inline PointFlag creep_increments(const PointLaw& law, const StageConditions& stage, const ElasticPredictor& p,
-                                  PointStates& points, int64_t k, double tolerance, Eight& increment,
-                                  CreepDerivatives& by) {
+// Newton's method in ln[D/(1 - k D/trial)], on all eight side by side; if a point leaves its range or does not settle,
+// each is solved alone.
+inline PointFlag creep_increments(const PointLaw& law, const StageConditions& stage,
+                                  const ElasticPredictor predictors[VECTORS], PointStates& points, int64_t k,
+                                  double tolerance, CreepDerivatives by[VECTORS]) {
     constexpr int ITERATIONS = 12;
     constexpr double LONGEST = 3.0;  // correction of ln[D/(1 - k D/trial)]
     alignas(64) double x[POINT_SIZE * EIGHT], out[(1 + POINT_SIZE) * EIGHT];
-    store(x + TIME * EIGHT, Eight(stage.time));
-    store(x + TEMPERATURE * EIGHT, Eight(stage.temperature));
-    const Eight zero(0.0), one(1.0);
-    const Mask resting = !(p.equivalent > zero);
-    const Eight equivalent = select(resting, one, p.equivalent), stiffness = 3.0 * stage.shear / p.volume;
-    const Eight trial = stiffness * equivalent, mean = p.mean, top = p.top;
-    const Eight strain = load(points.base + EQUIVALENT_STRAIN * points.count + k);
-    // first guess: the last increment, moved along the last tangent with the trial stress
-    const Eight last = load(points.increments + k), before = load(points.trials + k);
-    const Eight moved = last + load(points.by_trial + k) * (trial - before);
-    Eight guess = select((before >= zero) & (moved > zero), moved, last);
-    guess = select(guess > zero, guess, 1e-6 * equivalent);
-    Eight share = smaller(guess / equivalent, Eight(0.9999));
-    share = select((share > Eight(1e-280)) & !resting, share, Eight(1e-6));
-    Eight by_stress(0.0), by_principal(0.0), by_mean(0.0), by_strain(0.0);
-    bool settled = !any(!resting);
-    for (int iteration = 0; iteration < ITERATIONS && !settled; ++iteration) {
-        const Eight left = 1.0 - share, stress = trial * left;
-        increment = equivalent * share;
-        store(x + STRESS * EIGHT, stress);
-        store(x + STRAIN * EIGHT, strain + increment);
-        store(x + PRINCIPAL_STRESS * EIGHT, mean + top * stress);
-        store(x + MEAN_STRESS * EIGHT, mean);
-        law.update(EIGHT, x, law.theta, out);
-        by_principal = load(out + (1 + PRINCIPAL_STRESS) * EIGHT);
-        by_mean = load(out + (1 + MEAN_STRESS) * EIGHT);
-        by_strain = load(out + (1 + STRAIN) * EIGHT);
-        by_stress = load(out + (1 + STRESS) * EIGHT) + top * by_principal;
-        const Eight rate = load(out), residual = logarithm(increment) - stage.log_weight - rate;
-        const Eight slope = left * (1.0 - increment * by_strain) + share * stress * by_stress;
-        Eight step = -(residual / slope);
-        if (any(!(resting | ((slope > zero) & (rate > Eight(NO_RATE)) & (magnitude(step) < Eight(1e3)))))) break;
-        step = select(resting, zero, larger(Eight(-LONGEST), smaller(Eight(LONGEST), step)));
-        const Eight ratio = share / left * exponential(step);
-        share = larger(Eight(1e-290), smaller(Eight(1.0 - 1e-9), ratio / (1.0 + ratio)));
-        settled = !any(magnitude(step) > Eight(tolerance));
+    const Vector zero{};
+    CreepIteration iterations[VECTORS];
+    bool settled = true, regular = true;
+    for (int v = 0; v < VECTORS; ++v) {
+        iterations[v].begin(predictors[v], points, k + v * LANES);
+        store(x + TIME * EIGHT + v * LANES, splat(stage.time));
+        store(x + TEMPERATURE * EIGHT + v * LANES, splat(stage.temperature));
+        store(x + MEAN_STRESS * EIGHT + v * LANES, predictors[v].mean);
+        settled = settled && !any(~iterations[v].resting);
     }
-    if (settled) {
-        increment = select(resting, zero, equivalent * share);
-        store(points.increments + k, increment);
-    } else {
-        store(points.increments + k, guess);
-        for (int lane = 0; lane < EIGHT; ++lane) {
-            double alone[1 + POINT_SIZE] = {};
-            if (is_set(resting, lane)) {
-                points.increments[k + lane] = 0.0;
-            } else {
-                const PointFlag flag = solve_point(law, stage, p, lane, points, k + lane, tolerance, alone);
-                if (flag != POINTS_SOLVED) return flag;
-            }
-            by_principal.set(lane, alone[1 + PRINCIPAL_STRESS]);
-            by_mean.set(lane, alone[1 + MEAN_STRESS]);
-            by_strain.set(lane, alone[1 + STRAIN]);
-            by_stress.set(lane, alone[1 + STRESS] + p.top[lane] * alone[1 + PRINCIPAL_STRESS]);
+    if (settled) memset(out, 0, sizeof out);
+    for (int iteration = 0; iteration < ITERATIONS && regular && !settled; ++iteration) {
+        for (int v = 0; v < VECTORS; ++v) {
+            const CreepIteration& now = iterations[v];
+            const Vector stress = now.trial * (1.0 - now.share);
+            double* row = x + v * LANES;
+            store(row + STRESS * EIGHT, stress);
+            store(row + STRAIN * EIGHT, now.strain + now.equivalent * now.share);
+            store(row + PRINCIPAL_STRESS * EIGHT, predictors[v].mean + predictors[v].top * stress);
         }
-        increment = load(points.increments + k);
+        law.update(EIGHT, x, law.theta, out);
+        Mask strange{}, moving{};
+        for (int v = 0; v < VECTORS; ++v) {
+            CreepIteration& now = iterations[v];
+            const double* row = out + v * LANES;
+            const Vector left = 1.0 - now.share, stress = now.trial * left, increment = now.equivalent * now.share;
+            const Vector by_stress = load(row + (1 + STRESS) * EIGHT) +
+                                     predictors[v].top * load(row + (1 + PRINCIPAL_STRESS) * EIGHT);
+            const Vector rate = load(row), residual = logarithm(increment) - stage.log_weight - rate;
+            const Vector slope = left * (1.0 - increment * load(row + (1 + STRAIN) * EIGHT)) +
+                                 now.share * stress * by_stress;
+            Vector step = -(residual / slope);
+            strange |= ~(now.resting | ((slope > zero) & (rate > splat(NO_RATE)) & (magnitude(step) < splat(1e3))));
+            step = select(now.resting, zero, larger(splat(-LONGEST), smaller(splat(LONGEST), step)));
+            const Vector grown = now.share * exponential(step);
+            now.share = larger(splat(1e-290), smaller(splat(1.0 - 1e-9), grown / (left + grown)));
+            moving |= magnitude(step) > splat(tolerance);
+        }
+        regular = !any(strange);
+        settled = regular && !any(moving);
     }
-    const Mask creeps = increment > zero;
-    const Eight along = increment * by_stress, divisor = 1.0 / (1.0 + along * stiffness - increment * by_strain);
-    by.by_trial = select(creeps, along * divisor, zero);
-    by.by_principal = select(creeps, increment * by_principal * divisor, zero);
-    by.by_mean = select(creeps, increment * by_mean * divisor, zero);
+    for (int v = 0; v < VECTORS; ++v) {
+        const CreepIteration& now = iterations[v];
+        store(points.increments + k + v * LANES,
+              settled ? select(now.resting, zero, now.equivalent * now.share) : now.guess);
+    }
+    for (int point = 0; point < EIGHT && !settled; ++point) {
+        double alone[1 + POINT_SIZE] = {};
+        const PointPredictor p(predictors, point);
+        if (!(p.equivalent > 0.0)) {
+            points.increments[k + point] = 0.0;
+        } else {
+            const PointFlag flag = solve_point(law, stage, p, points, k + point, tolerance, alone);
+            if (flag != POINTS_SOLVED) return flag;
+        }
+        for (int row = 0; row <= POINT_SIZE; ++row) out[row * EIGHT + point] = alone[row];
+    }
+    for (int v = 0; v < VECTORS; ++v) {
+        const double* row = out + v * LANES;
+        const Vector increment = load(points.increments + k + v * LANES);
+        const Vector by_principal = load(row + (1 + PRINCIPAL_STRESS) * EIGHT);
+        const Vector along = increment * (load(row + (1 + STRESS) * EIGHT) + predictors[v].top * by_principal);
+        const Vector divisor = 1.0 / (1.0 + along * predictors[v].stiffness -
+                                      increment * load(row + (1 + STRAIN) * EIGHT));
+        const Mask creeps = increment > zero;
+        by[v].by_trial = select(creeps, along * divisor, zero);
+        by[v].by_principal = select(creeps, increment * by_principal * divisor, zero);
+        by[v].by_mean = select(creeps, increment * load(row + (1 + MEAN_STRESS) * EIGHT) * divisor, zero);
+    }
     return POINTS_SOLVED;
 }
 
 // The same for a law with states, one point after another.
 inline PointFlag creep_increments_with_states(const PointLaw& law, const StageConditions& stage,
-                                              const ElasticPredictor& p, PointStates& points, int64_t k,
-                                              double tolerance, Eight& increment, CreepDerivatives& by) {
+                                              const ElasticPredictor predictors[VECTORS], PointStates& points,
+                                              int64_t k, double tolerance, CreepDerivatives by[VECTORS]) {
     double out[(1 + MAX_STATES) * (7 + MAX_STATES)], gradient[(1 + MAX_STATES) * (POINT_SIZE + MAX_STATES)];
     double matrix[(1 + MAX_STATES) * (1 + MAX_STATES)], response[(1 + MAX_STATES) * (INPUTS + MAX_STATES)];
-    by.by_trial = by.by_principal = by.by_mean = Eight(0.0);
     for (int lane = 0; lane < EIGHT; ++lane) {
         const int64_t point = k + lane;
-        if (!(p.equivalent[lane] > 0.0)) {
+        const PointPredictor p(predictors, lane);
+        if (!(p.equivalent > 0.0)) {
             points.increments[point] = 0.0;
             continue;
         }
-        const double stiffness = 3.0 * stage.shear / p.volume[lane], trial = stiffness * p.equivalent[lane];
+        const double trial = p.stiffness * p.equivalent;
         if (points.trials[point] >= 0.0) {
             const double guess = points.increments[point] + points.by_trial[point] * (trial - points.trials[point]);
             if (guess > 0.0) points.increments[point] = guess;
         }
-        const PointFlag flag = solve_point(law, stage, p, lane, points, point, tolerance, out);
+        const PointFlag flag = solve_point(law, stage, p, points, point, tolerance, out);
         if (flag != POINTS_SOLVED) return flag;
         const double creep = points.increments[point];
         if (!(creep > 0.0)) continue;
-        const Axes axes = {p.mean[lane], p.top[lane], p.mean[lane], 0.0};
-        const StageProblem problem = {trial, stiffness, 0.0, stage.weight, 0.0};
+        const Axes axes = {p.mean, p.top, p.mean, 0.0};
+        const StageProblem problem = {trial, p.stiffness, 0.0, stage.weight, 0.0};
         gradient_of_update(out, problem, creep, gradient, law.states);
-        if (!differentiate_stage(axes, problem, creep, trial - stiffness * creep, out + 1, gradient, matrix, response,
+        if (!differentiate_stage(axes, problem, creep, trial - p.stiffness * creep, out + 1, gradient, matrix, response,
                                  law.states, 0))
             continue;
-        by.by_trial.set(lane, response[BY_TRIAL]);
-        by.by_principal.set(lane, response[BY_PRINCIPAL]);
-        by.by_mean.set(lane, response[BY_MEAN]);
+        CreepDerivatives& derivatives = by[lane / LANES];
+        derivatives.by_trial[lane % LANES] = response[BY_TRIAL];
+        derivatives.by_principal[lane % LANES] = response[BY_PRINCIPAL];
+        derivatives.by_mean[lane % LANES] = response[BY_MEAN];
     }
-    increment = load(points.increments + k);
     return POINTS_SOLVED;
 }
 
-// From the deformation gradient of eight points to P and, if STIFF, to A = dP/dF (symmetric); keeps what their states
-// become. at : with f11 ... f33 set. tolerance : on the last Newton correction of ln D; the error left is its square.
+// Stress P of the points of a vector and, if STIFF, A = dP/dF (symmetric), both times `weight`, into eights of numbers;
+// keeps what the states of the points become, whose increments are known.
 template <bool STIFF>
-CREEPKIT_INLINE PointFlag update_points(const PointLaw& law, const StageConditions& stage, PointStates& points,
-                                        int64_t k, Kinematics& at, double tolerance, Eight P[5], Eight A[25]) {
-    if (!set_strains(at)) return INVERTED;
-    const ElasticPredictor p = elastic_predictor(stage, at, points.base + k, points.count);
-    Eight increment(0.0);
-    CreepDerivatives by = {Eight(0.0), Eight(0.0), Eight(0.0)};
-    if (stage.weight > 0.0) {
-        const PointFlag flag =
-            law.states == 0 ? creep_increments(law, stage, p, points, k, tolerance, increment, by)
-                            : creep_increments_with_states(law, stage, p, points, k, tolerance, increment, by);
-        if (flag != POINTS_SOLVED) return flag;
-    } else {
-        store(points.increments + k, increment);
-    }
-    const Eight stiffness = 3.0 * stage.shear / p.volume, trial = stiffness * p.equivalent;
+CREEPKIT_INLINE void finish_points(const StageConditions& stage, PointStates& points, int64_t k, const Kinematics& at,
+                                   const ElasticPredictor& p, const CreepDerivatives& by, Vector weight, double* P,
+                                   double* A) {
+    const Vector increment = load(points.increments + k);
+    const Vector trial = p.stiffness * p.equivalent;
     store(points.trials + k, trial);
-    store(points.mises + k, trial - stiffness * increment);
+    store(points.mises + k, trial - p.stiffness * increment);
     store(points.directions + k, p.hoop * p.inverse);
     store(points.directions + points.count + k, p.difference * p.inverse);
     store(points.directions + 2 * points.count + k, p.shear * p.inverse);
-    Eight stress[4];
+    Vector stress[4], piola[5];
     log_stress(stage, p, increment, stress);
-    piola_stress(at, stress, P);
-    if (!STIFF) return POINTS_SOLVED;
+    piola_stress(at, stress, piola);
+    CREEPKIT_UNROLL for (int i = 0; i < 5; ++i) store(P + EIGHT * i, piola[i] * weight);
+    if (!STIFF) return;
     store(points.by_trial + k, by.by_trial);
-    Eight follow[4], moduli[4][4], by_w[3][3];
+    Vector follow[4], moduli[4][4], by_w[3][3];
     strain_derivatives(stage, p, increment, by, follow);
     tangent_moduli<true>(stage, p, increment, follow, moduli, by_w);
     double* kept = points.deviator + k;
@@ -342,23 +373,49 @@ CREEPKIT_INLINE PointFlag update_points(const PointLaw& law, const StageConditio
     store(kept + 3 * points.count, moduli[DIFFERENCE][HOOP] - moduli[DIFFERENCE][SUM]);
     store(kept + 4 * points.count, moduli[SHEAR][HOOP] - moduli[SHEAR][SUM]);
     store(kept + 5 * points.count, moduli[DIFFERENCE][SHEAR]);
-    piola_tangent(at, moduli, stress, A);
+    piola_tangent(at, moduli, stress, weight, A);
+}
+
+// From the deformation gradient of eight points to P (5, 8) and, if STIFF, to A = dP/dF (25, 8) (symmetric), both times
+// the points' weights (8,); keeps what their states become. at : with f11 ... f33 set. tolerance : on the last Newton
+// correction of ln D; the error left is its square.
+template <bool STIFF>
+CREEPKIT_INLINE PointFlag update_points(const PointLaw& law, const StageConditions& stage, PointStates& points,
+                                        int64_t k, Kinematics at[VECTORS], const double* weights, double tolerance,
+                                        double* P, double* A) {
+    ElasticPredictor predictors[VECTORS];
+    CreepDerivatives by[VECTORS] = {};
+    for (int v = 0; v < VECTORS; ++v) {
+        if (!set_strains(at[v])) return INVERTED;
+        predictors[v] = elastic_predictor(stage, at[v], points.base + k + v * LANES, points.count);
+    }
+    if (stage.weight > 0.0) {
+        const PointFlag flag = law.states == 0
+                                   ? creep_increments(law, stage, predictors, points, k, tolerance, by)
+                                   : creep_increments_with_states(law, stage, predictors, points, k, tolerance, by);
+        if (flag != POINTS_SOLVED) return flag;
+    } else {
+        for (int v = 0; v < VECTORS; ++v) store(points.increments + k + v * LANES, Vector{});
+    }
+    for (int v = 0; v < VECTORS; ++v)
+        finish_points<STIFF>(stage, points, k + v * LANES, at[v], predictors[v], by[v], load(weights + v * LANES),
+                             P + v * LANES, A + v * LANES);
     return POINTS_SOLVED;
 }
 
-// Stress P of eight points for a change of their creep strains by the sum of weights_i slopes_i, through the tangent of
-// the stage, which damps what the stage would damp. at : with strains set.
+// Stress P of the points of a vector for a change of their creep strains by the sum of weights_i slopes_i, through the
+// tangent of the stage, which damps what the stage would damp. at : with strains set.
 CREEPKIT_INLINE void stress_of_creep_change(const PointStates& points, int64_t k, const Kinematics& at,
-                                            const double weights[STAGES], Eight P[5]) {
+                                            const double weights[STAGES], Vector P[5]) {
     const int64_t stride = points.values * points.count;
-    Eight change[CREEP_COMPONENTS], kept[6];
+    Vector change[CREEP_COMPONENTS], kept[6];
     for (int v = 0; v < CREEP_COMPONENTS; ++v)
         change[v] = weights[0] * load(points.slopes + v * points.count + k) +
                     weights[1] * load(points.slopes + stride + v * points.count + k);
     for (int i = 0; i < 6; ++i) kept[i] = load(points.deviator + i * points.count + k);
-    const Eight first = kept[0] * change[0] + kept[3] * change[1] + kept[4] * change[2];
-    const Eight stress[4] = {first * (1.0 / 3.0), -(kept[3] * change[0] + kept[1] * change[1] + kept[5] * change[2]),
-                             first * (-2.0 / 3.0), -(kept[4] * change[0] + kept[5] * change[1] + kept[2] * change[2])};
+    const Vector first = kept[0] * change[0] + kept[3] * change[1] + kept[4] * change[2];
+    const Vector stress[4] = {first * (1.0 / 3.0), -(kept[3] * change[0] + kept[1] * change[1] + kept[5] * change[2]),
+                              first * (-2.0 / 3.0), -(kept[4] * change[0] + kept[5] * change[1] + kept[2] * change[2])};
     piola_stress(at, stress, P);
 }
 

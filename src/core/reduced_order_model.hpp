@@ -34,21 +34,6 @@ struct ReducedOrderModel {
 
 class ReducedOrderSensitivities;
 
-// Tile (8 x 8, by columns) += the sum over k of column_k row_k^T, whose numbers lie `stride` apart from k to k.
-CREEPKIT_INLINE void add_products(double* tile, const double* columns, const double* rows, int64_t stride,
-                                  int64_t count) {
-    Eight sums[EIGHT];
-#pragma GCC unroll 8
-    for (int q = 0; q < EIGHT; ++q) sums[q] = load(tile + EIGHT * q);
-    for (int64_t k = 0; k < count; ++k) {
-        const Eight column = load(columns + stride * k);
-#pragma GCC unroll 8
-        for (int q = 0; q < EIGHT; ++q) sums[q] += rows[stride * k + q] * column;
-    }
-#pragma GCC unroll 8
-    for (int q = 0; q < EIGHT; ++q) store(tile + EIGHT * q, sums[q]);
-}
-
 // A Gauss point of a side under pressure: its radius and its slopes in the deformed state, mm.
 struct SidePoint {
     double radius, dr, dz;
@@ -60,15 +45,16 @@ public:
     using SensitivityMemory = ReducedOrderSensitivities;
 
     explicit ReducedOrderSystem(const ReducedOrderModel& model)
-        : model(model), shape(BandShape::of(model.modes, model.modes - 1)),
+        : model(model), shape(model.modes, model.modes - 1),
           width((model.modes + EIGHT - 1) / EIGHT * EIGHT) {}
 
     const ReducedOrderModel& model;
-    const BandShape shape;  // the whole matrix is the band
+    BandShape shape;        // the whole matrix is the band
     const int64_t width;    // R
     double *tangent = nullptr, *residual = nullptr;  // lower triangle in tiles; (shape.rows(),)
 
     void take(Workspace& memory) {
+        shape.take(memory, true);
         tangent = memory.doubles(shape.numbers() + 1);
         residual = memory.doubles(shape.rows());
         products = memory.doubles(5 * EIGHT * width);
@@ -84,13 +70,12 @@ public:
     bool touches() const { return false; }
     bool contact_settled() const { return true; }
     double correction_share(const StageConditions&, double*, double size) const { return size > 1.0 ? 1.0 / size : 1.0; }
-    Eight weights(int64_t block) const { return load(model.weights + EIGHT * block); }
 
-    // Deformation gradient of eight points.
-    CREEPKIT_INLINE void deform(int64_t block, const double* q, Kinematics& at) const {
-        const double* by_mode = model.points_first + block * model.modes * 5 * EIGHT;
-        at.f11 = at.f22 = at.f33 = Eight(1.0);
-        at.f12 = at.f21 = Eight(0.0);
+    // Deformation gradient of the points of a vector, of which `point` is the first.
+    CREEPKIT_INLINE void deform(int64_t point, const double* q, Kinematics& at) const {
+        const double* by_mode = model.points_first + point / EIGHT * model.modes * 5 * EIGHT + point % EIGHT;
+        at.f11 = at.f22 = at.f33 = splat(1.0);
+        at.f12 = at.f21 = Vector{};
         for (int64_t i = 0; i < model.modes; ++i) {
             const double* at_mode = by_mode + 5 * EIGHT * i;
             at.f11 += q[i] * load(at_mode);
@@ -106,23 +91,21 @@ public:
     PointFlag assemble(const PointLaw& law, const StageConditions& stage, const double* q, PointStates& points,
                        double tolerance) {
         clear();
-        if (STIFF) memset(tangent, 0, sizeof(double) * size_t(shape.numbers() + 1));
-        alignas(64) double A[25][EIGHT];
+        if (STIFF) shape.clear(tangent);
+        alignas(64) double P[5][EIGHT], A[25][EIGHT];
         for (int64_t block = 0; block < model.points / EIGHT; ++block) {
-            Kinematics at;
-            deform(block, q, at);
-            Eight stress[5], moduli[25];
+            const int64_t first = EIGHT * block;
+            Kinematics at[VECTORS];
+            for (int v = 0; v < VECTORS; ++v) deform(first + v * LANES, q, at[v]);
             const PointFlag flag =
-                update_points<STIFF>(law, stage, points, EIGHT * block, at, tolerance, stress, moduli);
+                update_points<STIFF>(law, stage, points, first, at, model.weights + first, tolerance, P[0], A[0]);
             if (flag != POINTS_SOLVED) return flag;
-            const Eight weight = weights(block);
-            add_forces(block, stress, weight);
+            add_forces(block, P);
             if (!STIFF) continue;
-            for (int i = 0; i < 25; ++i) store(A[i], moduli[i] * weight);
             tangent_products(block, A, products);
             for (int64_t column = 0; column < shape.blocks; ++column)
                 for (int64_t row = column; row < shape.blocks; ++row)
-                    add_products(tangent + (column * shape.diagonals + row - column) * TILE,
+                    add_products<false>(tangent + shape.tile(column, row - column),
                                  model.gradients + block * EIGHT * 5 * width + EIGHT * row, products + EIGHT * column,
                                  width, 5 * EIGHT);
         }
@@ -133,14 +116,18 @@ public:
     // Out-of-balance forces of a change of all creep strains by the sum of weights_i slopes_i, into `residual`.
     void error_forces(const double* q, const PointStates& points, const double weights[STAGES]) {
         clear();
+        alignas(64) double P[5][EIGHT];
         for (int64_t block = 0; block < model.points / EIGHT; ++block) {
-            Kinematics at;
-            deform(block, q, at);
-            if (!set_strains(at)) continue;  // never: the stage has just converged here
-            const int64_t k = EIGHT * block;
-            Eight stress[5];
-            stress_of_creep_change(points, k, at, weights, stress);
-            add_forces(block, stress, load(model.weights + k));
+            for (int v = 0; v < VECTORS; ++v) {
+                const int64_t k = EIGHT * block + v * LANES;
+                Kinematics at;
+                Vector stress[5];
+                deform(k, q, at);
+                if (!set_strains(at)) continue;  // never: the stage has just converged here
+                stress_of_creep_change(points, k, at, weights, stress);
+                for (int i = 0; i < 5; ++i) store(P[i] + v * LANES, stress[i] * load(model.weights + k));
+            }
+            add_forces(block, P);
         }
     }
 
@@ -163,9 +150,9 @@ public:
 
     SidePoint side_point(int64_t k, const double* q) const {
         const double *rest = model.sides + 4 * k, *modes = model.side_modes + 4 * k * width;
-        Eight radius(0.0), dr(0.0), dz(0.0);
-        for (int64_t i = 0; i < width; i += EIGHT) {
-            const Eight part = load(q + i);
+        Vector radius{}, dr{}, dz{};
+        for (int64_t i = 0; i < width; i += LANES) {
+            const Vector part = load(q + i);
             radius += part * load(modes + i);
             dr += part * load(modes + 2 * width + i);
             dz += part * load(modes + 3 * width + i);
@@ -176,10 +163,10 @@ public:
     // Tangent times gradients of eight points, (8, 5, R), from A (25, 8), which carries the weights.
     CREEPKIT_INLINE void tangent_products(int64_t block, const double A[25][EIGHT], double* result) const {
         const double* gradients = model.gradients + block * EIGHT * 5 * width;
-        for (int64_t i = 0; i < width; i += EIGHT)
+        for (int64_t i = 0; i < width; i += LANES)
             for (int lane = 0; lane < EIGHT; ++lane) {
                 const double* G = gradients + lane * 5 * width + i;
-                Eight g[5];
+                Vector g[5];
                 for (int t = 0; t < 5; ++t) g[t] = load(G + t * width);
                 for (int s = 0; s < 5; ++s)
                     store(result + (lane * 5 + s) * width + i,
@@ -193,26 +180,25 @@ private:
 
     // Largest of the first `count` measured displacements, mm; NaN or infinite where one is.
     double largest_of(const double* q, int64_t count) const {
-        Eight worst(0.0), unusual(0.0);
-        for (int64_t k = 0; k < count; k += EIGHT) {
-            Eight value(0.0);
+        Vector worst{}, unusual{};
+        for (int64_t k = 0; k < count; k += LANES) {
+            Vector value{};
             for (int64_t i = 0; i < model.modes; ++i) value += q[i] * load(model.measures + i * model.measured + k);
             worst = larger(worst, magnitude(value));
             unusual += value - value;  // 0, or NaN where a value is NaN or infinite
         }
         double result = 0.0;
-        for (int lane = 0; lane < EIGHT; ++lane) result = fmax(result, worst[lane]);
+        for (int lane = 0; lane < LANES; ++lane) result = fmax(result, worst[lane]);
         return result + sum(unusual);
     }
 
     void clear() { memset(residual, 0, sizeof(double) * size_t(shape.rows())); }
 
-    CREEPKIT_INLINE void add_forces(int64_t block, const Eight stress[5], const Eight& weight) {
-        alignas(64) double P[5][EIGHT];
-        for (int i = 0; i < 5; ++i) store(P[i], stress[i] * weight);
+    // Forces of the stresses of eight points, which carry the weights.
+    CREEPKIT_INLINE void add_forces(int64_t block, const double P[5][EIGHT]) {
         const double* gradients = model.gradients + block * EIGHT * 5 * width;
-        for (int64_t i = 0; i < width; i += EIGHT) {
-            Eight total = load(residual + i);
+        for (int64_t i = 0; i < width; i += LANES) {
+            Vector total = load(residual + i);
             for (int lane = 0; lane < EIGHT; ++lane)
                 for (int s = 0; s < 5; ++s) total += P[s][lane] * load(gradients + (lane * 5 + s) * width + i);
             store(residual + i, total);
@@ -229,13 +215,13 @@ private:
             const SidePoint at = side_point(k, q);
             const double weight = pressure * model.sides[4 * k], *modes = model.side_modes + 4 * k * width;
             double *columns = side_columns + 4 * k * width, *rows = side_rows + 4 * k * width;
-            for (int64_t i = 0; i < width; i += EIGHT) {
-                const Eight r = load(modes + i), z = load(modes + width + i);
+            for (int64_t i = 0; i < width; i += LANES) {
+                const Vector r = load(modes + i), z = load(modes + width + i);
                 store(residual + i, load(residual + i) + weight * at.radius * (at.dz * r - at.dr * z));
                 if (!STIFF) continue;
                 // the symmetric part of r_modes (dz r + radius dz_modes)^T - z_modes (dr r + radius dr_modes)^T
-                const Eight across = weight * (at.dz * r + at.radius * load(modes + 3 * width + i));
-                const Eight along = weight * (at.dr * r + at.radius * load(modes + 2 * width + i));
+                const Vector across = weight * (at.dz * r + at.radius * load(modes + 3 * width + i));
+                const Vector along = weight * (at.dr * r + at.radius * load(modes + 2 * width + i));
                 store(columns + i, 0.5 * r);
                 store(columns + width + i, -0.5 * z);
                 store(columns + 2 * width + i, 0.5 * across);
@@ -249,7 +235,7 @@ private:
         if (!STIFF) return;
         for (int64_t column = 0; column < shape.blocks; ++column)
             for (int64_t row = column; row < shape.blocks; ++row)
-                add_products(tangent + (column * shape.diagonals + row - column) * TILE, side_columns + EIGHT * row,
+                add_products<false>(tangent + shape.tile(column, row - column), side_columns + EIGHT * row,
                              side_rows + EIGHT * column, width, 4 * model.side_points);
     }
 };

@@ -18,7 +18,8 @@ public:
     }
 
     void clear(const ReducedOrderSystem& system) {
-        memset(matrix, 0, sizeof(double) * size_t(2 * system.shape.numbers() + 1));
+        system.shape.clear(matrix);
+        system.shape.clear(matrix + system.shape.numbers());
         memset(right, 0, sizeof(double) * size_t(count));
     }
 
@@ -32,8 +33,8 @@ public:
     void subtract_forces(const ReducedOrderSystem& system, int64_t block, const double* stresses, int64_t padded) {
         const double* gradients = system.model.gradients + block * EIGHT * 5 * system.width;
         for (int64_t i = 0; i < system.model.modes; ++i)
-            for (int64_t c = 0; c < padded; c += EIGHT) {
-                Eight total = load(right + i * padded + c);
+            for (int64_t c = 0; c < padded; c += LANES) {
+                Vector total = load(right + i * padded + c);
                 for (int k = 0; k < 5 * EIGHT; ++k)
                     total -= gradients[k * system.width + i] * load(stresses + k * padded + c);
                 store(right + i * padded + c, total);
@@ -49,8 +50,8 @@ public:
         for (int64_t k = 0; k < model.side_points; ++k) {
             const SidePoint at = system.side_point(k, q);
             const double weight = model.sides[4 * k], *modes = model.side_modes + 4 * k * width;
-            for (int64_t i = 0; i < width; i += EIGHT) {
-                const Eight r = load(modes + i);
+            for (int64_t i = 0; i < width; i += LANES) {
+                const Vector r = load(modes + i);
                 store(pair + i, pressure * weight * (at.dz * r + at.radius * load(modes + 3 * width + i)));
                 store(pair + width + i, -pressure * weight * (at.dr * r + at.radius * load(modes + 2 * width + i)));
             }
@@ -84,8 +85,8 @@ public:
     void gradient_changes(const ReducedOrderSystem& system, int64_t block, double* gradients, int64_t padded) const {
         const double* modes = system.model.gradients + block * EIGHT * 5 * system.width;
         for (int k = 0; k < 5 * EIGHT; ++k)
-            for (int64_t c = 0; c < padded; c += EIGHT) {
-                Eight total(0.0);
+            for (int64_t c = 0; c < padded; c += LANES) {
+                Vector total{};
                 for (int64_t i = 0; i < system.model.modes; ++i)
                     total += modes[k * system.width + i] * load(right + i * padded + c);
                 store(gradients + k * padded + c, total);
@@ -112,10 +113,10 @@ private:
         const BandShape& shape = system.shape;
         for (int64_t one = 0; one < shape.blocks; ++one)
             for (int64_t other = one; other < shape.blocks; ++other) {
-                const int64_t place = (one * shape.diagonals + other - one) * TILE;
-                add_products(matrix + place, columns + EIGHT * other, rows + EIGHT * one, system.width, terms);
+                const int64_t place = shape.tile(one, other - one);
+                add_products<false>(matrix + place, columns + EIGHT * other, rows + EIGHT * one, system.width, terms);
                 if (other > one)  // above the diagonal a tile lies by rows
-                    add_products(matrix + shape.numbers() + place, rows + EIGHT * other, columns + EIGHT * one,
+                    add_products<false>(matrix + shape.numbers() + place, rows + EIGHT * other, columns + EIGHT * one,
                                  system.width, terms);
             }
     }

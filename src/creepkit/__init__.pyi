@@ -38,15 +38,12 @@ from .inverse.goodness_of_fit import relative_squared_error as relative_squared_
 from .inverse.identification_document import load as load
 from .inverse.ranking_document import load_ranking as load_ranking
 from .inverse.reference_conditions import with_arrhenius as with_arrhenius
-from .inverse.search.derivative_free import CmaEs as CmaEs
-from .inverse.search.derivative_free import ParticleSwarm as ParticleSwarm
 from .inverse.search.multistart import MultiStart as MultiStart
+from .inverse.search.particle_swarm import ParticleSwarm as ParticleSwarm
 from .inverse.selection.ranking import rank as rank
 from .inverse.settings import IdentificationSettings as IdentificationSettings
 from .inverse.settings import default_nuisances as default_nuisances
 from .inverse.sparsity.penalties import L2 as L2
-from .inverse.sparsity.penalties import GroupL2 as GroupL2
-from .inverse.sparsity.penalties import Sqrt as Sqrt
 from .inverse.sparsity.penalties import Subsets as Subsets
 from .inverse.uncertainty.quantities import exponent_at as exponent_at
 from .inverse.uncertainty.quantities import rate_at as rate_at

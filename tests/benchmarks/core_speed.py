@@ -1,15 +1,22 @@
 """Cost of a simulation in the compiled core, and of its steps.
 
-    python tests/benchmarks/core_speed.py [--repeats 30] [--write]
+    python tests/benchmarks/core_speed.py [--repeats 30] [--write] [--libraries before.so,now.so [--counts]]
 
 The dimple under 8 MPa, then 10 MPa from 4 h on, observed at 289 times of 12 h, by six laws of the paper; least CPU time
 of the repeats, on one thread. "Prediction" is what a fit asks for: set-up, simulation, Gaussian fits, interpolation in
 time. "Derivatives" adds those to all parameters of the law, the thickness, the modulus and the temperature.
 """
 
+import os
+import subprocess
+import sys
+import tempfile
 import time
+from functools import partial
+from pathlib import Path
 
 import numpy as np
+from core_instructions import PARTS, counted, write_problem
 from measured import Page, arguments
 
 import creepkit as ck
@@ -117,12 +124,67 @@ def tolerances(page: Page, repeats: int) -> None:
         )
 
 
+def answer_rounds() -> None:
+    """For each line of input, mean CPU ms of simulations, predictions, derivatives and reduced-order models."""
+    calls = []
+    for case in map(Case, CASES):
+        predictor = case.specimen.reduced_order_model()
+        reduced = predictor.reduced_model_of(case.setup.piece)
+        simulation = partial(
+            simulate, case.law, case.theta, reduced, case.setup.load_history, settings=predictor._settings(False)
+        )
+        calls.append((case.simulate, case.predict, partial(case.predict, True), simulation))
+    for _ in sys.stdin:
+        print(*np.mean([[least(call, 1) for call in own] for own in calls], axis=0), flush=True)
+
+
+def libraries(page: Page, paths: list[str], repeats: int, counts: bool) -> None:
+    """Libraries of the core in turns, with vectors of 4 and 8 numbers; instructions of their parts, with 4 and 2."""
+    page.table("library, vector", "simulation, ms", "prediction", "with derivatives", "reduced-order model")
+    best = {(path, lanes): np.full(4, np.inf) for lanes in (4, 8) for path in paths}
+    command = [sys.executable, "-c", "import core_speed; core_speed.answer_rounds()"]
+    workers = {}
+    for path, lanes in best:
+        environment = {**os.environ, "CREEPKIT_CORE": path, "CREEPKIT_LANES": str(lanes)}
+        workers[path, lanes] = subprocess.Popen(
+            command,
+            cwd=Path(__file__).parent,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+    for _ in range(repeats):
+        for key, worker in workers.items():
+            print(file=worker.stdin, flush=True)
+            best[key] = np.minimum(best[key], np.array(worker.stdout.readline().split(), dtype=float))
+    for worker in workers.values():
+        worker.communicate()
+    for (path, lanes), times in best.items():
+        page.row(f"{Path(path).parent.name}, {lanes}", *(f"{t:.2f}" for t in times))
+    if not counts:
+        return
+    page.table("thousand instructions: library, numbers in a vector", *PARTS.values())
+    case = Case("norton")
+    with tempfile.TemporaryDirectory() as folder:
+        write_problem(case.setup.model, case.simulate().displacements[1].copy(), Path(folder))
+        for lanes in (4, 2):
+            for path in paths:
+                found = counted(path, Path(folder), lanes)
+                page.row(f"{Path(path).parent.name}, {lanes}", *(f"{found[name]:.0f}" for name in PARTS.values()))
+
+
 def main() -> None:
     """Print the tables, and write the page if asked to."""
     parser = arguments(__doc__)
     parser.add_argument("--repeats", type=int, default=30)
+    parser.add_argument("--libraries", default="", help="compare these alone, in folders that name them")
+    parser.add_argument("--counts", action="store_true", help="count their instructions too, by valgrind")
     options = parser.parse_args()
     page = Page("core_speed", __doc__)
+    if options.libraries:
+        libraries(page, options.libraries.split(","), options.repeats, options.counts)
+        return
     laws(page, options.repeats)
     tolerances(page, options.repeats)
     if options.write:

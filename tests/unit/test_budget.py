@@ -15,13 +15,13 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 322,
-    "app": 612,
+    "app": 611,
     "cameras": 931,
-    "cli": 2351,
+    "cli": 2350,
     "core": 67,
     "dataset": 765,
     "discovery": 1402,
-    "experiments": 1584,
+    "experiments": 1572,
     "exporters": 2658,
     "extraction": 1307,
     "fem": 1827,
@@ -29,28 +29,28 @@ BUDGET = {
     "forecasts": 1412,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 11468,
+    "inverse": 11181,
     "jobs": 251,
     "kernels": 1703,
     "language": 1494,
     "laws": 136,
     "modules": 781,
     "quality": 1470,
-    "readers": 5574,
-    "records": 1977,
+    "readers": 5573,
+    "records": 1991,
     "registry": 615,
-    "reports": 6354,
-    "rupture_assessment": 1804,
+    "reports": 6169,
+    "rupture_assessment": 1787,
     "sampling": 1027,
     "screening": 683,
-    "specimens": 3592,
-    "studies": 3056,
+    "specimens": 3591,
+    "studies": 3055,
     "surrogates": 1668,
     "testing": 1850,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30052
+TESTS = 29889
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

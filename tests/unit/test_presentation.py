@@ -11,13 +11,10 @@ from typing import Any
 import numpy as np
 
 from creepkit.inverse.selection import rank
-from creepkit.inverse.sparsity.result import PenaltyPath
 from creepkit.inverse.uncertainty.correlation import Correlation
 from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
 from creepkit.laws.norton import NORTON
 from creepkit.presentation import function_named
-from creepkit.records import constant_stress
-from creepkit.specimens.run import Run
 from helpers import source_tree
 from helpers.log_rate_predictor import known_scatter, measured
 from helpers.source_tree import public_classes
@@ -56,19 +53,10 @@ def test_every_class_that_prints_so_has_a_text() -> None:
         assert getattr(import_module(module), name)._text, name
 
 
-def test_a_derived_class_uses_the_entries_of_its_base() -> None:
-    class Longer(Run):
-        """A run of a specimen of another package."""
-
-    run = Longer("bar", np.array([0.0, 1.0]), {"strain": np.array([0.0, 0.01])}, constant_stress(50.0), 1000.0)
-    assert str(run) == "bar: complete; 2 frames to 1 s, where strain 0.01"
-
-
 AXIS = np.array([10.0, 100.0])
 RECORDS = [
     Correlation(("ln A", "n"), np.array([[1.0, -0.5], [-0.5, 1.0]]), np.ones(2)),
     ProfileLikelihood("n", "1", AXIS, np.ones(2), 4.0, None, 5.0, 3.84, 0.95, (3.0, 5.0)),
-    PenaltyPath("l2", ("one",), AXIS, np.ones((2, 1)), AXIS, (("one",), ("one",)), np.zeros(2), np.ones((2, 1)), 1),
 ]
 
 

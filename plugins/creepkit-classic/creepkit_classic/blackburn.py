@@ -26,8 +26,8 @@ BLACKBURN = CreepLaw(
     title="Blackburn: two exponential transients and steady creep",
     terms={"fast transient": fast, "slow transient": slow, "steady": steady},
     params={
-        A: Param("steady rate coefficient", unit="1/s", bounds=(1e-60, 1e-5), scale="log", off=0.0),
-        n: Param("stress exponent of steady creep", bounds=(1, 16)),
+        A: Param("steady rate coefficient", unit="1/s", bounds=(1e-60, 1e-5), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent of steady creep", bounds=(1, 16), widens=True),
         C_f: STRAIN,
         C_s: STRAIN,
         a: Param("stress exponent of transient strain", bounds=(0.5, 6)),

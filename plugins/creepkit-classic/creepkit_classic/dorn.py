@@ -24,7 +24,7 @@ DORN = CreepLaw(
     terms={"climb and glide": A * diffusivity * modulus * b / (BOLTZMANN * temperature) * (stress / modulus) ** n},
     params={
         A: Param("Dorn's constant", unit="1", bounds=(1e-5, 1e20), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 12)),
+        n: Param("stress exponent", bounds=(1, 12), widens=True),
         D_0: Param("frequency factor of lattice diffusion", unit="mm^2/s", bounds=(1e-3, 1e6), scale="log"),
         Q: Param("activation energy of lattice diffusion", unit="J/mol", bounds=(5e4, 9e5)),
         b: Param("Burgers vector", unit="mm", bounds=(1.5e-7, 8e-7), scale="log"),

@@ -18,8 +18,8 @@ MPC_OMEGA = CreepLaw(
     title="MPC Omega: the rate grows exponentially with strain",
     terms={"acceleration by strain": A * stress**n * sympy.exp(acceleration)},
     params={
-        A: Param("initial rate at 1 MPa", unit="1/s", bounds=(1e-60, 1e-5), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 20)),
+        A: Param("initial rate at 1 MPa", unit="1/s", bounds=(1e-60, 1e-5), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(1, 20), widens=True),
         Omega: Param("acceleration by strain", unit="1", bounds=(1.0, 500.0), scale="log"),
         c: Param("fall of ln Omega with stress", unit="1/MPa", bounds=(0.0, 0.05), off=0.0),
     },

@@ -13,8 +13,8 @@ NORTON_BAILEY_RATE = CreepLaw(
     title="Norton-Bailey, time hardening: rate = A s^n t^m",
     terms={"time hardening": A * stress**n * time**m},
     params={
-        A: Param("rate at 1 MPa and 1 s", unit="1/s", bounds=(1e-40, 1e-2), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 12)),
+        A: Param("rate at 1 MPa and 1 s", unit="1/s", bounds=(1e-40, 1e-2), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(1, 12), widens=True),
         m: Param("time exponent of the rate", bounds=(-0.95, 0.0), off=0.0),
     },
     references=(

@@ -14,8 +14,8 @@ NORTON_BAILEY_STRAIN = CreepLaw(
     title="Norton-Bailey, strain hardening in the notation of Abaqus",
     terms={"strain hardening": (A * stress**n * ((m + 1) * strain) ** m) ** (1 / (m + 1))},
     params={
-        A: Param("rate at 1 MPa and 1 s", unit="1/s", bounds=(1e-40, 1e-2), scale="log"),
-        n: Param("stress exponent of the time form", bounds=(1, 12)),
+        A: Param("rate at 1 MPa and 1 s", unit="1/s", bounds=(1e-40, 1e-2), scale="log", widens=True),
+        n: Param("stress exponent of the time form", bounds=(1, 12), widens=True),
         m: Param("time exponent of the rate", bounds=(-0.9, 0.0), off=0.0),
     },
     references=(

@@ -13,8 +13,8 @@ NORTON_BAILEY_TIME = CreepLaw(
     title="Norton-Bailey, time form: strain = A s^n t^m",
     terms={"time form": A * m * stress**n * time ** (m - 1)},
     params={
-        A: Param("strain at 1 MPa after 1 s", unit="1", bounds=(1e-40, 1e-2), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 12)),
+        A: Param("strain at 1 MPa after 1 s", unit="1", bounds=(1e-40, 1e-2), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(1, 12), widens=True),
         m: Param("time exponent of the strain", bounds=(0.05, 1.0)),
     },
     references=(

@@ -14,8 +14,8 @@ THRESHOLD_STRESS = CreepLaw(
     title="Power law above a threshold stress",
     terms={"power law above threshold": A * sympy.Max(stress - s_0, 0) ** n},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 10)),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(1, 10), widens=True),
         s_0: Param("threshold stress", unit="MPa", bounds=(0.0, 500.0), off=0.0),
     },
     references=(

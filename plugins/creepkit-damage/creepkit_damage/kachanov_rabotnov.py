@@ -34,8 +34,8 @@ KACHANOV_RABOTNOV = CreepLaw(
     title="Kachanov-Rabotnov creep damage",
     terms={"damaged creep": A * (stress / (1 - damage(v, phi))) ** n * time**m},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-60, 1e-5), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 20)),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-60, 1e-5), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(1, 20), widens=True),
         B: Param("damage rate coefficient", unit="1/s", bounds=(1e-60, 1e-3), scale="log", off=0.0),
         chi: Param("stress exponent of damage", bounds=(1, 20)),
         phi: Param("exponent of damage", bounds=(0, 30)),

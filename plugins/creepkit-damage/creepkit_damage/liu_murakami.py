@@ -22,8 +22,8 @@ LIU_MURAKAMI = CreepLaw(
     title="Liu-Murakami creep damage",
     terms={"damaged creep": A * stress**n * sympy.exp(softening * w ** sympy.Rational(3, 2))},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-60, 1e-5), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 20)),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-60, 1e-5), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(1, 20), widens=True),
         B: Param("damage rate coefficient", unit="1/s", bounds=(1e-60, 1e-3), scale="log", off=0.0),
         p: Param("stress exponent of damage", bounds=(1, 20)),
         q_2: Param("exponential growth of damage", bounds=(0.5, 20)),

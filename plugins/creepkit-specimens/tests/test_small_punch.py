@@ -78,8 +78,7 @@ def test_deflections_to_half_the_diameter_of_the_hole(n: float, force: float) ->
     assert (np.diff(run.outputs["deflection"][: run.times.size]) > 0.0).all()
 
 
-@pytest.mark.parametrize("n", [3.0, 7.0])
-def test_mesh_and_penalty_converge(n: float) -> None:
+def test_mesh_and_penalty_converge() -> None:
     """The mesh errs by 1.3 % at most, by half as much as one twice as coarse; stiffer contact changes 1 % at most.
 
     Steps and equilibrium are tight: with a penalty of 100 times, looser equilibrium means pressures so wrong that steps
@@ -88,14 +87,13 @@ def test_mesh_and_penalty_converge(n: float) -> None:
     times = [1e3, 1e5]
 
     def deflections(**changes):
-        return crept(SmallPunch(tolerance=2e-4, **changes), n, 300.0, times).outputs["deflection"]
+        return crept(SmallPunch(tolerance=2e-4, **changes), 7.0, 300.0, times).outputs["deflection"]
 
     coarse, usual, fine = (deflections(refinement=r) for r in (0.5, 1.0, 2.0))
     assert (np.abs(usual / fine - 1.0) < 0.013).all()
     assert (np.abs(usual - fine) < 0.7 * np.abs(coarse - fine)).all()
-    for factor in (10.0, 100.0):
-        stiffer = deflections(refinement=2.0, contact_stiffness=factor * SmallPunch().contact_stiffness)
-        np.testing.assert_allclose(fine, stiffer, rtol=0.01)
+    stiffer = deflections(refinement=2.0, contact_stiffness=100.0 * SmallPunch().contact_stiffness)
+    np.testing.assert_allclose(fine, stiffer, rtol=0.01)
 
 
 def test_the_ball_carries_the_force_with_little_penetration() -> None:

@@ -43,7 +43,7 @@ extern "C" int64_t LANE_FUNCTION(creepkit_assemble)(
     memcpy(residual, system.residual, sizeof(double) * size_t(model->size));
     for (int64_t i = 0; tangent && i < model->size; ++i)
         for (int64_t j = 0; j <= i; ++j) {
-            const bool inside = i / EIGHT - j / EIGHT < system.shape.diagonals;
+            const bool inside = system.shape.first[i / EIGHT] <= j / EIGHT;
             tangent[i * model->size + j] = tangent[j * model->size + i] =
                 inside ? system.tangent[system.shape.place(i, j)] : 0.0;
         }

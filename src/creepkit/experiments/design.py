@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -185,7 +186,8 @@ class _Search:
                 self.left_out[candidate.description] = refusal
             else:
                 expectation = self.criterion.expectation(candidate.histories)
-                self.tests.append(PlannedTest(candidate, expectation, expectation))
+                what = candidate.description, candidate.histories, candidate.hours
+                self.tests.append(PlannedTest(*what, expectation, expectation))
         if refuse and not self.tests and self.left_out:
             name, refusal = next(iter(self.left_out.items()))
             raise FitError(f"the planned test '{name}' is of no use: {refusal}")
@@ -214,7 +216,7 @@ class _Search:
         """The best candidates at draws of the posteriors, and then the very best with refits in full."""
         promising = self._promising()
         for done, test in enumerate(promising):
-            if self._ruptures(test.candidate):
+            if self._ruptures(test):
                 self.tests.remove(test)
             else:
                 self._evaluate_at_draws(test)
@@ -226,7 +228,7 @@ class _Search:
         """The first candidates, no more than two of one load and duration."""
         chosen, places = list[PlannedTest](), Counter[tuple[float, float]]()
         for test in self.tests:
-            places[place := (test.first_level, test.candidate.duration)] += 1
+            places[place := (test.first_level, test.duration)] += 1
             if places[place] <= MOST_ALIKE and len(chosen) < EVALUATED_AT_DRAWS:
                 chosen.append(test)
         return chosen
@@ -241,16 +243,16 @@ class _Search:
 
     def _evaluate_at_draws(self, test: PlannedTest) -> None:
         expectation = self.criterion.expectation(test.histories, at_draws=True)
-        position = next(k for k, t in enumerate(self.tests) if t.candidate is test.candidate)
-        self.tests[position] = PlannedTest(test.candidate, expectation, test.first_order, True)
+        position = next(k for k, t in enumerate(self.tests) if t.histories is test.histories)
+        self.tests[position] = replace(test, expectation=expectation, at_draws=True)
         self.tests.sort(key=self._order)
 
     def _refit(self, criterion: LawCriterion) -> None:
         """Refits of the first candidate in every direction, until it stays the first or there were enough of them."""
         refits, refitted = 0, set()
-        while refits < MOST_REFITS and self.tests and id(self.tests[0].candidate) not in refitted:
+        while refits < MOST_REFITS and self.tests and id(self.tests[0].histories) not in refitted:
             first = self.tests[0]
-            refitted.add(id(first.candidate))
+            refitted.add(id(first.histories))
             for a, b in criterion.directions():
                 refits += int(refits < MOST_REFITS and criterion.refit(first.histories, a, b))
                 self.progress("refits in full", min(refits, MOST_REFITS), MOST_REFITS)
@@ -306,7 +308,7 @@ class _Search:
             left = self.task.budget - sum(test.hours for test in plan)
             notes.append(f"a plan has at most {MOST_RUNS} runs; {left:.3g} h of the budget are left")
         if plan and self.rigs:
-            notes += edges_of(plan[0].candidate, [t.candidate for t in self.tests], self.rigs)
+            notes += edges_of(plan[0], self.tests, self.rigs)
         return notes
 
     def _together(self, plan: Sequence[PlannedTest]) -> Expectation:

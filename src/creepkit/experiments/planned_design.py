@@ -13,7 +13,6 @@ from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import CandidateTest
 from creepkit.experiments.expectations import Expectation
 from creepkit.presentation import Presentable, present
-from creepkit.records import History
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,32 +27,16 @@ ALIKE = 0.05
 
 
 @dataclass(frozen=True)
-class PlannedTest:
-    """A run that could be made next: what it is, and what it is expected to tell.
+class PlannedTest(CandidateTest):
+    """A run that could be made next, and what it is expected to tell.
 
     first_order : the same worked out to first order about the estimates, as it is of all tests; of the best ones the
     expectation is at draws of the posteriors (at_draws).
     """
 
-    candidate: CandidateTest
     expectation: Expectation
     first_order: Expectation
     at_draws: bool = False
-
-    @property
-    def description(self) -> str:
-        """What it is, in words."""
-        return self.candidate.description
-
-    @property
-    def histories(self) -> tuple[History, ...]:
-        """Its test or tests, planned."""
-        return self.candidate.histories
-
-    @property
-    def hours(self) -> float:
-        """h of machine time."""
-        return self.candidate.hours
 
     @property
     def machine_time(self) -> str:
@@ -61,19 +44,14 @@ class PlannedTest:
         return machine_time_text(self.hours)
 
     @property
-    def first_level(self) -> float:
-        """The first load above zero: MPa, or a strain."""
-        return self.candidate.first_level
-
-    @property
     def information_per_hour(self) -> float:
         """Nats an hour of machine time."""
-        return self.expectation.information / self.candidate.hours
+        return self.expectation.information / self.hours
 
     @property
     def first_order_per_hour(self) -> float:
         """Nats an hour of machine time, to first order: like for like over all tests."""
-        return self.first_order.information / self.candidate.hours
+        return self.first_order.information / self.hours
 
 
 @dataclass(frozen=True)

@@ -104,8 +104,8 @@ def solve(
     mises, reactions = _empty_record(rows, points), _empty_record(rows)
     pattern = _contiguous(program.pattern)
     record = _Record(
-        rows, address(times), address(numbers), address(displacements), _optional(values), address(mises),
-        address(positions), address(counts), points, address(reactions),
+        rows, address(times), address(numbers), address(displacements), None if values is None else address(values),
+        address(mises), address(positions), address(counts), points, address(reactions),
     )  # fmt: skip
     entries = _Law(*_entry_addresses(law), address(theta), theta.size, law.states)
     given = _Input(
@@ -204,9 +204,14 @@ def _entry_addresses(law: CompiledLaw) -> tuple[int, int]:
 
 
 def _empty_record(rows: int, *shape: int) -> Floats:
-    """Zeros (rows, ...) for the core to write; SolveError, with the memory needed, where there is not enough."""
+    """Room (rows, ...) for the core to write; SolveError, with the memory needed, where there is not enough.
+
+    The core writes all of a row; of the first, where nothing has happened yet, some arrays stay zeros.
+    """
     try:
-        return np.zeros((rows, *shape))
+        record = np.empty((rows, *shape))
+        record[0] = 0.0
+        return record
     except MemoryError:
         size = 8 * rows * math.prod(shape) / 2**30
         raise SolveError(
@@ -217,10 +222,6 @@ def _empty_record(rows: int, *shape: int) -> Floats:
 
 def _contiguous(values: Floats) -> Floats:
     return np.ascontiguousarray(values, dtype=float)
-
-
-def _optional(array: Floats | None) -> ctypes.c_void_p | None:
-    return None if array is None else address(array)
 
 
 _NUMBER, _REAL, _ARRAY = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import qmc
@@ -79,3 +79,47 @@ class Bounds:
     def centre(self) -> Floats:
         """(unknowns,) half way between the bounds."""
         return 0.5 * (self.lower + self.upper)
+
+
+MOST_WIDENINGS = 4
+"""How often bounds of a search are widened."""
+
+
+WIDER_FACTOR, WIDER_SHARE = 100.0, 1.0 / 3.0
+"""By what a bound is widened: that of a coefficient, and the larger end of an exponent, by a share of itself."""
+
+
+NEAR_BOUND = 1e-3
+"""Of the width of the bounds: a value nearer to a bound than this ends at it."""
+
+
+def widened(law: CreepLaw, theta: Floats) -> CreepLaw | None:
+    """The law with wider bounds where an estimate ends at bounds that nobody stated; None where it ends at none.
+
+    theta : (parameters,) internal values. A coefficient may pass both of its bounds, an exponent that of larger size.
+    """
+    params = dict(law.params)
+    for (symbol, param), value in zip(law.params.items(), theta, strict=True):
+        low, high = ends = [param.to_internal(bound) for bound in param.bounds]
+        margin, bounds = NEAR_BOUND * (high - low), list(param.bounds)
+        reached = (value < low + margin, value > high - margin)
+        for k, sign in enumerate((-1.0, 1.0)):
+            if param.scale == "log" and reached[k]:
+                bounds[k] *= WIDER_FACTOR**sign
+            elif reached[k] and sign * ends[k] >= max(map(abs, ends)):
+                bounds[k] += WIDER_SHARE * bounds[k]
+        if param.widens and param.limits is not None:
+            bounds = list(np.clip(bounds, *param.limits))
+        if param.widens and tuple(bounds) != param.bounds:
+            params[symbol] = replace(param, bounds=(bounds[0], bounds[1]))
+    return replace(law, params=params) if params != dict(law.params) else None
+
+
+def widened_notes(law: CreepLaw, wider: CreepLaw) -> tuple[str, ...]:
+    """How far parameters were sought beyond the bounds of a law, a sentence each; wider : that law as it was fitted."""
+    pairs = zip(wider.table.items(), law.params.values(), strict=True)
+    return tuple(
+        f"{name} was searched from {found.bounds[0]:.3g} to {found.bounds[1]:.3g}, beyond the usual bounds of the law"
+        for (name, found), usual in pairs
+        if found.bounds != usual.bounds
+    )

@@ -17,7 +17,7 @@ from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.selection import Ranking
 from creepkit.inverse.selection.select import select as select_law
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
+from creepkit.inverse.sparsity.penalties import L2, Subsets
 from creepkit.inverse.sparsity.term_selection import identify_sparse
 from creepkit.language import CreepLaw
 from creepkit.options import takes_options
@@ -34,7 +34,7 @@ def identify(
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
     search: GlobalSearch | None = None,
-    penalty: ContributionPenalty | Subsets | None = None,
+    penalty: L2 | Subsets | None = None,
     through: Predictor | Literal["auto"] | None = "auto",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
@@ -44,8 +44,8 @@ def identify(
 
     law : a law or its name; using : a specimen (or its name) or any predictor, or {specimen: predictor}; by default
         the specimens that the histories name.
-    search : how to begin: by default least squares from screened starts; ParticleSwarm() as in the paper, CmaEs().
-    penalty : on the contributions of a sum's terms, such as L2(), GroupL2(), Sqrt() or Subsets(): terms that are left
+    search : how to begin: by default least squares from screened starts; ParticleSwarm() as in the paper.
+    penalty : on the contributions of a sum's terms, L2() or Subsets(): terms that are left
         out stand in `sparsity` of the result, and its law is the one that remains.
     through : a cheaper predictor in which the minima of the search are refined before `using` (finite elements) gives
         values and intervals; "auto" takes the reduced-order model of `using` where that states its own error.

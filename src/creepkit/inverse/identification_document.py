@@ -58,7 +58,6 @@ LAW_CODEC = ValueCodec(law_to_json, law_from_json)
 CODEC = RecordCodec(
     omitted={
         Identification: ("histories", "predictor", "search_trace", "linearised", "problem"),
-        Sparsity: ("path",),
         Perturbation: ("residual_change",),
     },
     ranges={
@@ -95,7 +94,7 @@ CODEC = RecordCodec(
         Sparsity: {"observations": NOT_NEGATIVE},
     },
     values={CreepLaw: LAW_CODEC},
-    names={"Sparsity": Sparsity, **dict.fromkeys(("PenaltyPath", "SearchTrace", "LinearisedProblem"), object)},
+    names={"Sparsity": Sparsity, **dict.fromkeys(("SearchTrace", "LinearisedProblem"), object)},
 )
 """Of identifications; histories, search trace, linearised problem and changes of residuals are not stored.
 

@@ -144,9 +144,9 @@ def identification_notes(
 def one_end_note(minima: Mapping[str, int], search: str) -> tuple[str, ...]:
     """That a search had one start alone, if it had.
 
-    minima : see inverse.search.multistart.minima_counts. search : its name, "" of a multi-start without a trace.
+    minima : see inverse.search.multistart.minima_counts. search : its name.
     """
-    if minima.get("search_ends") != 1 or search not in ("", "multi-start"):
+    if minima.get("search_ends") != 1 or search != "multi-start":
         return ()
     return ("the search ended once: whether another minimum is lower was not examined (raise starts)",)
 

@@ -11,6 +11,7 @@ import numpy as np
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.bound_penalties import check_bounds
+from creepkit.inverse.bounds import MOST_WIDENINGS, widened, widened_notes
 from creepkit.inverse.compared_tests import compared_tests, compares_rupture_times
 from creepkit.inverse.composite_predictor import (
     predict,
@@ -54,6 +55,7 @@ from creepkit.inverse.iterative_estimation import (
 from creepkit.inverse.judging import Judge
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
+from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbation import unmodelled_note
@@ -185,16 +187,24 @@ def identify_values(
             search_outcome = SearchOutcome([np.clip(start.u, lower, upper)], 0, None)
         else:
             search_outcome = initial_search(problem, through, search or MultiStart(), progress)
-        best, numerical_error = _best_estimate(
-            problem, search_outcome, through, start or StartingEstimate(None), progress
-        )
+        start = start or StartingEstimate(None)
+        best, numerical_error = _best_estimate(problem, search_outcome, through, start, progress)
+        for _ in range(MOST_WIDENINGS):
+            u, reference = best.minimum.x[: len(law.params)], problem.coordinates.reference
+            wider = widened(problem.law, problem.coordinates.theta(u))
+            if wider is None:
+                break
+            wider_problem = LeastSquaresProblem.from_histories(wider, histories, using, settings, reference)
+            problem = replace(wider_problem, evaluations=problem.evaluations)
+            start, search_outcome = StartingEstimate(u, (), reference), search_outcome._replace(starts=[u])
+            best, numerical_error = _best_estimate(problem, search_outcome, through, start, progress)
         gradient = _gradient(best)[: len(law.params)]
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
         best = under_errors_of_tests(best)
         fit = _result(histories, best, search_outcome, numerical_error)
-    return replace(fit, notes=(*left_out, *fit.notes))
+    return replace(fit, notes=(*left_out, *fit.notes, *widened_notes(law, fit.law)))
 
 
 def _gradient(best: EstimationResult) -> Floats:
@@ -223,8 +233,7 @@ def _best_estimate(
     limits, working_noise = IterationLimits(), None
     if through is not None and start.u is None:
         cheaper = problem.with_predictor(through)
-        results = [estimate_iteratively(cheaper, x, working_estimator, APPROXIMATE_LIMITS, progress) for x in starts]
-        best = max(results, key=lambda end: end.log_likelihood)
+        best = _best_of(cheaper, starts, working_estimator, APPROXIMATE_LIMITS, progress)
         starts, working_noise = [best.minimum.x], best.working_noise
     if reduced_order_model_of(problem.predictor) is not None:
         limits = SIMULATION_LIMITS
@@ -232,8 +241,7 @@ def _best_estimate(
         limits = replace(limits, rounds=REFIT_ROUNDS)
     nearly_there = through is not None or start.u is not None
     if not nearly_there or refined_of(problem.predictor) is None:
-        results = [estimate_iteratively(problem, x, working_estimator, limits, progress, working_noise) for x in starts]
-        best = max(results, key=lambda end: end.log_likelihood)
+        best = _best_of(problem, starts, working_estimator, limits, progress, working_noise)
         problem, x, working_noise = best.problem, best.minimum.x, best.working_noise
         limits = replace(limits, rounds=REFIT_ROUNDS)
         if refined_of(problem.predictor) is None:
@@ -259,6 +267,24 @@ def _best_estimate(
         if numerical_error.shift < SMALL_SHIFT:
             break
     return best, numerical_error
+
+
+def _best_of(
+    problem: LeastSquaresProblem,
+    starts: Sequence[Floats],
+    estimator: WorkingNoiseEstimator,
+    limits: IterationLimits,
+    progress: IterationCallback | None,
+    working_noise: NoiseModel | None = None,
+) -> EstimationResult:
+    """The likeliest of the estimates from starts (unknowns,); by likelihood the start that is best after one round."""
+    if len(starts) > 1 and estimator.by_likelihood:
+        first = replace(limits, rounds=1)
+        ends = [estimate_iteratively(problem, x, estimator, first, None, working_noise) for x in starts]
+        best = max(ends, key=lambda end: end.log_likelihood)
+        problem, starts, working_noise = best.problem, [best.minimum.x], best.working_noise
+    ends = [estimate_iteratively(problem, x, estimator, limits, progress, working_noise) for x in starts]
+    return max(ends, key=lambda end: end.log_likelihood)
 
 
 def _working_estimator(
@@ -341,7 +367,7 @@ def _result(
         ranges=fitted_ranges(problem),
         settings=problem.settings,
         provenance={
-            **provenance_of(problem, search_outcome.evaluations, getattr(search_outcome.trace, "search", "")),
+            **provenance_of(problem, search_outcome.evaluations, search_outcome.search),
             **search_outcome.minima,
         },
         errors=pooled_errors(histories, prediction, tests),
@@ -356,7 +382,7 @@ def _result(
         notes=(
             *suspect_frames_note(histories),
             *identification_notes(best, tests, nuisance_estimates),
-            *one_end_note(search_outcome.minima, getattr(search_outcome.trace, "search", "")),
+            *one_end_note(search_outcome.minima, search_outcome.search),
             *(nuisance.sentence for nuisance in implausible),
             *cut_interval_notes(law, estimates),
             *domain_notes(prediction, histories),

@@ -53,6 +53,11 @@ class SearchOutcome(NamedTuple):
     trace: SearchTrace | None
     minima: Mapping[str, int] = MappingProxyType({})
 
+    @property
+    def search(self) -> str:
+        """Its name; "" where it began from a given estimate."""
+        return self.trace.search if self.trace is not None else "multi-start" if self.minima else ""
+
 
 def initial_search(
     problem: LeastSquaresProblem, through: Predictor | None, search: GlobalSearch, progress: IterationCallback | None

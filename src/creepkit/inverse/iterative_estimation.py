@@ -48,7 +48,7 @@ class IterationLimits:
     tolerance: float = 1e-8
 
 
-APPROXIMATE_LIMITS = IterationLimits(rounds=3, steps=15, tolerance=1e-4)
+APPROXIMATE_LIMITS = IterationLimits(rounds=2, steps=8, tolerance=1e-3)
 """For a predictor on the way to another."""
 
 

@@ -28,7 +28,7 @@ from creepkit.inverse.output_transforms import (
     RateTransform,
 )
 from creepkit.records import History, Prediction, Predictor, is_logarithmic
-from creepkit.records.noise_correlations import correlation_matrix
+from creepkit.records.history import correlation_matrix
 
 RUPTURE_OUTPUT = "rupture"
 """The output of tests that were followed to rupture: the rupture time, s. It has no frames of its own."""

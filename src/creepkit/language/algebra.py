@@ -272,11 +272,9 @@ def fix(law: Law, values: Mapping[str, float]) -> Law:
 
 def with_bounds(law: Law, bounds: Mapping[str, tuple[float, float]]) -> Law:
     """Change bounds of parameters; LawError for an unknown parameter and for what bounds cannot be."""
-    params = dict(law.params)
-    for name, limits in bounds.items():
-        symbol = law.symbol(name)
-        params[symbol] = replace(params[symbol], bounds=limits)
-    return replace(law, params=params) if bounds else law
+    stated = {law.symbol(name): limits for name, limits in bounds.items()}
+    changed = {symbol: replace(law.params[symbol], bounds=limits, widens=False) for symbol, limits in stated.items()}
+    return replace(law, params={**law.params, **changed}) if bounds else law
 
 
 def with_temperature(law: Law, forms: Mapping[str, TemperatureForm]) -> Law:

@@ -52,6 +52,7 @@ class ParamDocument:
     scale: ParameterScale
     off: float | None
     limits: tuple[float, float] | None = None
+    widens: bool = False
 
 
 @dataclass(frozen=True)

@@ -119,6 +119,8 @@ class Param:
     off : a value, usually outside the bounds, that switches the parameter off ({0} of the paper's Table 1).
     limits : (low, high) of what is physical, such as (0, math.inf) of a modulus or (0, 1) of a fraction; no value
         outside is ever taken but `off`. The bounds lie within. None where anything goes.
+    widens : whether a search that ends at a bound goes on beyond it, within the limits: the bounds are where it begins,
+        and no knowledge. Not where they are stated, as by law.with_bounds().
     """
 
     meaning: str
@@ -127,6 +129,7 @@ class Param:
     scale: ParameterScale = "linear"
     off: float | None = None
     limits: tuple[float, float] | None = None
+    widens: bool = False
 
     def __post_init__(self) -> None:
         if self.scale not in ("linear", "log"):

@@ -20,9 +20,9 @@ DRIFTING_EXPONENT = CreepLaw(
     title="Power law with a time-dependent stress exponent n(t)",
     terms={"drifting exponent": A * stress**n * strain**m},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0),
-        n_0: Param("initial stress exponent", bounds=(1, 8)),
-        n_inf: Param("saturated stress exponent", bounds=(1, 8)),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0, widens=True),
+        n_0: Param("initial stress exponent", bounds=(1, 8), widens=True),
+        n_inf: Param("saturated stress exponent", bounds=(1, 8), widens=True),
         C: Param("amplitude of the transient", bounds=(0, 8)),
         tau_d: Param("decay time", unit="s", bounds=(1000, 15000)),
         tau_r: Param("rise time", unit="s", bounds=(1000, 15000)),

@@ -10,8 +10,8 @@ NORTON = CreepLaw(
     title="Norton power law (PL)",
     terms={"power law": A * stress**n},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 8), off=0.0),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(1, 8), off=0.0, widens=True),
     },
     references=("Norton (1929), The Creep of Steel at High Temperatures, McGraw-Hill",),
 )

@@ -11,8 +11,8 @@ STRAIN_HARDENING = CreepLaw(
     title="Strain-hardening power law (SPL)",
     terms={"strain hardening": A * stress**n * strain**m},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 8), off=0.0),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(1, 8), off=0.0, widens=True),
         m: Param("strain exponent", bounds=(-1, 0), off=0.0),
     },
     references=(f"{PAPER}, Table 1",),

@@ -14,8 +14,8 @@ TIME_HARDENING = CreepLaw(
     title="Norton-Bailey time-hardening power law (TPL)",
     terms={"time hardening": A * stress**n * time**m},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 8), off=0.0),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(1, 8), off=0.0, widens=True),
         m: Param("time exponent", bounds=(-0.95, 0), off=0.0),
     },
     references=(

@@ -38,7 +38,7 @@ from creepkit.readers.vocabulary import (
     unit_suffix,
 )
 from creepkit.records import Program
-from creepkit.records.noise_correlations import can_hold_together
+from creepkit.records.history import can_hold_together
 from creepkit.records.quantities import LENGTH, TIME, QuantityKind
 
 _ALLOWED_COMBINATIONS = (

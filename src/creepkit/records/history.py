@@ -1,8 +1,8 @@
-"""What was measured: one test, and everything known about how it was made."""
+"""What was measured: one test, everything known about how it was made, and how the noise of its outputs correlates."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from types import MappingProxyType
@@ -16,7 +16,6 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.limits import HOTTEST
 from creepkit.presentation import present
 from creepkit.records.loading import Loading, Program, loading_text
-from creepkit.records.noise_correlations import can_hold_together
 from creepkit.records.specimen_lookup import load_unit, output_unit
 from creepkit.records.units import celsius_text
 
@@ -24,6 +23,22 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from creepkit.language.elastic import Elastic
+
+
+def correlation_matrix(correlations: Mapping[tuple[str, str], float], names: Sequence[str] = ()) -> Floats:
+    """(names, names), ones on its diagonal; names : in order, by default those of the pairs."""
+    order = list(names) or list(dict.fromkeys(name for pair in correlations for name in pair))
+    matrix = np.eye(len(order))
+    for (first, second), value in correlations.items():
+        i, j = order.index(first), order.index(second)
+        matrix[i, j] = matrix[j, i] = value
+    return matrix
+
+
+def can_hold_together(correlations: Mapping[tuple[str, str], float]) -> bool:
+    """Whether some noise has these correlations: their matrix is finite and positive definite."""
+    matrix = correlation_matrix(correlations)
+    return bool(np.isfinite(matrix).all() and (np.linalg.eigvalsh(matrix) > 0.0).all())
 
 
 RUPTURE_TIME_TOLERANCE = 0.01

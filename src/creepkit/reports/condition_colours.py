@@ -12,15 +12,15 @@ from creepkit.arrays import Floats
 from creepkit.inverse.held_levels import held_temperatures, is_isothermal, temperature_holds
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_stresses
 from creepkit.records import ZERO_CELSIUS, History, Predictor
-from creepkit.reports.figures import logarithmic_labels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-USED_SHARE = 0.86
-"""Of a colour map: its palest colours cannot be seen on white."""
+USED_SHARE, SAME, LABELS = 0.86, 1e-6, 5
+"""Of a colour map, whose palest colours cannot be seen on white; the relative difference of conditions that are one;
+and labels along a colour bar, its ends among them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class ColourScale:
 
         transform: Callable[[Any], Any] = np.log if self.logarithmic else np.asarray
         low, high = (float(transform(end)) for end in self.ends)
-        share = (float(transform(value)) - low) / (high - low) if high > low else 0.0
+        share = (float(transform(value)) - low) / (high - low) if high - low > SAME * abs(high) else 0.0
         return colormaps[self.colour_map](USED_SHARE * share)
 
     @property
@@ -62,34 +62,15 @@ class ColourScale:
         from matplotlib import colormaps
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import ListedColormap, LogNorm, Normalize
-        from matplotlib.ticker import NullFormatter, NullLocator
+        from matplotlib.ticker import NullLocator
 
         low, high = self.ends
         norm = (LogNorm if self.logarithmic else Normalize)(low, high)
         colours = ListedColormap(colormaps[self.colour_map](np.linspace(0.0, USED_SHARE, 256)))
         bar = figure.colorbar(ScalarMappable(norm, colours), ax=list(panels), label=self.label, pad=0.01, aspect=30)
-        ticks = _with_ends(low, high, self.logarithmic)
-        bar.set_ticks(list(ticks), labels=[f"{v:.3g}" if v < 1000 else f"{v:.0f}" for v in ticks])
+        ticks = (np.geomspace if self.logarithmic else np.linspace)(low, high, LABELS)
+        bar.set_ticks(list(ticks), labels=[f"{float(f'{v:.3g}'):g}" for v in ticks])
         bar.ax.yaxis.set_minor_locator(NullLocator())
-        bar.ax.yaxis.set_minor_formatter(NullFormatter())
-
-
-SMALLEST_GAP = 0.08
-"""Of the length of a colour bar, between its ends and the round numbers beside them."""
-
-
-def _with_ends(low: float, high: float, logarithmic: bool) -> Floats:
-    """(labels,) low, high and the round numbers between them."""
-    from matplotlib.ticker import MaxNLocator
-
-    if not high > low:
-        return np.array([low])
-    transform: Callable[[Any], Any] = np.log if logarithmic else np.asarray
-    inner = np.asarray(logarithmic_labels(low, high) if logarithmic else MaxNLocator(6).tick_values(low, high))
-    share = (transform(np.maximum(inner, 1e-300) if logarithmic else inner) - transform(low)) / (
-        transform(high) - transform(low)
-    )
-    return np.array([low, *inner[(share > SMALLEST_GAP) & (share < 1 - SMALLEST_GAP)], high])
 
 
 def temperatures_celsius(histories: Sequence[History]) -> Floats:

@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.arrays import Floats
 from creepkit.experiments.planned_design import ALIKE, kind_of_reason, precision_text
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
-from creepkit.records import load_unit
+from creepkit.records import SECONDS_PER_HOUR, load_unit
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
-from creepkit.reports.figures import panels_of, save_figure, wrapped
+from creepkit.reports.figures import panel_grid, save_figure, wrapped
 from creepkit.reports.json_values import fields_to_json
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.collections import QuadMesh
     from matplotlib.figure import Figure
 
     from creepkit.experiments.expectations import Expectation
@@ -25,8 +23,8 @@ if TYPE_CHECKING:
     from creepkit.reports.svg import PageFigures
 
 
-ROWS = 8
-"""Tests in a table."""
+ROWS, MOST_TICKS = 8, 8
+"""Tests in a table, and labels along an axis of the map."""
 
 
 def design_text(design: Design) -> str:
@@ -212,26 +210,19 @@ def design_figure(design: Design, path: str | Path | None = None) -> Figure:
     the probability of a decisive and right verdict that tables give. The runs of the plan are marked. Of several
     specimens that of the best test is drawn.
     """
-    figure, axes = panels_of(10.5, 5.0, 1, 2, sharex=True, sharey=True)
-    drawn_tests = [test for test in design.tests if test.histories[0].specimen == design.best.histories[0].specimen]
-    rates = [test.first_order_per_hour for test in drawn_tests] or [1.0]
-    largest = max(*rates, 1e-9)
-    groups = [[t for t in drawn_tests if _is_constant(t)], [t for t in drawn_tests if not _is_constant(t)]]
-    drawn = None
-    for panel, tests, title in zip(axes, groups, ("constant load", "the load changes during the test"), strict=True):
-        drawn = _draw_map(panel, tests, largest) or drawn
-        panel.set_title(title)
-        for k, test in enumerate(t for t in design.plan if _is_constant(t) == (title == "constant load")):
-            label = "plan" if k == 0 else None
-            panel.plot(
-                test.first_level, test.candidate.duration / 3600.0, "s", ms=24, mfc="none", mec="r", mew=2, label=label
-            )
-        if any(_is_constant(t) == (title == "constant load") for t in design.plan):
-            panel.legend(loc="best", frameon=True, markerscale=0.4)
-        panel.set_xlabel(_load_label(design))
-    axes[0].set_ylabel("duration, h")
-    if drawn is not None:
-        figure.colorbar(drawn, ax=list(axes), label="information to first order, nats per hour of machine time")
+    figure, panels = panel_grid(2, 2, 5.25, 5.0)
+    specimen = design.best.histories[0].specimen if design.tests else ""
+    drawn = [test for test in design.tests if test.histories[0].specimen == specimen]
+    largest = max([test.first_order_per_hour for test in drawn] or [1.0], default=1.0)
+    titles = {True: "constant load", False: "the load changes during the test"}
+    images = []
+    for panel, (constant, title) in zip(panels, titles.items(), strict=True):
+        tests, plan = ([t for t in group if _is_constant(t) == constant] for group in (drawn, design.plan))
+        plan = [t for t in plan if _place(t) in map(_place, tests)]
+        images += _draw_map(panel, tests, plan, max(largest, 1e-9))
+        panel.set(title=title, xlabel=_load_label(design), ylabel="duration, h")
+    if images:
+        figure.colorbar(images[0], ax=panels, label="information to first order, nats per hour of machine time")
     figure.suptitle(wrapped(f"{design.sentence}. {cells_text(design)}", 10.0, 9.0), fontsize=9)
     return save_figure(figure, path)
 
@@ -245,45 +236,36 @@ def cells_text(design: Design) -> str:
     return f"{told}; its number: the probability of a decisive and right verdict, as in the table"
 
 
-def _draw_map(panel: Axes, tests: list[PlannedTest], largest: float) -> QuadMesh | None:
+def _place(test: PlannedTest) -> tuple[float, float]:
+    """First load, and duration in h."""
+    return round(test.first_level, 6), round(test.duration / SECONDS_PER_HOUR, 6)
+
+
+def _draw_map(panel: Axes, tests: list[PlannedTest], plan: list[PlannedTest], largest: float) -> list[Any]:
     """One cell for each load and duration, of the first of the tests there (ordered); its probability as a number."""
     if not tests:
         panel.text(0.5, 0.5, "none considered", transform=panel.transAxes, ha="center")
-        return None
-    best: dict[tuple[float, float], PlannedTest] = {}
-    for test in tests:
-        place = round(test.first_level, 6), round(test.candidate.duration / 3600.0, 6)
-        best.setdefault(place, test)
+        return []
+    best = {_place(test): test for test in reversed(tests)}
     loads, durations = (sorted({place[k] for place in best}) for k in (0, 1))
     values = np.full((len(durations), len(loads)), np.nan)
     for (load, duration), test in best.items():
-        values[durations.index(duration), loads.index(load)] = test.first_order_per_hour
-    mesh = panel.pcolormesh(
-        _edges(loads), _edges(durations), values, cmap="viridis", vmin=0.0, vmax=largest, edgecolors="w", linewidth=0.5
-    )
-    panel.set_xscale("log")
-    panel.set_yscale("log")
-    for axis, ticks in ((panel.xaxis, loads), (panel.yaxis, durations)):
-        shown = ticks if len(ticks) <= 8 else ticks[:: -(-len(ticks) // 8)]
-        axis.set_ticks(shown, labels=[f"{tick:.3g}" for tick in shown])
-        axis.set_ticks([], minor=True)
-    for (load, duration), test in best.items():
+        row, column = durations.index(duration), loads.index(load)
+        values[row, column] = test.first_order_per_hour
+        colour = "k" if test.first_order_per_hour > 0.6 * largest else "w"
         if np.isfinite(test.expectation.probability):
-            light = test.first_order_per_hour > 0.6 * largest
-            panel.text(load, duration, f"{test.expectation.probability:.2f}", ha="center", va="center", fontsize=7,
-                       color="k" if light else "w")  # fmt: skip
-    return mesh
-
-
-def _edges(centres: list[float]) -> Floats:
-    """Edges of cells about centres, geometric."""
-    logs = np.log(centres)
-    if len(logs) == 1:
-        return np.asarray(np.exp(logs[0] + np.array([-0.2, 0.2])))
-    middle = 0.5 * (logs[1:] + logs[:-1])
-    return np.asarray(
-        np.exp(np.concatenate([[1.5 * logs[0] - 0.5 * logs[1]], middle, [1.5 * logs[-1] - 0.5 * logs[-2]]]))
-    )
+            text = f"{test.expectation.probability:.2f}"
+            panel.text(column, row, text, ha="center", va="center", fontsize=7, color=colour)
+    image = panel.imshow(values, vmin=0.0, vmax=largest, aspect="auto", origin="lower")
+    for set_ticks, ticks in ((panel.set_xticks, loads), (panel.set_yticks, durations)):
+        step = -(-len(ticks) // MOST_TICKS)
+        set_ticks(range(0, len(ticks), step), [f"{tick:.3g}" for tick in ticks[::step]])
+    for k, (load, duration) in enumerate(map(_place, plan)):
+        place = (loads.index(load), durations.index(duration))
+        panel.plot(*place, "s", ms=24, mfc="none", mec="r", mew=2, label=None if k else "plan")
+    if plan:
+        panel.legend(loc="best", frameon=True, markerscale=0.4)
+    return [image]
 
 
 def _is_constant(test: PlannedTest) -> bool:

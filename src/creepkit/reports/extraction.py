@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +12,13 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import output_unit
-from creepkit.reports.figures import empty_figure, save_figure
+from creepkit.reports.figures import empty_figure, panel_grid, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from creepkit.extraction import Extraction, FieldMap
+    from creepkit.extraction import Extraction
 
 
 _WIDTH, _HEIGHT, _PANEL = 14.0, 11.5, 1.75
@@ -39,22 +40,45 @@ def extraction_figure(extraction: Extraction, path: str | Path | None = None) ->
     e = extraction
     figure = empty_figure(_WIDTH, _HEIGHT)
     figure.set_layout_engine("none")  # a constrained layout of so many panels takes as long as all else
-    outputs = list(e.outputs)
-    shown = e.maps
     parts: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.15])
     top, bottom = parts
-    maps = top.subplots(2, len(shown), squeeze=False, gridspec_kw=_MAPS)
-    _draw_maps(top, maps, e, shown)
-    panels = bottom.subplots(2, max(3, (len(outputs) + 4) // 2), squeeze=False, gridspec_kw=_COURSES).ravel()
-    for axes, name in zip(panels, outputs, strict=False):
+    heights = 1e3 * np.stack([m.heights for m in e.maps])
+    residuals = 1e3 * np.stack([m.residuals for m in e.maps])
+    high = float(np.nanmax(np.abs(heights[:, np.hypot(*e.places.T) < e.region.held[0]]), initial=1e-3))
+    finite = np.abs(residuals[np.isfinite(residuals)])
+    wide = float(np.quantile(finite, 0.99)) if finite.size else 1.0
+    rows = top.subplots(2, len(e.maps), squeeze=False, gridspec_kw=_MAPS)
+    extent = float(np.ptp(e.places[:, 0])) or 1.0
+    _draw_maps(rows[0], e, heights, (-0.05 * high, high), "height, um", extent)
+    _draw_maps(rows[1], e, residuals, (-wide, wide), "residual, um", 2.2 * e.region.moving)
+    for one, above, below in zip(e.maps, *rows, strict=True):
+        above.plot(*e.places[e.clamped].T, ",", color="w", alpha=0.8)
+        for radius in e.region.held:
+            angle = np.linspace(0.0, 2.0 * np.pi, 90)
+            above.plot(radius * np.cos(angle), radius * np.sin(angle), "--", color="r", lw=0.6)
+        above.set_title(f"frame {one.frame}, {e.times[one.frame]:.4g} s", fontsize=8)
+        reach = 1.1 * e.region.moving
+        below.set(xlim=(-reach, reach), ylim=(-reach, reach))
+        below.set_title(f"rms {1e3 * float(e.residual[one.frame]):.2f} um", fontsize=8)
+    _, panels = panel_grid(
+        len(e.outputs) + 3, max(3, (len(e.outputs) + 4) // 2), 0.0, 0.0, part=bottom, gridspec_kw=_COURSES
+    )
+    for axes, name in zip(panels, e.outputs, strict=False):
         _draw_output(axes, e, name)
-    rest = panels[len(outputs) :]
-    _draw_motion(rest[0], e, 1e3 * (e.motion.translations - _first(e.motion.translations, e)), "shift, um")
-    _draw_motion(rest[1], e, 1e3 * (e.motion.rotations - _first(e.motion.rotations, e)), "rotation, mrad")
-    if len(rest) > 2:
-        _draw_residuals(rest[2], e)
-    for axes in rest[3:]:
-        axes.set_axis_off()
+    shift, rotation = (1e3 * (v - v[int(np.argmax(e.used))]) for v in (e.motion.translations, e.motion.rotations))
+    drawn = {
+        "rigid motion: shift, um": dict(zip("xyz", shift.T, strict=True)),
+        "rigid motion: rotation, mrad": dict(zip("xyz", rotation.T, strict=True)),
+        "root mean square of residuals, um": {
+            "of the operator's model": 1e3 * e.residual,
+            "of the clamped plate": 1e3 * e.motion.residual,
+        },
+    }
+    for axes, (title, curves) in zip(panels[-3:], drawn.items(), strict=True):
+        for label, values in curves.items():
+            axes.plot(e.times, np.where(e.used, values, np.nan), lw=1.0, label=label)
+        axes.legend(fontsize=7, ncols=3)
+        _dress(axes, e, title)
     figure.suptitle(_title(e), fontsize=10, x=0.01, ha="left")
     return save_figure(figure, path, HistoryError)
 
@@ -71,57 +95,26 @@ def _title(e: Extraction) -> str:
     )
 
 
-def _draw_maps(figure: Any, axes: Any, e: Extraction, shown: tuple[FieldMap, ...]) -> None:
-    heights = 1e3 * np.stack([m.heights for m in shown])
-    residuals = 1e3 * np.stack([m.residuals for m in shown])
-    inner = np.hypot(*e.places.T) < e.region.held[0]
-    high = float(np.nanmax(np.abs(heights[:, inner]), initial=1e-3))
-    finite = np.abs(residuals[np.isfinite(residuals)])
-    wide = float(np.quantile(finite, 0.99)) if finite.size else 1.0
-    extents = float(np.ptp(e.places[:, 0])) or 1.0, 2.2 * e.region.moving
-    sizes = [max((_PANEL * 72.0 * e.spacing / extent) ** 2, 0.3) for extent in extents]
-    images: list[Any] = []
-    for k, one in enumerate(shown):
-        for row, values, limits, colours in (
-            (0, heights[k], (-0.05 * high, high), "viridis"),
-            (1, residuals[k], (-wide, wide), "RdBu_r"),
-        ):
-            panel = axes[row, k]
-            seen = np.isfinite(values)
-            size = sizes[row]
-            look: Any = {"s": size, "marker": "s", "cmap": colours, "vmin": limits[0], "vmax": limits[1], "lw": 0}
-            images.append(panel.scatter(*e.places[seen].T, c=values[seen], rasterized=True, **look))
-            lost = ~np.isfinite(one.heights)
-            panel.scatter(*e.places[lost].T, c="0.6", s=0.7 * size, marker="x", lw=0.5)
-            panel.plot(0.0, 0.0, "+", color="r", ms=6)
-            panel.set_aspect("equal")
-            panel.tick_params(labelsize=6)
-            if k:  # as wide as the first
-                panel.set_xticks([])
-                panel.set_yticks([])
-            if row == 0:
-                panel.plot(*e.places[e.clamped].T, ",", color="w", alpha=0.8)
-                for radius in e.region.held:
-                    _circle(panel, radius)
-                panel.set_title(f"frame {one.frame}, {e.times[one.frame]:.4g} s", fontsize=8)
-            else:
-                reach = 1.1 * e.region.moving
-                panel.set_xlim(-reach, reach)
-                panel.set_ylim(-reach, reach)
-                rms = 1e3 * float(e.residual[one.frame])
-                panel.set_title(f"rms {rms:.2f} um", fontsize=8)
-    axes[0, 0].set_ylabel("heights, mm about the centre", fontsize=7)
-    axes[1, 0].set_ylabel("residuals of the fit", fontsize=7)
-    for row, label in ((0, "height, um"), (1, "residual, um")):
-        below, above = axes[row, -1].get_position().intervaly
-        bar = figure.colorbar(images[row], cax=figure.add_axes((0.925, below, 0.012, above - below)))
-        bar.set_label(label, fontsize=7)
-        bar.ax.tick_params(labelsize=6)
-
-
-def _circle(axes: Axes, radius: float) -> None:
-    angle = np.linspace(0.0, 2.0 * np.pi, 90)
-    axes.plot(radius * np.cos(angle), radius * np.sin(angle), "--", color="r", lw=0.6)
+def _draw_maps(
+    panels: Sequence[Axes], e: Extraction, values: Floats, limits: tuple[float, float], label: str, extent: float
+) -> None:
+    """A row of maps with its colour bar; values : (maps, points) um. extent : mm that a panel shows."""
+    size = max((_PANEL * 72.0 * e.spacing / extent) ** 2, 0.3)
+    colours = "viridis" if label.startswith("height") else "RdBu_r"
+    look: Any = {"s": size, "marker": "s", "cmap": colours, "vmin": limits[0], "vmax": limits[1], "lw": 0}
+    for k, (panel, row, one) in enumerate(zip(panels, values, e.maps, strict=True)):
+        seen, lost = np.isfinite(row), ~np.isfinite(one.heights)
+        image = panel.scatter(*e.places[seen].T, rasterized=True, **{**look, "c": row[seen]})
+        crosses: Any = {"c": "0.6", "s": 0.7 * size, "marker": "x", "lw": 0.5}
+        panel.scatter(*e.places[lost].T, **crosses)
+        panel.plot(0.0, 0.0, "+", color="r", ms=6)
+        panel.set_aspect("equal")
+        panel.tick_params(labelsize=6, left=k == 0, bottom=k == 0, labelleft=k == 0, labelbottom=k == 0)
+    panels[0].set_ylabel("mm about the centre", fontsize=7)
+    below, above = panels[-1].get_position().intervaly
+    bar = panels[0].figure.colorbar(image, cax=panels[0].figure.add_axes((0.925, below, 0.012, above - below)))
+    bar.set_label(label, fontsize=7)
+    bar.ax.tick_params(labelsize=6)
 
 
 def _draw_output(axes: Axes, e: Extraction, name: str) -> None:
@@ -129,7 +122,6 @@ def _draw_output(axes: Axes, e: Extraction, name: str) -> None:
     used = e.used & np.isfinite(values)
     axes.fill_between(t, values - 1.96 * sd, values + 1.96 * sd, where=used.tolist(), color="C0", alpha=0.3, lw=0)
     axes.plot(t[used], values[used], ".", ms=2.5, color="C0")
-    _mark_flagged(axes, e)
     at_rest = np.isin(np.arange(t.size), e.rest)
     axes.plot(t[at_rest & used], values[at_rest & used], ".", ms=3.5, color="C2", label="at rest")
     good = values[used & ~at_rest]
@@ -137,43 +129,17 @@ def _draw_output(axes: Axes, e: Extraction, name: str) -> None:
         low, high = np.quantile(good, [0.02, 0.98])
         axes.set_ylim(low - 0.5 * (high - low) - 1e-9, high + 0.5 * (high - low) + 1e-9)
     unit = output_unit(name, e.specimen)
-    axes.set_title(f"{name}{f' in {unit}' if unit else ''}, 95 % band", fontsize=9)
-    _dress(axes)
+    _dress(axes, e, f"{name}{f' in {unit}' if unit else ''}, 95 % band")
 
 
-def _draw_motion(axes: Axes, e: Extraction, values: Floats, title: str) -> None:
-    for k, axis in enumerate("xyz"):
-        axes.plot(e.times, np.where(e.used, values[:, k], np.nan), lw=1.0, label=axis)
-    _mark_flagged(axes, e)
-    axes.legend(fontsize=7, ncols=3)
-    axes.set_title(f"rigid motion: {title}", fontsize=9)
-    _dress(axes)
-
-
-def _draw_residuals(axes: Axes, e: Extraction) -> None:
-    axes.plot(e.times, 1e3 * e.residual, lw=1.0, label="of the operator's model")
-    axes.plot(e.times, 1e3 * e.motion.residual, lw=1.0, label="of the clamped plate")
-    _mark_flagged(axes, e)
-    axes.set_ylim(bottom=0.0)
-    axes.legend(fontsize=7)
-    axes.set_title("root mean square of residuals, um", fontsize=9)
-    _dress(axes)
-
-
-def _mark_flagged(axes: Axes, e: Extraction) -> None:
+def _dress(axes: Axes, e: Extraction, title: str) -> None:
+    """Title and labels of what is drawn over time, with flagged frames in red."""
     for frame in sorted({frame for flag in e.flags for frame in flag.frames})[:200]:
         axes.axvline(float(e.times[frame]), color="r", lw=0.6, alpha=0.6)
-
-
-def _dress(axes: Axes) -> None:
+    axes.set_title(title, fontsize=9)
     axes.tick_params(labelsize=7)
     axes.set_xlabel("s", fontsize=7)
     axes.grid(alpha=0.3)
-
-
-def _first(values: Floats, e: Extraction) -> Floats:
-    """(3,) of the first used frame: what matters is how the plate moved since."""
-    return np.asarray(values[int(np.argmax(e.used))])
 
 
 def extraction_text(extraction: Extraction) -> str:

@@ -33,9 +33,14 @@ from creepkit.reports.answer import (
     value_cells,
 )
 from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, as_text, number, plural
-from creepkit.reports.compared_values import compared_values
+from creepkit.reports.compared_values import (
+    LAW_RATE_MEANING,
+    OWN_RATE_CHI_SQUARE,
+    compared_values,
+    judged_readings,
+    misfit_of,
+)
 from creepkit.reports.identification_plot import residual_caption, small_multiples
-from creepkit.reports.judged_readings import LAW_RATE_MEANING, OWN_RATE_CHI_SQUARE, judged_readings, misfit_of
 from creepkit.reports.rate_panels import rupture_rows
 
 if TYPE_CHECKING:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
+from creepkit.reports.compared_values import judged_readings
 from creepkit.reports.condition_colours import stress_scale, temperature_scale
-from creepkit.reports.figures import empty_figure, save_figure, set_range, shortened, span, wrapped
-from creepkit.reports.judged_readings import JudgedReadings, judged_readings
+from creepkit.reports.figures import empty_figure, save_figure, shortened, span, wrapped
 from creepkit.reports.prediction_bands import (
     FittedCurves,
     TestCurve,
@@ -89,7 +89,7 @@ def summary_figure(fit: Identification) -> Figure:
         if scale is by_temperature and len(tests) <= MOST_LABELLED:
             _label_stresses(axes, fit, by_stress.values, tests, scale.colours)
     panels = np.atleast_1d(lower.subplots(1, len(below)))
-    draw_rates(panels[0], fit, curves.prediction)
+    draw_rates(panels[0], fit)
     if len(below) > 1:
         draw_ruptures(panels[1], fit, scale.colours)
     return figure
@@ -186,12 +186,11 @@ def small_multiples(fit: Identification, tests: Sequence[int]) -> Figure:
         curve = curve_of_test(fit, curves, k, output)
         draw_curve(above, curve, colours[k], dots="0.25")
         set_curve_ranges(above, [curve], output)
-        draw_residuals(below, fit, curves, output, [k], colours)
+        _draw_residuals(below, fit, curve, output, (k, colours[k]))
         above.set_title(f"{shortened(fit.tests[k].name)}: {fit.histories[k].condition}", fontsize=8)
         above.set_ylabel(axis_label(output), fontsize=8)
         above.tick_params(labelbottom=False, labelsize=7)
         below.tick_params(labelsize=7)
-        below.set_ylabel("noise sd" if place % columns == 0 else "", fontsize=7)
         below.set_xlabel("time, h" if place // columns == rows - 1 else "", fontsize=8)
     return figure
 
@@ -211,60 +210,36 @@ SHOWN_QUANTILE = 0.99
 """Of the sizes of the residuals of a test, what the axis shows."""
 
 
-OUTLYING_RATIO = 4.0
-"""Tests whose residuals exceed those of the median test by this factor do not set the axis."""
+def _draw_residuals(axes: Axes, fit: Identification, curve: TestCurve, output: str, test: tuple[int, Any]) -> None:
+    """What the law leaves of the readings of a test; test : its position and colour.
 
-
-class Series(NamedTuple):
-    """The residuals of one test, in the order of time. hours, values : (readings,)."""
-
-    test: int
-    hours: Floats
-    values: Floats
-
-
-def draw_residuals(
-    axes: Axes,
-    fit: Identification,
-    curves: FittedCurves,
-    output: str,
-    tests: Sequence[int],
-    colours: Sequence[Any] | Mapping[int, Any],
-) -> str:
-    """What the law leaves of the readings of tests; returns a title that says what is drawn.
-
-    Over the noise of each reading, with the tests' own rates, lives and offsets, as the law is judged; where the noise
+    Over the noise of each reading, with the test's own rate, life and offset, as the law is judged; where the noise
     is not known, measured less identified. Readings beyond the axis are marked at its edge.
     """
-    readings = judged_readings(fit)
-    judged = readings is not None and any(readings.mask(k, output).any() for k in tests)
-    every = []
-    for k in (k for k in tests if any(one.output == output for one in fit.tests[k].outputs)):
-        series = _judged_series(readings, k, output) if judged and readings else _plain_series(fit, curves, k, output)
-        if series.values.size:
-            every.append(series)
-    limit = _limit([series.values for series in every], LEAST_RANGE if judged else 0.0)
-    beyond = 0
-    for k, hours, values in every:
-        style = line_style(fit.tests[k].weight)
-        axes.plot(hours, values, style, lw=0.9, color=colours[k], alpha=0.85)
-        for sign, marker in ((1.0, "^"), (-1.0, "v")):
-            outside = sign * values > limit
-            if outside.any():  # a line without points would collapse the layout
-                edge = np.full(int(outside.sum()), sign * limit)
-                axes.plot(hours[outside], edge, marker, ms=3.5, color=colours[k], mec="none", clip_on=False, zorder=4)
-                beyond += edge.size
-    if judged:
+    (k, colour), readings = test, judged_readings(fit)
+    known = np.isfinite(curve.residuals)
+    hours, values = curve.hours[known], curve.residuals[known]
+    judged = readings is not None and bool(readings.mask(k, output).any())
+    if judged and readings is not None:
+        times, values = readings.residuals(k, output)
+        order = np.argsort(times, kind="stable")
+        hours, values = times[order] / SECONDS_PER_HOUR, values[order]
         axes.axhspan(-NOISE_BAND, NOISE_BAND, color="black", alpha=0.1, lw=0)
+    reach = 1.15 * float(np.quantile(np.abs(values), SHOWN_QUANTILE)) if values.size else 0.0
+    limit = max(reach, LEAST_RANGE if judged else 0.0) or 1.0
+    axes.plot(hours, values, line_style(fit.tests[k].weight), lw=0.9, color=colour, alpha=0.85)
+    for sign, marker in ((1.0, "^"), (-1.0, "v")):
+        outside = sign * values > limit
+        if outside.any():  # a line without points would collapse the layout
+            edge = np.full(int(outside.sum()), sign * limit)
+            axes.plot(hours[outside], edge, marker, ms=3.5, color=colour, mec="none", clip_on=False, zorder=4)
     axes.axhline(0, color="black", lw=0.8)
-    set_range(axes, "y", -limit, limit, most=7)
+    span(axes, "y", -limit, limit)
     axes.set_ylim(-limit, limit)
-    if every:
-        set_time_range(axes, np.concatenate([series.hours for series in every]), output)
-    name = output.replace("_", " ")
-    axes.set(xlabel="time, h", ylabel=f"{name},\nnoise sd" if judged else _plain_label(name, output))
-    marked = f"\n▴▾: {beyond} beyond the axis" if beyond else ""
-    return f"{_title(readings, output, tests, fit) if judged and readings else _plain_title(fit, output)}{marked}"
+    if values.size:
+        set_time_range(axes, hours, output)
+    plain = "100 ln ratio, ≈ %" if is_logarithmic(output) else unit_of(output)
+    axes.set_ylabel("noise sd" if judged else plain, fontsize=7)
 
 
 def residual_caption(fit: Identification) -> str:
@@ -275,51 +250,3 @@ def residual_caption(fit: Identification) -> str:
         "measured less identified over the standard deviation of the noise of the reading, with the test's own rate, "
         "rupture life and offset, as where the law is judged; grey: two standard deviations"
     )
-
-
-def _judged_series(readings: JudgedReadings, test: int, output: str) -> Series:
-    times, values = readings.residuals(test, output)
-    order = np.argsort(times, kind="stable")
-    return Series(test, times[order] / SECONDS_PER_HOUR, values[order])
-
-
-def _plain_series(fit: Identification, curves: FittedCurves, test: int, output: str) -> Series:
-    curve = curve_of_test(fit, curves, test, output)
-    known = np.isfinite(curve.residuals)
-    return Series(test, curve.hours[known], curve.residuals[known])
-
-
-def _limit(values: Sequence[Floats], least: float) -> float:
-    """The end of a symmetric axis: what the tests need but for those that lie far beyond the median test."""
-    needed = [float(np.quantile(np.abs(one), SHOWN_QUANTILE)) for one in values]
-    if not needed:
-        return max(least, 1.0)
-    middle = float(np.median(needed))
-    most = max(one for one in needed if one <= OUTLYING_RATIO * middle or middle == 0.0)
-    return max(1.15 * most, least) or 1.0
-
-
-def _title(readings: JudgedReadings, output: str, tests: Sequence[int], fit: Identification) -> str:
-    """Noise and reduced chi-square of an output."""
-    unit = unit_of(output)
-    ends = [ends for k in tests if (ends := readings.noise(k, output)) is not None]
-    factor = 100.0 if is_logarithmic(output) else 1.0
-    low, high = factor * min(e[0] for e in ends), factor * max(e[1] for e in ends)
-    size = f"{low:.2g}" if f"{low:.2g}" == f"{high:.2g}" else f"{low:.2g} to {high:.2g}"
-    whole = len(tests) == len(fit.tests)
-    chi_square = readings.chi_square(None if whole else tests[0], output)
-    of_tests = f", reduced chi-square {chi_square:.3g}" if whole or len(tests) == 1 else ""
-    return f"{output.replace('_', ' ')}: noise sd {size}{' ' + unit if unit else ''}{of_tests}"
-
-
-def _plain_label(name: str, output: str) -> str:
-    if is_logarithmic(output):
-        return f"100 ln (measured / identified {name}), ≈ %"
-    return f"{name}, {unit_of(output)}" if unit_of(output) else name
-
-
-def _plain_title(fit: Identification, output: str) -> str:
-    noise = "noise not known"
-    if is_logarithmic(output):
-        return f"measured less identified, rms {fit.rms:.3g} of ln strain; {noise}"
-    return f"measured less identified {output.replace('_', ' ')}; {noise}"

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.cross_validation import CrossValidation
     from creepkit.inverse.single_values import SingleValue
-    from creepkit.inverse.sparsity.result import PenaltyPath, Sparsity
+    from creepkit.inverse.sparsity.result import Sparsity
     from creepkit.inverse.uncertainty.correlation import Correlation
     from creepkit.inverse.uncertainty.importance_sampling import PosteriorSamples
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
@@ -42,16 +42,6 @@ def sparsity_text(sparsity: Sparsity) -> str:
         rows.append((term, *(f"{one:.3f}" for one in numbers), "dropped" if after is None else f"{after:.3f}"))
     lines = [f"{sparsity.penalty}{strength}: {sparsity.verdict}", *aligned(("", "without", "with", "after"), rows)]
     return "\n".join([*lines, f"(contributions; below {LEAST_CONTRIBUTION:g} a term is dropped)"])
-
-
-def penalty_path_text(path: PenaltyPath) -> str:
-    """One row a strength: chi-square, BIC less the least, contributions and the terms that are kept."""
-    rows = []
-    for k, strength in enumerate(path.strengths):
-        numbers = [f"{strength:g}", f"{path.chi_square[k]:.1f}", f"{path.bic_excess[k]:.1f}"]
-        rows.append([*numbers, *(f"{c:.3f}" for c in path.contributions[k]), ", ".join(path.kept_terms[k])])
-    rows[path.chosen][-1] += "   <- chosen"
-    return "\n".join(aligned(("strength", "chi-square", "BIC - least", *path.terms, "kept"), rows))
 
 
 # ---- uncertainty -----------------------------------------------------------------------------------------------------

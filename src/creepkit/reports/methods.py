@@ -90,7 +90,7 @@ def _estimation(found: GroupFindings, contents: ReportContents, references: Refe
 def _search(fit: Identification, contents: ReportContents, references: References) -> str:
     """How the optimum was sought, where that is known."""
     settings, how = fit.settings, _search_name(fit, contents)
-    end = f", and refined by least squares with the Levenberg-Marquardt method{references.cite('levenberg')}."
+    end = f", and refined by least squares in a trust region{references.cite('trust region')}."
     seed = f" (seed {settings.seed})"
     if how.startswith("multi-start"):
         return (
@@ -99,8 +99,6 @@ def _search(fit: Identification, contents: ReportContents, references: Reference
         )
     if "swarm" in how:
         return f"Parameters were sought within their bounds by a particle swarm{references.cite('swarm')}{seed}{end}"
-    if how.startswith("cma-es"):
-        return f"Parameters were sought within their bounds by CMA-ES{references.cite('cma-es')}{seed}{end}"
     return f"Parameters were sought within their bounds{end}"
 
 

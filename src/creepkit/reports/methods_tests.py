@@ -185,7 +185,7 @@ def _reference_temperatures(law: CreepLaw) -> Iterable[float]:
 
 CITATIONS = {
     "sobol": "I. M. Sobol' (1967), USSR Comput. Math. Math. Phys. 7(4), 86-112",
-    "levenberg": "K. Levenberg (1944), Q. Appl. Math. 2, 164-168; D. W. Marquardt (1963), J. SIAM 11, 431-441",
+    "trust region": "M. A. Branch, T. F. Coleman, Y. Li (1999), SIAM J. Sci. Comput. 21(1), 1-23",
     "weighted least squares": "G. A. F. Seber, C. J. Wild (1989), Nonlinear Regression, Wiley, New York",
     "reml": "H. D. Patterson, R. Thompson (1971), Biometrika 58, 545-554",
     "satterthwaite": "F. E. Satterthwaite (1946), Biometrics Bull. 2, 110-114",
@@ -200,7 +200,6 @@ CITATIONS = {
     "chen": f"{PAPER}, Eq. (S3)",
     "student": "K. L. Lange, R. J. A. Little, J. M. G. Taylor (1989), J. Am. Stat. Assoc. 84, 881-896",
     "swarm": "M. Clerc, J. Kennedy (2002), IEEE Trans. Evol. Comput. 6(1), 58-73",
-    "cma-es": "N. Hansen (2016), The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772",
     "pysindy": "B. M. de Silva et al. (2020), J. Open Source Softw. 5(49), 2104",
     "creepkit": f"The authors of creepkit, creepkit (software), version {version('creepkit')}, licence Apache-2.0",
 }

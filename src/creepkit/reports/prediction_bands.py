@@ -1,4 +1,4 @@
-"""The identified curves of tests with what the estimates leave uncertain of them, and the creep rate of each test.
+"""The identified curves of tests with what the estimates leave uncertain of them.
 
 With y(x) a predicted output, x = (u, e) the unknowns (coordinates of the law and nuisance parameters of the tests) and
 C their covariance, its standard deviation is sqrt(dy/dx C dy/dx'). One prediction with sensitivities gives y and dy/dx.
@@ -12,16 +12,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats
+from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.inverse.defect_correction import with_correction_at_frames
 from creepkit.inverse.frame_noise import usable_frames
-from creepkit.inverse.held_levels import holds, is_isothermal, temperature_holds
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.reference_conditions import LOAD_TOLERANCE, reference_stresses
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
-from creepkit.records import SECONDS_PER_HOUR, History, Prediction, is_logarithmic, output_unit
+from creepkit.records import SECONDS_PER_HOUR, Prediction, is_logarithmic, output_unit
 from creepkit.reports.figures import set_range
 
 if TYPE_CHECKING:
@@ -110,99 +108,6 @@ def joint_covariance(fit: Identification) -> Floats:
     covariance = lift @ fit.covariance @ lift.T
     covariance[count:, count:] += inverse
     return np.asarray(covariance)
-
-
-@dataclass(frozen=True)
-class HoldRate:
-    """The creep rate that one hold of one test shows, at the strain and time of the reference point.
-
-    stress : MPa; temperature : K; rate : 1/s, the identified one times measured over identified growth of the output
-    that grows with creep, the median over the hold; of a test without frames times measured over identified minimum
-    rate, which is `stated`.
-    """
-
-    test: int
-    stress: float
-    temperature: float
-    rate: float
-    stated: bool = False
-
-
-FEWEST_FRAMES = 3
-"""Frames of a hold from which a rate is taken."""
-
-
-def rates_of_tests(fit: Identification, prediction: Prediction) -> list[HoldRate]:
-    """The creep rate of each hold of each test; a hold without growth has none.
-
-    prediction : of the fitted tests, at their own nuisances.
-    """
-    rates = []
-    for k, (history, test) in enumerate(zip(fit.histories, fit.tests, strict=True)):
-        if not test.outputs:
-            rates += _stated_rate(fit, k)
-            continue
-        output = test.outputs[0].output
-        predicted = prediction.of(k)[:, prediction.outputs.index(output)]
-        for stress, under_load in _levels(fit, history, output):
-            for temperature, at_temperature in _temperatures(history):
-                frames = under_load & at_temperature & np.isfinite(predicted)
-                if frames.sum() < FEWEST_FRAMES:
-                    continue
-                ratio = _growth_ratio(history.outputs[output][frames], predicted[frames])
-                if ratio > 0:
-                    rate = ratio * float(fit.rate(stress, temperature, warn=False)[0])
-                    rates.append(HoldRate(k, stress, temperature, rate))
-    return rates
-
-
-def _stated_rate(fit: Identification, test: int) -> list[HoldRate]:
-    """The creep rate that the minimum rate of a test without frames shows, if it has one."""
-    history, compared = fit.histories[test], fit.tests[test].minimum_rate
-    if compared is None or not compared.ratio > 0:
-        return []
-    stress, temperature = float(reference_stresses(history, fit.predictor)[0]), history.mean_temperature
-    rate = float(fit.rate(stress, temperature, warn=False)[0]) / compared.ratio
-    return [HoldRate(test, stress, temperature, rate, stated=True)]
-
-
-def _levels(fit: Identification, history: History, output: str) -> list[tuple[float, Bools]]:
-    """The reference stress, MPa, of each level of the load, and (frames,) which frames were taken under it."""
-    stresses = np.unique([s for s in reference_stresses(history, fit.predictor) if s > 0])
-    used, program = usable_frames(history, output), history.loading.program()
-    tolerance = LOAD_TOLERANCE * float(np.abs(program.values).max())
-    pieces = [p for p in holds(program, float(history.times[-1]), tolerance) if p[2] > 0]
-    levels = np.unique([p[2] for p in pieces])
-    if levels.size != stresses.size or history.loading.quantity == "components":
-        return [(float(np.exp(np.mean(np.log(stresses)))), used)] if stresses.size else []
-    by_load = dict(zip(levels, stresses, strict=True))
-    return [(by_load[v], used & (history.times > start) & (history.times <= end)) for start, end, v in pieces]
-
-
-def _temperatures(history: History) -> list[tuple[float, Bools]]:
-    """The temperature, K, of each hold of a test, and (frames,) which frames were taken at it; of ramps, their mean."""
-    pieces = temperature_holds(history)
-    if is_isothermal(history) or not pieces:
-        return [(history.mean_temperature, np.ones(history.times.size, bool))]
-    last = max(end for _, end, _ in pieces)
-    return [(value, (history.times > start) & ((history.times <= end) | (end == last))) for start, end, value in pieces]
-
-
-GROWTH_INTERVALS = 8
-"""Pieces of a hold over which growth is compared."""
-
-
-def _growth_ratio(measured: Floats, predicted: Floats) -> float:
-    """Median of measured over predicted increments across an eighth of a hold's frames; both (frames,).
-
-    Increments of under 1 % of the predicted range are left out; without any, there is no growth and the ratio is 0.
-    """
-    stride = max(1, measured.size // GROWTH_INTERVALS)
-    increments = predicted[stride:] - predicted[:-stride]
-    large = np.abs(increments) > 0.01 * float(np.ptp(predicted))
-    if not large.any():
-        return 0.0
-    return float(np.median((measured[stride:] - measured[:-stride])[large] / increments[large]))
 
 
 # ---- as they are drawn -----------------------------------------------------------------------------------------------

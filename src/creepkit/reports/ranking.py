@@ -17,6 +17,7 @@ from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE
 from creepkit.records import is_logarithmic
 from creepkit.reports.answer import titled_law, unit_text, value_cells
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
+from creepkit.reports.compared_values import judged_readings, misfit_of
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
 from creepkit.reports.figures import (
     empty_figure,
@@ -30,7 +31,6 @@ from creepkit.reports.figures import (
 from creepkit.reports.identification import rejected, scatter_of_rates, verdict_given_law
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
 from creepkit.reports.json_values import fields_to_json
-from creepkit.reports.judged_readings import judged_readings, misfit_of
 from creepkit.reports.load_programs import program_text
 from creepkit.reports.prediction_bands import FittedCurves, axis_label, curve_of_test, fitted_curves
 from creepkit.reports.terminal import print_table, tell, tell_written

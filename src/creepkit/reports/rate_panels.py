@@ -9,14 +9,14 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
+from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.identified_values import MinimumRate, minimum_rates_of
 from creepkit.inverse.minimum_rates import apparent_exponent
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_stresses
 from creepkit.language import strain, time
-from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, Prediction
+from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
 from creepkit.reports.figures import draw_parity, panels_of, place_legend_right, shortened, span
-from creepkit.reports.prediction_bands import HoldRate, rates_of_tests
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,10 +28,6 @@ if TYPE_CHECKING:
 
 MOST_TEMPERATURES = 6
 """Curves of rate over stress at most, and temperatures that the legend names."""
-
-
-SMALLEST_SHARE = 1e-4
-"""Of the lowest curve: rates of tests below that are not drawn."""
 
 
 DRAWN_FACTOR = 30.0
@@ -59,44 +55,32 @@ class RatePoints(NamedTuple):
     """Rates that tests show; label : of the legend. celsius, stress, rate : (tests,) °C, MPa, 1/s."""
 
     label: str
-    marker: str
     celsius: Floats
     stress: Floats
     rate: Floats
 
 
-def draw_rates(axes: Axes, fit: Identification, prediction: Prediction) -> None:
-    """Creep rates over stress: measured minimum rates and those by the law, or the law's rate at the reference point.
-
-    prediction : of the fitted tests, at their own nuisances.
-    """
+def draw_rates(axes: Axes, fit: Identification) -> None:
+    """Creep rates over stress: measured minimum rates and the law's, or the law's rate at the reference point."""
     minimum_rates = compared_minimum_rates(fit)
     if minimum_rates:
         draw_minimum_rates(axes, fit, minimum_rates)
     elif any(v > 0 for h in fit.histories for v in reference_stresses(h, fit.predictor)):
-        _draw_reference_rates(axes, fit, rates_of_tests(fit, prediction))
+        _draw_reference_rates(axes, fit)
     else:
         axes.set_axis_off()
 
 
-def _draw_reference_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> None:
-    """Identified rate over stress with its 95 % band at some temperatures, and that rate times what each test shows."""
+def _draw_reference_rates(axes: Axes, fit: Identification) -> None:
+    """Identified rate over stress with its 95 % band at some temperatures, and the own rate of each test."""
+    own = [rate for k in range(len(fit.tests)) for rate in own_rates(fit, k)]
     stresses = [v for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
     grid = np.geomspace(0.8 * min(stresses), 1.25 * max(stresses), 60)
     curves = [
         RateCurve(celsius, grid, *fit.rate(grid, np.full_like(grid, celsius + ZERO_CELSIUS), warn=False))
         for celsius in _drawn_temperatures(tested_temperatures(fit.histories))
     ]
-    lowest = min(float(curve.low.min()) for curve in curves)
-    shown = [r for r in rates if r.rate > SMALLEST_SHARE * lowest]
-    points = [
-        RatePoints(label, marker, *_columns(tests, "temperature", "stress", "rate"))
-        for marker, label, tests in (
-            ("o", "law × measured /\nidentified growth\nof each test", [r for r in shown if not r.stated]),
-            ("s", "law × measured /\nidentified minimum\nrate of each test", [r for r in shown if r.stated]),
-        )
-        if tests
-    ]
+    points = [RatePoints("law × own rate\nof each test", *np.array(own).T)] if own else []
     _draw(axes, fit, curves, points, "95 % band:\nlaw")
     reference = fit.reference
     initial = "\ninternal variables as at the start, not those of a test" if fit.law.states else ""
@@ -105,6 +89,24 @@ def _draw_reference_rates(axes: Axes, fit: Identification, rates: Sequence[HoldR
         f"the law's rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h{initial}",
         fontsize=9,
     )
+
+
+def own_rates(fit: Identification, test: int) -> list[tuple[float, float, float]]:
+    """Temperature, °C, stress, MPa, and the law's rate, 1/s, times the own factor of a test, of each of its levels.
+
+    Of a test without frames the factor is that of its minimum rate. There are none where tests have no rate of their
+    own.
+    """
+    history, found = fit.histories[test], fit.tests[test]
+    factor = 1.0 / found.minimum_rate.ratio if not found.outputs and found.minimum_rate else found.rate_factor
+    stresses = np.unique([v for v in reference_stresses(history, fit.predictor) if v > 0])
+    if factor == 1.0 or not np.isfinite(factor):
+        return []
+    return [
+        (T - ZERO_CELSIUS, float(stress), factor * float(fit.rate(stress, T, warn=False)[0]))
+        for stress in stresses
+        for T in dict.fromkeys(held_temperatures(history))
+    ]
 
 
 def draw_minimum_rates(axes: Axes, fit: Identification, rates: Sequence[MinimumRate]) -> None:
@@ -116,7 +118,7 @@ def draw_minimum_rates(axes: Axes, fit: Identification, rates: Sequence[MinimumR
         if known:
             celsius, *columns = _columns(known, "temperature", "stress", "predicted", "low", "high")
             curves.append(RateCurve(float(celsius.mean()), *columns))
-    points = RatePoints("measured", "o", *_columns(rates, "temperature", "stress", "measured"))
+    points = RatePoints("measured", *_columns(rates, "temperature", "stress", "measured"))
     _draw(axes, fit, curves, [points], "line: by the law;\nband: 95 % of\na single test")
     sentence = exponent_sentence(rates)
     axes.set(xlabel="stress, MPa", ylabel="minimum creep rate, %/h")
@@ -149,8 +151,8 @@ def _draw(
             axes.errorbar(curve.stress, rate, yerr=error, fmt="_", label=label, **style)
     for one in points:
         for celsius, stress, rate in zip(one.celsius, one.stress, PERCENT_PER_HOUR * one.rate, strict=True):
-            axes.plot(stress, rate, one.marker, ms=4, color=scale(celsius), mec="black", mew=0.4, zorder=3)
-        axes.plot([], [], one.marker, ms=4, color="grey", mec="black", mew=0.4, label=one.label)
+            axes.plot(stress, rate, "o", ms=4, color=scale(celsius), mec="black", mew=0.4, zorder=3)
+        axes.plot([], [], "o", ms=4, color="grey", mec="black", mew=0.4, label=one.label)
     ends = PERCENT_PER_HOUR * np.concatenate([v for curve in curves for v in (curve.low, curve.high)] or [centre])
     ends = ends[(ends > centre.min() / DRAWN_FACTOR) & (ends < centre.max() * DRAWN_FACTOR)]
     span(axes, "x", *(one.stress for one in drawn), logarithmic=True, margin=1.07)

@@ -292,7 +292,59 @@ def fit_method(
     times = GroupedTimes.of(tests.log_time, tests.censored, tests.groups, distribution)
     problem = _scaled(method, basis, times, tests.ruptured)
     point = _minimum(problem, _start(problem, tests))
-    return _result(method, problem, point, tests, degree=degree, fixed=fixed, centre=centre, level=level)
+    location, count = problem.location_count, problem.linear.shape[1]
+    scale, scatter = float(np.exp(point[location])), np.abs(point[location + 1 :])
+    freedom = float(max(tests.ruptured - location, 1))
+    levels = [m.shape[1] for m in times.members]
+    scale_corrected = scale * float(np.sqrt(tests.ruptured / freedom))
+    scatter_corrected = scatter * np.sqrt([h / (h - 1.0) for h in levels])
+    corrected = np.array([*point[:location], np.log(scale_corrected), *scatter_corrected])
+    covariance = _covariance(problem, point, corrected)
+    # From scaled coordinates to those of the basis; the scale stands as its logarithm.
+    jacobian = np.eye(point.size)
+    jacobian[:count, :count] = problem.transform
+    jacobian[location, location] = scale
+    covariance = jacobian @ covariance @ jacobian.T
+    estimates = np.array([*problem.transform @ point[:count], *point[count:location]])
+    variances = _variance_freedom(problem, point, scale_corrected, scatter_corrected)
+    variances = variances.transformed(jacobian[:location, :location])
+    effects = times.effects(problem.mean(point[None])[0], scale, scatter)
+
+    def constants(p: Floats) -> dict[str, float]:
+        return method.parameters(p[:count], float(p[count]) if method.bilinear else 0.0, degree, fixed, centre)
+
+    def by_group(values: Sequence[Any]) -> dict[str, Any]:
+        return dict(zip(tests.groups, values, strict=True))
+
+    return RuptureFit(
+        method.name,
+        degree,
+        distribution,
+        dict(fixed),
+        centre,
+        estimates[:count],
+        float(point[count]) if method.bilinear else 0.0,
+        scale,
+        by_group([*map(float, scatter)]),
+        by_group(levels),
+        covariance,
+        scale_corrected,
+        by_group([*map(float, scatter_corrected)]),
+        -float(problem.cost(point[None])[0]),
+        variances,
+        tests.ruptured,
+        tuple(
+            RuptureParameter(name, value, value - half, value + half, method.unit(name))
+            for name, (value, half) in _with_half_widths(constants, estimates, covariance, variances, level).items()
+        ),
+        by_group(
+            [
+                dict(zip(sorted(set(values)), map(float, modes), strict=True))
+                for values, modes in zip(tests.groups.values(), effects, strict=True)
+            ]
+        ),
+        level,
+    )
 
 
 def too_few_tests(
@@ -372,65 +424,6 @@ def _minimum(problem: _Scaled, start: Floats) -> Floats:
     return np.asarray(point)
 
 
-def _result(
-    method: RuptureMethod,
-    problem: _Scaled,
-    point: Floats,
-    tests: RuptureTests,
-    *,
-    degree: int,
-    fixed: Mapping[str, float],
-    centre: Centre,
-    level: float,
-) -> RuptureFit:
-    location, count = problem.location_count, problem.linear.shape[1]
-    scale, scatter = float(np.exp(point[location])), np.abs(point[location + 1 :])
-    freedom = float(max(tests.ruptured - location, 1))
-    levels = [m.shape[1] for m in problem.times.members]
-    scale_corrected = scale * float(np.sqrt(tests.ruptured / freedom))
-    scatter_corrected = scatter * np.sqrt([h / (h - 1.0) for h in levels])
-    corrected = np.array([*point[:location], np.log(scale_corrected), *scatter_corrected])
-    covariance = _covariance(problem, point, corrected)
-    # From scaled coordinates to those of the basis; the scale stands as its logarithm.
-    jacobian = np.eye(point.size)
-    jacobian[:count, :count] = problem.transform
-    jacobian[location, location] = scale
-    covariance = jacobian @ covariance @ jacobian.T
-    coefficients = problem.transform @ point[:count]
-    curvature = float(point[count]) if problem.bilinear is not None else 0.0
-    variances = _variance_freedom(problem, point, scale_corrected, scatter_corrected)
-    variances = variances.transformed(jacobian[:location, :location])
-    mean = problem.mean(point[None])[0]
-    effects = problem.times.effects(mean, scale, scatter)
-    named = {
-        group: dict(zip(sorted(set(values)), map(float, modes), strict=True))
-        for (group, values), modes in zip(tests.groups.items(), effects, strict=True)
-    }
-    return RuptureFit(
-        method.name,
-        degree,
-        problem.times.distribution,
-        dict(fixed),
-        centre,
-        coefficients,
-        curvature,
-        scale,
-        dict(zip(tests.groups, map(float, scatter), strict=True)),
-        dict(zip(tests.groups, levels, strict=True)),
-        covariance,
-        scale_corrected,
-        dict(zip(tests.groups, map(float, scatter_corrected), strict=True)),
-        -float(problem.cost(point[None])[0]),
-        variances,
-        tests.ruptured,
-        _parameters(
-            method, degree, fixed, centre, np.array([*coefficients, curvature]), (covariance, variances), level
-        ),
-        named,
-        level,
-    )
-
-
 def _variance_freedom(problem: _Scaled, point: Floats, scale: float, scatter: Floats) -> VarianceFreedom:
     """Of the tests that broke, about the estimates."""
     broken, count = ~problem.times.censored, problem.linear.shape[1]
@@ -458,41 +451,32 @@ def _inverse(matrix: Floats) -> Floats:
     return np.asarray((vectors / np.maximum(values, 1e-8 * max(values.max(), 1e-300))) @ vectors.T)
 
 
-def _parameters(
-    method: RuptureMethod,
-    degree: int,
-    fixed: Mapping[str, float],
-    centre: Centre,
-    estimates: Floats,
-    uncertainty: tuple[Floats, VarianceFreedom],
+def _with_half_widths(
+    constants: Callable[[Floats], dict[str, float]],
+    point: Floats,
+    covariance: Floats,
+    freedom: VarianceFreedom,
     level: float,
-) -> tuple[RuptureParameter, ...]:
-    """Constants as the literature writes them, by the delta method.
+) -> dict[str, tuple[float, float]]:
+    """{constant as the literature writes it: (value, half the width of its interval)}, by the delta method.
 
-    estimates : (coefficients + 1,), the curvature last. uncertainty : their covariance, and its degrees of freedom.
+    point : (estimates,) of location. covariance : of all, those first.
     """
-    covariance, freedom = uncertainty
-    point = estimates if method.bilinear else estimates[:-1]
 
-    def values(p: Floats) -> dict[str, float]:
-        c, k = (p[:-1], float(p[-1])) if method.bilinear else (p, 0.0)
-        return method.parameters(c, k, degree, fixed, centre)
+    def values(p: Floats) -> Floats:
+        return np.array([*constants(p).values()])
 
-    spread = np.sqrt(np.maximum(np.diag(covariance)[: point.size], 0.0))
+    part = covariance[: point.size, : point.size]
+    spread = np.sqrt(np.maximum(np.diag(part), 0.0))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        at = values(point)
+        at = constants(point)
         steps = [1e-3 * s * e for s, e in zip(spread, np.eye(point.size), strict=True)]
         jacobian = np.array(
             [
-                (np.array([*values(point + h).values()]) - np.array([*values(point - h).values()]))
-                / (2e-3 * max(s, 1e-300))
+                (values(point + h) - values(point - h)) / (2e-3 * max(s, 1e-300))
                 for h, s in zip(steps, spread, strict=True)
             ]
         ).T
-        part = covariance[: point.size, : point.size]
         variance = np.einsum("mi,ij,mj->m", jacobian, part, jacobian)
         half = stdtrit(freedom.of(jacobian), 0.5 + 0.5 * level) * np.sqrt(np.maximum(variance, 0.0))
-    return tuple(
-        RuptureParameter(name, value, value - float(h), value + float(h), method.unit(name))
-        for (name, value), h in zip(at.items(), half, strict=True)
-    )
+    return {name: (value, float(h)) for (name, value), h in zip(at.items(), half, strict=True)}

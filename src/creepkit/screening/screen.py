@@ -32,7 +32,7 @@ from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.selection.discrimination import equivalent_laws
 from creepkit.inverse.selection.select import select
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets, check_penalty
+from creepkit.inverse.sparsity.penalties import L2, Subsets, check_penalty
 from creepkit.inverse.sparsity.term_selection import identify_full, identify_reduced
 from creepkit.jobs.progress import ProgressCallback, duration_text
 from creepkit.jobs.worker_pools import ProcessWorkers, process_count
@@ -145,7 +145,7 @@ class ScreeningJob:
     surrogate: Predictor | None
     settings: IdentificationSettings
     dense_law: CreepLaw | None
-    penalty: ContributionPenalty | Subsets | None
+    penalty: L2 | Subsets | None
     confirm: bool | str
     folder: Path
     task_name: ClassVar[str] = "alloy"
@@ -205,7 +205,7 @@ class ScreeningOptions:
     through : a surrogate in which laws of several terms are searched before the predictor gives values (see
         identify()).
     dense : the law whose misfit without sparsity is compared with the reduced one's (Fig. 7b), None for none.
-    penalty : what makes the reduced law of it, such as Sqrt(); by default the reduced law is the best candidate.
+    penalty : what makes the reduced law of it, such as Subsets(); by default the reduced law is the best candidate.
     confirm : whether the best law is simulated by the specimen itself: True, False, or "when in doubt", that is where
         a surrogate says that its prediction lies outside its domain.
     """
@@ -213,7 +213,7 @@ class ScreeningOptions:
     settings: IdentificationSettings = field(default_factory=IdentificationSettings)
     through: Predictor | None = None
     dense: CreepLaw | str | None = DENSE_LAW
-    penalty: ContributionPenalty | Subsets | None = None
+    penalty: L2 | Subsets | None = None
     confirm: bool | Literal["when in doubt"] = "when in doubt"
 
     def __post_init__(self) -> None:

@@ -1,7 +1,6 @@
 """The verbs, with plugins and predictors made for the occasion."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -106,17 +105,6 @@ def test_a_simulation_without_any_of_its_times_is_an_error(times: tuple[float, .
         "simulation of law 'norton' ended at 0.5 s, before any of the times asked for: burst; "
         "check values, loading and times"
     )
-
-
-def test_numbers_after_the_end_are_left_out() -> None:
-    """A predictor that fills in values after its own end."""
-
-    class Careless(Steady):
-        def predict(self, *args: object, **kwargs: object) -> Prediction:
-            told = super().predict(*args, **kwargs)
-            return replace(told, values=np.nan_to_num(told.values, nan=9.0))
-
-    assert simulate(Careless(Status.RUPTURED, end=3.0)).outputs["strain"].tolist() == pytest.approx([1e-4, 2e-4])
 
 
 @pytest.mark.usefixtures("_own_registry")

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import creepkit as ck
-from creepkit.errors import CreepkitError, LawError
+from creepkit.errors import LawError
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.language.law_codec import law_from_json, law_to_json
 from helpers.command_line import creepkit, one_line
@@ -281,19 +281,6 @@ def test_values_outside_the_physical_limits_are_refused() -> None:
         law.values({"A": 1e-16, "n": 13.0})
     with pytest.raises(LawError, match="not physical"):
         ck.simulate(law, "uniaxial", {"A": 1e-16, "n": 0.1}, loading=ck.constant_stress(50), times=[1.0])
-
-
-@pytest.mark.parametrize(
-    ("limits", "said"),
-    [
-        ((2, 12), r"bounds \(1, 8\) must lie within the limits \(2, 12\)"),
-        (3, "two numbers|a number, a number"),
-        (("a", 9), "a number"),
-    ],
-)
-def test_limits_hold_the_bounds(limits, said: str) -> None:
-    with pytest.raises(CreepkitError, match=said):
-        limited(limits)
 
 
 @pytest.mark.parametrize("limits", [None, (0.5, 12), (0.5, math.inf), (-math.inf, math.inf)])

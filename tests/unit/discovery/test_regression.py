@@ -135,27 +135,6 @@ def test_prior_odds_decide_what_the_points_do_not():
         candidate_forms(NORTON, "n", False, T_REF, NINE, ("linear",), {"linear": 0.0})
 
 
-def test_a_combination_that_fails_is_recorded_and_the_others_go_on():
-    """The paper's law with an exponential of 1/T in each of six parameters is larger than a law may be."""
-    law, T = DRIFTING_EXPONENT.fix(m=0), np.array([973.0, 1013.0, 1053.0, 1093.0])
-    theta = np.stack([arrhenius_line(T, LN_A, Q), *(np.full(T.size, v) for v in (3.6, 4.4, 1.0, 6000.0, 2500.0))], 1)
-    given = points(theta, np.diag([0.05, 0.1, 0.05, 0.1, 300.0, 200.0]) ** 2, T, law=law)
-    own = {
-        name: candidate_forms(law, name, name == "A", T_REF, T, ("constant", "modified-arrhenius", form), prior)
-        for name, form, prior in [
-            ("A", "arrhenius", {"modified-arrhenius": 1e20}),
-            *((name, "wachtman", {"wachtman": 1e20}) for name in law.names[1:]),
-        ]
-    }
-    found = rank_combinations(given, own)
-    assert {reason.split(": ", 1)[1][:27] for reason in found.failed.values()} == {"the expression is too large"}
-    assert tuple(found.best.forms.values()) not in found.failed
-    assert found.law.names[0] == "A"
-    weights = [one.weight for one in found.combinations]
-    assert sum(weights) == pytest.approx(1.0)
-    assert weights == sorted(weights, reverse=True)
-
-
 PLUGIN = """
 from sympy import Symbol
 from creepkit.language import Param, TemperatureForm, hookimpl, temperature

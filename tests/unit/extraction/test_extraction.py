@@ -15,7 +15,7 @@ import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.extraction.frame_checks import frames_at_rest
 from creepkit.extraction.noise import autocorrelation, patch_covariance, patch_numbers, rigid_gains, time_correlation
-from creepkit.extraction.plate import plate_axes, rigid_motions
+from creepkit.extraction.plate import rigid_motions
 from creepkit.extraction.temperature_fields import InfraredCamera, image_of_numbers, temperature_between
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.records import CameraFrame, Channel, Frames, InstrumentRecord
@@ -191,17 +191,6 @@ def test_a_planted_rigid_motion_is_found_beside_wild_points(degrees):
     np.testing.assert_allclose(motion.rotation_vectors()[0], vector, rtol=1e-6, atol=1e-13)
     np.testing.assert_allclose(motion.translations()[0], shift, atol=1e-9)
     np.testing.assert_allclose(motion.taken_off(places, np.nan_to_num(moved))[0, 90:], 0.0, atol=1e-9)
-
-
-def test_axes_of_a_tilted_plate_leave_a_fixture_out():
-    places = flat_points(2)
-    places[:60, 2] = 5.0
-    turn = Rotation.from_rotvec([0.2, -0.1, 0.3]).as_matrix()
-    axes = plate_axes(places @ turn.T + [3.0, 4.0, 500.0])
-    np.testing.assert_allclose(axes.axes[2], turn[:, 2], atol=1e-9)
-    np.testing.assert_allclose(np.linalg.det(axes.axes), 1.0)
-    here = axes.camera_places(np.array([[1.5, -2.0]]))[0]
-    np.testing.assert_allclose(axes.place_of(*here[:2]), [1.5, -2.0], atol=1e-9)
 
 
 def test_patches_give_the_scatter_of_a_fit_to_correlated_errors():

@@ -150,40 +150,6 @@ def test_stiffness_of_a_side_is_the_derivative_of_its_force() -> None:
             np.testing.assert_allclose(found[:, :, i, a], slope, atol=1e-9)
 
 
-def surface_stiffness(body: FiniteElementModel, u: np.ndarray) -> np.ndarray:
-    """Derivatives (2 nodes, 2 nodes) of the forces of a unit pressure on the whole surface."""
-    total = np.zeros((u.size, u.size))
-    for nodes in body.pressed:
-        numbers = 2 * nodes + np.arange(2)[:, None]
-        places = body.nodes[nodes].T + u[numbers]
-        total[np.ix_(numbers.ravel(), numbers.ravel())] += stiffness(places).reshape(6, 6)
-    return total
-
-
-def test_load_stiffness_is_symmetric_where_the_ends_are_held() -> None:
-    """The bottom is clamped and the other end lies on the axis, so that the pressure has a potential, p V."""
-    body, u = deformed(CLAMPED)
-    free = body.equations >= 0
-    inner = surface_stiffness(body, u)[np.ix_(free, free)]
-    assert np.abs(inner).max() > 0.1
-    np.testing.assert_allclose(inner, inner.T, atol=1e-13)
-
-
-def test_load_stiffness_is_skew_at_a_free_end() -> None:
-    """p V less p r^2 dz/2 at the foot of the wall: what is skew is r there, between its r and z alone."""
-    body, u = deformed(FILLET)
-    free = body.equations >= 0
-    whole = surface_stiffness(body, u)
-    foot = int(body.pressed[-1, 2])
-    assert body.nodes[foot] == pytest.approx([5.0, 0.0])
-    skew = whole - whole.T
-    expected = np.zeros_like(skew)
-    expected[2 * foot + 1, 2 * foot] = body.nodes[foot, 0] + u[2 * foot]
-    expected -= expected.T
-    np.testing.assert_allclose(abs(skew[np.ix_(free, free)]), abs(expected[np.ix_(free, free)]), atol=1e-13)
-    assert skew[2 * foot + 1, 2 * foot] != 0.0
-
-
 def tangents(geometry: DimpleGeometry) -> tuple[FiniteElementModel, np.ndarray, np.ndarray, np.ndarray]:
     """Body, displacements, the tangent that Newton's method takes, and differences of the residual, (size, size)."""
     body, u = deformed(geometry)

@@ -11,7 +11,16 @@ import pytest
 
 from creepkit.errors import CacheWarning, ExportError
 from creepkit.files import writing
-from creepkit.files.writing import RECORD, check_target, is_foreign, made_from, overwriting, write_bytes, write_text
+from creepkit.files.writing import (
+    RECORD,
+    check_folder_target,
+    check_target,
+    is_foreign,
+    made_from,
+    overwriting,
+    write_bytes,
+    write_text,
+)
 from helpers.command_line import creepkit
 
 FOREIGN = "creepkit did not write it as it is now"
@@ -118,6 +127,15 @@ def test_a_received_file_does_not_choose_which_converted_test_is_lost(tmp_path, 
     assert "tests/D1.csv: cannot be written: it is there, and creepkit made it from ../camera.csv;" in refused.stderr
     assert "stress_MPa: 100" in Path("tests/D1.csv").read_text()
     assert creepkit("read", "received.csv", "--to", "tests", "--force").exit_code == 0
+
+
+def test_a_folder_is_checked_with_what_goes_into_it(tmp_path):
+    check_folder_target(tmp_path / "new" / "deeper", ExportError, ("a",))
+    (tmp_path / "a").write_text("mine")
+    with pytest.raises(ExportError, match=FOREIGN):
+        check_folder_target(tmp_path, ExportError, ("a",))
+    with pytest.raises(ExportError, match="is no folder; name a folder for the results"):
+        check_folder_target(tmp_path / "a" / "b", ExportError)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of a process are those of Linux")

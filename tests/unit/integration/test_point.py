@@ -13,7 +13,6 @@ from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Param, State, parameters, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
-from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import Program, Status
 from helpers.kachanov_law import A, C, damage, kachanov, n, v
 
@@ -110,17 +109,6 @@ def test_a_limit_that_is_met_faster_than_any_step_is_a_rupture(steepness: float,
     assert result.end_times[0, 0] == pytest.approx(1e6, rel=1e-8)
     assert result.end_jacobian is not None
     np.testing.assert_allclose(result.end_jacobian[0, 0], [0, 0, -1, -np.log(100.0), 0], rtol=1e-5, atol=1e-5)
-
-
-def test_strain_hardening_continues_from_its_strain_after_steps_and_holds() -> None:
-    """p^(1-m) grows by (1 - m) A s^n t in each step of stress, and rests at zero stress."""
-    a, power, m = 1e-15, 4.0, -0.7
-    steps = [(0.0, 80.0), (1e4, 130.0), (3e4, 0.0), (4e4, 95.0)]
-    times = np.array([0.0, 5e3, 1e4, 1.0001e4, 2e4, 3e4, 3.5e4, 4e4, 4.2e4, 1e5])
-    grown = np.interp(times, [0, 1e4, 3e4, 4e4, 1e5], np.cumsum([0, 80**4 * 1e4, 130**4 * 2e4, 0, 95**4 * 6e4]))
-    result = run(STRAIN_HARDENING, {"A": a, "n": power, "m": m}, Program.steps(steps), times)
-    np.testing.assert_allclose(result.strain[0], ((1 - m) * a * grown) ** (1 / (1 - m)), rtol=1e-9)
-    assert result.steps.sum() < 40, "the clock makes hardening a straight line"
 
 
 def test_many_tests_and_candidates_in_one_call_equal_one_by_one() -> None:

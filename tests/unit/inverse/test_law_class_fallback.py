@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.composite_predictor import CompositePredictor, outside_class, predictor_for_law
 from creepkit.inverse.confirmation import confirm
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.select import select
@@ -80,13 +79,3 @@ def test_it_confirms_nothing_of_a_law_that_it_does_not_know(tests: list[History]
     found = confirm(replace(fit, predictor=Narrow()), tests, BARS)
     assert found.confirmed
     assert found.noise_ratio == pytest.approx(0.0, abs=1e-3)
-
-
-def test_each_specimen_of_several_has_its_own_answer() -> None:
-    both = CompositePredictor({"uniaxial": Narrow(), "bulge": BARS})
-    chosen = predictor_for_law(both, NORTON)
-    assert isinstance(chosen, CompositePredictor)
-    assert chosen.predictors == {"uniaxial": BARS, "bulge": BARS}
-    assert predictor_for_law(both, HARDENING) is both
-    assert outside_class(both, NORTON) == "law 'norton' is none of its laws"
-    assert outside_class(BARS, NORTON) == ""

@@ -12,7 +12,7 @@ import creepkit as ck
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
+from creepkit.inverse.search.particle_swarm import ParticleSwarm
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import L2, check_penalty
@@ -62,8 +62,7 @@ def stated(stress=80.0):
 
 
 def bounded(A_bounds):
-    params = {A: replace(NORTON.params[A], bounds=A_bounds), N: replace(NORTON.params[N], bounds=(1, 5))}
-    return replace(NORTON, params=params)
+    return NORTON.with_bounds(A=A_bounds, n=(1, 5))
 
 
 STILL = DerivedQuantity("pi", "1", "linear", lambda c: lambda u: np.full(u.shape[:-1], np.pi))
@@ -120,8 +119,6 @@ MISTAKES = [
     (lambda tests, fit: ParticleSwarm(particles=1), "particles is 1; allowed are whole numbers from 2 to"),
     (lambda tests, fit: ParticleSwarm(iterations=2.5), "iterations is 2.5"),
     (lambda tests, fit: ParticleSwarm(cognitive=2.0, social=2.0), "must be more than 4 together"),
-    (lambda tests, fit: CmaEs(population=2), "population is 2"),
-    (lambda tests, fit: CmaEs(initial_step_size=0), "initial_step_size is 0; allowed are numbers above 0"),
     (lambda tests, fit: correlation(fit, "raw"), "allowed are 'author' and 'conditioned'"),
     (lambda tests, fit: profile(fit, "n", level=95), "level is 95"),
     (lambda tests, fit: profile(fit, STILL), "pi does not depend on any parameter"),
@@ -157,7 +154,6 @@ SEARCHES = {
     "multistart": None,
     "swarm": ParticleSwarm(particles=16, iterations=3),
     "swarm, unrefined": ParticleSwarm(particles=16, iterations=3, refined_candidates=0),
-    "cma": CmaEs(iterations=5, restarts=0),
 }
 
 

@@ -252,14 +252,6 @@ def test_readings_of_another_test_are_found_when_rounded_or_thinned(decimals, ev
         assert copied_tests([copy, original]) == {0: 1}, "the one with more readings stays"
 
 
-def test_conditions_that_were_converted_are_the_same():
-    original = bar(1)
-    kept = StressSteps([(0.0, round(150.0 / 6.894757, 2) * 6.894757)])  # written in ksi
-    assert copied_tests([original, changed(original, loading=kept, temperature=round(873.15) + 0.0)]) == {1: 0}
-    assert not copied_tests([original, changed(original, loading=StressSteps([(0.0, 160.0)]))])
-    assert not copied_tests([original, changed(original, temperature=883.15)])
-
-
 def test_total_strain_of_the_other_file_leaves_the_same_readings():
     """Total strain, written to 5 decimals of a percent, less its elastic part, is off by the rounding of both."""
     original = bar(1)

@@ -25,9 +25,9 @@ from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.reports.answer import cautions, interval_digits, key_figures
 from creepkit.reports.blocks import number, typeset
+from creepkit.reports.compared_values import judged_readings
 from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
 from creepkit.reports.html import report_html
-from creepkit.reports.judged_readings import judged_readings
 from creepkit.reports.ranking import separating_test
 from creepkit.reports.rate_panels import plate_figure
 from helpers.report_pages import contents, ranking

@@ -146,21 +146,6 @@ def test_arrivals_and_rupture_of_mpc_omega():
     np.testing.assert_allclose(life.log_time_derivatives[0, 0, 1:5], pace, rtol=1e-4)
 
 
-def test_damage_ends_at_the_limit_of_the_state():
-    """dw/dt = B s^k/(1-w)^r from 0 to 0.99: t = (1 - 0.01^(1+r))/((1+r) B s^k), whatever the strain does."""
-    values = {"A": 1e-16, "n": 4.0, "B": 1e-15, "k": 3.5, "r": 4.0}
-    found = FINE.predict_to_rupture(
-        KACHANOV, KACHANOV.to_internal(values), [bar(times=np.geomspace(1e3, 3e7, 6))], sensitivities=True
-    )
-    expected = (1 - 0.01**5) / (5 * 1e-15 * 80.0**3.5)
-    np.testing.assert_allclose(found.times_to_strain.rupture_times[0, 0], expected, rtol=1e-6)
-    by_r = 0.01**5 * np.log(100.0) / (1 - 0.01**5) - 1 / 5
-    slopes = dict(zip(KACHANOV.names, found.times_to_strain.rupture_jacobian[0, 0], strict=True))
-    assert slopes == pytest.approx({"A": 0, "n": 0, "B": -1, "k": -np.log(80.0), "r": by_r}, rel=1e-4, abs=1e-5)
-    assert found.status[0, 0] == Status.COMPLETE  # it breaks after the last frame
-    assert found.end_times[0, 0] == 3e7
-
-
 @pytest.mark.parametrize("measure", ["logarithmic", "engineering"])
 def test_norton_under_constant_load_runs_away(measure):
     """e = -ln(1 - n r t)/n: Hoff's ductile rupture (J. Appl. Mech. 20 (1953) 105), here up to a strain of one."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,6 @@ class SearchTrace:
 
     best_cost : (iterations,) - lowest cost so far; evaluations : (iterations,) candidates evaluated so far.
     quartiles : (iterations, 3) - costs of that iteration's candidates, 25, 50 and 75 %.
-    restarts : iterations at which a new run of the search began, but for the first.
     refined_cost : lowest cost after local refinement of the best, which took `refinement_evaluations` simulations.
     """
 
@@ -46,17 +45,16 @@ class SearchTrace:
     best_cost: Floats
     evaluations: Ints
     quartiles: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    restarts: tuple[int, ...] = ()
     refined_cost: float | None = None
     refinement_evaluations: int = 0
 
     @classmethod
-    def from_costs(cls, search: str, costs: Sequence[Floats], restarts: Sequence[int] = ()) -> SearchTrace:
+    def from_costs(cls, search: str, costs: Sequence[Floats]) -> SearchTrace:
         """The trace of a search; costs : (candidates,) of each iteration."""
         lowest = np.minimum.accumulate([float(np.min(candidate_costs)) for candidate_costs in costs])
         evaluations = np.cumsum([len(each) for each in costs])
         quartiles = np.array([np.percentile(each, QUARTILES) for each in costs])
-        return cls(search, lowest, evaluations, quartiles, tuple(restarts))
+        return cls(search, lowest, evaluations, quartiles)
 
     def __len__(self) -> int:
         return len(self.best_cost)
@@ -66,8 +64,29 @@ SAME_BASIN = 0.1
 """Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
 
 
-CONVERGED_DECREASE = 1e-3
-"""A decrease of the cost, half of chi-square, below which a search has converged."""
+FIRST_STEPS = Tolerances(max_steps=3)
+"""Of every start of least squares, before the best of them are refined to the end."""
+
+
+CONTINUED = 2
+"""Of the ends of the first steps, how many are refined to the end."""
+
+
+def refined(
+    problem: LeastSquaresProblem, starts: Sequence[Floats], progress: IterationCallback | None = None
+) -> list[Minimum]:
+    """The ends that starts (parameters,) of least squares lead to, best first; far worse ones after few steps."""
+    ends = []
+    for k, u in enumerate(starts):
+        ends.append(problem.minimise(u, tolerances=FIRST_STEPS))
+        if progress is not None:
+            progress("start", k + 1, len(starts))
+    ends.sort(key=lambda end: end.cost)
+    for k, end in enumerate(ends[:CONTINUED]):
+        if not end.converged:
+            further = problem.minimise(end.x)
+            ends[k] = replace(further, evaluations=further.evaluations + end.evaluations)
+    return sorted(ends, key=lambda end: end.cost)
 
 
 def refine_candidates(
@@ -92,8 +111,8 @@ def refine_candidates(
         minima.append(problem.minimise(u[k]))
         if progress is not None:
             progress("refinement", done + 1, len(selected))
-    evaluations = sum(minimum.evaluations for minimum in minima)
     minima.sort(key=lambda minimum: minimum.cost)
+    evaluations = sum(minimum.evaluations for minimum in minima)
     return SearchResult(tuple(minima), replace(trace, refined_cost=minima[0].cost, refinement_evaluations=evaluations))
 
 

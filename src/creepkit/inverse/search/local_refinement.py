@@ -38,10 +38,6 @@ class Penalty(AdditionalResiduals, Protocol):
         """(candidates,) - what is added to the cost; u : (candidates, parameters)."""
         ...
 
-    def frozen_weights_at(self, u: Floats) -> AdditionalResiduals:
-        """The residuals with weights taken at u (parameters,), and kept."""
-        ...
-
 
 @dataclass(frozen=True)
 class Minimum:
@@ -123,14 +119,3 @@ def robust_loss(squared: Floats, loss: str) -> Floats:
     if loss == "huber":
         return np.where(squared <= 1.0, squared, 2.0 * np.sqrt(np.maximum(squared, 1.0)) - 1.0)
     return np.asarray(np.log1p(squared) if loss == "cauchy" else np.arctan(squared))
-
-
-def robust_weight(squared: Floats, loss: str) -> Floats:
-    """(...,) - their derivatives at squared (...,): the weights of iteratively reweighted least squares."""
-    if loss == "linear":
-        return np.ones_like(squared)
-    if loss == "soft_l1":
-        return np.asarray(1.0 / np.sqrt(1.0 + squared))
-    if loss == "huber":
-        return np.where(squared <= 1.0, 1.0, 1.0 / np.sqrt(np.maximum(squared, 1.0)))
-    return np.asarray(1.0 / (1.0 + squared) if loss == "cauchy" else 1.0 / (1.0 + squared**2))

@@ -1,4 +1,4 @@
-"""Multi-start least squares: of many Sobol draws the best, and the centre of the bounds, are refined in a batch.
+"""Multi-start least squares: of many Sobol draws the best, and the centre of the bounds, are refined.
 
 Measured on creep problems: a few selected starts with exact Jacobians find the least cost at a hundredth of the
 evaluations of a particle swarm.
@@ -19,8 +19,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.bounds import LOG_RATE_BOUNDS, Bounds
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import median_log_rate_excess, median_log_rupture_excess
-from creepkit.inverse.search.global_search import SearchResult, SearchTrace
-from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
+from creepkit.inverse.search.global_search import SearchResult, refined
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.options import Options, option
 
@@ -43,11 +42,8 @@ class MultiStart(Options, title="multi-start", error=FitError, prefix="multi-sta
         """The minima of all starts, best first; a sum's best single term stands behind the best."""
         starts, draws = self.starts or problem.settings.starts, self.draws or default_draws(problem)
         screened = screened_starts(problem, starts=starts, draws=draws)
-        problem.check_predicted(np.array(screened))  # from where nothing is predicted, no direction leads away
         initial_points = [*single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2), *screened]
-        costs: list[Floats] = []
-        minima = batched_levenberg_marquardt(problem, initial_points, progress=progress, costs=costs)
-        return SearchResult(tuple(minima), SearchTrace.from_costs("multi-start", costs) if costs else None)
+        return SearchResult(tuple(refined(problem, initial_points, progress)))
 
 
 def default_draws(problem: LeastSquaresProblem) -> int:
@@ -75,7 +71,7 @@ def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int)
             continue
         single = problem.with_law(single_law)
         positions = [law.names.index(name) for name in single_law.names]
-        minimum = batched_levenberg_marquardt(single, screened_starts(single, starts=starts, draws=draws))[0]
+        minimum = refined(single, screened_starts(single, starts=starts, draws=draws))[0]
         problem.evaluations.count += single.evaluations.count
         u = bounds.centre
         u[positions] = minimum.x
@@ -108,7 +104,7 @@ def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) ->
             + sobol[:, internal_rates] * (INTERNAL_RATE_RANGE[1] - INTERNAL_RATE_RANGE[0])
         )
         points[0, internal_rates] = log_internal_rate + 0.5 * sum(INTERNAL_RATE_RANGE)
-        for _ in range(3 + 2 * min(len(internal_rates), 1)):
+        for _ in range(2 + 3 * min(len(internal_rates), 1)):
             residuals = problem.candidate_residuals(bounds.clip(points))
             points[:, rates] -= np.clip(median_log_rate_excess(observations, residuals), -6, 6)[:, None]
             points[:, internal_rates] -= np.clip(median_log_rupture_excess(observations, residuals), -6, 6)[:, None]
@@ -117,10 +113,11 @@ def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) ->
     score = np.array(
         [np.mean(np.arcsinh(candidate_residuals[observations.present]) ** 2) for candidate_residuals in residuals]
     )
-    if not np.isfinite(score).any():
+    chosen = [0, *[int(k) for k in np.argsort(score) if k != 0][: max(starts - 1, 0)]]
+    if not np.isfinite(score[chosen]).any():  # from where nothing is predicted, no direction leads away
+        problem.check_predicted(points[chosen])
         raise FitError(f"law '{problem.law.name}': no point within its bounds can be simulated; widen the bounds")
-    order = [int(k) for k in np.argsort(score) if k != 0][: max(starts - 1, 0)]
-    return [points[0], *(points[k] for k in order)]
+    return [points[k] for k in chosen]
 
 
 def _with_sampled_exponents(problem: LeastSquaresProblem, points: Floats, sobol: Floats) -> Floats:

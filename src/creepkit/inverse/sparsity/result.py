@@ -1,4 +1,4 @@
-"""Results of term selection: the sparsity record of an identification, and the regularisation path of a penalty."""
+"""The sparsity record of an identification: how a sum was reduced to fewer terms."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 from scipy.stats import chi2
 
-from creepkit.arrays import Floats
 from creepkit.inverse.goodness_of_fit import OutputErrors
 from creepkit.presentation import Presentable
 
@@ -36,7 +35,6 @@ class Sparsity(Presentable, text="reports.inference:sparsity_text"):
     contributions_* : {term: contribution} without penalty, with it, and after the refit of what was kept.
     full, reduced : statistics of the sum and of the reduced law under one covariance.
     observations : measured values, N of BIC.
-    path : over the strength, where that was chosen automatically (not saved).
     """
 
     law: str
@@ -52,7 +50,6 @@ class Sparsity(Presentable, text="reports.inference:sparsity_text"):
     full: FitStatistics
     reduced: FitStatistics
     observations: int
-    path: PenaltyPath | None = field(default=None, repr=False, compare=False)
 
     @property
     def chi_square_rise(self) -> float:
@@ -108,31 +105,6 @@ def _quoted_list(names: list[str] | TermNames) -> str:
     """'a', 'b' and 'c'."""
     quoted = [f"'{name}'" if not name.startswith("exponent ") else name for name in names]
     return quoted[0] if len(quoted) == 1 else " and ".join([", ".join(quoted[:-1]), quoted[-1]]) if quoted else ""
-
-
-@dataclass(frozen=True, eq=False)
-class PenaltyPath(Presentable, text="reports.inference:penalty_path_text"):
-    """One row for each strength, the first of which is 0.
-
-    penalty : its class; terms : of the sum; strengths : (strengths,) -, half a chi-square.
-    contributions : (strengths, terms) -; chi_square : (strengths,) - of the data, penalty apart.
-    kept_terms : that are left; bic_excess : (strengths,) - BIC of these refitted, less the least of all.
-    x : (strengths, unknowns) where the penalised fits ended; chosen : the row that was chosen.
-    """
-
-    penalty: str
-    terms: TermNames
-    strengths: Floats
-    contributions: Floats
-    chi_square: Floats
-    kept_terms: tuple[TermNames, ...]
-    bic_excess: Floats
-    x: Floats
-    chosen: int
-
-    def contributions_by_term(self, row: int | None = None) -> dict[str, float]:
-        """{term: contribution} of one row, by default the chosen one."""
-        return dict(zip(self.terms, map(float, self.contributions[self.chosen if row is None else row]), strict=True))
 
 
 LEAST_CONTRIBUTION = 0.05

@@ -1,16 +1,12 @@
 """Term selection: a sum is fitted with a penalty, terms are dropped, the rest is refitted and compared with the sum.
 
-A concave penalty has a minimum at each corner, so that the penalised fit has many starts. Along the path of a penalty
-the strength is chosen by BIC: at each strength the terms that contribute 5 % or more are kept and refitted without
-penalty, and the set of lowest BIC wins, at the lowest strength that leaves it.
+Misfit and penalty together have several minima, so that the penalised fit has many starts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
@@ -22,9 +18,9 @@ from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.inverse.search.multistart import distinct
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.penalties import ContributionPenalty, PenalisedTerms, Subsets, check_penalty
+from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Subsets, check_penalty
 from creepkit.inverse.sparsity.reduced_laws import ReducedLaw, ReducedLaws, TermProblem, terms_above
-from creepkit.inverse.sparsity.result import FitStatistics, PenaltyPath, Sparsity, TermNames
+from creepkit.inverse.sparsity.result import FitStatistics, Sparsity, TermNames
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
@@ -52,98 +48,36 @@ def penalised_fit(problem: TermProblem, penalty: PenalisedTerms, starts: Sequenc
     return min(completed, key=lambda m: m.cost)
 
 
-PATH_STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
-"""Two a decade, in units of half a chi-square: from nothing to more than a dimple's whole test is worth."""
-
-
-def trace_path(
-    reductions: ReducedLaws,
-    penalty: ContributionPenalty,
-    strengths: Sequence[float] = PATH_STRENGTHS,
-    progress: IterationCallback | None = None,
-) -> PenaltyPath:
-    """The path over `strengths`, from the sum without penalty; each fit starts where the last ended, and in corners.
-
-    It ends when one term is left.
-    """
-    problem, labels = reductions.problem, reductions.terms
-    penalised, full = PenalisedTerms.from_problem(problem.problem, penalty, 0.0), reductions.full()
-    corners = penalised_starts(reductions)[-len(labels) :]
-    optima = [full.x]
-    for k, strength in enumerate(sorted(strengths)):
-        optima.append(_next_fit(reductions, replace(penalised, strength=strength), optima[-1], corners).x)
-        if progress is not None:
-            progress("strength", k + 1, len(strengths))
-        if len(terms_above(problem.contributions_at(optima[-1]))) == 1:
-            break
-    contributions = np.array([list(problem.contributions_at(x).values()) for x in optima])
-    kept_terms = tuple(terms_above(dict(zip(labels, row, strict=True))) for row in contributions)
-    bic = np.array([reductions.with_terms(terms).bic for terms in kept_terms])
-    chi_square = np.array([problem.problem.chi_square(x) for x in optima])
-    path_strengths = np.array([0.0, *sorted(strengths)])[: len(optima)]
-    excess = bic - bic.min()
-    return PenaltyPath(
-        type(penalty).__name__,
-        labels,
-        path_strengths,
-        contributions,
-        chi_square,
-        kept_terms,
-        excess,
-        np.array(optima),
-        int(excess.argmin()),
-    )
-
-
-def _next_fit(
-    reductions: ReducedLaws, penalised: PenalisedTerms, previous: Floats, corners: Sequence[Floats]
-) -> Minimum:
-    """The penalised fit from the last one, and from the corners that cost less there."""
-    problem, limit = reductions.problem, reductions.problem.cost(previous, penalised)
-    lower = [x for x in corners if problem.cost(x, penalised) < limit]
-    return penalised_fit(problem, penalised, [previous, *lower])
-
-
 @dataclass(frozen=True, eq=False)
 class TermChoice:
     """The terms that a penalty keeps.
 
     contributions : of all terms under the penalty; x : (unknowns,) there.
-    strength, path : None of a choice among subsets; trace : of the global search, if there was one.
+    strength : None of a choice among subsets; trace : of the global search, if there was one.
     """
 
     kept_terms: TermNames
     contributions: Mapping[str, float]
     x: Floats
     strength: float | None = None
-    path: PenaltyPath | None = None
     trace: SearchTrace | None = None
 
 
 def choose_terms(
     reductions: ReducedLaws,
-    penalty: ContributionPenalty | Subsets,
+    penalty: L2 | Subsets,
     search: GlobalSearch | None = None,
     progress: IterationCallback | None = None,
 ) -> TermChoice:
     """The terms that a penalty keeps.
 
-    search : a global search of the penalised cost besides the usual starts; not for subsets, nor along a path.
+    search : a global search of the penalised cost besides the usual starts; not for subsets.
     """
     problem = reductions.problem
     if isinstance(penalty, Subsets):
         lowest = reductions.lowest_bic(penalty.EXHAUSTIVE_LIMIT)
         x = problem.embedded(lowest.law, lowest.x)
         return TermChoice(lowest.kept_terms, problem.contributions_at(x), x)
-    if penalty.strength == "auto":
-        path = trace_path(reductions, penalty, progress=progress)
-        return TermChoice(
-            path.kept_terms[path.chosen],
-            path.contributions_by_term(),
-            path.x[path.chosen],
-            float(path.strengths[path.chosen]),
-            path,
-        )
     penalised_terms = PenalisedTerms.from_problem(problem.problem, penalty)
     starts, trace = penalised_starts(reductions), None
     if search is not None:
@@ -164,7 +98,7 @@ def identify_sparse(
     histories: Sequence[History],
     using: PredictorOrMapping,
     *,
-    penalty: ContributionPenalty | Subsets,
+    penalty: L2 | Subsets,
     search: GlobalSearch | None = None,
     through: Predictor | None = None,
     settings: IdentificationSettings | None = None,
@@ -184,7 +118,7 @@ def identify_sparse(
 
 
 def identify_reduced(
-    penalty: ContributionPenalty | Subsets,
+    penalty: L2 | Subsets,
     full: Identification,
     reductions: ReducedLaws,
     search: GlobalSearch | None = None,
@@ -240,7 +174,7 @@ def _sparsity_record(
     reductions: ReducedLaws,
     reduced: ReducedLaw,
     choice: TermChoice,
-    penalty: ContributionPenalty | Subsets,
+    penalty: L2 | Subsets,
 ) -> Sparsity:
     problem, full = reductions.problem, reductions.full(reduced)
     return Sparsity(
@@ -257,5 +191,4 @@ def _sparsity_record(
         full=FitStatistics(full.chi_square, full.parameter_count, full.bic, full_fit.errors),
         reduced=FitStatistics(reduced.chi_square, reduced.parameter_count, reduced.bic, fit.errors),
         observations=problem.problem.observations.count,
-        path=choice.path,
     )

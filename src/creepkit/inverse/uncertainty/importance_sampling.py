@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.special import softmax
 from scipy.stats import chi2, multivariate_t, norm, qmc
 
 from creepkit import limits
@@ -45,8 +46,8 @@ ROUNDS, MOST_ROUNDS = 4, 12
 """Of proposals: at least, and where the samples are still worth too few."""
 
 
-DRAWS = 256
-"""In each round, a power of two for the Sobol sequence."""
+DRAWS, MOST_DRAWS = 256, 4096
+"""In each round, a power of two for the Sobol sequence; and where many of them lie outside the bounds."""
 
 
 SAMPLES = 400
@@ -169,34 +170,35 @@ def covariance_root(covariance: Floats) -> Floats:
 def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape: Floats, seed: int) -> Floats | None:
     """Samples of the posterior with residuals as quadratic functions of u, where it is what predictions say; else None.
 
-    Fitted to draws about the optimum, and judged at draws of what it says itself, which improve it where it fails.
+    Fitted to draws about the optimum, and judged at draws of what it says itself, which improve it where it fails; at
+    last these draws are weighted by what predictions say of them.
     """
     count = max(LEAST_POINTS, 2 * quadratic_terms(centre.size))
-    drawn = _drawn(centre, shape, seed)
+    drawn = _drawn(centre, shape, seed, MOST_DRAWS)
     u = drawn[posterior.inside(drawn)][:count]
     if len(u) < count:
         return None
     residuals, rate_effect = posterior.residuals(u)
     log_density = posterior.log_density(residuals, rate_effect)
-    for k in range(FITS):
+    for k, points in enumerate(JUDGED_POINTS):
         usable = np.isfinite(log_density) & np.isfinite(residuals).all(axis=(1, 2))
         if usable.sum() < 1.5 * quadratic_terms(centre.size):
             return None
         weights = np.exp(0.5 * np.maximum(log_density[usable] - log_density.max(), LEAST_LOG_WEIGHT))
         surface = QuadraticResiduals.fitted(u[usable], residuals[usable], weights, centre, shape)
         density = _corrected(replace(posterior, quadratic=surface), u[usable], log_density[usable], weights)
-        samples = posterior_samples(density, centre, shape, seed + k)
+        samples = posterior_samples(density, centre, shape, seed + k, least=2.0 * SAMPLES)
         if samples is None:
             return None
-        judged = samples[:: len(samples) // LEAST_POINTS][:LEAST_POINTS]
+        judged = samples[:: len(samples) // points][:points]
         further, further_effect = posterior.residuals(judged)
         exact = posterior.log_density(further, further_effect)
-        error = float(np.std(exact - density(judged)))
-        if error < LARGEST_ERROR:
+        errors = exact - density(judged)
+        if float(np.std(errors)) < LARGEST_ERROR:
             return samples
         u, residuals = np.concatenate([u, judged]), np.concatenate([residuals, further])
         log_density = np.concatenate([log_density, exact])
-    return None
+    return _resampled(judged, errors, LEAST_EFFECTIVE_SIZE, SAMPLES)
 
 
 def _corrected(quadratic: Posterior, u: Floats, log_density: Floats, weights: Floats) -> Callable[[Floats], Floats]:
@@ -218,11 +220,11 @@ def _corrected(quadratic: Posterior, u: Floats, log_density: Floats, weights: Fl
 
 
 LEAST_POINTS = 32
-"""Simulated points that quadratic residuals are fitted to at least, and at which they are judged."""
+"""Simulated points that quadratic residuals are fitted to at least."""
 
 
-FITS = 3
-"""Of quadratic residuals, before the posterior is sampled by predictions alone."""
+JUDGED_POINTS = (32, 32, 400)
+"""Draws at which each of the fits of quadratic residuals is judged; the last are weighted by what predictions say."""
 
 
 LEAST_LOG_WEIGHT = -20.0
@@ -252,7 +254,6 @@ def posterior_samples(
     smallest = 1e-6 * np.diag(np.diag(shape))
     points, log_density = np.zeros((0, size)), np.zeros(0)
     proposals: list[tuple[Floats, Floats]] = []
-    weights = np.zeros(0)
     for k in range(MOST_ROUNDS):
         proposals.append((centre, shape))
         drawn = _drawn(centre, shape, seed + k)
@@ -263,14 +264,22 @@ def posterior_samples(
         log_weight = log_density - mixture
         if not np.isfinite(log_weight).any():
             return None
-        weights = np.exp(log_weight - log_weight.max())
-        weights /= weights.sum()
+        weights = softmax(log_weight)
         centre = weights @ points
         deviation = points - centre
         shape = (weights[:, None] * deviation).T @ deviation + smallest
         if k + 1 >= ROUNDS and 1.0 / float((weights**2).sum()) >= least:
             break
-    if 1.0 / float((weights**2).sum()) < LEAST_EFFECTIVE_SIZE:
+    return _resampled(points, log_weight, LEAST_EFFECTIVE_SIZE, draws)
+
+
+def _resampled(points: Floats, log_weight: Floats, least: float, draws: int) -> Floats | None:
+    """(draws, parameters) points of equal weight; None where those of weights (points,) are worth fewer than `least`.
+
+    points : (points, parameters). log_weight : (points,) ln of their weights.
+    """
+    weights = softmax(log_weight)
+    if not 1.0 / float((weights**2).sum()) >= least:
         return None
     positions = (np.arange(draws) + 0.5) / draws
     return np.asarray(points[np.searchsorted(np.cumsum(weights), positions).clip(max=len(points) - 1)])
@@ -309,9 +318,9 @@ LARGEST_FALL = 2.0
 """Of the logarithm of the posterior along a principal axis: a Gaussian falls by 0.5, Student's t by less than this."""
 
 
-def _drawn(centre: Floats, shape: Floats, seed: int) -> Floats:
-    """(DRAWS, parameters) quasi-random draws of a multivariate Student's t."""
-    unit = qmc.Sobol(centre.size + 1, seed=seed).random(DRAWS)
+def _drawn(centre: Floats, shape: Floats, seed: int, draws: int = DRAWS) -> Floats:
+    """(draws, parameters) quasi-random draws of a multivariate Student's t."""
+    unit = qmc.Sobol(centre.size + 1, seed=seed).random(draws)
     unit = np.clip(unit, 1e-9, 1.0 - 1e-9)
     normal = norm.ppf(unit[:, :-1]) @ np.linalg.cholesky(shape).T
     mixing = chi2.ppf(unit[:, -1:], PROPOSAL_FREEDOM) / PROPOSAL_FREEDOM

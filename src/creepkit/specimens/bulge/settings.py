@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -158,13 +159,11 @@ class BulgeSettings(FiniteElementSettings):
         """Outputs of each frame from points of the top about the centre; see `camera_points`."""
         return observe_surface(points, operator)
 
-    @property
+    @cached_property
     def dimensions(self) -> tuple[Dimension, ...]:
         """The lengths of the dimple, unless its mesh is from elsewhere, and the window within which it is observed."""
-        lengths = tuple(
-            Dimension(name, getattr(self.geometry, name), LENGTH_RANGE, **_LENGTHS.get(name, {}))
-            for name in (DimpleGeometry.lengths if self.mesh is None else ())
-        )
+        names = DimpleGeometry.lengths if self.mesh is None else ()
+        lengths = (Dimension(n, getattr(self.geometry, n), LENGTH_RANGE, **_LENGTHS.get(n, {})) for n in names)
         return (*lengths, Dimension("window", self.observation.window, LENGTH_RANGE, of_piece=False))
 
     def plotted_series(self, outputs: Mapping[str, Floats]) -> dict[str, Floats]:

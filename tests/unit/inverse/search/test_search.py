@@ -1,4 +1,4 @@
-"""ParticleSwarm, CmaEs and their trace: known minima, the rules of their sources, bounds, seeds, restarts."""
+"""Multi-start and ParticleSwarm: known minima, the rules of its sources, bounds, seeds; planted values are found."""
 
 import numpy as np
 import pytest
@@ -8,39 +8,33 @@ from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.identify import identify
 from creepkit.inverse.initial_search import search_problem
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
-from creepkit.inverse.search.global_search import SearchTrace
-from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
-from creepkit.inverse.search.local_refinement import robust_loss, robust_weight
+from creepkit.inverse.search.global_search import SearchTrace, refined
 from creepkit.inverse.search.multistart import MultiStart, distinct, screened_starts
+from creepkit.inverse.search.particle_swarm import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import History
 from helpers.cost_functions import Known, cube, quadratic, rastrigin, rosenbrock
 
-SWARM, CMA_ES = ParticleSwarm(refined_candidates=0), CmaEs(refined_candidates=0)
+SWARM = ParticleSwarm(refined_candidates=0)
 BEYOND = Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0]))
 """The minimum lies beyond a bound."""
 KNOWN = [
-    (SWARM, quadratic, cube(3), [1, 2, 3]),
-    (SWARM, quadratic, BEYOND, [2, 2]),
-    (SWARM, rosenbrock, cube(2), [1, 1]),
-    (SWARM, rastrigin, cube(3, 5.12), [0, 0, 0]),
-    (CMA_ES, quadratic, cube(3), [1, 2, 3]),
-    (CMA_ES, quadratic, BEYOND, [2, 2]),
-    (CMA_ES, rosenbrock, cube(2), [1, 1]),
-    (CMA_ES, rosenbrock, cube(5), [1, 1, 1, 1, 1]),
+    (quadratic, cube(3), [1, 2, 3]),
+    (quadratic, BEYOND, [2, 2]),
+    (rosenbrock, cube(2), [1, 1]),
+    (rastrigin, cube(3, 5.12), [0, 0, 0]),
 ]
 
 
 def test_known_minima_are_found_without_refinement_and_no_candidate_leaves_the_bounds():
     missed = []
-    for search, cost, box, at in KNOWN:
+    for cost, box, at in KNOWN:
         landscape = Known(cost, box)
-        found, everything = search.minima(landscape).minima[0], np.concatenate(landscape.seen)
+        found, everything = SWARM.minima(landscape).minima[0], np.concatenate(landscape.seen)
         if np.abs(found.x - at).max() > 0.02 or found.cost != cost(found.x[None])[0]:
-            missed.append((search.description, cost.__name__, found))
+            missed.append((cost.__name__, found))
         if (everything < box.lower).any() or (everything > box.upper).any():
-            missed.append((search.description, cost.__name__, "left the bounds"))
+            missed.append((cost.__name__, "left the bounds"))
     assert missed == []
 
 
@@ -59,9 +53,8 @@ def test_refined_minima_differ_and_come_best_first():
     assert len(np.unique(np.array([m.x for m in found]).round(2), axis=0)) > 1
 
 
-@pytest.mark.parametrize("search", [ParticleSwarm(12, 25), CmaEs(population=12, iterations=25, restarts=0)])
-def test_an_iteration_is_one_prediction_and_a_seed_gives_the_same_answer_twice(search):
-    runs = []
+def test_an_iteration_is_one_prediction_and_a_seed_gives_the_same_answer_twice():
+    runs, search = [], ParticleSwarm(12, 25)
     for seed in (7, 7, 8):
         landscape = Known(rastrigin, cube(4), IdentificationSettings(seed=seed))
         runs.append(search.minima(landscape))
@@ -98,18 +91,6 @@ def test_the_swarm_starts_from_a_sobol_set():
     assert (counts == 1).all()
 
 
-def test_restarts_find_what_one_run_misses():
-    """Of four runs on many minima the best one counts; each has twice the candidates of the one before."""
-    landscape = Known(rastrigin, cube(4, 5.12))
-    found = CmaEs(iterations=600, restarts=3).minima(landscape)
-    np.testing.assert_allclose(found.minima[0].x, 0.0, atol=1e-3)
-    starts = (0, *found.trace.restarts)
-    assert [landscape.calls[k] for k in starts] == [landscape.calls[0] * 2**run for run in range(len(starts))]
-    alone = CmaEs(iterations=600, restarts=0, refined_candidates=0).minima(Known(rastrigin, cube(4, 5.12)))
-    assert alone.trace.best_cost[-1] > 0.5  # the next best minimum lies at 1
-    assert alone.trace.restarts == ()
-
-
 def test_a_trace_keeps_the_lowest_so_far_what_was_asked_and_the_quartiles():
     costs = [np.array([9.0, 5.0, 7.0]), np.array([6.0, 8.0, 10.0]), np.array([3.0, 4.0, 5.0, 6.0, 7.0])]
     trace = SearchTrace.from_costs("search", costs)
@@ -119,9 +100,9 @@ def test_a_trace_keeps_the_lowest_so_far_what_was_asked_and_the_quartiles():
     assert len(trace) == 3
 
 
-# ---- levenberg marquardt ---------------------------------------------------------------------------------------------
+# ---- multi-start -----------------------------------------------------------------------------------------------------
 
-# Least squares from several starts at once: planted values found from each of them, within bounds.
+# Least squares from several starts: planted values found from them, within bounds.
 
 
 TIMES = np.geomspace(600.0, 4e5, 25)
@@ -146,10 +127,10 @@ def landscape(law, values, stresses=(60.0, 90.0, 130.0)):
 def test_planted_values_are_found_from_many_starts(name, values):
     law = ck.law(name)
     view = landscape(law, values)
-    ends = batched_levenberg_marquardt(view, screened_starts(view, starts=6, draws=32))
+    ends = refined(view, screened_starts(view, starts=6, draws=32))
     found = view.coordinates.values(ends[0].x)
     assert {n: found[n] for n in values} == pytest.approx(values, rel=1e-3)
-    assert sum(end.cost < ends[0].cost + 1e-4 for end in ends) >= 4
+    assert sum(end.cost < ends[0].cost + 1e-4 for end in ends) >= 2
     assert all((view.bounds.lower <= end.x).all() and (end.x <= view.bounds.upper).all() for end in ends)
 
 
@@ -170,26 +151,16 @@ def test_minima_that_predict_the_same_are_one():
     assert len(distinct(found, view.bounds)) <= 2
 
 
-@pytest.mark.parametrize("loss", ["linear", "soft_l1", "huber", "cauchy", "arctan"])
-def test_losses_have_their_own_slopes(loss):
-    z = np.geomspace(1e-3, 30.0, 40)
-    slope = (robust_loss(z * (1 + 1e-6), loss) - robust_loss(z * (1 - 1e-6), loss)) / (2e-6 * z)
-    assert robust_weight(z, loss) == pytest.approx(slope, rel=1e-6)
-
-
 # ---- bulge -----------------------------------------------------------------------------------------------------------
 
-# The swarm and CMA-ES on the real landscape: a planted bulge test through the stand-in of one degree of freedom.
+# The swarm on the real landscape: a planted bulge test through the stand-in of one degree of freedom.
 
 
 TRUTH = {"A": 2e-16, "n": 4.5}
 FRAMES = np.arange(1800.0, 43201.0, 1800.0)
 LOADING, ELASTIC = ck.PressureJump(P1=8, P2=10, Tj=14400), ck.Elastic(E=150e3)
 NORTON = ck.law("norton")
-SEARCHES = {
-    "swarm": ParticleSwarm(particles=40, iterations=15, refined_candidates=2),
-    "cma": CmaEs(iterations=30, restarts=0, refined_candidates=1),
-}
+SMALL_SWARM = ParticleSwarm(particles=40, iterations=15, refined_candidates=2)
 
 
 @pytest.fixture(scope="module")
@@ -206,9 +177,8 @@ def test(stand_in):
     return ck.History("planted", FRAMES, noisy, LOADING, 293.15, specimen="bulge", elastic=ELASTIC)
 
 
-@pytest.mark.parametrize("name", SEARCHES)
-def test_a_planted_law_lies_in_its_intervals_whatever_searched(stand_in, test, name):
-    fit = identify(NORTON, [test], stand_in, search=SEARCHES[name])
+def test_a_planted_law_lies_in_its_intervals_whatever_searched(stand_in, test):
+    fit = identify(NORTON, [test], stand_in, search=SMALL_SWARM)
     default = identify(NORTON, [test], stand_in)
     assert all(e.low <= TRUTH[e.name] <= e.high for e in fit.estimates)
     assert fit.log_likelihood == pytest.approx(default.log_likelihood, abs=0.01)

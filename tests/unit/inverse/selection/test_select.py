@@ -100,10 +100,7 @@ def test_hold_out_and_sums_are_asked_for_by_name():
 
 
 def test_a_law_that_cannot_be_identified_is_named_and_the_others_go_on():
-    norton = ck.law("norton")
-    A, n = norton.params
-    narrow = {A: replace(norton.params[A], bounds=(1e-40, 1e-30)), n: replace(norton.params[n], bounds=(1, 5))}
-    hopeless = replace(norton, name="hopeless", params=narrow)
+    hopeless = replace(ck.law("norton").with_bounds(A=(1e-40, 1e-30), n=(1, 5)), name="hopeless")
     tests = measured("norton", {"A": 1e-16, "n": 4.2})
     ranking = ck.select(["norton", hopeless], tests, "uniaxial", nuisances=[], starts=3)
     assert [r.fit.law.name for r in ranking.laws] == ["norton"]

@@ -210,8 +210,7 @@ def test_ends_at_the_laws_bounds_are_said_to_be_open():
 
 def test_an_interval_cut_by_a_bound_is_open_on_that_side(tests):
     """The truth lies at n = 4 and the law allows n up to 4.1: only the lower end can be found."""
-    A, n = NORTON.params
-    short = replace(NORTON, params={A: NORTON.params[A], n: replace(NORTON.params[n], bounds=(1.0, 4.1))})
+    short = NORTON.with_bounds(n=(1.0, 4.1))
     found = profile(known_scatter(short, tests, SD), "n")
     assert found.high is None
     assert found.low == pytest.approx(profile(known_scatter(NORTON, tests, SD), "n").low, abs=0.02)

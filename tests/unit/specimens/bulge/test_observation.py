@@ -7,7 +7,7 @@ from scipy.optimize import curve_fit
 
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.fem.time_interpolation import TimeInterpolation
-from creepkit.specimens.bulge.field_fit import fit_field
+from creepkit.specimens.bulge.field_fit import fit_field, paper_parameters
 from creepkit.specimens.bulge.observation import Observation
 from helpers.bulge_profiles import FINE, LOOKED_AT, NODES, bell, cross, plates, profile_with_apex, richardson, table
 from helpers.paths import needs_shared_data
@@ -226,6 +226,14 @@ def test_lost_and_wild_points():
     fit = fit_field(x, y, surface)
     assert fit.points == 2497
     np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], [0.35, 3.6, 2.3], rtol=0.005)
+
+
+@pytest.mark.parametrize(("p", "theta"), [(2.2, 0.0), (2.0, 0.25 * np.pi)])
+def test_eight_parameters_as_those_of_the_paper(p, theta):
+    x, y = pixels()
+    along, across = np.cos(theta) * x + np.sin(theta) * y, np.cos(theta) * y - np.sin(theta) * x
+    fit = fit_field(x, y, 0.4 * np.exp(-0.5 * (np.abs(along / 2.7) ** p + np.abs(across / 2.7) ** p)))
+    np.testing.assert_allclose(paper_parameters(0.4, 2.7, 2.7, p, theta), [fit.amplitude, fit.width, p], rtol=1e-7)
 
 
 # ---- observation at times --------------------------------------------------------------------------------------------
