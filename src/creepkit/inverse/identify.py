@@ -72,6 +72,7 @@ from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with
 from creepkit.inverse.uncertainty.laplace_approximation import (
     covariance_of_values,
     cut_interval_notes,
+    median_freedom,
     parameter_estimates,
     positive_semidefinite,
     restricted_covariance,
@@ -362,7 +363,7 @@ def _result(
         rms=pooled_log_strain_rms(tests),
         log_likelihood=best.log_likelihood,
         effective_frames=effective_sample_size(best.residuals, noise_model),
-        freedom=float(np.median(freedom[:count])),
+        freedom=median_freedom(freedom[:count]),
         tests=tests,
         ranges=fitted_ranges(problem),
         settings=problem.settings,

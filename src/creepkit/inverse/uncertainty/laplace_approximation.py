@@ -45,7 +45,8 @@ def restricted_covariance(
 
     fixed : (output, component) that are known beside those that nuisances give. The variance of an unknown that the
     scatter between tests decides is known worse than that of one which every curve shows: each has degrees of freedom
-    of its own. Unknowns at their bounds count here as all others: their intervals reach inwards.
+    of its own, NaN where no observation depends on it. Unknowns at their bounds count here as all others: their
+    intervals reach inwards.
     """
     unconstrained = replace(linearised, free=np.ones_like(linearised.free))
     factor = CovarianceFactor.of_residuals(linearised.residuals, noise_model)
@@ -67,15 +68,21 @@ def restricted_covariance(
     with np.errstate(over="ignore"):  # a variance that nothing makes uncertain has a freedom without bound
         freedom = 2.0 * np.diag(solution.covariance) ** 2 / np.maximum(variance_of_variance, 1e-300)
     determined = (unconstrained.jacobian != 0).any(axis=(0, 1))
-    return solution.covariance, np.where(determined, np.clip(freedom, MINIMUM_FREEDOM, NORMAL_FREEDOM), MINIMUM_FREEDOM)
+    return solution.covariance, np.where(determined, np.clip(freedom, MINIMUM_FREEDOM, NORMAL_FREEDOM), np.nan)
+
+
+def median_freedom(freedom: Floats) -> float:
+    """Of those that the tests determine; the least where there are none. freedom : (n,)."""
+    known = freedom[np.isfinite(freedom)]
+    return float(np.median(known)) if known.size else MINIMUM_FREEDOM
 
 
 def with_freedom(covariance: Floats, freedom: Floats) -> Floats:
     """The covariance of the normal distribution whose 95 % intervals are those of Student's t, (n, n).
 
-    covariance : (n, n). freedom : (n,) degrees of freedom of each variance.
+    covariance : (n, n). freedom : (n,) degrees of freedom of each variance, NaN of one that is a prior's.
     """
-    scale = student.ppf(0.975, freedom) / NORMAL_QUANTILE
+    scale = student.ppf(0.975, np.nan_to_num(freedom, nan=NORMAL_FREEDOM)) / NORMAL_QUANTILE
     return np.asarray(covariance * np.outer(scale, scale))
 
 
