@@ -23,9 +23,8 @@ import creepkit as ck
 from creepkit import kernels
 from creepkit.fem.simulation import simulate
 from creepkit.records import History, PressureJump
-from creepkit.specimens.bulge.finite_elements import BulgeTest
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.finite_element_tests import solver_settings
+from creepkit.specimens.finite_element_tests import FiniteElementTest, solver_settings
 
 TIMES = np.maximum(np.arange(289) * 150.0, 1.0)
 CASES = {
@@ -50,7 +49,7 @@ class Case:
             name=name, times=TIMES, outputs={}, loading=PressureJump(8.0, 10.0, 14400.0), temperature=1000.0,
             specimen="bulge", elastic=ck.Elastic(150e3),
         )  # fmt: skip
-        self.setup = BulgeTest.of(self.specimen, self.history, {})
+        self.setup = FiniteElementTest.of(self.specimen, self.history, {})
 
     def simulate(self, **settings: float):
         """The finite element simulation alone."""
@@ -60,8 +59,8 @@ class Case:
     def predict(self, jacobian: bool = False):
         """What a fit asks for."""
         nuisances = NUISANCES if jacobian else {}
-        test = BulgeTest.of(self.specimen, self.history, nuisances, jacobian)
-        return test.respond(self.law, self.theta, solver_settings(self.specimen, exact=jacobian))
+        test = FiniteElementTest.of(self.specimen, self.history, nuisances, jacobian)
+        return test.response(test.simulate(self.law, self.theta, solver_settings(self.specimen, exact=jacobian)))
 
 
 def least(call, repeats: int) -> float:

@@ -14,7 +14,7 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.adequacy import Adequacy
-from creepkit.inverse.composite_predictor import CompositePredictor, predict
+from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import NumericalError, correct_defect
 from creepkit.inverse.explanation import LeftOut
@@ -323,8 +323,7 @@ class Identification(
         """
         predictor = self._predictor_or(using)
         tests = list(histories or self.histories)
-        prediction = predict(
-            predictor,
+        prediction = predictor.predict(
             self.law,
             self.law.to_internal(self.values),
             tests,
@@ -371,9 +370,8 @@ class Identification(
         if using is None and (self.predictor is not None or self.predictor_documents):
             predictor = self._predictor_or(None)
         elif using is None or isinstance(using, str | Mapping):
-            resolved = resolve_predictors(using, tests)
-            predictor = CompositePredictor(resolved) if isinstance(resolved, dict) else resolved
-        elif hasattr(using, "predict"):
+            predictor = CompositePredictor.of(resolve_predictors(using, tests))
+        elif isinstance(using, Predictor):
             predictor = using
         else:
             raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")

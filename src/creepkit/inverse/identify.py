@@ -13,14 +13,7 @@ from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.bound_penalties import check_bounds
 from creepkit.inverse.bounds import MOST_WIDENINGS, widened, widened_notes
 from creepkit.inverse.compared_tests import compared_tests, compares_rupture_times
-from creepkit.inverse.composite_predictor import (
-    predict,
-    prediction_errors_of,
-    predictors_for_law,
-    reduced_order_model_of,
-    refined_of,
-    through_for_law,
-)
+from creepkit.inverse.composite_predictor import predictors_for_law, through_for_law
 from creepkit.inverse.defect_correction import (
     NumericalError,
     correct_defect,
@@ -236,16 +229,16 @@ def _best_estimate(
         cheaper = problem.with_predictor(through)
         best = _best_of(cheaper, starts, working_estimator, APPROXIMATE_LIMITS, progress)
         starts, working_noise = [best.minimum.x], best.working_noise
-    if reduced_order_model_of(problem.predictor) is not None:
+    if problem.predictor.reduced_order_model() is not None:
         limits = SIMULATION_LIMITS
     if start.u is not None:
         limits = replace(limits, rounds=REFIT_ROUNDS)
     nearly_there = through is not None or start.u is not None
-    if not nearly_there or refined_of(problem.predictor) is None:
+    if not nearly_there or problem.predictor.refined() is None:
         best = _best_of(problem, starts, working_estimator, limits, progress, working_noise)
         problem, x, working_noise = best.problem, best.minimum.x, best.working_noise
         limits = replace(limits, rounds=REFIT_ROUNDS)
-        if refined_of(problem.predictor) is None:
+        if problem.predictor.refined() is None:
             return best, None
     else:
         x = starts[0]
@@ -291,7 +284,7 @@ def _best_of(
 def _working_estimator(
     problem: LeastSquaresProblem, numerical_error: NumericalError | None = None
 ) -> WorkingNoiseEstimator:
-    errors = prediction_errors_of(problem.predictor) if numerical_error is None else numerical_error.remaining
+    errors = problem.predictor.error if numerical_error is None else numerical_error.remaining
     return WorkingNoiseEstimator(problem.settings, problem.observations, errors)
 
 
@@ -325,8 +318,7 @@ def _result(
     rates = RateExplanations(problem, linear.x, judged, noise_model)
     of_errors, of_common = error_covariances(found_at, noise_model, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
-    prediction = predict(
-        problem.predictor,
+    prediction = problem.predictor.predict(
         law,
         coordinates.theta(u)[None],
         list(histories),

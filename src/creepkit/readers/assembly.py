@@ -47,16 +47,7 @@ from creepkit.readers.standard_names import in_standard_keys, in_standard_names,
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
-from creepkit.records import (
-    UNKNOWN_DURATION,
-    History,
-    Loading,
-    Program,
-    dimensions_of,
-    known_specimens,
-    outputs_of_test,
-    specimen_of,
-)
+from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, dimensions_of, known_specimens, specimen_of
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -163,8 +154,10 @@ def _stated_fields(conditions: StatedConditions, name: str, elastic: Elastic | N
 
 def _check_operator(history: History, location: str) -> None:
     """HistoryError where the operator of a test does not give the outputs of its columns."""
+    specimen = specimen_of(history)
     try:
-        outputs_of_test(specimen_of(history), replace(history, source=location))
+        if specimen is not None:
+            specimen.outputs_of_test(replace(history, source=location))
     except SolveError as error:
         raise HistoryError(str(error)) from error
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.inverse.defect_correction import with_correction_at_frames
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
@@ -67,7 +66,9 @@ def _fitted_curves(fit: Identification) -> FittedCurves:
         )
     histories, coordinates = fit.histories, fit.coordinates
     nuisances = fit.nuisance_values(histories)
-    prediction = predict_with_sensitivities(fit.predictor, fit.law, coordinates.theta(fit.u), histories, nuisances)
+    prediction = fit.predictor.predict(
+        fit.law, coordinates.theta(fit.u)[None], histories, nuisances=nuisances, sensitivities=True
+    )
     assert prediction.jacobian is not None
     with np.errstate(invalid="ignore"):
         jacobian = prediction.jacobian[0] @ coordinates.jacobian(fit.u)

@@ -14,7 +14,7 @@ from creepkit.inverse.compared_tests import (
     has_tertiary_creep,
     rests_on_durations,
 )
-from creepkit.inverse.composite_predictor import CompositePredictor, predict_to_rupture
+from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identified_values import state_at_strain
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
@@ -157,8 +157,8 @@ def test_bars_are_followed_to_rupture_beside_tests_that_are_not():
     )  # fmt: skip
     both = CompositePredictor({"uniaxial": BAR, "relaxation": Relaxation()})
     given = {name: np.array([value]) for name, value in values.items()}
-    found = predict_to_rupture(
-        both, law, law.to_internal(given), [bars[0], held, bars[1]], sensitivities=True
+    found = both.predict_to_rupture(
+        law, law.to_internal(given), [bars[0], held, bars[1]], sensitivities=True
     ).times_to_strain
     alone = BAR.predict_to_rupture(law, law.to_internal(given), bars, sensitivities=True).times_to_strain
     np.testing.assert_array_equal(found.rupture_times[0, [0, 2]], alone.rupture_times[0])
