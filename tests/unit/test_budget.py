@@ -37,7 +37,7 @@ BUDGET = {
     "modules": 781,
     "quality": 1470,
     "readers": 5566,
-    "records": 2257,
+    "records": 2256,
     "registry": 615,
     "reports": 6167,
     "rupture_assessment": 1787,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29848
+TESTS = 29836
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
