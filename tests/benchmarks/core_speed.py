@@ -75,25 +75,15 @@ def least(call, repeats: int) -> float:
 
 
 def laws(page: Page, repeats: int) -> None:
-    """Predictions, law by law."""
+    """Cost of the six laws."""
     page.heading("Six laws")
-    heads = "simulation, ms", "prediction, ms", "with derivatives, ms", "ratio", "steps"
-    page.table("law", *heads)
-    rows = []
-    for name in CASES:
-        case = Case(name)
-        made = case.simulate()
-        march, whole, exact = (
-            least(call, repeats) for call in (case.simulate, case.predict, lambda case=case: case.predict(True))
-        )
-        rows.append((march, whole, exact))
-        accepted, rejected, *_ = made.iterations
-        page.row(
-            name, f"{march:.2f}", f"{whole:.2f}", f"{exact:.2f}", f"{exact / whole:.2f}",
-            f"{accepted} + {rejected}",
-        )  # fmt: skip
-    march, whole, exact = np.mean(rows, axis=0)
-    page.row("mean", f"{march:.2f}", f"{whole:.2f}", f"{exact:.2f}", f"{exact / whole:.2f}", "")
+    page.table("of the laws", "simulation, ms", "prediction, ms", "with derivatives, ms")
+    cases = [Case(name) for name in CASES]
+    costs = [
+        [least(call, repeats) for call in (case.simulate, case.predict, partial(case.predict, True))] for case in cases
+    ]
+    for name, cost in (("least", np.min), ("mean", np.mean), ("largest", np.max)):
+        page.row(name, *(f"{value:.2f}" for value in cost(costs, axis=0)))
 
 
 def tolerances(page: Page, repeats: int) -> None:
@@ -109,7 +99,7 @@ def tolerances(page: Page, repeats: int) -> None:
         case = Case(name)
         made = case.simulate(tolerance=1e-5, newton=1e-9, max_steps=100_000)
         exact[name] = made.at(made.displacements[:, case.setup.model.top[0], 1], TIMES)
-    for tolerance, growth_ in ((1e-2, 2.0), (1e-2, 3.0), (2e-2, 2.0), (2e-2, 3.0), (4e-2, 3.0)):
+    for tolerance, growth_ in ((1e-2, 2.0), (2e-2, 3.0), (4e-2, 3.0)):
         errors, costs = [], []
         for name in CASES:
             case = Case(name)
