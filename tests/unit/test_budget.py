@@ -20,7 +20,7 @@ BUDGET = {
     "cli": 2347,
     "core": 67,
     "dataset": 765,
-    "discovery": 1402,
+    "discovery": 1401,
     "experiments": 1562,
     "exporters": 2658,
     "extraction": 1302,
@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1403,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 10858,
+    "inverse": 10850,
     "jobs": 251,
     "kernels": 1703,
     "language": 1494,
@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 5566,
     "records": 2256,
     "registry": 615,
-    "reports": 6168,
+    "reports": 6167,
     "rupture_assessment": 1787,
     "sampling": 1026,
     "screening": 682,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29826
+TESTS = 29836
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

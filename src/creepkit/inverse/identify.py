@@ -65,10 +65,11 @@ from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with
 from creepkit.inverse.uncertainty.laplace_approximation import (
     covariance_of_values,
     cut_interval_notes,
-    interval_quantile,
+    median_freedom,
     parameter_estimates,
     positive_semidefinite,
     restricted_covariance,
+    with_freedom,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
@@ -302,7 +303,7 @@ def _result(
     linear, by_likelihood = best.linearised, working_estimator.by_likelihood
     noise_model = working_estimator.final(linear, best.working_noise)
     unestimated = working_estimator.unestimated_drift_components(noise_model)
-    covariance, freedom = restricted_covariance(linear, noise_model, problem.settings.nuisances, unestimated, count)
+    covariance, freedom = restricted_covariance(linear, noise_model, problem.settings.nuisances, unestimated)
     working_noise = None
     if not by_likelihood:
         working_noise = with_single_value_weight(best.working_noise, problem.observations)
@@ -326,10 +327,8 @@ def _result(
     if not problem.observations.followed_to_rupture.any():
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
-    # Their size is known, so that their interval is a normal one whatever the degrees of freedom of the tests are.
-    quantile = interval_quantile(freedom)
-    error_covariance = (interval_quantile(1e9) / quantile) ** 2 * of_errors[:count, :count]
-    law_covariance = positive_semidefinite(covariance[:count, :count]) + error_covariance
+    error_covariance = of_errors[:count, :count]
+    law_covariance = with_freedom(positive_semidefinite(covariance[:count, :count]), freedom[:count]) + error_covariance
     values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)
     single_values = values_of_tests.compared(histories, without_curves=used)
@@ -345,7 +344,7 @@ def _result(
     judge = Judge(problem, noise_model, working_estimator.predictor_errors, histories)
     adequacy = judge.adequacy_with_remedies(judged, unmodelled, rates.found).with_unpredicted(unpredicted)
     adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
-    estimates = parameter_estimates(law, coordinates, u, law_covariance, quantile)
+    estimates = parameter_estimates(law, coordinates, u, law_covariance)
     return Identification(
         law=law,
         estimates=estimates,
@@ -356,7 +355,7 @@ def _result(
         rms=pooled_log_strain_rms(tests),
         log_likelihood=best.log_likelihood,
         effective_frames=effective_sample_size(best.residuals, noise_model),
-        freedom=freedom,
+        freedom=median_freedom(freedom[:count]),
         tests=tests,
         ranges=fitted_ranges(problem),
         settings=problem.settings,

@@ -17,7 +17,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.defect_correction import with_correction_at_frames
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.records import SECONDS_PER_HOUR, Prediction, is_logarithmic, output_unit
 from creepkit.reports.figures import set_range
 
@@ -79,8 +79,7 @@ def _fitted_curves(fit: Identification) -> FittedCurves:
     for k, test in enumerate(fit.tests):
         for output_fit in test.outputs:
             prediction.values[:, k, :, prediction.outputs.index(output_fit.output)] += output_fit.offset
-    quantile = interval_quantile(fit.freedom)
-    return FittedCurves(prediction, quantile * np.sqrt(np.maximum(variance, 0.0)))
+    return FittedCurves(prediction, NORMAL_QUANTILE * np.sqrt(np.maximum(variance, 0.0)))
 
 
 def _nuisance_jacobian(fit: Identification, prediction: Prediction) -> Floats:

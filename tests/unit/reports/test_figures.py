@@ -14,7 +14,7 @@ import pytest
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.ranking import ranking_from_scores
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.kernels import lower
 from creepkit.language import arrhenius
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
@@ -101,7 +101,7 @@ def fit():
 
 def test_the_band_of_a_norton_bar_is_that_of_its_rate(fit):
     """strain = A s^n t: ln strain has the standard deviation of ln rate at that stress, at every time."""
-    curves, quantile = fitted_curves(fit), interval_quantile(fit.freedom)
+    curves, quantile = fitted_curves(fit), NORMAL_QUANTILE
     jacobian = fit.coordinates.jacobian(fit.u)  # of (ln A, n) to u
     for k, stress in enumerate(STRESSES):
         to_log_rate = np.array([1.0, np.log(stress)]) @ jacobian
