@@ -78,8 +78,6 @@ from .records.history_selection import select_tests as select_tests
 from .records.instrument_format import InstrumentFormat as InstrumentFormat
 from .records.instrument_record import Channel as Channel
 from .records.instrument_record import InstrumentRecord as InstrumentRecord
-from .records.interfaces import Predictor as Predictor
-from .records.interfaces import Specimen as Specimen
 from .records.law_with_values import LawWithValues as LawWithValues
 from .records.law_with_values import Units as Units
 from .records.loading import PointLoading as PointLoading
@@ -95,6 +93,8 @@ from .records.loading import load_steps as load_steps
 from .records.prediction import Nuisance as Nuisance
 from .records.prediction import Prediction as Prediction
 from .records.prediction import Status as Status
+from .records.predictor import Predictor as Predictor
+from .records.specimen import Specimen as Specimen
 from .records.specimen_record import Dimension as Dimension
 from .records.specimen_record import Load as Load
 from .records.specimen_record import Output as Output
@@ -108,8 +108,8 @@ from .rupture_assessment.assessment import load_rupture_assessment as load_ruptu
 from .sampling.conditions import TimeGrid as TimeGrid
 from .screening.screen import ScreeningOptions as ScreeningOptions
 from .screening.screen import screen as screen
-from .specimens.axisymmetric.displacements import Displacements as Displacements
-from .specimens.axisymmetric.specimen import Axisymmetric as Axisymmetric
+from .specimens.axisymmetric import Axisymmetric as Axisymmetric
+from .specimens.axisymmetric import Displacements as Displacements
 from .specimens.bulge.field_fit import fit_field as fit_field
 from .specimens.bulge.field_fit import paper_parameters as paper_parameters
 from .specimens.per_test import OneTest as OneTest

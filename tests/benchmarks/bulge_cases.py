@@ -22,10 +22,9 @@ from creepkit.arrays import Floats
 from creepkit.fem.simulation import Simulation, simulate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Loading, PressureJump, Program, RecordedLoading
-from creepkit.specimens.bulge.finite_elements import BulgeTest
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.finite_element_tests import solver_settings
+from creepkit.specimens.finite_element_tests import FiniteElementTest, solver_settings
 
 BENCHMARKS = Path(__file__).resolve().parents[2].parent / "shared/data/benchmarks"
 HOUR = 3600.0
@@ -65,10 +64,10 @@ class Case:
             elastic=ck.Elastic(self.E),
         )
 
-    def simulation(self, end: float, **changes: float) -> tuple[Simulation, BulgeTest]:
+    def simulation(self, end: float, **changes: float) -> tuple[Simulation, FiniteElementTest]:
         """A run until `end`, s, by the specimen with some settings changed."""
         specimen = self.specimen.replace(**changes)
-        setup = BulgeTest.of(specimen, self.history(np.array([end])), {})
+        setup = FiniteElementTest.of(specimen, self.history(np.array([end])), {})
         kernel = kernels.lower(self.model, "compiled")
         theta = self.model.to_internal(self.model.values(self.values))[0]
         return simulate(kernel, theta, setup.model, setup.load_history, settings=solver_settings(specimen)), setup
@@ -77,7 +76,7 @@ class Case:
         """Apex in mm, D_amp in mm, S_d in mm and S_p at `times`, (times, 4)."""
         run, setup = self.simulation(float(times[-1]), **changes)
         top = run.displacements[:, setup.model.top, 1]
-        observed = setup.observation.observe(setup.radii, top)
+        observed = setup.piece.observation.observe(setup.piece.top_radii, top)
         return np.column_stack([run.at(top[:, 0], times), run.at(observed, times)])
 
 

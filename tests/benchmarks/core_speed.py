@@ -23,9 +23,8 @@ import creepkit as ck
 from creepkit import kernels
 from creepkit.fem.simulation import simulate
 from creepkit.records import History, PressureJump
-from creepkit.specimens.bulge.finite_elements import BulgeTest
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.finite_element_tests import solver_settings
+from creepkit.specimens.finite_element_tests import FiniteElementTest, solver_settings
 
 TIMES = np.maximum(np.arange(289) * 150.0, 1.0)
 CASES = {
@@ -50,7 +49,7 @@ class Case:
             name=name, times=TIMES, outputs={}, loading=PressureJump(8.0, 10.0, 14400.0), temperature=1000.0,
             specimen="bulge", elastic=ck.Elastic(150e3),
         )  # fmt: skip
-        self.setup = BulgeTest.of(self.specimen, self.history, {})
+        self.setup = FiniteElementTest.of(self.specimen, self.history, {})
 
     def simulate(self, **settings: float):
         """The finite element simulation alone."""
@@ -60,8 +59,8 @@ class Case:
     def predict(self, jacobian: bool = False):
         """What a fit asks for."""
         nuisances = NUISANCES if jacobian else {}
-        test = BulgeTest.of(self.specimen, self.history, nuisances, jacobian)
-        return test.respond(self.law, self.theta, solver_settings(self.specimen, exact=jacobian))
+        test = FiniteElementTest.of(self.specimen, self.history, nuisances, jacobian)
+        return test.response(test.simulate(self.law, self.theta, solver_settings(self.specimen, exact=jacobian)))
 
 
 def least(call, repeats: int) -> float:
@@ -76,25 +75,15 @@ def least(call, repeats: int) -> float:
 
 
 def laws(page: Page, repeats: int) -> None:
-    """Predictions, law by law."""
+    """Cost of the six laws."""
     page.heading("Six laws")
-    heads = "simulation, ms", "prediction, ms", "with derivatives, ms", "ratio", "steps"
-    page.table("law", *heads)
-    rows = []
-    for name in CASES:
-        case = Case(name)
-        made = case.simulate()
-        march, whole, exact = (
-            least(call, repeats) for call in (case.simulate, case.predict, lambda case=case: case.predict(True))
-        )
-        rows.append((march, whole, exact))
-        accepted, rejected, *_ = made.iterations
-        page.row(
-            name, f"{march:.2f}", f"{whole:.2f}", f"{exact:.2f}", f"{exact / whole:.2f}",
-            f"{accepted} + {rejected}",
-        )  # fmt: skip
-    march, whole, exact = np.mean(rows, axis=0)
-    page.row("mean", f"{march:.2f}", f"{whole:.2f}", f"{exact:.2f}", f"{exact / whole:.2f}", "")
+    page.table("of the laws", "simulation, ms", "prediction, ms", "with derivatives, ms")
+    cases = [Case(name) for name in CASES]
+    costs = [
+        [least(call, repeats) for call in (case.simulate, case.predict, partial(case.predict, True))] for case in cases
+    ]
+    for name, cost in (("least", np.min), ("mean", np.mean), ("largest", np.max)):
+        page.row(name, *(f"{value:.2f}" for value in cost(costs, axis=0)))
 
 
 def tolerances(page: Page, repeats: int) -> None:
@@ -110,7 +99,7 @@ def tolerances(page: Page, repeats: int) -> None:
         case = Case(name)
         made = case.simulate(tolerance=1e-5, newton=1e-9, max_steps=100_000)
         exact[name] = made.at(made.displacements[:, case.setup.model.top[0], 1], TIMES)
-    for tolerance, growth_ in ((1e-2, 2.0), (1e-2, 3.0), (2e-2, 2.0), (2e-2, 3.0), (4e-2, 3.0)):
+    for tolerance, growth_ in ((1e-2, 2.0), (2e-2, 3.0), (4e-2, 3.0)):
         errors, costs = [], []
         for name in CASES:
             case = Case(name)

@@ -35,7 +35,7 @@ import creepkit as ck
 from creepkit.errors import CreepkitError, FitWarning
 from creepkit.experiments.candidate_tests import frame_times
 from creepkit.experiments.rig import rigs_of
-from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 
 SERVICE = {"bars": 40.0, "scatter": 40.0, "dimples": 60.0}
 """MPa, of the rate that is wanted: below the tests."""
@@ -180,7 +180,7 @@ def true_log_rate(fit, values, stress):
 def log_rate_and_sd(fit, stress):
     """ln rate and its standard deviation by an identification."""
     rate, low, high = (float(v) for v in fit.rate(stress))
-    quantile = 1.96 if fit.samples is not None else interval_quantile(fit.freedom)
+    quantile = NORMAL_QUANTILE
     return np.log(rate), np.log(high / low) / (2.0 * quantile)
 
 

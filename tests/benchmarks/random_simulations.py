@@ -44,7 +44,6 @@ from creepkit.records import (
     Status,
     dimensions_of,
     loads_of,
-    predict_with,
     typical_history,
 )
 from creepkit.registry import default_registry
@@ -223,7 +222,7 @@ def run_prediction(
     theta, derivatives = random_theta(rng, law, candidates), bool(rng.random() < 0.33)
     try:
         tests = [random_test(rng, specimen).replace(name=f"test {i}") for i in range(number)]
-        made = predict_with(specimen, law, theta, tests, sensitivities=derivatives)
+        made = specimen.predict(law, theta, tests, sensitivities=derivatives)
     except CreepkitError as error:
         counts["refused"] += candidates * number
         counts["traceback"] += not one_line(error)
@@ -231,7 +230,7 @@ def run_prediction(
     judge(made, tests, counts)
     if candidates * number > 1:
         c, t = int(rng.integers(candidates)), int(rng.integers(number))
-        alone = predict_with(specimen, law, theta[c : c + 1], [tests[t]], sensitivities=derivatives)
+        alone = specimen.predict(law, theta[c : c + 1], [tests[t]], sensitivities=derivatives)
         same = np.array_equal(alone.of(0), made.of(t, c), equal_nan=True)
         counts["untrue"] += not same or alone.status[0, 0] != made.status[c, t]
     return candidates * number

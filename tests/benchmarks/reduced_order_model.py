@@ -26,10 +26,9 @@ from creepkit.fem.solver import SolverSettings
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw, Param, State, parameters, principal_stress, states, stress
 from creepkit.records import History, Status
-from creepkit.specimens.bulge.finite_elements import BulgeTest
 from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.finite_element_tests import solver_settings
+from creepkit.specimens.finite_element_tests import FiniteElementTest, solver_settings
 
 SHORTEST, LEAST = 60.0, 0.02
 DEFLECTION = 2.4
@@ -41,7 +40,7 @@ class Reference:
     """A case in finite elements, and their CPU time, s."""
 
     case: Case
-    setup: BulgeTest
+    setup: FiniteElementTest
     kernel: CompiledLaw
     theta: Floats
     settings: SolverSettings
@@ -59,7 +58,7 @@ def references(specimen: Bulge, thicknesses: tuple[float, ...], count: int, seed
     result: list[Reference] = []
     for case in drawn_cases(seed):
         own = specimen.replace(apex_thickness=thicknesses[len(result) % len(thicknesses)]) if thicknesses else specimen
-        setup = BulgeTest.of(own, case.history(TIMES), {})
+        setup = FiniteElementTest.of(own, case.history(TIMES), {})
         kernel = kernels.lower(case.model, "compiled")
         theta = case.model.to_internal(case.model.values(case.values))[0]
         settings = solver_settings(own)

@@ -17,7 +17,6 @@ from measured import Page, arguments
 from public_calls import predict
 
 import creepkit as ck
-from creepkit.inverse.composite_predictor import outside_class
 from creepkit.records import Status
 from creepkit.surrogates.evaluation import relative_squared_error
 
@@ -144,7 +143,7 @@ def main():
         page.heading(title[0].upper() + title[1:])
         page.table(*HEADS)
         for name, data in sets.items():
-            if not outside_class(model, data.law):
+            if not model.outside_class(data.law):
                 page.row(*cells(name, model, data))
     if options.write:
         page.write()

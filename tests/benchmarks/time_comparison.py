@@ -11,7 +11,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.cross_validation import CrossValidation
 from creepkit.inverse.single_values import SingleValue
 from creepkit.language import CreepLaw
-from creepkit.records import History, Prediction, Predictor, Status, predict_with
+from creepkit.records import History, Prediction, Predictor, Status
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def times_to_strain(
         h.replace(times=grid, outputs={"strain": np.zeros(grid.size)}, standard_deviation={}, includes_elastic=False)
         for (h, _), grid in zip(reached, time_grids, strict=True)
     ]
-    prediction = predict_with(predictor, law, law.to_internal(values), extended)
+    prediction = predictor.predict(law, law.to_internal(values), extended)
     predicted = [
         _crossing_time(prediction.of(k)[:, 0], grid, strain, prediction, k) for k, grid in enumerate(time_grids)
     ]

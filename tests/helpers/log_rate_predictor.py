@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -12,14 +11,14 @@ from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw
-from creepkit.records import History, Nuisance, Prediction, constant_stress
+from creepkit.records import History, Nuisance, Prediction, Predictor, constant_stress
 from helpers.planted_bars import carried_out
 
 END = 1e5
 """s."""
 
 
-class LogRates:
+class LogRates(Predictor):
     """Predictor: amplitude = ln(rate at the test's stress) + time / END, in mm, whatever that would be.
 
     nuisances : "thickness" adds its distance from `nominal` times `by`.
@@ -36,18 +35,14 @@ class LogRates:
         """That of a rate of exp(-15) 1/s."""
         return float(np.exp(-15.0) * END)
 
-    def predict(
-        self, law: CreepLaw, theta: np.ndarray, histories: Sequence[History], *,
-        nuisances: Mapping[str, Any] | None = None, sensitivities: bool = False,
-    ) -> Prediction:  # fmt: skip
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         count, longest = len(theta), max(h.times.size for h in histories)
         kernel, found = lower(law, "numpy"), np.full((count, len(histories), longest, 1), np.nan)
         for k, h in enumerate(histories):
             s = h.loading.program().values[0]
             log = np.broadcast_to(kernel.internal_log_rate(s, 1.0, 1.0, h.temperature, s, s / 3, *theta.T), (count,))
             found[:, k, : h.times.size, 0] = log[:, None] + h.times / END
-        shift = 0.0 if not nuisances else self.by * (np.asarray(nuisances["thickness"]) - self.nominal)
-        found += np.broadcast_to(shift, found.shape[:2])[..., None, None]
+        found += self.by * (nuisances.get("thickness", np.full((1, 1), self.nominal)) - self.nominal)[..., None, None]
         ends, status = np.full(found.shape[:2], np.inf), np.zeros(found.shape[:2], np.int64)
         slopes = {"thickness": np.full(found.shape, self.by)} if sensitivities and nuisances else {}
         lengths = np.array([h.times.size for h in histories])

@@ -9,21 +9,19 @@ BARS = ck.specimen("uniaxial")
 
 
 @dataclass(frozen=True)
-class Narrow:
+class Narrow(Predictor):
     """Knows all laws but those named in `unknown`, of which it predicts nothing."""
 
     unknown: tuple[str, ...] = ("norton",)
     name: str = "narrow"
     outputs: tuple[str, ...] = ("strain",)
 
-    @property
-    def specimen(self) -> Predictor:
-        return BARS
+    specimen = BARS
 
     def outside_class(self, law: ck.CreepLaw) -> str:
         return f"law '{law.name}' is none of its laws" if law.name in self.unknown else ""
 
-    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         if self.outside_class(law):
             return unpredicted(histories, self.outputs, len(theta), Status.OUTSIDE_CLASS, self.outside_class(law))
         return BARS.predict(law, theta, histories, sensitivities=sensitivities)

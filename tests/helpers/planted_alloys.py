@@ -7,7 +7,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.language import Elastic
-from creepkit.records import History, PressureJump, Status, constant_stress
+from creepkit.records import History, Predictor, PressureJump, Status, constant_stress
 
 TIMES = np.geomspace(60.0, 2e5, 40)
 NORTON = {"A": 2e-16, "n": 4.6}
@@ -26,29 +26,27 @@ def _bar(name, alloy, stress, values, rng):
 
 
 @dataclass(frozen=True)
-class Deadly:
+class Deadly(Predictor):
     """A predictor that takes its process with it."""
 
     name: str = "deadly"
     outputs: tuple[str, ...] = ("strain",)
 
-    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         os._exit(3)
 
 
 @dataclass(frozen=True)
-class Doubting:
+class Doubting(Predictor):
     """A stand-in for bars that creeps a little too much and doubts whatever it says."""
 
     excess: float = 0.0
     name: str = "doubting"
     outputs: tuple[str, ...] = ("strain",)
 
-    @property
-    def specimen(self):
-        return ck.specimen("uniaxial")
+    specimen = ck.specimen("uniaxial")
 
-    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         found = self.specimen.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
         outside = np.full_like(found.status, int(Status.OUTSIDE_DOMAIN))
         return replace(found, values=(1.0 + self.excess) * found.values, status=outside)

@@ -74,7 +74,7 @@ def simulated(planned: PlannedDimple, schedule: Schedule) -> Dimple:
     top = run.test.model.top
     rise, widening = (run._at(np.asarray(run.simulation.displacements[:, top, k]), loaded) for k in (1, 0))
     still = np.zeros((schedule.frames - loaded.size, rise.shape[1]))
-    return Dimple(schedule.times, run.test.radii, np.vstack([still, rise]), np.vstack([still, widening]))
+    return Dimple(schedule.times, run.test.piece.top_radii, np.vstack([still, rise]), np.vstack([still, widening]))
 
 
 def grid(count: int, columns: int) -> list[tuple[float, float]]:

@@ -5,16 +5,14 @@ elastic deflection; k, kappa and that deflection are fits to finite element resu
 and so on, read as numbers of a test problem, not as truth). Width and shape are smooth functions of D, made up.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
-from creepkit.errors import SolveError
 from creepkit.kernels import lower
-from creepkit.language import CreepLaw, Elastic
-from creepkit.records import Dimension, History, Prediction, PressureJump
+from creepkit.language import Elastic
+from creepkit.records import Dimension, History, Prediction, Predictor, PressureJump
 
 END = 4 * 3600.0
 GRID = np.concatenate([[0.0], np.geomspace(60.0, 1200.0, 8), np.linspace(1800.0, END, 22)])
@@ -40,7 +38,7 @@ def elastic(P, E, h):
 
 
 @dataclass
-class OneDegree:
+class OneDegree(Predictor):
     """Predictor of amplitude (mm), width (mm) and shape.
 
     exact : whether it gives derivatives (differences of its own); stand_in : whether it offers a coarser one.
@@ -69,19 +67,11 @@ class OneDegree:
         if self.stand_in:
             self.reduced_order_model = lambda: OneDegree(coarseness=1.1, calls=self.calls)
 
-    def predict(
-        self, law: CreepLaw, theta: np.ndarray, histories: Sequence[History], *,
-        nuisances: Mapping[str, np.ndarray] | None = None, sensitivities: bool = False,
-    ) -> Prediction:  # fmt: skip
-        for kind in nuisances or {}:
-            if kind not in self.nuisances:
-                raise SolveError(f"{self.name} does not know the nuisance '{kind}'")
-        count = max(len(theta), *(len(v) for v in nuisances.values())) if nuisances else len(theta)
-        own = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in (nuisances or {}).items()}
-        theta = np.broadcast_to(theta, (count, theta.shape[-1]))
-        self.calls.append(count)
-        found, ends = self._run(law, theta, histories, own)
-        slopes, changes = self._slopes(law, theta, histories, own) if sensitivities and self.exact else (None, {})
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
+        self.calls.append(len(theta))
+        found, ends = self._run(law, theta, histories, nuisances)
+        exact = sensitivities and self.exact
+        slopes, changes = self._slopes(law, theta, histories, nuisances) if exact else (None, {})
         lengths = np.array([h.times.size for h in histories])
         status = np.where(np.isfinite(ends), 1, 0)
         return Prediction(found, self.outputs, lengths, status, ends, slopes, nuisance_jacobian=changes)

@@ -6,18 +6,16 @@ import numpy as np
 
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw
-from creepkit.records import History, Prediction, constant_stress
+from creepkit.records import History, Prediction, Predictor, constant_stress
 
 
-class Steady:
+class Steady(Predictor):
     """Predictor: strain = rate(stress, temperature) x time, with exact derivatives."""
 
     name = "steady"
     outputs = ("strain",)
 
-    def predict(
-        self, law: CreepLaw, theta: np.ndarray, histories: Sequence[History], *, sensitivities: bool = False
-    ) -> Prediction:
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         kernel, count, values = lower(law, "numpy"), len(theta), law.from_internal(theta)
         shape = (count, len(histories), max(h.times.size for h in histories), 1)
         strain, slope = np.full(shape, np.nan), np.full((*shape, len(law.names)), np.nan)

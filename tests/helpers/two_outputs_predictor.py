@@ -5,23 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from creepkit.language import CreepLaw
-from creepkit.records import History, Prediction
+from creepkit.records import History, Predictor
 from helpers.steady_rate_predictor import Steady
 
 GAIN = {"amplitude": 40.0, "width": -100.0}
 """mm per unit of strain."""
 
 
-class TwoOutputs:
+class TwoOutputs(Predictor):
     """Predictor: amplitude = 40 mm x strain, and width = 3 mm - 100 mm x strain, with exact derivatives."""
 
     name = "two outputs"
     outputs = tuple(GAIN)
 
-    def predict(
-        self, law: CreepLaw, theta: np.ndarray, histories: Sequence[History], *, sensitivities: bool = False
-    ) -> Prediction:
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         found = Steady().predict(law, theta, histories, sensitivities=True)
         gain, base = np.array([*GAIN.values()]), np.array([0.0, 3.0])
         slope = found.jacobian * gain[:, None] if sensitivities else None

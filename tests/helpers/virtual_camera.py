@@ -47,7 +47,7 @@ def simulated_dimple(
     widening = run._at(np.asarray(run.simulation.displacements[:, top, 0]), loaded)
     zeros = np.zeros((rest, rise.shape[1]))
     times = interval * np.arange(frames)
-    return Dimple(times, run.test.radii, np.vstack([zeros, rise]), np.vstack([zeros, widening]))
+    return Dimple(times, run.test.piece.top_radii, np.vstack([zeros, rise]), np.vstack([zeros, widening]))
 
 
 @dataclass(frozen=True)

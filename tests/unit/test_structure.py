@@ -98,10 +98,9 @@ def names_of_shipped_specimens() -> set[str]:
         specimen = entry.value
         if not type(specimen).__module__.startswith("creepkit."):
             continue  # of a plugin
-        names |= {specimen.name, getattr(specimen, "surrogate_name", specimen.name)}
+        names |= {specimen.name, specimen.surrogate_name or specimen.name, *specimen.dataset_names.values()}
         names |= {str(output) for output in outputs_of(specimen)}
         names |= {name for length in dimensions_of(specimen) for name in length.names}
-        names |= set(getattr(specimen, "dataset_names", {}).values())
     return names - ORDINARY_WORDS
 
 

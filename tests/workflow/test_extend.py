@@ -105,12 +105,10 @@ def test_the_cantilever_is_that_of_beam_theory() -> None:
 
 def test_its_central_differences_are_the_derivatives_of_the_closed_form() -> None:
     """The deflection goes with A and with h^-(2 n + 1)."""
-    from creepkit.inverse.composite_predictor import predict_with_sensitivities
-
     beam, norton = contributed("specimen")[-1], ck.law("norton")
     test = ck.History("beam", np.array([3.6e6]), {}, ck.constant_load("force", 12.0), 300.0, specimen="cantilever")
     theta = norton.to_internal({"A": 1e-16, "n": 4.0})[0]
-    found = predict_with_sensitivities(beam, norton, theta, [test], {"height": np.array([[2.0]])})
+    found = beam.predict(norton, theta[None], [test], nuisances={"height": np.array([[2.0]])}, sensitivities=True)
     deflection = found.values[0, 0, 0, 0]
     assert found.jacobian[0, 0, 0, 0, 0] == pytest.approx(deflection, rel=3e-6)
     assert found.nuisance_jacobian["height"][0, 0, 0, 0] == pytest.approx(-9.0 / 2.0 * deflection, rel=1e-3)

@@ -207,7 +207,7 @@ def laboratory(tmp_path_factory):
     )
     still = np.zeros((REST, rise.shape[1]))
     times = INTERVAL * np.arange(REST + LOADED)
-    dimple = Dimple(times, run_cameras.test.radii, np.vstack([still, rise]), np.vstack([still, widening]))
+    dimple = Dimple(times, run_cameras.test.piece.top_radii, np.vstack([still, rise]), np.vstack([still, widening]))
     write_frames(folder / "frames", VirtualCamera(seed=21, points=1700).frames(dimple))
     stamps = "".join(f"{k},{1e3 * (START + t):.0f}\n" for k, t in enumerate(times))
     (folder / "times.csv").write_text("index,time\n" + stamps)

@@ -13,8 +13,8 @@ from creepkit import kernels
 from creepkit.fem.mesh import SIDE_SLOPES, SIDE_VALUES, SIDE_WEIGHTS
 from creepkit.fem.simulation import simulate
 from creepkit.records import Status
-from creepkit.specimens.axisymmetric.finite_elements import AxisymmetricTest
-from creepkit.specimens.finite_element_tests import solver_settings
+from creepkit.specimens.axisymmetric import prepared_section
+from creepkit.specimens.finite_element_tests import FiniteElementTest, solver_settings
 
 E = ck.Elastic(E=150e3)
 
@@ -100,7 +100,7 @@ def test_the_ball_carries_the_force_with_little_penetration() -> None:
     """The pressures that the final displacements mean sum up to the force along the axis; the disc lies on the ball."""
     disc = SmallPunch(tolerance=1e-4)
     run = crept(disc, 5.0, 300.0, [1e5])
-    body, moved = run.test.body, run.simulation.displacements[-1]
+    body, moved = prepared_section(run.test.piece, run.test.load), run.simulation.displacements[-1]
     contact = body.section.contacts[-1]
     at_rest, now = body.section.nodes, body.section.nodes + moved
     places = np.einsum("gn,eni->egi", SIDE_VALUES, now[contact.sides])
@@ -135,17 +135,15 @@ def test_derivatives_are_those_of_differences_in_the_same_steps() -> None:
     nuisances = {"modulus": 0.02, "temperature": 3.0, "load step@50000": 0.01}
     nuisances |= {each.name: 1.01 * each.default for each in disc.dimensions}
     settings = solver_settings(disc, exact=True)._replace(newton=1e-8)
-    test = AxisymmetricTest.of(disc, plan, nuisances, True)
+    test = FiniteElementTest.of(disc, plan, nuisances, True)
     simulation = test.simulate(kernel, theta, settings)
     assert simulation.sensitivities is not None
     found = simulation.sensitivities[:, 0]
 
     def deflections(theta, **changes):
-        other = AxisymmetricTest.of(disc, plan, {**nuisances, **changes}, False)
-        again = simulate(
-            kernel, theta, other.body.model, other.load_history, settings=settings, same_steps_as=simulation
-        )
-        return other.quantities(again)[:, 0]
+        other = FiniteElementTest.of(disc, plan, {**nuisances, **changes}, False)
+        again = simulate(kernel, theta, other.model, other.load_history, settings=settings, same_steps_as=simulation)
+        return other.piece.observed(other.load, again)[:, 0]
 
     def compare(column, values, step: float) -> None:
         known = (values(step) - values(-step)) / (2.0 * step)

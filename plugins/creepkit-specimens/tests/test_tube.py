@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 import creepkit as ck
 from creepkit.records import Program, Status
+from creepkit.specimens.axisymmetric import prepared_section
 
 STIFF = ck.Elastic(E=9e7)
 """Elastic strains of 1e-6 and less beside creep strains of 1e-4: what is left is creep."""
@@ -42,7 +43,7 @@ def simulated(tube: Tube, values: dict[str, float], pressure: float, times, elas
 
 def last_rate(run) -> float:
     """Growth of the outer diameter per second in the last accepted step."""
-    quantities = run.test.quantities(run.simulation)
+    quantities = run.test.piece.observed(run.test.load, run.simulation)
     return 2.0 * float(np.diff(quantities[-2:, 0])[0] / np.diff(run.simulation.times[-2:])[0])
 
 
@@ -116,7 +117,7 @@ def plate_of(specimen: ck.Axisymmetric, values: dict[str, float], pressure, time
 
 def plate_rate(run) -> float:
     """Of the observed displacement in the last accepted step, mm/s."""
-    quantities = run.test.quantities(run.simulation)
+    quantities = run.test.piece.observed(run.test.load, run.simulation)
     return float(np.diff(quantities[-2:, 0])[0] / np.diff(run.simulation.times[-2:])[0])
 
 
@@ -168,9 +169,9 @@ def notched(bar: NotchedBar, values: dict[str, float], loading, times, elastic=S
 def last_rates(bar: NotchedBar, values: dict[str, float], force: float, time: float) -> np.ndarray:
     """Rates (2,) of elongation and contraction in the last accepted step, mm/s."""
     run = notched(bar, values, ck.constant_load("force", force), [time])
-    quantities = run.test.quantities(run.simulation)
+    quantities = run.test.piece.observed(run.test.load, run.simulation)
     change = np.diff(quantities[-2:], axis=0)[0] / np.diff(run.simulation.times[-2:])[0]
-    radial = [number % 2 for number in run.test.body.order].index(0)
+    radial = [number % 2 for number in prepared_section(run.test.piece, run.test.load).order].index(0)
     return np.array([2.0 * change[1 - radial], -2.0 * change[radial]])
 
 

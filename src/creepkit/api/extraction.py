@@ -13,7 +13,7 @@ from creepkit.errors import HistoryError
 from creepkit.extraction.domes import Centers
 from creepkit.extraction.options import ClockOptions
 from creepkit.instruments.imposed import channel_names, named_specimens
-from creepkit.records import Loading, Program, RecordedLoading, Specimen, SupportsSurfaceObservation
+from creepkit.records import Loading, Program, RecordedLoading, Specimen
 from creepkit.registry.arguments import resolve_predictor
 
 if TYPE_CHECKING:
@@ -228,9 +228,10 @@ def history_of(extraction: Extraction, under: Imposed) -> History:
     return history.replace(standard_deviation=sd, labels={**history.labels, **kelvin})
 
 
-def _watched(specimen: Specimen | str) -> SupportsSurfaceObservation:
+def _watched(specimen: Specimen | str) -> Specimen:
     watched = resolve_predictor(specimen)
-    if not isinstance(watched, SupportsSurfaceObservation):
-        name = getattr(watched, "name", type(watched).__name__)
-        raise HistoryError(f"specimen '{name}' does not say how cameras see its surface; use one that does, as 'bulge'")
+    if not isinstance(watched, Specimen) or not watched.is_watched:
+        raise HistoryError(
+            f"specimen '{watched.label}' does not say how cameras see its surface; use one that does, as 'bulge'"
+        )
     return watched

@@ -11,10 +11,10 @@ from creepkit.arrays import ArrayLike
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import SolveError
 from creepkit.language import symbols
-from creepkit.records import History, Loading, Predictor, Program, Status, call_of_plugin, predict_with
+from creepkit.records import History, Loading, Predictor, Program, Status, call_of_plugin
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictor
-from creepkit.specimens.run import Run, Runnable, run_from_outputs, unusual_values, with_explanation
+from creepkit.specimens.run import Run, run_from_outputs, unusual_values, with_explanation
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw, Elastic
@@ -57,7 +57,7 @@ def simulate(
         outputs={},
         loading=loading,
         temperature=ROOM_TEMPERATURE if temperature is None else temperature,
-        specimen=getattr(getattr(using, "specimen", using), "name", "uniaxial"),
+        specimen=using.specimen.name or "uniaxial",
         elastic=elastic,
         includes_elastic=elastic is not None and loading.quantity == "stress",
         source=f"simulation of law '{law.name}'",
@@ -73,16 +73,12 @@ def simulate(
 
 
 def _simulated(law: CreepLaw, using: Predictor, values: Mapping[str, float], planned_test: History) -> Run:
-    if isinstance(using, Runnable):
-        runnable = using
-        return call_of_plugin(
-            lambda: runnable.run(law, values, planned_test),
-            using,
-            f"specimen '{getattr(using, 'name', type(using).__name__)}': run()",
-            SolveError,
-        )
-    theta = law.to_internal(values)
-    prediction = predict_with(using, law, theta, [planned_test])
+    run: Run | None = call_of_plugin(
+        lambda: using.run(law, values, planned_test), using, f"specimen '{using.label}': run()", SolveError
+    )
+    if run is not None:
+        return run
+    prediction = using.predict(law, law.to_internal(values), [planned_test])
     status, end = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
     return run_from_outputs(Run, planned_test, prediction.outputs, prediction.of(0), status, end, prediction.reason)
 

@@ -20,15 +20,7 @@ from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.language import CreepLaw, temperature
-from creepkit.records import (
-    History,
-    LawWithValues,
-    Specimen,
-    constant_stress,
-    dimensions_of,
-    known_specimens,
-    predict_with,
-)
+from creepkit.records import History, LawWithValues, Specimen, constant_stress, dimensions_of, known_specimens
 from creepkit.records.units import celsius_text
 from creepkit.registry import resolve_law
 from creepkit.specimens.bulge.specimen import Bulge
@@ -162,7 +154,7 @@ def _specimens(known: Mapping[str, Specimen], wanted: Sequence[str]) -> tuple[Sp
 
 def _numbers_asked_for(specimen: Specimen) -> tuple[bool, int]:
     """How much a user has to state before a first curve of a specimen is seen: a modulus, and how many lengths."""
-    return "modulus" in getattr(specimen, "conditions", {}), len(dimensions_of(specimen))
+    return "modulus" in specimen.conditions, len(dimensions_of(specimen))
 
 
 def _first_temperature(histories: Sequence[History], fit: Identification | None) -> float:
@@ -180,7 +172,7 @@ def usual_end(page_law: PageLaw, stress: float, kelvin: float) -> float:
     plan = History(name="first curve", times=times, outputs={}, loading=constant_stress(stress), temperature=kelvin)
     law = page_law.law
     try:
-        prediction = predict_with(known_specimens()[plan.specimen], law, law.to_internal(dict(page_law.values)), [plan])
+        prediction = known_specimens()[plan.specimen].predict(law, law.to_internal(dict(page_law.values)), [plan])
     except CreepkitError:
         return USUAL_TIME
     strain = prediction.values[0, 0, :, 0]

@@ -39,7 +39,6 @@ from creepkit.records import (
     is_logarithmic,
     loads_of,
     outputs_of,
-    outputs_of_test,
     typical_history,
 )
 
@@ -195,7 +194,7 @@ def _undetermined(fit: Identification) -> Sequence[str]:
 
 def specimen_document(specimen: Specimen) -> dict[str, Any]:
     """A specimen by its record: outputs, loads, whether it needs a modulus, and what predicts it."""
-    conditions: Mapping[str, tuple[float, float]] = getattr(specimen, "conditions", None) or {}
+    conditions: Mapping[str, tuple[float, float]] = specimen.conditions
     low, high = conditions.get("modulus", (50e3, 300e3))
     modulus = float(f"{getattr(typical_history(specimen).elastic, 'E', 150e3):.2g}")
     return {
@@ -234,11 +233,13 @@ def _load_document(specimen: Specimen, load: Load, conditions: Mapping[str, tupl
     }
 
 
-def _reference_stress(specimen: Any, plan: History) -> float:
+def _reference_stress(specimen: Specimen, plan: History) -> float:
     """MPa, that stands for a plan."""
+    if not specimen.states("reference_stress"):
+        return USUAL_STRESS
     try:
         stress = float(np.max(specimen.reference_stress(plan)))
-    except (CreepkitError, AttributeError, ValueError):
+    except (CreepkitError, ValueError):
         return USUAL_STRESS
     return stress if 0.0 < stress < math.inf else USUAL_STRESS
 
@@ -257,7 +258,7 @@ def test_document(history: History, contents: PageContents) -> dict[str, Any]:
     """A measured test: its frames, the noise of each output, and how it was made."""
     frames, temperature = _thinned(np.flatnonzero(history.used), MOST_FRAMES), history.temperature_program()
     specimen: Any = contents.specimen(history.specimen)
-    stated = set(outputs_of_test(specimen, history)) if history.outputs else set()
+    stated = set(specimen.outputs_of_test(history)) if history.outputs else set()
     fits = _test_fits(history, contents)
     return {
         "name": history.name,

@@ -19,7 +19,6 @@ from creepkit.errors import CreepkitError, SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.mesh import SIDES, outline
 from creepkit.records import History, Specimen
-from creepkit.specimens.bulge.finite_elements import BulgeTest, radii_of_top
 from creepkit.specimens.bulge.gaussian_fit import GaussianFit
 from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
 from creepkit.specimens.bulge.specimen import Bulge
@@ -78,7 +77,7 @@ def rom_data(predictor: BulgeReducedOrderModel, lengths: Mapping[str, float] | N
     Trains the model where that has not been done. SolveError where rings are observed, which have no fit.
     """
     piece = predictor.specimen.replace(**(lengths or {}))
-    fit = piece.observation.sampling(radii_of_top(BulgeTest.model_of(piece))).fit
+    fit = piece.observation.sampling(piece.top_radii).fit
     if not isinstance(fit, GaussianFit):
         raise SolveError("a page shows amplitude, width and shape of a dimple; observe a profile or a field, not rings")
     model = predictor.reduced_model_of(piece)

@@ -191,7 +191,7 @@ def _loading(
 
 
 def _usual_level(specimen: Specimen, load: str) -> str:
-    low, high = getattr(specimen, "conditions", {}).get(load, (100.0, 100.0))
+    low, high = specimen.conditions.get(load, (100.0, 100.0))
     return f"{float(f'{(low * high) ** 0.5:.1g}'):g}"
 
 

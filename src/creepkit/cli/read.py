@@ -84,13 +84,8 @@ def command(
     else:
         without = len(found) - len(framed)
         counted = f"{without} test{'' if without == 1 else 's'} without frames" if without else ""
-        parts = (
-            report.tables_text(tables),
-            report.histories_text(found),
-            counted,
-            str(quality) if framed or remarked else "",
-        )
-        tell("\n".join(part for part in parts if part))
+        flags = str(quality) if framed or remarked else ""
+        tell("\n".join(filter(None, (report.tables_text(tables), report.histories_text(found), counted, flags))))
     if to is not None:
         for path in _write(found, to):
             tell_written(path, err=as_json)

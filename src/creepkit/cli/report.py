@@ -76,22 +76,29 @@ def _page_source(names: list[str], histories: list[History]) -> PageSource:
     histories : given by --tests; measured files in the place of results are added to them.
     """
     import creepkit as ck
+
+    named = [name for name in names if name.endswith(".json") or is_law_name(name)]
+    if named and len(names) > 1:
+        raise FitError(f"{len(names)} laws or results are named; name one, and tests by --tests")
+    if not named:
+        histories += ck.read_histories(names)
+    elif not histories or names[0].endswith(".json"):
+        return _named_source(names[0])
+    return fitted_laws(named, histories)
+
+
+def fitted_laws(names: list[str], histories: list[History]) -> PageSource:
+    """Laws by name, or those that suit tests, fitted to these."""
+    import creepkit as ck
     from creepkit.inverse.candidate_laws import LawChanges
     from creepkit.inverse.candidates import candidates
 
-    laws = [name for name in names if is_law_name(name)]
-    if len(names) > 1 and (laws or any(name.endswith(".json") for name in names)):
-        raise FitError(f"{len(names)} laws or results are named; name one, and tests by --tests")
-    if not laws and not names[0].endswith(".json"):
-        histories += ck.read_histories(names)
-    elif not (laws and histories):
-        return _named_source(names[0])
-    tried = [ck.law(name) for name in laws] or candidates(histories)[:MOST_FITTED]
-    fitted = LawChanges().applied(tried, histories)
+    laws = [ck.law(name) for name in names] or candidates(histories)[:MOST_FITTED]
+    laws = LawChanges().applied(laws, histories)
     with ProgressBar() as progress:
-        if len(fitted) == 1:
-            return ck.identify(fitted[0], histories, progress=progress.tick)
-        return ck.select(fitted, histories, sums=False, progress=progress.tick)
+        if len(laws) == 1:
+            return ck.identify(laws[0], histories, progress=progress.tick)
+        return ck.select(laws, histories, sums=False, progress=progress.tick)
 
 
 def _named_source(name: str) -> PageSource:

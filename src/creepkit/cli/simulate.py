@@ -53,7 +53,7 @@ def command(
         raise SolveError("a test needs its end: give --end-h, such as 100")
     if planned.temperature is None and valued.law.uses(temperature):
         raise SolveError(f"law '{valued.law.name}' depends on temperature: give --temperature-c")
-    if picture is not None and not hasattr(planned.specimen, "draws_section"):
+    if picture is not None and not planned.specimen.draws_section:
         raise SolveError(f"--picture: specimen '{planned.specimen.name}' has no section to draw; leave it out")
     specimen: Any = planned.specimen
     run = ck.simulate(
@@ -86,7 +86,7 @@ def _frame_times(end: float, points: int | None, every: float | None, specimen: 
     if points is not None and every is not None:
         raise SolveError("--points and --every both say when frames are taken; give one of them")
     if points is None and every is None:
-        every = getattr(specimen, "frame_interval", None)
+        every = specimen.frame_interval
     if every is None:
         return np.linspace(0.0, end, points or DEFAULT_FRAMES)
     if not end / SIMULATED_FRAMES.high <= every <= end:

@@ -18,7 +18,7 @@ from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell
 from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru, Training
 
 if TYPE_CHECKING:
-    from creepkit.records import SupportsTraining
+    from creepkit.records import Predictor
 
 DataSet = Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit surrogate generate wrote.")]
 Device = Annotated[str, Option(help="auto (a GPU where there is one), cpu or cuda.")]
@@ -198,16 +198,14 @@ def _recipe(network: dict[str, Any], training: dict[str, Any]) -> ParameterGru:
     return replace(recipe, **network, training=recipe.training.changed(training))
 
 
-def _trainable_model(specimen: Any, lengths: dict[str, float]) -> SupportsTraining:
+def _trainable_model(specimen: Any, lengths: dict[str, float]) -> Predictor:
     """The reduced-order model of a specimen with other lengths; SolveError where it has none that is trained."""
-    from creepkit.records import SupportsReducedOrderModel, SupportsTraining, known_specimens
+    from creepkit.records import known_specimens
 
-    def model_of(one: Any) -> Any:
-        return one.reduced_order_model() if isinstance(one, SupportsReducedOrderModel) else None
-
-    predictor = model_of(specimen.replace(**lengths) if lengths else specimen)
-    if not isinstance(predictor, SupportsTraining):
-        others = [name for name, one in known_specimens().items() if isinstance(model_of(one), SupportsTraining)]
+    predictor: Predictor | None = (specimen.replace(**lengths) if lengths else specimen).reduced_order_model()
+    if predictor is None or not predictor.is_trained:
+        models = {name: one.reduced_order_model() for name, one in known_specimens().items()}
+        others = [name for name, model in models.items() if model is not None and model.is_trained]
         raise SolveError(
             f"--specimen {specimen.name}: it has no reduced-order model that is trained; "
             f"name one of those that have one: {', '.join(others)}"

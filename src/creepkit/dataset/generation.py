@@ -78,7 +78,7 @@ class GenerationJob:
 
     def on_one_thread(self) -> GenerationJob:
         """The generation with a specimen that simulates on one thread."""
-        if getattr(self.specimen, "threads", 1) == 1:
+        if self.specimen.threads == 1:
             return self
         return replace(self, specimen=self.specimen.replace(threads=1))  # type: ignore[attr-defined]
 

@@ -16,7 +16,7 @@ from creepkit.arrays import Ints
 from creepkit.dataset.dataset import FAILED, NOT_SIMULATED, Dataset, empty_columns
 from creepkit.errors import DatasetError
 from creepkit.jobs.worker_process import error_text
-from creepkit.records import Predictor, Status, SupportsReducedOrderModel, predict_with
+from creepkit.records import Predictor, Status
 from creepkit.sampling.conditions import creep_output, hold_times
 from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion, SimulationOutcome
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 def rejected_by_screening(design: SamplingDomain, samples: Dataset) -> Ints:
     """(rows,) the number of the criterion that a sample cannot meet, 0 where it must be simulated to know."""
     reasons = np.zeros(len(samples), dtype=np.int64)
-    if not design.screened or not isinstance(samples.specimen, SupportsReducedOrderModel):
-        return reasons
     reduced_model, criteria = samples.specimen.reduced_order_model(), _outcome_criteria(design)
+    if not design.screened or reduced_model is None:
+        return reasons
     for row in np.flatnonzero(samples.reasons == 0).tolist():
         try:
             outcome = _outcome(samples, row, reduced_model, frames=False)
@@ -54,7 +54,7 @@ def _outcome(samples: Dataset, row: int, model: Predictor, *, frames: bool) -> S
     hold_instants = hold_times(test)
     shown_times = test.times if frames else np.unique(hold_instants)
     times = np.union1d(shown_times, hold_instants)
-    prediction = predict_with(model, samples.law, samples.theta_of(row), [test.replace(times=times)])
+    prediction = model.predict(samples.law, samples.theta_of(row), [test.replace(times=times)])
     observed, shown = prediction.of(0), creep_output(samples.specimen)
     outputs, hold_outputs = (observed[np.searchsorted(times, t)] for t in (shown_times, hold_instants))
     status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])

@@ -285,7 +285,7 @@ def temperature_study(
         "forms": options.forms, "prior": options.prior, "parameters": options.parameters
     }  # fmt: skip
     law, resolved = resolve_law(law), resolve_predictors(using, tests)
-    predictor = CompositePredictor(resolved) if isinstance(resolved, dict) else resolved
+    predictor = CompositePredictor.of(resolved)
     if law.uses(temperature):
         raise FitError(f"law '{law.name}' depends on temperature already; give it without: forms are what is sought")
     check_form_options(law, **form_options)

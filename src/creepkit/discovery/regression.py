@@ -30,7 +30,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, ReferencePoint
-from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile, lies_at_bound
+from creepkit.inverse.uncertainty.laplace_approximation import lies_at_bound
 from creepkit.language import CreepLaw, Param, temperature
 from creepkit.records import ZERO_CELSIUS
 
@@ -156,10 +156,9 @@ def _theta_covariance(fit: Identification) -> Floats:
     An estimate at its bound, which says nothing but that, has the variance of its bounds beside.
     """
     jacobian, covariance = fit.coordinates.jacobian(fit.u), fit.by_tests_alone.covariance
-    variance_factor = (interval_quantile(fit.freedom) / interval_quantile(INFINITE_FREEDOM)) ** 2
     at_bound = [lies_at_bound(fit.law.table[e.name], e) for e in fit.estimates]
     of_bounds = np.where(at_bound, np.ptp(fit.law.internal_bounds, axis=0) ** 2 / 12.0, 0.0)
-    return np.asarray(variance_factor * jacobian @ covariance @ jacobian.T + np.diag(of_bounds))
+    return np.asarray(jacobian @ covariance @ jacobian.T + np.diag(of_bounds))
 
 
 def _central_reference(references: Sequence[ReferencePoint]) -> ReferencePoint:

@@ -341,7 +341,7 @@ def _with_numbers_of_fit(refit: FormCombination, criterion_difference: float, we
         refit,
         values={name: values[name] for name in names},
         covariance=covariance,
-        degrees_of_freedom=fit.freedom,
+        degrees_of_freedom=INFINITE_FREEDOM,
         criterion_difference=criterion_difference,
         weight=weight,
     )

@@ -17,7 +17,6 @@ import numpy as np
 from scipy.stats import norm, qmc
 
 from creepkit.arrays import Floats
-from creepkit.inverse.composite_predictor import predictor_for, reduced_order_model_of
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
@@ -31,7 +30,7 @@ from creepkit.records import History, Predictor, dimension_named
 def predictor_of(fit: Identification) -> Predictor:
     """What planned tests are predicted with: the reduced-order model where the predictor of the fit has one."""
     assert fit.predictor is not None
-    return reduced_order_model_of(fit.predictor) or fit.predictor
+    return fit.predictor.reduced_order_model() or fit.predictor
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +198,7 @@ def nuisances_of_planned(law: KnownLaw, planned: Sequence[History], *, of_made: 
     for k, (n, owner) in enumerate(zip(nuisances.nuisances, nuisances.owners, strict=True)):
         sd[k] = spread.get(n.kind, sd[k])
         if n.is_length and n.scope == "test" and owner in by_name:
-            length = dimension_named(predictor_for(measured.predictor, by_name[owner]), n.kind)
+            length = dimension_named(measured.predictor.for_history(by_name[owner]), n.kind)
             mean[k] = by_name[owner].geometry.get(length.name, mean[k]) if length is not None else mean[k]
     first = 0 if of_made else len(made)
     index = {key: positions[first:] for key, positions in nuisances.test_index.items()}

@@ -30,7 +30,6 @@ from creepkit.errors import CreepkitError
 from creepkit.experiments.expectations import Expectation, ExpectedChiSquare
 from creepkit.experiments.known_laws import Expansion, KnownLaw, nuisances_of_planned, values_of_nuisances
 from creepkit.experiments.planned_outcomes import PlannedOutcomes, test_key
-from creepkit.inverse.composite_predictor import predict, search_predictor_of
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.initial_search import search_problem
 from creepkit.inverse.iterative_estimation import starting_point
@@ -310,7 +309,7 @@ def _as_if_made(truth: KnownLaw, deviation: Floats, planned: Sequence[History]) 
     nuisances = nuisances_of_planned(truth, named)
     e = values_of_nuisances(nuisances, truth, deviation[truth.size :])
     theta = truth.fit.coordinates.theta(truth.fit.u + deviation[: truth.size])
-    prediction = predict(predictor, truth.fit.law, theta[None], named, nuisances=nuisances.predictor_values(e))
+    prediction = predictor.predict(truth.fit.law, theta[None], named, nuisances=nuisances.predictor_values(e))
     made = []
     for k, history in enumerate(named):
         values = {name: prediction.of(k)[:, j] for j, name in enumerate(prediction.outputs) if name in base.outputs}
@@ -341,7 +340,7 @@ def _refit_in_full(
         broad = LeastSquaresProblem.from_histories(
             law.fit.law, histories, measured.predictor, law.fit.settings, law.fit.reference
         )
-        searched = search_problem(broad, search_predictor_of(measured.predictor))
+        searched = search_problem(broad, measured.predictor.for_search())
         minima = MultiStart().minima(searched).minima
         begun += [m.x for m in distinct(minima, searched.bounds, equal_predictions=EQUAL_REDUCED_ORDER_PREDICTIONS)]
     own = replace(noise_model, outputs={name: noise_model[name] for name in observations.outputs})

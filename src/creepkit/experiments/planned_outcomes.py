@@ -17,12 +17,11 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.experiments.known_laws import KnownLaw, compact_effects, nuisances_of_planned, values_of_nuisances
-from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.observation_vector import ObservationVector
-from creepkit.inverse.residuals import candidate_residuals, candidate_residuals_and_jacobian, residuals_of_prediction
-from creepkit.records import History, Status, outputs_of_test
+from creepkit.inverse.residuals import candidate_residuals_and_jacobian, residuals_of_prediction
+from creepkit.records import History, Status
 
 CHUNK = 8
 """Planned tests that are predicted at once: between two chunks progress is reported, and a stop takes effect."""
@@ -151,7 +150,7 @@ class PlannedOutcomes:
         base, predictor = self.laws[0].measured.observations, self.laws[0].measured.predictor
         planned = []
         for history in chunk:
-            names = outputs_of_test(predictor_for(predictor, history), history) or base.outputs
+            names = predictor.for_history(history).outputs_of_test(history) or base.outputs
             noise = {n: float(base.noise[base.outputs.index(n)]) for n in names if n in base.outputs}
             sd = {n: np.full(history.times.size, max(v, 1e-300)) for n, v in noise.items()}
             zero = {n: np.zeros(history.times.size) for n in noise}
@@ -180,30 +179,24 @@ class PlannedOutcomes:
             self._known.setdefault(test_key(history), [[under[0] for under in by_law] for by_law in outcomes])
         mask, nuisances = observations.present[0], nuisances_of_planned(known, [history])
         u = known.fit.u + deviations[:, : known.size]
-        prediction = predict(
-            known.measured.predictor,
+        prediction = known.measured.predictor.predict(
             known.fit.law,
             known.fit.coordinates.theta(u),
             [history],
             nuisances=nuisances.predictor_values(values_of_nuisances(nuisances, known)),
             sensitivities=True,
         )
-        derivatives = None
-        if prediction.jacobian is None:
-            values = candidate_residuals(observations, prediction)
-        else:
-            values, internal = candidate_residuals_and_jacobian(observations, prediction)
-            of_u = np.einsum("cep,cpq->ecq", internal[:, 0], known.fit.coordinates.jacobian(u))
-            derivatives = of_u.reshape(1, mask.size, -1)
+        values, internal = candidate_residuals_and_jacobian(observations, prediction)
+        of_u = np.einsum("cep,cpq->ecq", internal[:, 0], known.fit.coordinates.jacobian(u))
+        derivatives = of_u.reshape(1, mask.size, -1)
         transformed = np.where(observations.present, values + observations.transformed_values, 0.0)
         columns = np.moveaxis(transformed, 0, -1)
         means, jacobians = [], []
         for under, factor in enumerate(self._covariances[test_key(history)]):
             at_estimates = self._known[test_key(history)][law][under].jacobian
             jacobian = np.tile(at_estimates, (len(u), 1, 1))
-            if derivatives is not None:
-                whitened = factor.whiten(derivatives)[0][mask].reshape(-1, len(u), known.size)
-                jacobian[:, :, : known.size] = np.moveaxis(whitened, 1, 0)
+            whitened = factor.whiten(derivatives)[0][mask].reshape(-1, len(u), known.size)
+            jacobian[:, :, : known.size] = np.moveaxis(whitened, 1, 0)
             of_shared = deviations[:, known.size :] @ at_estimates[:, known.size :].T
             means.append(np.asarray(factor.whiten(columns)[0][mask].T + of_shared))
             jacobians.append(jacobian)
@@ -230,8 +223,8 @@ def _predicted(law: KnownLaw, planned: Sequence[History], observations: Observat
     """What a law predicts of planned tests at its estimates, with derivatives."""
     nuisances, problem, coordinates = nuisances_of_planned(law, planned), law.measured, law.fit.coordinates
     e, u, size = values_of_nuisances(nuisances, law), law.fit.u, law.size
-    prediction = predict_with_sensitivities(
-        problem.predictor, law.fit.law, coordinates.theta(u), planned, nuisances.predictor_values(e)
+    prediction = problem.predictor.predict(
+        law.fit.law, coordinates.theta(u)[None], planned, nuisances=nuisances.predictor_values(e), sensitivities=True
     )
     coefficients = coordinates.coefficients if coordinates.every_rate_has_coefficient else None
     residuals = residuals_of_prediction(observations, prediction, nuisances, coefficients)
@@ -248,7 +241,7 @@ def _predicted(law: KnownLaw, planned: Sequence[History], observations: Observat
     effects = compact_effects(jacobian[..., [size + k for k in own]] * sd[own]) if own else None
     leading = []
     for k, history in enumerate(planned):
-        outputs = outputs_of_test(predictor_for(problem.predictor, history), history) or prediction.outputs
+        outputs = problem.predictor.for_history(history).outputs_of_test(history) or prediction.outputs
         values = prediction.of(k)[:, prediction.outputs.index(outputs[0])]  # the first grows with creep
         leading.append(values[np.isfinite(values)])
     return _Chunk(

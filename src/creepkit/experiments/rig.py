@@ -12,13 +12,12 @@ import numpy as np
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
-from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.identification import Identification
 from creepkit.limits import Limits
 from creepkit.limits import numbers as numbers_between
 from creepkit.options import CELSIUS, Options, option
-from creepkit.records import History, Predictor, dimension_named, dimensions_of, load_unit, outputs_of_test
+from creepkit.records import History, Predictor, dimension_named, dimensions_of, load_unit
 
 LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
 """Where nothing is said of a rig: its least and greatest level over those of the tests that were made, and its longest
@@ -188,7 +187,7 @@ def check_dimensions(rig: Rig, fit: Identification) -> None:
     """FitError for a dimension that the test pieces of a rig do not have."""
     assert fit.predictor is not None
     history = next(h for h in fit.histories if h.specimen == rig.specimen)
-    predictor = predictor_for(fit.predictor, history)
+    predictor = fit.predictor.for_history(history)
     known = [d.name for d in dimensions_of(predictor)]
     for name in rig.dimensions:
         if name not in history.geometry and name not in known:
@@ -198,7 +197,7 @@ def check_dimensions(rig: Rig, fit: Identification) -> None:
 
 def _largest_output(history: History, predictor: Predictor) -> float:
     """The largest value of the leading output, in its unit."""
-    outputs = outputs_of_test(predictor_for(predictor, history), history) or tuple(history.outputs)
+    outputs = predictor.for_history(history).outputs_of_test(history) or tuple(history.outputs)
     values = next((history.outputs[name] for name in outputs if name in history.outputs), np.zeros(1))
     finite = values[np.isfinite(values)]
     return float(finite.max()) if finite.size else 0.0
@@ -206,10 +205,10 @@ def _largest_output(history: History, predictor: Predictor) -> float:
 
 def _dimensions(tests: Sequence[History], predictor: Predictor) -> dict[str, tuple[float, ...]]:
     """The length of the tests that is known least exactly, as they or the specimen state it; a single one is varied."""
-    known = max(dimensions_of(predictor_for(predictor, tests[0])), key=lambda d: d.tolerance, default=None)
+    known = max(dimensions_of(predictor.for_history(tests[0])), key=lambda d: d.tolerance, default=None)
     if known is None or known.tolerance == 0.0:
         return {}
-    own = [dimension_named(predictor_for(predictor, h), known.name) or known for h in tests]
+    own = [dimension_named(predictor.for_history(h), known.name) or known for h in tests]
     values = sorted({round(float(h.geometry.get(d.name, d.default)), 4) for h, d in zip(tests, own, strict=True)})
     varied = [round(r * values[0], 4) for r in VARIED_RATIOS] if len(values) == 1 else values
     return {known.name: tuple(varied)}

@@ -1,6 +1,6 @@
 """From camera frames to histories: domes, rigid motion, one centre, outputs with their noise, flags.
 
-`extract_surfaces` does it for any specimen that says how cameras see it (records.SupportsSurfaceObservation);
+`extract_surfaces` does it for any specimen that says how cameras see it (records.Specimen);
 docs/concepts/extraction.md describes the method.
 """
 

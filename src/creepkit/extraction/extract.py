@@ -17,7 +17,7 @@ from creepkit.extraction.frame_checks import FrameFlags, frames_at_rest, motion_
 from creepkit.extraction.noise import NOISE_FRAMES, ErrorFields, NoiseEstimate, estimate_noise, smooth_free, whole
 from creepkit.extraction.plate import RigidMotions, rigid_motions
 from creepkit.extraction.series import PointSeries, ReferencePlate, SeriesOfFrames, read_series, reference_plate
-from creepkit.records import Frames, SupportsSurfaceObservation, SurfaceObservation, SurfacePoints, SurfaceRegion
+from creepkit.records import Frames, Specimen, SurfaceObservation, SurfacePoints, SurfaceRegion
 
 FEWEST_CLAMPED_POINTS = 30
 """Points of the clamped plate that a frame needs for its rigid motion."""
@@ -67,10 +67,7 @@ class TakenOff(NamedTuple):
 
 
 def extract_surfaces(
-    frames: Frames,
-    specimen: SupportsSurfaceObservation,
-    request: ExtractionRequest,
-    failed: dict[str, str] | None = None,
+    frames: Frames, specimen: Specimen, request: ExtractionRequest, failed: dict[str, str] | None = None
 ) -> list[Extraction]:
     """Extract every test piece in the field of view, in one pass through the frames.
 
@@ -157,9 +154,7 @@ def _group(plate: ReferencePlate, center: Floats, region: SurfaceRegion, centers
     return np.flatnonzero(chosen)
 
 
-def _extract_one(
-    frames: Frames, specimen: SupportsSurfaceObservation, request: ExtractionRequest, piece: _Piece
-) -> Extraction:
+def _extract_one(frames: Frames, specimen: Specimen, request: ExtractionRequest, piece: _Piece) -> Extraction:
     region, series, plate = specimen.surface_region, piece.series, piece.plate
     places = plate.places[series.points] - np.r_[piece.center, 0.0]
     distance = np.hypot(places[:, 0], places[:, 1])
@@ -210,7 +205,7 @@ def _extract_one(
     return Extraction(
         name=piece.name,
         source=frames.name,
-        specimen=getattr(specimen, "name", "specimen"),
+        specimen=specimen.label,
         operator=seen.operator,
         times=frames.times - frames.times[0],
         outputs=seen.outputs,

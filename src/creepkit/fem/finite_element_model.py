@@ -14,7 +14,6 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import SIDES, Mesh, discretize
-from creepkit.fem.solvable_model import SensitivityDirections
 
 TILE = 8
 """Side of the tiles in which the core keeps banded matrices."""
@@ -36,6 +35,25 @@ class RigidContact(NamedTuple):
     stiffness: float
     smoothing: float
     moves: bool
+
+
+@dataclass(frozen=True, eq=False)
+class SensitivityDirections:
+    """What is differentiated to beside the P parameters of the law: C = P + D + G columns.
+
+    segments : (D, segments, 10) change of the load history's segments, in the units of their columns.
+    gradients : (G, elements, 4, 2, 2) and
+    hoops : (G, elements, 4), see fem.mesh.GeometryDerivative.
+    velocities : (G, 2 nodes) mm, all three for each unit of a number of the geometry.
+    forces : (G, nodes, 2) N/rad, change of the dead forces of a unit of the load, for each unit of that number; None
+        where there are no such forces, or they stay.
+    """
+
+    segments: Floats
+    gradients: Floats
+    hoops: Floats
+    velocities: Floats
+    forces: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)

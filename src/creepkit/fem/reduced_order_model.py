@@ -17,9 +17,8 @@ import numpy as np
 from creepkit.arrays import Floats, Ints, frozen
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
-from creepkit.fem.finite_element_model import FiniteElementModel
+from creepkit.fem.finite_element_model import FiniteElementModel, SensitivityDirections
 from creepkit.fem.mesh import SIDE_SLOPES, SIDE_VALUES, SIDE_WEIGHTS
-from creepkit.fem.solvable_model import SensitivityDirections
 
 BLOCK = 8
 """Modes and points are kept in blocks of so many."""

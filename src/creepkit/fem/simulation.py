@@ -11,10 +11,9 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem import solver
-from creepkit.fem.finite_element_model import FiniteElementModel
+from creepkit.fem.finite_element_model import FiniteElementModel, SensitivityDirections
 from creepkit.fem.mesh import GeometryDerivative
-from creepkit.fem.solvable_model import SensitivityDirections, SolvableModel
-from creepkit.fem.solver import LoadProgram, SolverSettings
+from creepkit.fem.solver import LoadProgram, SolvableModel, SolverSettings
 from creepkit.fem.time_interpolation import TimeInterpolation
 from creepkit.integration.time_discretisation import merge_programs
 from creepkit.kernels.interface import CompiledLaw

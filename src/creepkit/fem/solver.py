@@ -11,8 +11,8 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.core import CoreStructure, address, function
 from creepkit.errors import SolveError
-from creepkit.fem.finite_element_model import FiniteElementModel
-from creepkit.fem.solvable_model import SensitivityDirections, SolvableModel
+from creepkit.fem.finite_element_model import FiniteElementModel, SensitivityDirections
+from creepkit.fem.reduced_order_model import ReducedOrderModel
 from creepkit.integration.core_structures import MAX_STATES
 from creepkit.kernels.interface import CompiledEntry, CompiledLaw
 
@@ -30,6 +30,10 @@ unit); at its end, and temperature K, modulus MPa and motion of held nodes at bo
 
 CREEP_COMPONENTS, EQUIVALENT_STRAIN = 3, 3
 """Creep components of a point, and the place of its equivalent creep strain."""
+
+
+SolvableModel = FiniteElementModel | ReducedOrderModel
+"""What can be simulated."""
 
 
 class SolverSettings(NamedTuple):

@@ -19,24 +19,14 @@ from creepkit.forecasts.draws import (
     own_variances,
     uncertain_quantities,
 )
-from creepkit.inverse.composite_predictor import (
-    outside_class,
-    predict,
-    predict_with_sensitivities,
-    predictor_for,
-    predicts_rupture,
-    reduced_order_model_of,
-    refined_of,
-    search_predictor_of,
-)
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.rate_nuisances import law_with_rate_factors
 from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.single_values import EXTRAPOLATION_FACTOR
 from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 from creepkit.inverse.uncertainty.quantities import log_rate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor, Status
+from creepkit.records.rate_nuisances import law_with_rate_factors
 
 FOLLOWED_TIMES, ADDED_TIMES = 300, 20
 """Geometrically spaced times at which a test is followed to its rupture, or to its last time, beside its own."""
@@ -108,7 +98,7 @@ class SimulatedTest:
     @cached_property
     def own(self) -> Predictor:
         """The predictor of this test."""
-        return predictor_for(self.predictor, self.history)
+        return self.predictor.for_history(self.history)
 
     @cached_property
     def followed(self) -> History:
@@ -117,7 +107,9 @@ class SimulatedTest:
         A drift is one over the test: with it nothing is followed beyond.
         """
         last = max(float(self.history.times[-1]), self.history.rupture_time or 0.0)
-        far = predicts_rupture(self.predictor, self.history) and not any("drift" in kind for kind in self.centre)
+        far = self.predictor.for_history(self.history).follows_to_rupture and not any(
+            "drift" in kind for kind in self.centre
+        )
         horizon, count = (EXTRAPOLATION_FACTOR * last, FOLLOWED_TIMES) if far else (last, ADDED_TIMES)
         times = np.geomspace((FIRST_OF_FOLLOWED if far else FIRST_OF_ADDED) * last, horizon, count)
         return self.history.replace(times=np.union1d(times, self.history.times), outputs={}, standard_deviation={})
@@ -129,9 +121,9 @@ class SimulatedTest:
         That is {output: standard deviation} of the numerical error, in the output's unit: a tenth of what the refined
         predictor changes, or what predictors state of themselves.
         """
-        coarse, refined = self._at_values(self.predictor), refined_of(self.own)
+        coarse, refined = self._at_values(self.predictor), self.own.refined()
         if refined is None:
-            return coarse, dict(getattr(self.own, "error", {}))
+            return coarse, dict(self.own.error)
         exact = self._at_values(refined)
         change = exact.values[0] - coarse.values[0]
         remaining = {
@@ -144,10 +136,10 @@ class SimulatedTest:
     @cached_property
     def _cheaper(self) -> Predictor:
         """What predicts draws, which are then corrected at the identified values; its own where nothing is cheaper."""
-        cheaper = reduced_order_model_of(self.own)
-        if cheaper is None or outside_class(cheaper, self.fit.law):
-            return search_predictor_of(self.own)
-        return search_predictor_of(cheaper if {*self.centre} <= {*getattr(cheaper, "nuisances", ())} else self.own)
+        cheaper = self.own.reduced_order_model()
+        if cheaper is None or cheaper.outside_class(self.fit.law):
+            return self.own.for_search()
+        return (cheaper if {*self.centre} <= {*cheaper.nuisances} else self.own).for_search()
 
     def drawn(self, u: Floats, log_factor: Floats, nuisances: Mapping[str, Floats]) -> TestCurves:
         """The curves of draws, through a cheaper predictor moved by its difference from the exact one at the values.
@@ -169,7 +161,7 @@ class SimulatedTest:
     def sensitivities(self) -> TestSensitivities:
         """The derivatives, at its own times."""
         law, theta, moved = self._with_factor(self.fit.coordinates.theta(self.fit.u)[None], np.zeros(1))
-        prediction = predict_with_sensitivities(self.own, law, theta[0], [self.history], self._fixed)
+        prediction = self.own.predict(law, theta, [self.history], nuisances=self._fixed, sensitivities=True)
         assert prediction.jacobian is not None
         count, size = self.history.times.size, self.fit.u.size
         jacobian = np.nan_to_num(prediction.jacobian[0, 0, :count])
@@ -202,7 +194,7 @@ class SimulatedTest:
         self, predictor: Predictor, theta: Floats, log_factor: Floats, nuisances: Mapping[str, Floats]
     ) -> TestCurves:
         law, theta, _ = self._with_factor(theta, log_factor)
-        prediction = predict(predictor, law, theta, [self.followed], nuisances=nuisances)
+        prediction = predictor.predict(law, theta, [self.followed], nuisances=nuisances)
         status, values = prediction.status[:, 0], np.array(prediction.values[:, 0, : self.followed.times.size])
         end_times = np.where(status == Status.RUPTURED, prediction.end_times[:, 0], np.inf)
         finished, failed = status == Status.COMPLETE, status == Status.NOT_CONVERGED

@@ -13,7 +13,6 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError, nearest
-from creepkit.inverse.composite_predictor import predictor_for, supports_nuisance
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import owner_of, prior_mean
 from creepkit.inverse.uncertainty.importance_sampling import covariance_root
@@ -193,12 +192,12 @@ def uncertain_quantities(
 ) -> list[UncertainQuantity]:
     """What of a test is known to a tolerance: as given, as the fit estimated it, or as the specimen states it."""
     estimated = {(n.key, n.owner): k for k, n in enumerate(fit.nuisances)}
-    own_predictor = predictor_for(predictor, history)
+    own_predictor = predictor.for_history(history)
     dimensions: dict[str, UncertainQuantity] = {}
     for nuisance in fit.settings.nuisances:
         kind = nuisance.kind
         has_tolerance = kind in TOLERANCE_KINDS or is_length_nuisance(kind)
-        if not (has_tolerance and supports_nuisance(own_predictor, kind) and nuisance.applies_to(history.name)):
+        if not (has_tolerance and own_predictor.follows(kind) and nuisance.applies_to(history.name)):
             continue
         mean = prior_mean(nuisance, history, predictor)
         position = estimated.get((nuisance.key, owner_of(nuisance, history)))
@@ -210,7 +209,7 @@ def uncertain_quantities(
             dimensions[kind] = UncertainQuantity(kind, mean, _spread_between_tests(fit, nuisance), low, high)
     stated = ((d.names[-1], d.tolerance) for d in dimensions_of(own_predictor) if d.tolerance > 0.0)  # relative ones
     for given, relative in (*stated, *((kind, None) for kind in tolerances)):
-        if not supports_nuisance(own_predictor, given) or (relative is not None and given in dimensions):
+        if not own_predictor.follows(given) or (relative is not None and given in dimensions):
             continue
         known = dimensions.get(given)
         mean = known.mean if known else prior_mean(Nuisance(given), history, predictor)
@@ -231,7 +230,7 @@ def _spread_between_tests(fit: Identification, nuisance: Nuisance) -> float:
 def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[History], predictor: Predictor) -> None:
     """FitError for a tolerance of what no test has, or that is no standard deviation."""
     for kind, sd in tolerances.items():
-        lengths = {name for h in histories for d in dimensions_of(predictor_for(predictor, h)) for name in d.names}
+        lengths = {name for h in histories for d in dimensions_of(predictor.for_history(h)) for name in d.names}
         known = sorted({*TOLERANCE_KINDS, *lengths, *all_dimensions()})
         if kind not in known:
             raise FitError(f"a tolerance of '{kind}' is not known; {nearest(kind, known)}")
@@ -242,11 +241,11 @@ def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[Histor
                 f"the tolerance of '{kind}' is {sd:g}; allowed are 0 to {LARGEST_TOLERANCES[kind]:g} "
                 f"({'K' if 'temperature' in kind else 'relative, 0.05 for 5 %'})"
             )
-        if not any(supports_nuisance(predictor_for(predictor, h), kind) for h in histories):
+        if not any(predictor.for_history(h).follows(kind) for h in histories):
             raise FitError(f"the tolerance of '{kind}' means nothing to the specimens of these tests; leave it out")
         for history in histories if is_length_nuisance(kind) else ():
-            own = predictor_for(predictor, history)
-            length = prior_mean(Nuisance(kind), history, own) if supports_nuisance(own, kind) else np.inf
+            own = predictor.for_history(history)
+            length = prior_mean(Nuisance(kind), history, own) if own.follows(kind) else np.inf
             if sd > LARGEST_OF_LENGTH * length:
                 raise FitError(
                     f"the tolerance of '{kind}' is {sd:g} mm, of test '{history.name}' with {length:g} mm; at most "

@@ -17,7 +17,7 @@ from creepkit.errors import FitError, nearest
 from creepkit.forecasts.draws import check_tolerances, law_draws
 from creepkit.forecasts.forecast_of_test import forecast_test
 from creepkit.forecasts.results import TestForecast
-from creepkit.inverse.composite_predictor import CompositePredictor, reduced_order_model_of, underlying_specimen
+from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
@@ -135,7 +135,7 @@ def forecast(
             if progress is not None:
                 progress("tests", k, len(histories))
             rng = np.random.default_rng([weighted[0][0].settings.seed, zlib.crc32(history.name.encode())])
-            count = draws or (DRAWS if reduced_order_model_of(predictor) is None else COSTLY_DRAWS)
+            count = draws or (DRAWS if predictor.reduced_order_model() is None else COSTLY_DRAWS)
             most_draws = max(most_draws, count)
             laws = [(law_draws(f, max(round(count * w), LEAST_DRAWS), rng), w) for f, w in weighted]
             made.append(
@@ -157,7 +157,7 @@ def _predictor(
 ) -> Predictor:
     """What predicts one test: as asked, else its specimen as it was fitted, else as it is registered."""
     if using is None and fit.predictor is not None:
-        known = registered_specimens(underlying_specimen(fit.predictor))
+        known = registered_specimens(fit.predictor.specimen)
         if history.specimen in known:
             return known[history.specimen]
         if not known:

@@ -36,7 +36,7 @@ COMPONENTS = "components"
 def needs_modulus(specimen: Specimen, loading: Loading) -> bool:
     """Whether a planned test has no curve without Young's modulus: by its specimen, or because strain is prescribed."""
     prescribed = isinstance(loading, StrainSteps) or (isinstance(loading, PointLoading) and bool(loading.strain))
-    return prescribed or "modulus" in getattr(specimen, "conditions", {})
+    return prescribed or "modulus" in specimen.conditions
 
 
 def load_of_components(components: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]]) -> PointLoading:

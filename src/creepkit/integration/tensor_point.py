@@ -32,6 +32,12 @@ _SHEAR_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 _MEAN_DIRECTION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
+def von_mises(stress: Floats) -> Floats:
+    """The von Mises stress (...,), MPa, of tensors (..., 6)."""
+    deviator = stress - stress[..., :3].mean(axis=-1)[..., None] * _MEAN_DIRECTION
+    return np.asarray(np.sqrt(1.5 * (deviator**2 @ _SHEAR_WEIGHTS)))
+
+
 class ProportionalLoading(NamedTuple):
     """A scalar problem.
 
@@ -56,10 +62,7 @@ def proportional_loading(
     times, stresses = _segment_ends(programs, end)
     means = stresses[:, :3].mean(axis=1)
     deviators = stresses - means[:, None] * _MEAN_DIRECTION
-    size, room = (
-        np.sqrt(1.5 * (deviators**2 @ _SHEAR_WEIGHTS)),
-        _PROPORTIONALITY_TOLERANCE * max(float(np.abs(stresses).max()), 1e-300),
-    )
+    size, room = von_mises(stresses), _PROPORTIONALITY_TOLERANCE * max(float(np.abs(stresses).max()), 1e-300)
     along = deviators[np.argmax(size)] / size.max() if size.max() > room else np.zeros(6)
     level = 1.5 * (deviators * _SHEAR_WEIGHTS) @ along
     line = _line(level, means, room)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
-from creepkit.inverse.composite_predictor import prediction_errors_of, reduced_order_model_of, through_for_law
+from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify as identify_law
@@ -135,5 +135,5 @@ def _resolve_through(
         raise FitError(
             f"through is '{quoted(through)}'; give 'auto', None or a predictor such as ck.surrogate('dimple')"
         )
-    reduced = None if isinstance(predictor, Mapping) else reduced_order_model_of(predictor)
-    return reduced if reduced is not None and prediction_errors_of(reduced) else None
+    reduced = None if isinstance(predictor, Mapping) else predictor.reduced_order_model()
+    return reduced if reduced is not None and reduced.error else None

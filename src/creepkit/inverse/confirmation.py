@@ -10,7 +10,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import CompositePredictor, outside_class
+from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, errors_of_output
 from creepkit.inverse.history_checks import without_suspect_frames
@@ -164,14 +164,14 @@ def confirm(
     if all(h.specimen in known for h in tests):
         used = {h.specimen: known[h.specimen] for h in tests}
         using = used if len(used) > 1 else next(iter(used.values()))
-    resolved = resolve_predictors(using, tests)
-    predictor = CompositePredictor(resolved) if isinstance(resolved, dict) else resolved
+    predictor = CompositePredictor.of(resolve_predictors(using, tests))
     prediction = fit.predict(tests, predictor)
-    can_predict = fit.predictor is not None and not outside_class(fit.predictor, fit.law)
+    can_predict = fit.predictor is not None and not fit.predictor.outside_class(fit.law)
     fit_prediction = fit.predict(tests) if can_predict else None
-    name = getattr(predictor, "name", type(predictor).__name__)
     return Confirmation(
-        fit.law.name, name, tuple(_confirmed_test(fit, prediction, fit_prediction, k, h) for k, h in enumerate(tests))
+        fit.law.name,
+        predictor.label,
+        tuple(_confirmed_test(fit, prediction, fit_prediction, k, h) for k, h in enumerate(tests)),
     )
 
 

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.composite_predictor import predict, refined_of
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.records import History, Prediction, Predictor, Status, output_unit
@@ -63,12 +62,11 @@ class NumericalError:
 
 def correct_defect(problem: LeastSquaresProblem, x: Floats) -> tuple[LeastSquaresProblem, NumericalError | None]:
     """The problem with its predictor corrected at x (unknowns,) by the more exact one, if it has one."""
-    refined = refined_of(problem.predictor)
+    refined = problem.predictor.refined()
     if refined is None or problem.observations.followed_to_rupture.any():
         return problem, None
     observations, count = problem.observations, problem.parameter_count
-    prediction = predict(
-        refined,
+    prediction = refined.predict(
         problem.law,
         problem.coordinates.theta(x[:count])[None],
         problem.histories,
@@ -138,10 +136,8 @@ def _numerical_error(
         noise = float(observations.noise[position])
         noises = max(noises, sizes[name] / noise) if noise > 0 else noises
     return {
-        "predictor": _name(problem.predictor),
-        "refined": f"{_name(refined)} on a finer mesh"
-        if _name(refined) == _name(problem.predictor)
-        else _name(refined),
+        "predictor": problem.predictor.label,
+        "refined": f"{refined.label} on a finer mesh" if refined.label == problem.predictor.label else refined.label,
         "size": sizes,
         "noises": noises,
         "shift": float("nan"),
@@ -158,7 +154,3 @@ def shift_of_values(problem: LeastSquaresProblem, x: Floats, change: Floats) -> 
     whitened = problem.whiten(problem.residuals(x).offset_sensitivity * change)
     shift = covariance @ (jacobian[: whitened.size].T @ whitened)
     return float(np.abs(shift / np.sqrt(np.diag(covariance))).max())
-
-
-def _name(predictor: Predictor) -> str:
-    return str(getattr(predictor, "name", type(predictor).__name__))

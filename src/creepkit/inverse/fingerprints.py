@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import pickle
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from creepkit.errors import DatasetError
 from creepkit.files.json_documents import canonical_json
-from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.records import History, Predictor, Program
 from creepkit.registry.specimen_documents import specimen_to_json
 
@@ -19,42 +18,22 @@ METADATA_FIELDS = ("source", "labels")
 """Fields of a history that no identification uses."""
 
 
-def single_threaded(predictor: Predictor) -> Predictor:
-    """The same predictor, which starts no threads."""
-    untyped: Any = predictor
-    if isinstance(untyped, CompositePredictor):
-        return CompositePredictor({name: single_threaded(p) for name, p in untyped.predictors.items()})
-    if _is_surrogate(untyped):
-        metadata = replace(untyped.metadata, specimen=single_threaded(untyped.metadata.specimen))
-        return untyped.recipe.surrogate(untyped.weights, metadata)  # type: ignore[no-any-return]
-    if "specimen" in getattr(untyped, "__dataclass_fields__", ()):  # the reduced-order model of a specimen
-        return replace(untyped, specimen=single_threaded(untyped.specimen))  # type: ignore[no-any-return]
-    if getattr(untyped, "threads", 1) == 1:
-        return predictor
-    return untyped.replace(threads=1)  # type: ignore[no-any-return]
-
-
 def predictor_fingerprint(predictor: Predictor) -> str:
     """SHA-256, shortened, of what decides the predictions of a predictor; the number of threads does not."""
-    return hashlib.sha256(_serialised_predictor(single_threaded(predictor))).hexdigest()[:16]
+    return hashlib.sha256(_serialised_predictor(predictor.single_threaded())).hexdigest()[:16]
 
 
 def _serialised_predictor(predictor: Predictor) -> bytes:
     untyped: Any = predictor
-    if isinstance(untyped, CompositePredictor):
-        return b"".join(name.encode() + _serialised_predictor(p) for name, p in sorted(untyped.predictors.items()))
-    if _is_surrogate(untyped):
+    if predictor.parts:
+        return b"".join(name.encode() + _serialised_predictor(one) for name, one in sorted(predictor.parts.items()))
+    if predictor.is_surrogate:
         weights = b"".join(array.tobytes() for array in untyped.weights.values())
         return canonical_json(untyped.file_header) + weights
     try:
         return canonical_json(specimen_to_json(untyped))
     except (DatasetError, AttributeError):  # a mesh of its own, or no record at all
         return pickle.dumps(predictor)
-
-
-def _is_surrogate(predictor: Any) -> bool:
-    """Whether it is a surrogate.Surrogate; asking by class would load surrogates for everybody."""
-    return all(hasattr(predictor, name) for name in ("recipe", "weights", "metadata"))
 
 
 def history_text(history: History) -> str:

@@ -8,13 +8,13 @@ import numpy as np
 
 from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import compared_outputs, predictor_for, predicts_rupture
+from creepkit.inverse.composite_predictor import compared_outputs
 from creepkit.inverse.observation_vector import ObservationVector, frames_with_data
 from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.quality import check_loading_strain, check_rig, exclude_suspect_frames, repeated_row_notes, without_copies
-from creepkit.records import History, Predictor, is_logarithmic, output_named, outputs_of_test
+from creepkit.records import History, Predictor, is_logarithmic, output_named
 
 SUSPECT_LABEL = "suspect"
 """Label of a history that says which of its frames were left out, and why."""
@@ -170,7 +170,7 @@ def _check_outputs(history: History, predictor: Predictor) -> None:
         return
     outputs = compared_outputs(predictor, history)
     if not outputs:
-        known = ", ".join(outputs_of_test(predictor_for(predictor, history), history)) or "nothing"
+        known = ", ".join(predictor.for_history(history).outputs_of_test(history)) or "nothing"
         raise FitError(
             f"history '{history.name}' has none of the outputs that are predicted ({known}); "
             f"it has {', '.join(history.outputs) or 'none'}"
@@ -189,8 +189,8 @@ def _check_without_frames(history: History, predictor: Predictor) -> None:
         raise FitError(
             f"history '{history.name}' has no frames, no minimum rate and no known end: nothing to identify a law from"
         )
-    if history.minimum_rate is None and not predicts_rupture(predictor, history):
-        name = getattr(predictor_for(predictor, history), "name", "predictor")
+    if history.minimum_rate is None and not predictor.for_history(history).follows_to_rupture:
+        name = getattr(predictor.for_history(history), "name", "predictor")
         raise FitError(
             f"history '{history.name}' has its end alone, and {name} follows no test to rupture; leave the test out"
         )
@@ -203,7 +203,7 @@ def check_explicit_nuisances(
     if not kinds or not observations.followed_to_rupture.any():
         return
     history = histories[int(np.argmax(observations.followed_to_rupture))]
-    name = getattr(predictor_for(predictor, history), "name", "predictor")
+    name = getattr(predictor.for_history(history), "name", "predictor")
     raise FitError(
         f"nuisance '{kinds[0]}' cannot be fitted beside tests that are followed to their end ('{history.name}', "
         f"{name}); leave it out, or drop how they ended: history.replace(rupture_time=None, unruptured=False)"

@@ -14,7 +14,7 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.adequacy import Adequacy
-from creepkit.inverse.composite_predictor import CompositePredictor, predict
+from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import NumericalError, correct_defect
 from creepkit.inverse.explanation import LeftOut
@@ -30,9 +30,9 @@ from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import LawAtTests, constant_stress_tests
 from creepkit.inverse.uncertainty.laplace_approximation import (
+    NORMAL_QUANTILE,
     Estimate,
     delta_method,
-    interval_quantile,
     parameter_estimates,
     positive_semidefinite,
 )
@@ -91,7 +91,8 @@ class Identification(
     log_likelihood : of the fitted frames as if they were independent (working noise), with explicit nuisances
         integrated out; of identifications by likelihood the restricted one, but for a constant of the law.
     effective_frames : number of independent frames (about one a test when tests differ from one another).
-    freedom : degrees of freedom of the intervals (see inverse.uncertainty).
+    freedom : the median degrees of freedom of the parameters, those of profiles and samples; in `covariance` each
+        variance has its own, so that 1.96 standard deviations are a 95 % interval.
     search_trace : how its global search went; linearised : the problem made linear at the optimum, of identifications
         by likelihood; problem : what was minimised, under the covariance that was found (none of them is saved).
     sparsity : how a penalty reduced the sum that this law was part of, if one did.
@@ -245,8 +246,7 @@ class Identification(
             np.reshape([0.0 if one is None else float(getattr(one, name)) for one in found], stresses.shape)
             for name in ("total", "own")
         )
-        normal = interval_quantile(1e9)
-        return np.sqrt(np.clip((normal * total) ** 2 - (high - value) ** 2, 0.0, (normal * own) ** 2))
+        return np.sqrt(np.clip((NORMAL_QUANTILE * total) ** 2 - (high - value) ** 2, 0.0, (NORMAL_QUANTILE * own) ** 2))
 
     def activation_energy(self) -> tuple[float, float, float]:
         """Activation energy -R d ln rate / d(1/T), J/mol, at the reference point with its 95 % interval."""
@@ -263,10 +263,10 @@ class Identification(
             value, draws = function(self.u), function(self.samples)
             low, high = np.quantile(draws, (0.025, 0.975), axis=0)
             below, above = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
-            errors = self._quantile * self.error_sd(function)
+            errors = NORMAL_QUANTILE * self.error_sd(function)
             return value, value - np.hypot(below, errors), value + np.hypot(above, errors)
         value, sd = delta_method(function, self.u, self.covariance)
-        return value, value - self._quantile * sd, value + self._quantile * sd
+        return value, value - NORMAL_QUANTILE * sd, value + NORMAL_QUANTILE * sd
 
     @checked
     def rupture_time(
@@ -323,8 +323,7 @@ class Identification(
         """
         predictor = self._predictor_or(using)
         tests = list(histories or self.histories)
-        prediction = predict(
-            predictor,
+        prediction = predictor.predict(
             self.law,
             self.law.to_internal(self.values),
             tests,
@@ -371,9 +370,8 @@ class Identification(
         if using is None and (self.predictor is not None or self.predictor_documents):
             predictor = self._predictor_or(None)
         elif using is None or isinstance(using, str | Mapping):
-            resolved = resolve_predictors(using, tests)
-            predictor = CompositePredictor(resolved) if isinstance(resolved, dict) else resolved
-        elif hasattr(using, "predict"):
+            predictor = CompositePredictor.of(resolve_predictors(using, tests))
+        elif isinstance(using, Predictor):
             predictor = using
         else:
             raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
@@ -407,7 +405,7 @@ class Identification(
             settings=replace(self.settings, usual_errors="none"),
             covariance=covariance,
             error_covariance=None,
-            estimates=parameter_estimates(self.law, self.coordinates, self.u, covariance, self._quantile),
+            estimates=parameter_estimates(self.law, self.coordinates, self.u, covariance),
             rate_scatter=scatter,
         )
 
@@ -449,7 +447,3 @@ class Identification(
     def plot(self, path: str | Path | None = None) -> Figure:
         """Measured against identified, and residuals; written to `path` when given."""
         return present("reports.identification_plot:identification_figure", self, path)
-
-    @property
-    def _quantile(self) -> float:
-        return interval_quantile(self.freedom)

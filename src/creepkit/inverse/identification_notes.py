@@ -75,7 +75,7 @@ def provenance_of(problem: LeastSquaresProblem, search_evaluations: int, search:
         "law": law.name,
         "origin": registry.default_registry().distributions_of(law),
         "fingerprint": law.fingerprint,
-        "specimen": getattr(problem.predictor, "name", type(problem.predictor).__name__),
+        "specimen": problem.predictor.label,
         "evaluations": problem.evaluations.count,
         "search_evaluations": search_evaluations,
         **({"search": search} if search else {}),

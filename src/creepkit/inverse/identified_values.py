@@ -10,7 +10,6 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
-from creepkit.inverse.composite_predictor import predict_to_rupture, predicts_rupture
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.minimum_rates import measured_minimum_rate
 from creepkit.inverse.single_values import SingleValue
@@ -98,7 +97,7 @@ def state_at_strain(fit: Identification) -> StateAtStrain | None:
     def function(u: Floats) -> Floats:
         theta = fit.coordinates.theta(u)
         flat = np.ascontiguousarray(theta.reshape(-1, theta.shape[-1]))
-        reached = predict_to_rupture(predictor, fit.law, flat, bars).times_to_strain
+        reached = predictor.predict_to_rupture(fit.law, flat, bars).times_to_strain
         assert reached is not None
         with np.errstate(divide="ignore", invalid="ignore"):
             log_time = np.log(reached.times[..., 1])
@@ -107,7 +106,7 @@ def state_at_strain(fit: Identification) -> StateAtStrain | None:
         return np.stack([log_time[:, 1], log_rate[:, 1], exponent], axis=-1).reshape(*theta.shape[:-1], 3)
 
     try:
-        if not all(predicts_rupture(predictor, bar) for bar in bars):
+        if not all(predictor.for_history(bar).follows_to_rupture for bar in bars):
             return None
         ends = np.array(fit.interval_of(function))
     except CreepkitError:

@@ -14,14 +14,7 @@ from creepkit.inverse.adequacy import SHAPE_MISFIT
 from creepkit.inverse.bound_penalties import check_bounds
 from creepkit.inverse.bounds import MOST_WIDENINGS, widened, widened_notes
 from creepkit.inverse.compared_tests import compared_tests, compares_rupture_times
-from creepkit.inverse.composite_predictor import (
-    predict,
-    prediction_errors_of,
-    predictors_for_law,
-    reduced_order_model_of,
-    refined_of,
-    through_for_law,
-)
+from creepkit.inverse.composite_predictor import predictors_for_law, through_for_law
 from creepkit.inverse.defect_correction import (
     NumericalError,
     correct_defect,
@@ -73,10 +66,11 @@ from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with
 from creepkit.inverse.uncertainty.laplace_approximation import (
     covariance_of_values,
     cut_interval_notes,
-    interval_quantile,
+    median_freedom,
     parameter_estimates,
     positive_semidefinite,
     restricted_covariance,
+    with_freedom,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
@@ -249,16 +243,16 @@ def _best_estimate(
         cheaper = problem.with_predictor(through)
         best = _best_of(cheaper, starts, working_estimator, APPROXIMATE_LIMITS, progress)
         starts, working_noise = [best.minimum.x], best.working_noise
-    if reduced_order_model_of(problem.predictor) is not None:
+    if problem.predictor.reduced_order_model() is not None:
         limits = SIMULATION_LIMITS
     if start.u is not None:
         limits = replace(limits, rounds=REFIT_ROUNDS)
     nearly_there = through is not None or start.u is not None
-    if not nearly_there or refined_of(problem.predictor) is None:
+    if not nearly_there or problem.predictor.refined() is None:
         best = _best_of(problem, starts, working_estimator, limits, progress, working_noise)
         problem, x, working_noise = best.problem, best.minimum.x, best.working_noise
         limits = replace(limits, rounds=REFIT_ROUNDS)
-        if refined_of(problem.predictor) is None:
+        if problem.predictor.refined() is None:
             return best, None
     else:
         x = starts[0]
@@ -303,7 +297,7 @@ def _best_of(
 def _working_estimator(
     problem: LeastSquaresProblem, numerical_error: NumericalError | None = None
 ) -> WorkingNoiseEstimator:
-    errors = prediction_errors_of(problem.predictor) if numerical_error is None else numerical_error.remaining
+    errors = problem.predictor.error if numerical_error is None else numerical_error.remaining
     return WorkingNoiseEstimator(problem.settings, problem.observations, errors)
 
 
@@ -322,7 +316,7 @@ def _result(
     linear, by_likelihood = best.linearised, working_estimator.by_likelihood
     noise_model = working_estimator.final(linear, best.working_noise)
     unestimated = working_estimator.unestimated_drift_components(noise_model)
-    covariance, freedom = restricted_covariance(linear, noise_model, problem.settings.nuisances, unestimated, count)
+    covariance, freedom = restricted_covariance(linear, noise_model, problem.settings.nuisances, unestimated)
     working_noise = None
     if not by_likelihood:
         working_noise = with_single_value_weight(best.working_noise, problem.observations)
@@ -337,8 +331,7 @@ def _result(
     rates = RateExplanations(problem, linear.x, judged, noise_model)
     of_errors, of_common = error_covariances(found_at, noise_model, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
-    prediction = predict(
-        problem.predictor,
+    prediction = problem.predictor.predict(
         law,
         coordinates.theta(u)[None],
         list(histories),
@@ -347,10 +340,8 @@ def _result(
     if not problem.observations.followed_to_rupture.any():
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
-    # Their size is known, so that their interval is a normal one whatever the degrees of freedom of the tests are.
-    quantile = interval_quantile(freedom)
-    error_covariance = (interval_quantile(1e9) / quantile) ** 2 * of_errors[:count, :count]
-    law_covariance = positive_semidefinite(covariance[:count, :count]) + error_covariance
+    error_covariance = of_errors[:count, :count]
+    law_covariance = with_freedom(positive_semidefinite(covariance[:count, :count]), freedom[:count]) + error_covariance
     values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)
     single_values = values_of_tests.compared(histories, without_curves=used)
@@ -366,7 +357,7 @@ def _result(
     judge = Judge(problem, noise_model, working_estimator.predictor_errors, histories)
     adequacy = judge.adequacy_with_remedies(judged, unmodelled, rates.found).with_unpredicted(unpredicted)
     adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
-    estimates = parameter_estimates(law, coordinates, u, law_covariance, quantile)
+    estimates = parameter_estimates(law, coordinates, u, law_covariance)
     return Identification(
         law=law,
         estimates=estimates,
@@ -377,7 +368,7 @@ def _result(
         rms=pooled_log_strain_rms(tests),
         log_likelihood=best.log_likelihood,
         effective_frames=effective_sample_size(best.residuals, noise_model),
-        freedom=freedom,
+        freedom=median_freedom(freedom[:count]),
         tests=tests,
         ranges=fitted_ranges(problem),
         settings=problem.settings,

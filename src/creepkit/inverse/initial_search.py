@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from creepkit.arrays import Floats
-from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -64,8 +63,8 @@ def initial_search(
 ) -> SearchOutcome:
     """The best minima that differ, by the reduced-order model of the cheapest predictor."""
     predictor = through or problem.predictor
-    reduced_order_model = reduced_order_model_of(predictor)
-    searched = search_problem(problem, search_predictor_of(reduced_order_model or predictor))
+    reduced_order_model = predictor.reduced_order_model()
+    searched = search_problem(problem, (reduced_order_model or predictor).for_search())
     search_result = search.minima(searched, progress)
     equal = EQUAL_PREDICTIONS if reduced_order_model is None else EQUAL_REDUCED_ORDER_PREDICTIONS
     apart = distinct(search_result.minima, searched.bounds, equal_predictions=equal)

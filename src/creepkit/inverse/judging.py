@@ -28,7 +28,6 @@ from scipy.optimize import lsq_linear
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.adequacy import LARGEST_SCATTER, Adequacy, LargestDeviation, OutputAdequacy
-from creepkit.inverse.composite_predictor import prediction_errors_of
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.iterative_estimation import at_own_rates, linearised
 from creepkit.inverse.known_noise import KnownNoise
@@ -235,7 +234,7 @@ def judged_residuals_of(fit: Identification) -> JudgedResiduals | None:
     problem = fit.least_squares_problem
     linear = fit.linearised or linearised(problem, fit.x, problem.residuals(fit.x))
     error = fit.numerical_error
-    errors = prediction_errors_of(problem.predictor) if error is None else error.remaining
+    errors = problem.predictor.error if error is None else error.remaining
     linear = at_own_rates(problem, linear, fit.noise_model)
     return Judge(problem, fit.noise_model, errors, fit.histories).residuals(linear)
 

@@ -19,7 +19,6 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.compared_tests import compares_minimum_rate, duration_known, followed_duration, needs_durations
-from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
@@ -64,7 +63,7 @@ def check_minimum_rates(law: CreepLaw, histories: Sequence[History], predictor: 
             "such as norton"
         )
     for history in (h for h in histories if compares_minimum_rate(h)):
-        own = predictor_for(predictor, history)
+        own = predictor.for_history(history)
         leading = _leading_output(own)
         if leading is None or leading.quantity != "strain":
             known = "nothing is known of its outputs" if leading is None else f"its leading output is {leading}"
@@ -134,11 +133,8 @@ def minimum_rates(
     """
     known: dict[str, Any] = {"includes_elastic": False, "minimum_rate": None, "minimum_rate_sd": None}
     curves = [h.replace(times=followed_duration(h) * TIMES, outputs={}, **known) for h in histories]
-    if sensitivities and len(theta) == 1:
-        predicted = predict_with_sensitivities(predictor, law, theta[0], curves, nuisances)
-    else:
-        predicted = predict(predictor, law, theta, curves, nuisances=nuisances, sensitivities=sensitivities)
-    columns = [predicted.outputs.index(str(_leading_output(predictor_for(predictor, h)))) for h in curves]
+    predicted = predictor.predict(law, theta, curves, nuisances=nuisances, sensitivities=sensitivities)
+    columns = [predicted.outputs.index(str(_leading_output(predictor.for_history(h)))) for h in curves]
     intervals = np.stack([np.diff(h.times) for h in curves])
 
     def slopes(array: Floats) -> Floats:

@@ -13,7 +13,6 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError, nearest
-from creepkit.inverse.composite_predictor import predictor_for, supports_nuisance
 from creepkit.inverse.noise_model import Residuals
 from creepkit.language import CreepLaw, temperature
 from creepkit.records import (
@@ -91,7 +90,7 @@ class NuisanceParameters:
             offered = [_takes_effect(nuisance, h, predictor) for h in histories]
             named = any(nuisance.applies_to(h.name) for h in histories)
             if named and not any(offered):
-                allowed = {k for h in histories for k in getattr(predictor_for(predictor, h), "nuisances", ())}
+                allowed = {k for h in histories for k in getattr(predictor.for_history(h), "nuisances", ())}
                 raise FitError(
                     f"nuisance '{nuisance.key}' means nothing to the predictor of these histories; leave it out, or "
                     f"take another: {nearest(nuisance.kind, sorted(allowed))}"
@@ -118,7 +117,7 @@ class NuisanceParameters:
                 is_length_nuisance(kind_and_start(key)[0]) and (index >= 0).any()
             ):  # which is no deviation: a test cannot be without one
                 for test in map(int, np.flatnonzero(index < 0)):
-                    if supports_nuisance(predictor_for(predictor, histories[test]), key):
+                    if predictor.for_history(histories[test]).follows(key):
                         raise FitError(
                             f"test '{histories[test].name}' has no nuisance '{key}', which other tests have; give it "
                             "one, or leave out tests="
@@ -189,7 +188,7 @@ class NuisanceParameters:
 def _refuse_two_names(nuisances: Sequence[Nuisance], histories: Sequence[History], predictor: Predictor) -> None:
     """FitError where a test would have one length twice, by its name and by its alias."""
     for history in histories:
-        own = predictor_for(predictor, history)
+        own = predictor.for_history(history)
         of_length: dict[str, str] = {}
         for kind in (n.kind for n in nuisances if n.is_length and n.applies_to(history.name)):
             length = dimension_named(own, kind)
@@ -201,7 +200,7 @@ def _refuse_two_names(nuisances: Sequence[Nuisance], histories: Sequence[History
 
 def _takes_effect(nuisance: Nuisance, history: History, predictor: Predictor) -> bool:
     """Whether a nuisance applies to a test, its predictor knows it, and it begins before the last used frame."""
-    if not nuisance.applies_to(history.name) or not supports_nuisance(predictor_for(predictor, history), nuisance.kind):
+    if not nuisance.applies_to(history.name) or not predictor.for_history(history).follows(nuisance.kind):
         return False
     if nuisance.kind == "load step" and history.loading.quantity not in SCALABLE_LOADS:
         return False
@@ -245,7 +244,7 @@ def prior_mean(nuisance: Nuisance, history: History | None, using: Predictor) ->
     """
     if not nuisance.is_length or nuisance.mean > 0 or history is None:
         return nuisance.mean
-    length = dimension_named(predictor_for(using, history), nuisance.kind)
+    length = dimension_named(using.for_history(history), nuisance.kind)
     if length is None:
         problem = (
             f"nuisance '{nuisance.kind}' has no mean, and the specimen of test '{history.name}' has no such length"
@@ -256,7 +255,7 @@ def prior_mean(nuisance: Nuisance, history: History | None, using: Predictor) ->
 
 def has_nuisance(nuisance: Nuisance, history: History, using: Predictor | None) -> bool:
     """Whether what predicts a test knows a nuisance: in joint fits lengths belong to tests of some specimens alone."""
-    return using is None or not nuisance.is_length or supports_nuisance(predictor_for(using, history), nuisance.kind)
+    return using is None or not nuisance.is_length or using.for_history(history).follows(nuisance.kind)
 
 
 def initial_prior_sd(nuisance: Nuisance, mean: float) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
 from creepkit.inverse.compared_tests import compares_minimum_rate, followed_duration
-from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
+from creepkit.inverse.composite_predictor import compared_outputs
 from creepkit.inverse.frame_noise import frame_noise, noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_series import SharedNoise
 from creepkit.inverse.output_transforms import (
@@ -209,7 +209,10 @@ class ObservationVector:
         rupture_times : whether ends of tests without frames are among them.
         """
         followed = np.array(
-            [h.end_known and (rupture_times or bool(h.outputs)) and predicts_rupture(predictor, h) for h in histories]
+            [
+                h.end_known and (rupture_times or bool(h.outputs)) and predictor.for_history(h).follows_to_rupture
+                for h in histories
+            ]
         )
         rows = [
             {

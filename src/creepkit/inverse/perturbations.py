@@ -25,7 +25,6 @@ import numpy as np
 import sympy
 
 from creepkit.arrays import Floats
-from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities, predictor_for, supports_nuisance
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.nuisance_parameters import prior_mean
@@ -219,7 +218,7 @@ def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedPro
         add("load", 100 * sizes["load"], "%", of_rates(exponents, sizes["load"]))
     if any(moved):
         imposed = [h for h, counts in zip(histories, moved, strict=True) if counts]
-        known = all(supports_nuisance(predictor_for(problem.predictor, h), "modulus") for h in imposed)
+        known = all(problem.predictor.for_history(h).follows("modulus") for h in imposed)
         if known and "modulus" not in shared:
             change = of_outputs(_slope(problem, x, "modulus"), sizes["modulus"])
             add("modulus", 100 * sizes["modulus"], "%", change)
@@ -230,14 +229,14 @@ def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedPro
 
 def tolerated_dimensions(problem: LeastSquaresProblem) -> list[Dimension]:
     """The lengths of the test pieces that their specimens know to a tolerance only, each once."""
-    predictors = [predictor_for(problem.predictor, h) for h in problem.histories]
+    predictors = [problem.predictor.for_history(h) for h in problem.histories]
     return list({d.name: d for p in predictors for d in dimensions_of(p) if d.tolerance > 0.0}.values())
 
 
 def _length(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, kind: str) -> list[Perturbation]:
     """A length that every test piece has, known to its tolerance only."""
-    predictors = [predictor_for(problem.predictor, h) for h in problem.histories]
-    lengths = [dimension_named(p, kind) if supports_nuisance(p, kind) else None for p in predictors]
+    predictors = [problem.predictor.for_history(h) for h in problem.histories]
+    lengths = [dimension_named(p, kind) if p.follows(kind) else None for p in predictors]
     tolerances = [0.0 if length is None else length.tolerance for length in lengths]
     if not all(tolerances):
         return []
@@ -315,7 +314,9 @@ def _slope(problem: LeastSquaresProblem, x: Floats, kind: str, at: Floats | None
     theta, nuisances = _values(problem, x)
     values = nuisances.get(kind, np.zeros((1, len(problem.histories)))) if at is None else at[None]
     nuisances = {**nuisances, kind: values}
-    prediction = predict_with_sensitivities(problem.predictor, problem.law, theta, problem.histories, nuisances)
+    prediction = problem.predictor.predict(
+        problem.law, theta[None], problem.histories, nuisances=nuisances, sensitivities=True
+    )
     return np.asarray(problem.observations.select_outputs(prediction.nuisance_jacobian[kind], prediction)[0])
 
 
@@ -325,7 +326,7 @@ def _motion_slope(problem: LeastSquaresProblem, x: Floats) -> Floats:
 
     def outputs(change: float) -> Floats:
         histories = [_moved(history, change) for history in problem.histories]
-        prediction = predict(problem.predictor, problem.law, theta[None], histories, nuisances=nuisances)
+        prediction = problem.predictor.predict(problem.law, theta[None], histories, nuisances=nuisances)
         return np.asarray(problem.observations.select_outputs(prediction.values, prediction)[0])
 
     with np.errstate(invalid="ignore"):  # of tests that end before

@@ -7,16 +7,15 @@ again.
 
 from __future__ import annotations
 
-import hashlib
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from creepkit.errors import DatasetError, FitError, quoted
-from creepkit.files.json_documents import as_read_back, canonical_json
+from creepkit.files.json_documents import as_read_back
 from creepkit.inverse.composite_predictor import CompositePredictor
-from creepkit.records import Predictor, SupportsReducedOrderModel
+from creepkit.inverse.fingerprints import predictor_fingerprint
+from creepkit.records import Predictor
 from creepkit.registry import default_registry
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 
@@ -45,9 +44,7 @@ def predictor_documents(predictor: Predictor | None) -> dict[str, PredictorDocum
     """{specimen: document} of a composite predictor; of any other one document under SINGLE, of none nothing."""
     if predictor is None:
         return {}
-    if isinstance(predictor, CompositePredictor):
-        return {specimen: _document_of(one) for specimen, one in predictor.predictors.items()}
-    return {SINGLE: _document_of(predictor)}
+    return {specimen: _document_of(one) for specimen, one in (predictor.parts or {SINGLE: predictor}).items()}
 
 
 def predictor_from_documents(documents: Mapping[str, PredictorDocument]) -> Predictor | None:
@@ -84,8 +81,8 @@ def missing_predictor(documents: Mapping[str, PredictorDocument]) -> str:
 
 def registered_specimens(predictor: Predictor | None) -> dict[str, Predictor]:
     """{name: specimen} of those parts of a predictor that are registered specimens, with whatever settings."""
-    parts = predictor.predictors.values() if isinstance(predictor, CompositePredictor) else (predictor,)
-    described = [(one, _document_of(one)) for one in parts if one is not None]
+    parts = () if predictor is None else (predictor.parts or {SINGLE: predictor}).values()
+    described = [(one, _document_of(one)) for one in parts]
     return {document.name: one for one, document in described if document.kind == "specimen"}
 
 
@@ -93,11 +90,11 @@ def registered_specimens(predictor: Predictor | None) -> dict[str, Predictor]:
 
 
 def _document_of(predictor: Predictor) -> PredictorDocument:
-    name = str(getattr(predictor, "name", type(predictor).__name__))
-    if _is_surrogate(predictor):
-        return PredictorDocument("surrogate", name, fingerprint=_fingerprint(predictor))
-    underlying = getattr(predictor, "specimen", None)
-    if isinstance(underlying, SupportsReducedOrderModel) and underlying.reduced_order_model() == predictor:
+    name = predictor.label
+    if predictor.is_surrogate:
+        return PredictorDocument("surrogate", name, fingerprint=predictor_fingerprint(predictor))
+    underlying = predictor.specimen
+    if underlying is not predictor and underlying.reduced_order_model() == predictor:
         document = _document_of(underlying)
         if document.kind == "specimen":
             return replace(document, kind="reduced-order model")
@@ -118,20 +115,5 @@ def _predictor_of(document: PredictorDocument) -> Predictor | None:
             specimen = specimen_from_json(fields, "predictor_documents")
         except DatasetError as error:
             raise FitError(str(error)) from None
-        if document.kind == "specimen":
-            return specimen
-        return specimen.reduced_order_model() if isinstance(specimen, SupportsReducedOrderModel) else None
+        return specimen if document.kind == "specimen" else specimen.reduced_order_model()
     return None
-
-
-def _is_surrogate(predictor: Predictor) -> bool:
-    """Whether it is a surrogate; where it is, their module has been imported."""
-    module: Any = sys.modules.get("creepkit.surrogates.surrogate")
-    return module is not None and isinstance(predictor, module.Surrogate)
-
-
-def _fingerprint(surrogate: Any) -> str:
-    digest = hashlib.sha256(canonical_json(surrogate.file_header))
-    for name, array in sorted(surrogate.weights.items()):
-        digest.update(name.encode() + array.tobytes())
-    return digest.hexdigest()[:32]

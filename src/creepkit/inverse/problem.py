@@ -22,14 +22,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.bound_penalties import BoundPenalties, constraint_points
 from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.compared_tests import compares_rupture_times
-from creepkit.inverse.composite_predictor import (
-    CompositePredictor,
-    concatenated_tests,
-    predict,
-    predict_to_rupture,
-    predict_with_sensitivities,
-    prediction_errors_of,
-)
+from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import check_creep, check_explicit_nuisances, check_histories
 from creepkit.inverse.minimum_rates import check_minimum_rates, with_minimum_rates
@@ -56,7 +49,7 @@ from creepkit.inverse.search.local_refinement import (
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
-from creepkit.records import History, NuisanceValues, Prediction, Predictor
+from creepkit.records import History, NuisanceValues, Prediction, Predictor, concatenated_tests
 
 CACHED_EVALUATIONS = 4
 """Points whose residuals are cached: a search ends at one that it has evaluated, and the next begins there."""
@@ -131,7 +124,7 @@ class LeastSquaresProblem:
 
         reference : the reference point of the coordinates, where those of another identification are to be kept.
         """
-        predictor = CompositePredictor(dict(predictor)) if isinstance(predictor, Mapping) else predictor
+        predictor = CompositePredictor.of(predictor)
         check_histories(law, histories, predictor)
         check_minimum_rates(law, histories, predictor)
         tests = [thinned_history(h, settings.frames) for h in histories]
@@ -144,7 +137,7 @@ class LeastSquaresProblem:
         check_explicit_nuisances([n.kind for n in nuisances.nuisances], observations, tests, predictor)
         log_rate, log_internal_rate = median_log_strain_rate(tests, predictor), median_log_inverse_duration(tests)
         bounds = Bounds.from_law(law, coordinates, log_rate, log_internal_rate).with_nuisances(nuisances)
-        noise = WorkingNoiseEstimator(settings, observations, prediction_errors_of(predictor)).initial()
+        noise = WorkingNoiseEstimator(settings, observations, predictor.error).initial()
         covariance_factor = CovarianceFactor.of_residuals(
             residuals_at_measured_values(observations), with_single_value_weight(noise, observations)
         )
@@ -224,33 +217,34 @@ class LeastSquaresProblem:
     def candidate_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
         """Residuals (candidates, tests, observations) of u (candidates, parameters), and their derivatives to u.
 
-        The nuisance parameters stay at their means; it is one prediction where the predictor differentiates itself.
+        The nuisance parameters stay at their means; it is one prediction but where tests are followed to rupture.
         """
         if self.observations.followed_to_rupture.any():
-            return self._jacobian_one_by_one(u)
+            single = self.with_fixed_nuisances()
+            evaluated = [single.residuals(one) for one in u]
+            jacobians = [r.jacobian for r in evaluated if r.jacobian is not None]
+            return np.stack([r.values for r in evaluated]), np.stack(jacobians)
         prediction = self._prediction(u, jacobian=True)
-        if prediction.jacobian is None:
-            return self._jacobian_one_by_one(u)
         self.evaluations.count += len(u)
         self.evaluations.failures.record(prediction, self.histories)
         values, internal_jacobian = candidate_residuals_and_jacobian(self.observations, prediction, self.correction)
         jacobian = np.einsum("ctep,cpq->cteq", internal_jacobian, self.coordinates.jacobian(u))
         return values, np.where(self.observations.present[..., None], jacobian, 0.0)
 
-    def _jacobian_one_by_one(self, u: Floats) -> tuple[Floats, Floats]:
-        single = self.with_fixed_nuisances()
-        evaluated = [single.residuals(one) for one in u]
-        jacobians = [r.jacobian for r in evaluated if r.jacobian is not None]
-        return np.stack([r.values for r in evaluated]), np.stack(jacobians)
-
     def _prediction(self, u: Floats, *, jacobian: bool) -> Prediction:
-        tests = (self.predictor, self.law, self.coordinates.theta(u), self.histories)
+        """Of u (candidates, parameters), the nuisance parameters at their means."""
         nuisances = replace(self.nuisance_parameters, fixed=True).predictor_values(np.zeros(0))
+        return self._predicted(u, nuisances, self.histories, jacobian)
+
+    def _predicted(
+        self, u: Floats, nuisances: NuisanceValues, histories: Sequence[History], sensitivities: bool
+    ) -> Prediction:
+        tests = (self.law, self.coordinates.theta(u), histories)
         if self.observations.followed_to_rupture.any():
-            prediction = predict_to_rupture(*tests, sensitivities=jacobian)
+            prediction = self.predictor.predict_to_rupture(*tests, sensitivities=sensitivities)
         else:
-            prediction = predict(*tests, nuisances=nuisances, sensitivities=jacobian)
-        return with_minimum_rates(prediction, *tests, nuisances, sensitivities=jacobian)
+            prediction = self.predictor.predict(*tests, nuisances=nuisances, sensitivities=sensitivities)
+        return with_minimum_rates(prediction, self.predictor, *tests, nuisances, sensitivities=sensitivities)
 
     def check_predicted(self, u: Floats) -> None:
         """FitError, with counts over all that were tried, where nothing is predicted at u (candidates, parameters)."""
@@ -270,24 +264,15 @@ class LeastSquaresProblem:
             moved = u.copy()
             moved[list(self.coordinates.coefficients)] += log_factors[k]
             own = {key: values[:, [k]] for key, values in nuisances.items()}
-            groups.append(([k], self._with_sensitivities(moved, own, [history])))
+            groups.append(([k], self._predicted(moved[None], own, [history], True)))
         return self._residuals_of(u, concatenated_tests(groups, self.histories))
 
     def _evaluated(self, x: Floats) -> Residuals:
         u, e = x[: self.parameter_count], x[self.parameter_count :]
         nuisances = self.nuisance_parameters.predictor_values(e)
-        prediction = self._with_sensitivities(u, nuisances, self.histories)
+        prediction = self._predicted(u[None], nuisances, self.histories, True)
         self.evaluations.failures.record(prediction, self.histories)
         return self._residuals_of(u, prediction)
-
-    def _with_sensitivities(self, u: Floats, nuisances: NuisanceValues, histories: Sequence[History]) -> Prediction:
-        theta = self.coordinates.theta(u)
-        tests = (self.predictor, self.law, theta[None], histories)
-        if self.observations.followed_to_rupture.any():
-            prediction = predict_to_rupture(*tests, sensitivities=True)
-        else:
-            prediction = predict_with_sensitivities(self.predictor, self.law, theta, histories, nuisances)
-        return with_minimum_rates(prediction, *tests, nuisances, sensitivities=True)
 
     def _residuals_of(self, u: Floats, prediction: Prediction) -> Residuals:
         coordinates = self.coordinates

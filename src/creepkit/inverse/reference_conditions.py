@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,6 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.compared_tests import followed_duration
-from creepkit.inverse.composite_predictor import predictor_for
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
 from creepkit.records import ZERO_CELSIUS, History, Predictor, growing_output, is_logarithmic, specimen_of
@@ -90,9 +89,9 @@ def _load_holds(history: History, used: Bools) -> Iterator[Ints]:
 
 def reference_stresses(history: History, predictor: Predictor | None = None) -> Floats:
     """(stresses,) MPa, the reference stresses of a test."""
-    reference_stress = _stated(history, predictor, "reference_stress")
-    if reference_stress is not None:
-        return np.atleast_1d(np.asarray(reference_stress(history), float))
+    stated = _stated(history, predictor, "reference_stress")
+    if stated is not None:
+        return np.atleast_1d(np.asarray(stated, float))
     if history.loading.quantity != "stress":
         raise FitError(
             f"{history.origin}: nothing says which stress a {history.loading.quantity} makes in the specimen "
@@ -108,17 +107,17 @@ def reference_condition(history: History, predictor: Predictor | None = None) ->
     return float(np.median(positive)) if positive.size else 1e-6, history.mean_temperature
 
 
-def _stated(history: History, predictor: Predictor | None, method: str) -> Callable[[History], Any] | None:
+def _stated(history: History, predictor: Predictor | None, method: str) -> Any:
     """What the predictor of a test says of it by a method, else what the specimen that the test names says."""
-    own = None if predictor is None else predictor_for(predictor, history)
-    candidates = (own, getattr(own, "specimen", None), specimen_of(history))
-    return next((getattr(one, method) for one in candidates if hasattr(one, method)), None)
+    own = None if predictor is None else predictor.for_history(history)
+    named = (own, None if own is None else own.specimen, specimen_of(history))
+    return next((getattr(one, method)(history) for one in named if one is not None and one.states(method)), None)
 
 
 def growth_per_strain(history: History, predictor: Predictor | None = None) -> float:
     """By how much the leading output grows for each unit of reference strain, in its unit; 1 where nothing says so."""
     stated = _stated(history, predictor, "growth_per_strain")
-    return 1.0 if stated is None else float(stated(history))
+    return 1.0 if stated is None else float(stated)
 
 
 def reference_end_strain(history: History, predictor: Predictor | None = None) -> float:
@@ -126,9 +125,9 @@ def reference_end_strain(history: History, predictor: Predictor | None = None) -
     if not history.outputs:
         rate = history.minimum_rate
         return STRAIN_WITHOUT_FRAMES if rate is None else max(rate * followed_duration(history), 1e-7)
-    reference_strain = _stated(history, predictor, "reference_strain")
-    if reference_strain is not None:
-        return max(float(reference_strain(history)), 1e-7)
+    stated = _stated(history, predictor, "reference_strain")
+    if stated is not None:
+        return max(float(stated), 1e-7)
     output = growing_output(history)
     if is_logarithmic(output):
         return max(float(np.max(history.outputs[output][usable_frames(history, output)], initial=0.0)), 1e-7)

@@ -22,7 +22,6 @@ from scipy.stats import f
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.compared_tests import compares_minimum_rate
-from creepkit.inverse.composite_predictor import predict_to_rupture, predictor_for, predicts_rupture
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.minimum_rates import minimum_rates
 from creepkit.inverse.noise_model import NoiseModel
@@ -98,7 +97,9 @@ class LawAtTests:
         without_curves : whether ends of tests without frames were compared.
         """
         ends: dict[int, SingleValue] = {}
-        followed = [k for k, h in enumerate(histories) if h.end_known and predicts_rupture(self.predictor, h)]
+        followed = [
+            k for k, h in enumerate(histories) if h.end_known and self.predictor.for_history(h).follows_to_rupture
+        ]
         tests = [histories[k] for k in followed]
         for k, h, life, low, high in zip(followed, tests, *self.rupture_times(tests), strict=True):
             used, end = without_curves or bool(h.outputs), h.rupture_time or float(h.times[-1])
@@ -109,8 +110,8 @@ class LawAtTests:
     def rupture_times(self, histories: Sequence[History]) -> tuple[Floats, Floats, Floats]:
         """Rupture times, s, with intervals: (time, low, high), (tests,) each; infinite where none comes."""
         for history in histories:
-            if not predicts_rupture(self.predictor, history):
-                name = getattr(predictor_for(self.predictor, history), "name", "predictor")
+            if not self.predictor.for_history(history).follows_to_rupture:
+                name = getattr(self.predictor.for_history(history), "name", "predictor")
                 raise FitError(
                     f"history '{history.name}': {name} follows no test to rupture; give using=, such as uniaxial"
                 )
@@ -118,7 +119,7 @@ class LawAtTests:
             return np.zeros(0), np.zeros(0), np.zeros(0)
         law, theta = self.coordinates.law, self.coordinates.theta(self.u)[None]
         extended = [_extended_to_rupture(history) for history in histories]
-        times = predict_to_rupture(self.predictor, law, theta, extended, sensitivities=True).times_to_strain
+        times = self.predictor.predict_to_rupture(law, theta, extended, sensitivities=True).times_to_strain
         assert times is not None
         assert times.rupture_jacobian is not None
         # ln of a time changes by -1 with ln of a factor on all rates, where the law has no explicit time

@@ -11,7 +11,7 @@ from creepkit.arrays import Floats
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.quality.flags import QualityFlag
 from creepkit.quality.frames import load_segments, noise_standard_deviation
-from creepkit.records import History, Predictor, growing_output, output_named, predict_with
+from creepkit.records import History, Predictor, growing_output, output_named
 from creepkit.records.units import celsius_text, time_text
 
 REPLICATE_TEMPERATURE_TOLERANCE = 3.0
@@ -174,7 +174,7 @@ def _elastic_value(history: History, frame: int, specimen: Predictor, output: st
     """Output of the specimen without creep at a frame."""
     elastic_history = history.replace(times=history.times[frame : frame + 1], outputs={}, standard_deviation={})
     theta = _NO_CREEP_LAW.to_internal({"A": 0.0, "n": 1.0})
-    result = predict_with(specimen, _NO_CREEP_LAW, theta, [elastic_history])
+    result = specimen.predict(_NO_CREEP_LAW, theta, [elastic_history])
     return float(result.of(0)[0, result.outputs.index(output)])
 
 

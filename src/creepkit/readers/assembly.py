@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import partial
@@ -47,16 +47,7 @@ from creepkit.readers.standard_names import in_standard_keys, in_standard_names,
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms
-from creepkit.records import (
-    UNKNOWN_DURATION,
-    History,
-    Loading,
-    Program,
-    dimensions_of,
-    known_specimens,
-    outputs_of_test,
-    specimen_of,
-)
+from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, dimensions_of, known_specimens, specimen_of
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -163,8 +154,10 @@ def _stated_fields(conditions: StatedConditions, name: str, elastic: Elastic | N
 
 def _check_operator(history: History, location: str) -> None:
     """HistoryError where the operator of a test does not give the outputs of its columns."""
+    specimen = specimen_of(history)
     try:
-        outputs_of_test(specimen_of(history), replace(history, source=location))
+        if specimen is not None:
+            specimen.outputs_of_test(replace(history, source=location))
     except SolveError as error:
         raise HistoryError(str(error)) from error
 
@@ -339,6 +332,9 @@ def questions_of_assumed(history: History) -> list[Question]:
     return [Question(path, str(path), what, key, (likely,), is_free=True) for what, key, likely in asked]
 
 
+_SOME_OUTPUTS = "of a specimen, such as strain_pct, stress_MPa (relaxation), deflection_mm, elongation_mm, amplitude_mm"
+
+
 def _specimen_and_outputs(
     conditions: StatedConditions, frames: TableFrames, load: str, location: str
 ) -> tuple[str, dict[str, Floats]]:
@@ -354,26 +350,16 @@ def _specimen_and_outputs(
         if len(chosen) > 1:
             what = f"the columns are those of {' and '.join(chosen)}; which specimen is it?"
             raise conditions.question(what, "specimen", *chosen, location=location, is_free=False)
-        raise _unidentified(named, present if named in terms.outputs else chosen, terms, location)
+        needed = f"of '{named}' ({', '.join(terms.outputs[named])})" if named in terms.outputs else _SOME_OUTPUTS
+        found = f" (found: outputs of {' and '.join(present)})" if present else ""
+        raise HistoryError(f"{location}: missing column: no output {needed}{found}")
     outputs = {name: frames.values[name] for name in terms.outputs[chosen[0]] if name in frames.values}
     return named or chosen[0], outputs
 
 
-def _unidentified(named: str, present: Sequence[str], terms: Terms, location: str) -> HistoryError:
-    """Why it is not known which specimen was tested."""
-    description = f"outputs of {' and '.join(present)}" if present else "no output"
-    if named in terms.outputs:
-        known = f"{', '.join(terms.outputs[named])} ({named})"
-        return HistoryError(
-            f"{location}: missing column: the columns hold {description}, those of {named} are needed: {known}"
-        )
-    known = "strain_pct, stress_MPa (relaxation), deflection_mm (beams), elongation_mm, amplitude_mm (bulge)"
-    return HistoryError(f"{location}: missing column: no output of a specimen, such as {known}")
-
-
 def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], location: str) -> None:
     """Refuse a column that would go unread, such as a pressure beside a stress."""
-    unread = [name for name in frames.values if name.removesuffix("_sd") not in {"time", "used", "step", *read_columns}]
+    unread = [name for name in frames.values if name.removesuffix("_sd") not in {"time", "used", *read_columns}]
     if unread:
         read_text = ", ".join(sorted(read_columns))
         table = frames.table

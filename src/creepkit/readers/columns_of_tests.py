@@ -8,8 +8,9 @@ above `0.2 %` and `1 %`.
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import accumulate
 
@@ -93,11 +94,12 @@ class TestColumn:
     """A column of a table of tests.
 
     quantity : of QUANTITIES, a time to a strain, `time_to_strain 0.01`, or a key of TEXTS; "" where its name means
-    none. unit : of a number, as creepkit writes it or as it is written.
+    none. unit : of a number, as creepkit writes it or as it is written. factor : of numbers of `rate x 10^6 (1/h)`.
     """
 
     quantity: str = ""
     unit: str = ""
+    factor: float = 1.0
 
     @property
     def kind(self) -> QuantityKind | None:
@@ -118,10 +120,16 @@ class TestColumn:
 _IS_TIME = re.compile(
     r"\b(?:time|temps|duree|zeit|hours?|hrs?|h|stunden|heures?|life|duration|days?|tage|jours)\b|zeit\b"
 )
-_RATES = re.compile(r"rate\b|geschwindigkeit\b|vitesse\b")
+RATES = re.compile(r"rate\b|geschwindigkeit\b|vitesse\b")
 _OF_CREEP = re.compile(r"\b(?:min\w*|steady|second\w*|station\w*|sekund\w*|creep|fluage)\b|kriech")
 _OF_RUPTURE = re.compile(r"\b(?:rupt\w*|fail\w*|fracture|break|bruch\w*|ruine)\b")
 _OF_OTHERS = re.compile(r"elong|dehnung\b|strain\b|allong|parameter|ratio|log|sd\b|std|error|stress\b|date|datum")
+_FACTOR = re.compile(
+    r"[x×*·]?\s*(?<![\d./])(?<!/ )(?:10\s*\^?\s*([+\-−]\d+|(?<=\^)\d+|(?<=\^ )\d+|[⁻⁺]?[⁰¹²³⁴-⁹]+)|1[eE]([+-]?\d+))\s*"
+)
+"""A power of ten by which numbers were multiplied, or that stands in their unit; rates are small, so it divides."""
+
+
 _PER_CENT = r"(\d+(?:[.,]\d+)?)\s*(?:%|pct\b|per ?cent\b|percent\b|prozent\b|pour ?cent\b)"
 _SYMBOL_TO_STRAIN = re.compile(rf"t[\s_]*\(?\s*(?:[eε]p?\s*=?\s*)?{_PER_CENT}\s*\)?(?:[\s_,/(\[].*)?", re.IGNORECASE)
 _UNIT_IN_NAME = {"h": r"hours?|hrs?|stunden|heures?", "d": r"days|tage|jours", "min": r"minutes|minuten"}
@@ -130,6 +138,14 @@ _UNIT_IN_NAME = {"h": r"hours?|hrs?|stunden|heures?", "d": r"days|tage|jours", "
 @lru_cache(maxsize=4096)
 def column_called(written: str) -> TestColumn:
     """The column that a name means."""
+    if power := _FACTOR.search(written):
+        plain = " ".join(_FACTOR.sub(" ", written).split())
+        rate = column_called(
+            re.sub(r"(?<=[(\[]) (?=\S)| (?=[)\]])", "", plain).replace("(/", "(1/").replace("[/", "[1/")
+        )
+        exponent = int(unicodedata.normalize("NFKC", power[1] or power[2]).replace("−", "-"))
+        if rate.kind is RATE:
+            return replace(rate, factor=10.0 ** -abs(exponent))
     if (strain := _strain_reached(written)) is not None:
         return TestColumn(f"{TIME_TO_STRAIN} {strain:.6g}", _unit_of_time(written))
     name, unit = split_written_name(written)
@@ -159,17 +175,11 @@ def _meaning(name: str, is_per_cent: bool) -> str:
 def _quantity_by_words(name: str, unit: str) -> str:
     """The quantity of which the words of a name speak, whatever else they say of it."""
     plain = plain_words(name)
-    is_rate = _RATES.search(plain) and _OF_CREEP.search(plain) and not re.search(r"sd\b|std|err", plain)
+    is_rate = RATES.search(plain) and _OF_CREEP.search(plain) and not re.search(r"sd\b|std|err", plain)
     if is_rate and (unit in RATE.units or unit in ("", "pct")):
         return "minimum_rate"
     is_rupture = _OF_RUPTURE.search(plain) and _IS_TIME.search(plain) and not _OF_OTHERS.search(plain)
     return "rupture" if is_rupture else ""
-
-
-def is_rate(written: str) -> bool:
-    """Whether a column that means no quantity may be one of rates of creep."""
-    name, unit = split_written_name(written)
-    return _RATES.search(plain_words(name)) is not None and (not unit or unit_suffix(unit) in (*RATE.units, "pct"))
 
 
 def _strain_reached(written: str) -> float | None:
@@ -322,7 +332,8 @@ def is_test_table(names: Sequence[str], rows: Sequence[TableRow] = ()) -> bool:
     is_named = any(_differ(rows, k) for k, one in enumerate(columns) if one.quantity in ("name", "specimen"))
     measured = not {"minimum_rate", "rupture"}.isdisjoint(found) or any(one.strain is not None for one in columns)
     measured |= "end_time" in found and (is_named or any(kind_of_column(name) in FIRM for name in names))
-    return measured and not {"stress", "temperature"}.isdisjoint(found) and (is_named or not has_frames(names))
+    is_framed = "end_time" in found and has_frames(names)
+    return measured and not {"stress", "temperature"}.isdisjoint(found) and (is_named or not is_framed)
 
 
 def _differ(rows: Sequence[TableRow], column: int) -> bool:

@@ -92,8 +92,14 @@ def read_frames(
         raise HistoryError(f"{place}: missing column: no time {result}; name one time_s, time_min or time_h")
     if notes and "strain" in values and values["strain"].max() <= 0.0:
         values["strain"] = -values["strain"]
+    if "x" in map(str.casefold, found.values()) and (np.diff(values["time"]) < 0.0).any():
+        order = np.argsort(values["time"], kind="stable")
+        values, notes = (
+            {name: one[order] for name, one in values.items()},
+            [*notes, "points of a plot in order of time"],
+        )
     table = table.assuming(*notes)
-    imposed = [values[name] for name in (*terms.number_kinds, "temperature", "step") if name in values]
+    imposed = [values[name] for name in (*terms.number_kinds, "temperature") if name in values]
     return _strictly_increasing(_without_readings_before_steps(TableFrames(table, values, table.lines), imposed))
 
 
@@ -175,7 +181,8 @@ def _converted_column(table: CellTable, name: str, kind: QuantityKind, suffix: s
     """One column in creepkit's unit."""
     k, numbers = table.column(name), table.numbers(name)
     written = table.as_written(k)
-    if kind.low == 0.0 and kind.name in ("stress", "pressure") and numbers.size:  # a reading of none may be below it
+    # A reading of none may be below it.
+    if kind.low == 0.0 and kind.name in ("stress", "pressure", "time") and numbers.size:
         numbers = -numbers if kind.name == "stress" and numbers.max() <= 0.0 else numbers
         numbers = np.where((numbers < 0.0) & (numbers >= -NOISE_OF_ZERO * numbers.max()), 0.0, numbers)
     return kind.convert_all(numbers, suffix, lambda row: table.location(int(table.lines[row]), k), written)
@@ -191,7 +198,7 @@ def _check_marks(table: CellTable, k: int, marks: Floats) -> None:
 
 
 def _without_readings_before_steps(frames: TableFrames, imposed: Sequence[Floats]) -> TableFrames:
-    """The frames with the later of two of one time that differ in load, temperature or step.
+    """The frames with the later of two of one time that differ in load or temperature.
 
     A reading before a change of load and one after it state when it was; the mean of both would be neither.
     """

@@ -90,11 +90,8 @@ def read_loading(conditions: StatedConditions, frames: TableFrames) -> Loading:
 
 def _loading_advice(terms: Terms, loads: Sequence[str]) -> str:
     """What to write, for each of these loads."""
-    forms = []
-    for name in (load for load in loads if load in terms.load_kinds):
-        unit, steps = next(iter(terms.load_kinds[name].units)), f"{name}_steps"
-        levels = f"{name}_1_{unit}, {name}_2_{unit} and jump_time_h"
-        forms.append(f"{name}_{unit}, {steps}, or {levels}" if unit else steps)
+    units = {name: next(iter(terms.load_kinds[name].units)) for name in loads if name in terms.load_kinds}
+    forms = [f"{name}_{unit}, or {name}_steps" if unit else f"{name}_steps" for name, unit in units.items()]
     return f"write {'; or '.join(forms)}"
 
 
@@ -193,7 +190,7 @@ def _stated_loading(
     noise = _noise_of_level(column) if isinstance(stated, tuple) and column is not None else 0.0
     if column is None or (stated is not None and _agrees(_as_program(stated), frames.times, column, noise)):
         return stated
-    if stated is None and "step" not in frames.values:
+    if stated is None:
         jump = _step_change(conditions, quantity) if quantity != "temperature" else None
         stated = None if jump is None else _loading_of(conditions, quantity, jump, jump.time).program()
     if stated is not None:
@@ -221,10 +218,10 @@ def _check_bare_strain(conditions: StatedConditions, quantity: str, kind: Quanti
 
 
 def _imposed_column(conditions: StatedConditions, frames: TableFrames, quantity: str) -> Floats | None:
-    """The column of a load or of the temperature, unless it is an output; levels of numbered steps stand for it."""
+    """The column of a load or of the temperature, unless it is an output."""
     terms, column = conditions.terms, frames.values.get(quantity)
     if column is None or quantity == "temperature":
-        return _levels_of_steps(conditions, frames, quantity) if column is None else column
+        return column
     if terms.own_outputs:
         is_output = quantity in terms.own_outputs and quantity not in terms.own_loads
         return None if is_output or quantity not in (*terms.number_kinds, *terms.own_loads) else column
@@ -323,23 +320,6 @@ def _is_strained_at_constant_rate(times: Floats, strain: Floats, stress: Floats)
     return bool(is_constant and is_elastic and stress[0] <= 0.05 * level and stress[1] < 0.97 * level)
 
 
-def _levels_of_steps(conditions: StatedConditions, frames: TableFrames, quantity: str) -> Floats | None:
-    """The level at each frame, of numbered steps: a column `step` beside `stress_1_MPa`, `stress_2_MPa`, ..."""
-    steps = frames.values.get("step")
-    if steps is None or not conditions.states(f"{quantity}_1"):
-        return None
-    levels = np.full(steps.size, np.nan)
-    for number in np.unique(steps):
-        level = conditions.take_number(f"{quantity}_{number:g}")
-        if level is None:
-            frame = int(np.argmax(steps == number))
-            raise HistoryError(
-                f"{frames.location(frame)}: step {number:g} has no level; write {quantity}_{number:g} with its unit"
-            )
-        levels[steps == number] = level.value
-    return levels
-
-
 def _recorded(
     conditions: StatedConditions, frames: TableFrames, quantity: str, column: Floats
 ) -> float | TimeValuePairs | Program:
@@ -395,7 +375,7 @@ def _steps_early(frames: TableFrames, quantity: str, bounds: tuple[int, int, int
     with the elastic strain of the step, is clearly nearer to that between them.
     """
     before, frame, after = bounds
-    names = [n for n in frames.values if n not in ("time", "used", "step", "temperature", quantity) and n[-3:] != "_sd"]
+    names = [n for n in frames.values if n not in ("time", "used", "temperature", quantity) and n[-3:] != "_sd"]
     first, last = max(before, frame - 4), min(after - 1, frame + 2)
     if quantity == "strain" or not names or first > frame - 2 or last == frame:
         return None

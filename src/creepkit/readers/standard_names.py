@@ -15,7 +15,7 @@ or `Time of day`, or the values: elapsed are times that begin below one hour or 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -122,7 +122,9 @@ def _stated_by_columns(table: CellTable) -> list[tuple[str, SourceText]]:
 
 def _without_per_cent_signs(table: CellTable, known: Terms) -> CellTable:
     """The table without the signs in cells such as `1.2 %`, whose columns are in per cent, as their names must say."""
-    signed = [k for k, cell in enumerate(table.rows[0].cells) if cell.endswith("%") and _kind(table.columns[k], known)]
+    kinds, cells = known.columns.kinds, table.rows[0].cells if table.rows else ()
+    found = [split_unit(name, kinds) for name in table.columns]
+    signed = [k for k, one in enumerate(found) if one and cells[k].endswith("%") and "pct" in kinds[one[0]].units]
     if not signed:
         return table
     columns = list(table.columns)
@@ -138,12 +140,6 @@ def _without_per_cent_signs(table: CellTable, known: Terms) -> CellTable:
             raise HistoryError(f"{table.location(row.line, odd[0])}: {what}")
     rows = [TableRow(r.line, [c.rstrip("% ") if k in signed else c for k, c in enumerate(r.cells)]) for r in table.rows]
     return replace(table, columns=columns, rows=rows, written=table.written or table.columns)
-
-
-def _kind(name: str, known: Terms) -> bool:
-    """Whether a column holds a quantity that may be in per cent."""
-    found = split_unit(name, known.columns.kinds)
-    return found is not None and "pct" in known.columns.kinds[found[0]].units
 
 
 def _with_decided_strains(
@@ -223,35 +219,25 @@ def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: T
             assert entry is not None
             raise HistoryError(f"{entry.location}: {key} says nothing here, for no times are dates; leave it out")
         return table
-    clock = times[0]
-    cells = list(cells_of(table.rows, clock))
+    clock, kinds, columns = times[0], known.columns.kinds, list(table.columns)
+    cells, written = list(cells_of(table.rows, clock)), table.as_written(clock)
+    suffix = (split_unit(columns[clock], kinds) or ("", ""))[1]
+    if suffix and suffix in kinds["time"].units:
+        what = f"'{written}' is in {suffix}, and its first cell is '{quoted(cells[0])}', a time of a clock"
+        place = table.location(table.columns_line, clock)
+        raise HistoryError(f"{place}: {what}; leave the unit out of the name, or write numbers")
     elapsed = [_ELAPSED.fullmatch(cell) for cell in cells]
     if elapsed[0]:
-        hours, assumption = _times_of(elapsed, table, clock, known.vocabulary.synonyms)
+        seconds, assumption = _times_of(elapsed, table, clock, known.vocabulary.synonyms)
     else:
-        hours, assumption = _since_first_row(cells, table, order.text if order else "", zone.text if zone else "")
-    written = table.as_written(clock)
-    columns = list(table.columns)
-    suffix = (split_unit(columns[clock], known.columns.kinds) or ("", ""))[1]
-    if suffix in known.columns.kinds["time"].units and suffix:
-        place = table.location(table.columns_line, clock)
-        raise HistoryError(
-            f"{place}: '{written}' is in {suffix}, and its first cell is '{quoted(cells[0])}', a time of a clock; "
-            "leave "
-            "the unit out of the name, or write numbers"
-        )
+        seconds, assumption = _since_first_row(cells, table, order.text if order else "", zone.text if zone else "")
     columns[clock] = "time_s"
-    rows = list(_with_times(table, clock, hours))
-    assumptions = (*table.assumptions, *([assumption] if assumption else []))
-    return replace(table, columns=columns, rows=rows, written=table.written or table.columns, assumptions=assumptions)
-
-
-def _with_times(table: CellTable, clock: int, times: Floats) -> Iterator[TableRow]:
-    """The rows with other times, s."""
-    for row, time in zip(table.rows, times, strict=True):
-        changed = list(row.cells)
-        changed[clock] = repr(float(time)).replace(".", table.dialect.decimal)
-        yield TableRow(row.line, changed)
+    texts = [repr(float(time)).replace(".", table.dialect.decimal) for time in seconds]
+    rows = [
+        TableRow(row.line, [text if k == clock else cell for k, cell in enumerate(row.cells)])
+        for row, text in zip(table.rows, texts, strict=True)
+    ]
+    return replace(table.renamed(columns), rows=rows).assuming(*filter(None, (assumption,)))
 
 
 def _times_of(

@@ -31,11 +31,10 @@ from creepkit.files.delimited_text import (
     parse_number,
     parse_numbers,
 )
-from creepkit.files.reading import how_to_raise, raised
 from creepkit.readers.vocabulary import plain_name, split_written_name, unit_suffix
 
-MAXIMUM_COLUMNS, MAXIMUM_CELL = 2000, 10_000
-"""Columns of a table; characters of a cell, in which units are looked for."""
+MAXIMUM_CELL = 10_000
+"""Characters of a cell, in which units are looked for."""
 
 
 _POINT_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
@@ -100,10 +99,7 @@ def some_of(names: Sequence[str], count: int = 12) -> str:
 
 
 def refuse_long_cells(place: str, cells: Sequence[str]) -> None:
-    """Refuse more columns than a table has, and a cell that is no name, number or remark."""
-    if len(cells) > (most := raised(MAXIMUM_COLUMNS)):
-        what = f"number of columns {len(cells)}, more than {most}; write the tests to several files"
-        raise HistoryError(f"{place}: {what}, or {how_to_raise(len(cells), most)}")
+    """Refuse a cell that is no name, number or remark."""
     if len(longest := max(cells, key=len, default="")) > MAXIMUM_CELL:
         what = f"a cell of {len(longest)} characters, more than {MAXIMUM_CELL}"
         raise HistoryError(f"{place}: {what}; is a quote or a line missing?")
@@ -307,6 +303,9 @@ def check_columns(location: str, columns: Sequence[str]) -> None:
 def named_columns(table: CellTable) -> CellTable:
     """The table whose first row names its columns."""
     names, rows = table.rows[0], table.rows[1:]
+    if not names.cells[0] and [row.cells[0] for row in rows] == [str(k) for k in range(len(rows))]:  # as of pandas
+        kept = range(1, max(len(row.cells) for row in table.rows))
+        return named_columns(replace(table, rows=with_columns(table.rows, kept), positions=kept))
     width = max((k for k, cell in enumerate(names.cells, 1) if cell), default=0)
     place = table.location(names.line)
     check_columns(place, names.cells[:width])

@@ -17,7 +17,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.ends_of_tests import kind_of_column
-from creepkit.readers.frames import OF_UNIT, unknown_text
+from creepkit.readers.frames import OF_UNIT, column_question, unknown_text
 from creepkit.readers.table import (
     CellTable,
     SourceText,
@@ -194,14 +194,10 @@ def _states_condition(table: CellTable, column: int, rows: Sequence[TableRow], k
 
 
 def _is_sensor(name: str, table: CellTable, known: Terms) -> bool:
-    """Whether a name such as `Temperature 1` is that of a sensor: a first level without a second one or steps."""
-    level = _FIRST_LEVEL.match(known.condition(name))
-    if level is None or "step" in map(known.quantity, table.columns):
-        return False
-    return not any(f"{known.condition(other)}_".startswith(f"{level[1]}_2_") for other in table.columns)
-
-
-_FIRST_LEVEL = re.compile(r"(.+)_1(?:_|$)")
+    """Whether a name such as `Temperature 1` is that of a sensor: a first level without a second one."""
+    level = re.match(r"(.+)_1(?:_|$)", known.condition(name))
+    second = f"{level[1]}_2_" if level else ""
+    return level is not None and not any(f"{known.condition(other)}_".startswith(second) for other in table.columns)
 
 
 def _entries_of_columns(table: CellTable, columns: Sequence[int], row: TableRow, known: Terms) -> dict[str, SourceText]:
@@ -291,17 +287,13 @@ def _blocks(table: CellTable, known: Terms) -> list[CellTable]:
         body = next((k for k, row in enumerate(part) if is_frame(row, table)), len(part))
         said = {cell for row in blocks[-1] for cell in row.cells} if blocks else set()
         is_new = any(cell not in said for row in part[:body] for cell in row.cells)
-        times = [next(float_of(c) for c in row.cells if is_number(c, table.dialect)) for row in part[body:][:1]]
-        if is_new or not times or times[0] < _last_number(blocks[-1], table):
+        around = [*(blocks[-1][-1:] if blocks else ()), *part[body : body + 1]]
+        times = [next((float_of(c) for c in row.cells if is_number(c, table.dialect)), 0.0) for row in around]
+        if is_new or len(times) < 2 or times[1] < times[0]:
             blocks.append(part)
         else:
             blocks[-1] += part[body:]
     return [replace(table, rows=rows) for rows in blocks]
-
-
-def _last_number(rows: Sequence[TableRow], table: CellTable) -> float:
-    """The first number of the last row of frames."""
-    return next(float_of(c) for row in reversed(rows) for c in row.cells if is_number(c, table.dialect))
 
 
 def _name_in_titles(block: CellTable) -> str:
@@ -471,6 +463,11 @@ def _rows_beside_notes(
 
 
 def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
+    heads = [dict.fromkeys(filter(None, row.cells)) for row in (*headed.whole, *headed.table.rows[:3])]
+    if not headed.times and (axes := [one for one in heads if {*map(str.casefold, one)} == {"x", "y"}]):
+        choices = [dict(zip(axes[0], (f"time_{unit}", "strain_pct"), strict=True)) for unit in ("h", "s")]
+        what = f"{' and '.join(map(repr, axes[0]))} are columns of a plot; what are they?"
+        raise column_question(headed.table, what, *choices)
     if not headed.times:
         raise HistoryError(
             f"{headed.place}: missing column: no time among {some_of(list(filter(None, headed.names)))}; name one "

@@ -15,20 +15,20 @@ from functools import partial
 from itertools import pairwise
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import Dialect, is_missing, is_number
+from creepkit.files.delimited_text import Dialect, float_of, is_missing, is_number
 from creepkit.readers.columns_of_tests import (
     NAMES,
     QUANTITIES,
+    RATES,
     TEXTS,
     TestColumn,
     TestTableHead,
     column_called,
     is_number_like,
-    is_rate,
     only_text,
     quantity_of,
 )
-from creepkit.readers.ends_of_tests import LABEL, NO, YES, kind_of_column
+from creepkit.readers.ends_of_tests import LABEL, NO, YES, kind_of_column, plain_words
 from creepkit.readers.questions import Answer, Question, collected
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width, without_ignored
 from creepkit.readers.table_heads import conditions_in_text, sources_of_names
@@ -42,7 +42,7 @@ from creepkit.readers.vocabulary import (
     unit_suffix,
     words_of,
 )
-from creepkit.records.quantities import STRESS, TIME
+from creepkit.records.quantities import RATE, STRESS, TIME
 
 MOST_ASKED = 6
 """Texts that a question or a note names."""
@@ -141,6 +141,8 @@ class TestTable:
         text, decimal = row.cells[k], self.table.dialect.decimal
         if self.columns[k].kind or re.fullmatch(r"[+-]?\d*,\d+", text):
             text, decimal = plain_number(text, decimal)
+        if self.columns[k].factor != 1.0 and is_number(text, Dialect(decimal=decimal)):
+            text, decimal = f"{self.columns[k].factor * float_of(text):.12g}", "."
         return SourceText(text, self.table.location(row.line), decimal, self.names[k])
 
     def question(
@@ -243,6 +245,8 @@ class TestTable:
             quantities = [one.quantity for one in found]
             if column.quantity in quantities:
                 self.errors.append(self._twice(written, self.names[quantities.index(column.quantity)]))
+            if column.factor != 1.0:
+                self.table = self.table.assuming(f"numbers of '{quoted(written, 60)}' times {column.factor:g}")
             for key, one in zip(self.table.header, stated, strict=True):
                 if one.quantity == column.quantity:
                     what = f"'{quoted(key, 60)}' is also a column, '{quoted(written, 60)}'; keep one of them"
@@ -298,7 +302,7 @@ class TestTable:
     def _ask_of_quantity(self, written: str) -> None:
         """Ask of a time or a rate that is not understood: `t0.2 (h)` may be one to a strain."""
         name, unit = split_written_name(written)
-        if is_rate(written):
+        if RATES.search(plain_words(name)) and (not unit or unit_suffix(unit) in (*RATE.units, "pct")):
             meaning, what = f"minimum rate ({unit})" if unit else "minimum rate", "rate that is not understood; is it a"
             what = f"column '{quoted(written, 60)}' is a {what} minimum creep rate?"
         elif unit_suffix(unit) in TIME.units and not _OF_TREATMENT.search(name):

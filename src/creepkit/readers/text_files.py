@@ -21,7 +21,6 @@ from creepkit.files.reading import FileKind, read_bytes
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.table import (
     MAXIMUM_CELL,
-    MAXIMUM_COLUMNS,
     CellTable,
     SourceText,
     TableRow,
@@ -138,7 +137,7 @@ def _numbered(
 def _rows_of_texts(numbered: Iterator[tuple[int, str]], dialect: Dialect, path: Path) -> Iterator[TableRow]:
     """The rows in which a cell holds something; HistoryError for what no table holds."""
     for number, line, cells in split_lines(numbered, dialect, path):
-        if len(cells) > MAXIMUM_COLUMNS or len(line) > MAXIMUM_CELL:
+        if len(line) > MAXIMUM_CELL:
             refuse_long_cells(f"{path}:{number}", cells)
         if cells[0] or any(cells):
             yield TableRow(number, cells)

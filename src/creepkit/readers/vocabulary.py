@@ -16,7 +16,6 @@ from creepkit.records import TENSOR_COMPONENTS, dimensions_of, known_specimens, 
 from creepkit.records.quantities import (
     ANGLE,
     AREA,
-    COUNT,
     FLAG,
     FORCE,
     LENGTH,
@@ -77,7 +76,17 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
     "strain": (
-        *("creep strain", "total strain", "engineering strain", "true strain", "logarithmic strain", "dehnung"),
+        *(
+            "creep",
+            "total creep",
+            "total creep strain",
+            "creep strain",
+            "total strain",
+            "engineering strain",
+            "true strain",
+            "logarithmic strain",
+            "dehnung",
+        ),
         *("kriechdehnung", "gesamtdehnung", "zeitdehnung", "plastische dehnung", "bleibende dehnung", "déformation"),
         *("déformation de fluage", "allongement relatif", "deformation relative"),
     ),
@@ -126,6 +135,8 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("od", "o.d.", "outside diameter", "tube diameter", "aussendurchmesser", "außendurchmesser"),
         *("diamètre extérieur",),
     ),
+    "span": ("outer span", "support span", "auflagerabstand", "stützweite"),
+    "inner_span": ("inner span", "load span", "loading span"),
     "width": ("specimen width", "breite", "probenbreite", "largeur"),
     "thickness": (
         *("specimen thickness", "wall thickness", "wall", "dicke", "probendicke", "wandstärke", "wanddicke"),
@@ -342,10 +353,6 @@ LABEL_KEYS: Mapping[str, str] = {
 """{key: label} of what tests share with others: a forecast tells the scatter between heats and laboratories apart."""
 
 
-HIGHEST_STEP = 9
-"""Levels of a load that keys may number, `stress_1_MPa` to `stress_9_MPa`."""
-
-
 CLOSE_SPELLING = 0.8
 """Similarity above which an unknown name is a misspelt one."""
 
@@ -435,7 +442,7 @@ class Terms:
     def condition_kinds(self) -> dict[str, QuantityKind]:
         """The kinds of all numbers that stand once for a test."""
         stepped = {**self.number_kinds, "temperature": TEMPERATURE}
-        levels = {f"{name}_{k}": kind for name, kind in stepped.items() for k in range(1, HIGHEST_STEP + 1)}
+        levels = {f"{name}_{k}": kind for name, kind in stepped.items() for k in (1, 2)}
         return {**CONDITION_KINDS, **self.load_kinds, **levels, **self._standard_deviation_kinds()}
 
     @cached_property
@@ -444,7 +451,7 @@ class Terms:
         return {
             **{"time": TIME, **self.output_kinds(), **self._standard_deviation_kinds(), **self.number_kinds},
             **self.own_outputs,
-            **{"temperature": TEMPERATURE, "used": FLAG, "step": COUNT},
+            **{"temperature": TEMPERATURE, "used": FLAG},
         }
 
     @cached_property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,22 @@ STEP_DURATION = 5.0
 
 SCALABLE_LOADS = ("stress", "pressure", "force", "displacement")
 """Quantities of a loading that a load step can change."""
+
+
+def warmer_and_stiffer(history: History, temperature_change: float, modulus_change: float) -> History:
+    """A history that is so many K warmer, its modulus larger by that share."""
+    if temperature_change == 0.0 and modulus_change == 0.0:
+        return history
+    program, elastic = history.temperature_program(), history.elastic
+    if elastic is not None:
+        elastic = replace(elastic, E=elastic.E * (1.0 + modulus_change))
+    return history.replace(temperature=Program(program.times, program.values + temperature_change), elastic=elastic)
+
+
+def with_changed_history(history: History, values: Mapping[str, float]) -> History:
+    """The history that nuisances {key: value} of programs, temperature and modulus stand for."""
+    changed = with_program_nuisances(history, values)
+    return warmer_and_stiffer(changed, values.get("temperature", 0.0), values.get("modulus", 0.0))
 
 
 def with_program_nuisances(history: History, values: Mapping[str, float]) -> History:

@@ -1,26 +1,16 @@
-"""What predictors share: matching candidates with nuisance parameters, and assembly of predictions of single tests."""
+"""Predictions put together: of single tests, of groups of tests, and of consecutive candidates."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import CreepkitError, SolveError
 from creepkit.records.history import History
-from creepkit.records.prediction import NuisanceValues, Prediction, Status
-
-
-def check_nuisances(
-    nuisances: Iterable[str], known: Sequence[str], predictor: str, error: type[CreepkitError] = SolveError
-) -> None:
-    """Raise `error` where the predictor does not know a kind of nuisance; predictor : in words, "a bulge specimen"."""
-    for kind in nuisances:
-        if kind not in known:
-            names = ", ".join(known) or "none"
-            raise error(f"{predictor} does not know the nuisance '{kind}'; it knows {names}")
+from creepkit.records.prediction import NuisanceValues, Prediction, Status, TimesToStrain
 
 
 def broadcast_candidates(
@@ -97,3 +87,71 @@ def _padded(arrays: Sequence[Floats], shape: tuple[int, ...]) -> Floats:
     for k, array in enumerate(arrays):
         padded[:, k, : array.shape[1]] = array
     return padded
+
+
+TIMES_TO_STRAIN_FILLS = {
+    **{"times": np.nan, "log_time_derivatives": np.inf, "rupture_times": np.nan},
+    **{"time_jacobian": np.nan, "rupture_jacobian": np.nan},
+}
+"""What the times to strain of tests hold where they have no frame."""
+
+
+def concatenated_tests(groups: Sequence[tuple[list[int], Prediction]], histories: Sequence[History]) -> Prediction:
+    """One prediction, in the order of the histories, of groups of tests; with the union of outputs."""
+    outputs = tuple(dict.fromkeys(name for _, prediction in groups for name in prediction.outputs))
+    candidates, longest = len(groups[0][1].values), max(h.times.size for h in histories)
+    shape = (candidates, len(histories), longest, len(outputs))
+    columns = [[outputs.index(name) for name in prediction.outputs] for _, prediction in groups]
+
+    def gathered(arrays: Sequence[Any], axes: int, fill: float) -> Any:
+        """Arrays (candidates, tests[, times[, outputs]], ...) of the groups as one, None where one of them is."""
+        if any(array is None for array in arrays):
+            return None
+        out = np.full((*shape[:axes], *arrays[0].shape[axes:]), fill)
+        for (tests, _), array, of_group in zip(groups, arrays, columns, strict=True):
+            index = [range(candidates), tests, *(range(size) for size in array.shape[2:3]), of_group]
+            out[np.ix_(*index[:axes])] = array
+        return out
+
+    predictions = [prediction for _, prediction in groups]
+    kinds = {kind for prediction in predictions for kind in prediction.nuisance_jacobian}
+    times_to_strain = [prediction.times_to_strain for prediction in predictions]
+    whole = None
+    if all(times_to_strain):
+        arrays = {
+            name: gathered([getattr(times, name) for times in times_to_strain], 2 if "rupture" in name else 3, fill)
+            for name, fill in TIMES_TO_STRAIN_FILLS.items()
+        }
+        horizon = np.zeros(len(histories))
+        for (tests, _), times in zip(groups, times_to_strain, strict=True):
+            horizon[tests] = times.horizon  # type: ignore[union-attr]
+        whole = TimesToStrain(horizon=horizon, **arrays)
+    return Prediction(
+        gathered([p.values for p in predictions], 4, np.nan),
+        outputs,
+        np.array([h.times.size for h in histories], np.int64),
+        gathered([p.status for p in predictions], 2, int(Status.COMPLETE)),
+        gathered([p.end_times for p in predictions], 2, np.inf),
+        gathered([p.jacobian for p in predictions], 4, np.nan),
+        tuple(h.times for h in histories),
+        {
+            kind: gathered([p.nuisance_jacobian.get(kind, np.zeros_like(p.values)) for p in predictions], 4, 0.0)
+            for kind in kinds
+        },
+        whole,
+    )
+
+
+def concatenated_candidates(parts: Sequence[Prediction]) -> Prediction:
+    """The predictions of consecutive candidates as one."""
+    names = "values", "status", "end_times"
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(p, name) for p in parts]) for name in names}
+    jacobians = [part.jacobian for part in parts if part.jacobian is not None]
+    return replace(
+        parts[0],
+        **arrays,
+        jacobian=np.concatenate(jacobians) if jacobians else None,
+        nuisance_jacobian={
+            key: np.concatenate([part.nuisance_jacobian[key] for part in parts]) for key in parts[0].nuisance_jacobian
+        },
+    )

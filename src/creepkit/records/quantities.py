@@ -151,9 +151,6 @@ TEMPERATURE = QuantityKind("temperature", conversions("K", "C", "F"), low=0.0, h
 FLAG = QuantityKind("flag", NUMBER.units, low=0.0, high=1.0)
 
 
-COUNT = QuantityKind("number from 1 on", NUMBER.units, low=1.0, high=1e6)
-
-
 FORCE = QuantityKind("force", conversions("N", "kN", "lbf", "kgf", "daN"))
 
 

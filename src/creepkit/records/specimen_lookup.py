@@ -10,7 +10,7 @@ from creepkit.errors import SolveError, nearest
 from creepkit.records.specimen_record import Dimension, Load, Output
 
 Registered = Any
-"""A registered specimen; the interfaces of specimens and histories stand above this module."""
+"""A predictor; the interfaces of specimens and histories stand above this module."""
 
 
 class StatedTest(Protocol):
@@ -29,12 +29,11 @@ class StatedTest(Protocol):
 _used: dict[str, Registered] = {}
 
 
-def remember_specimen(predictor: object) -> None:
+def remember_specimen(predictor: Registered) -> None:
     """Keep what a specimen says of itself that was given to a public function and that no plugin registered."""
-    specimen = _specimen_behind(predictor)
-    name = getattr(specimen, "name", None)
-    if isinstance(name, str) and hasattr(specimen, "outputs"):
-        _used[name] = specimen
+    specimen = predictor.specimen
+    if specimen.name:
+        _used[specimen.name] = specimen
 
 
 def forget_unregistered() -> None:
@@ -57,44 +56,32 @@ def specimen_of(history: StatedTest) -> Registered | None:
     return known_specimens().get(history.specimen)
 
 
-def outputs_of(predictor: object) -> tuple[Output, ...]:
+def outputs_of(predictor: Registered | None) -> tuple[Output, ...]:
     """The outputs of a predictor, then its optional ones; those of which it gives the names alone are numbers."""
-    stated = dict.fromkeys((*getattr(predictor, "outputs", ()), *getattr(predictor, "optional_outputs", ())))
-    own = getattr(getattr(predictor, "specimen", None), "outputs", ())
-    known = {name: output for name in own if isinstance(output := name, Output)}
+    if predictor is None:
+        return ()
+    stated = dict.fromkeys((*predictor.outputs, *predictor.optional_outputs))
+    known = {name: output for name in predictor.specimen.outputs if isinstance(output := name, Output)}
     return tuple(o if isinstance(o, Output) else known.get(o, Output(o)) for o in stated)
 
 
-def outputs_of_test(predictor: object, history: StatedTest) -> tuple[str, ...]:
-    """The outputs that a predictor gives of a test: `outputs`, unless the test itself decides; () where none are known.
-
-    SolveError where the test has optional outputs that its operator does not give.
-    """
-    own = getattr(predictor, "outputs_of_test", None)
-    return tuple(getattr(predictor, "outputs", ()) if own is None else own(history))
-
-
-def outputs_of_tests(predictor: object, histories: Iterable[StatedTest]) -> tuple[str, ...]:
+def outputs_of_tests(predictor: Registered, histories: Iterable[StatedTest]) -> tuple[str, ...]:
     """The outputs that a predictor gives of any of the tests, or of none: its `outputs`."""
-    every = dict.fromkeys(name for history in histories for name in outputs_of_test(predictor, history))
-    return tuple(every) or tuple(getattr(predictor, "outputs", ()))
+    every = dict.fromkeys(name for history in histories for name in predictor.outputs_of_test(history))
+    return tuple(every) or tuple(predictor.outputs)
 
 
-def loads_of(predictor: object) -> tuple[Load, ...]:
+def loads_of(predictor: Registered | None) -> tuple[Load, ...]:
     """The loads that a specimen, or a predictor that stands for one, takes; () where it does not say."""
-    return tuple(getattr(_specimen_behind(predictor), "loads", ()))
+    return () if predictor is None else tuple(predictor.specimen.loads)
 
 
-def dimensions_of(predictor: object) -> tuple[Dimension, ...]:
+def dimensions_of(predictor: Registered | None) -> tuple[Dimension, ...]:
     """The lengths of a specimen's test piece, with its own as defaults; () where it does not say."""
-    return tuple(getattr(_specimen_behind(predictor), "dimensions", ()))
+    return () if predictor is None else tuple(predictor.specimen.dimensions)
 
 
-def _specimen_behind(predictor: object) -> object:
-    return getattr(predictor, "specimen", predictor)
-
-
-def dimension_named(predictor: object, name: str) -> Dimension | None:
+def dimension_named(predictor: Registered, name: str) -> Dimension | None:
     """The length of a specimen's test piece of this name or alias; None where it has none."""
     return next((d for d in dimensions_of(predictor) if name in d.names), None)
 
@@ -148,17 +135,16 @@ def all_dimensions() -> dict[str, Dimension]:
     return {name: d for one in known_specimens().values() for d in dimensions_of(one) for name in d.names}
 
 
-def check_load(predictor: object, history: StatedTest) -> None:
+def check_load(predictor: Registered, history: StatedTest) -> None:
     """SolveError unless a specimen takes the load of a history."""
     loads = loads_of(predictor)
     if not loads or history.loading.quantity in (load.name for load in loads):
         return
-    name = getattr(_specimen_behind(predictor), "name", type(predictor).__name__)
     allowed = " or ".join(f"{load.name} ({load.unit})" if load.unit else load.name for load in loads)
     advice = " or ".join(_LOADINGS[load.quantity] for load in loads if load.quantity in _LOADINGS)
     raise SolveError(
-        f"{history.origin}: specimen '{name}' is loaded by {allowed}, found {history.loading.quantity}; use "
-        f"{advice or 'load_steps or constant_load'}"
+        f"{history.origin}: specimen '{predictor.specimen.label}' is loaded by {allowed}, found "
+        f"{history.loading.quantity}; use {advice or 'load_steps or constant_load'}"
     )
 
 
@@ -170,7 +156,7 @@ _LOADINGS = {
 """{quantity of a load: how it is written}."""
 
 
-def check_geometry(predictor: object, names: Iterable[str], where: str) -> None:
+def check_geometry(predictor: Registered, names: Iterable[str], where: str) -> None:
     """SolveError for a length that the test piece of a specimen does not have."""
     known = [d.name for d in dimensions_of(predictor)]
     for name in names:

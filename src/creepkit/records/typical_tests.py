@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from creepkit.records.history import History
 from creepkit.records.loading import Loading, PointLoading, constant_strain, constant_stress, load_steps
 from creepkit.records.specimen_lookup import loads_of
 from creepkit.records.specimen_record import Load
+
+if TYPE_CHECKING:
+    from creepkit.records.predictor import Predictor
 
 TYPICAL_STRESS = 100.0
 """MPa, reference stress of a test whose specimen states no range of the load."""
@@ -26,7 +29,7 @@ TYPICAL_VALUES = {"strain": 1e-3, "pressure": 10.0, "force": 100.0, "moment": 10
 
 
 def typical_history(
-    specimen: object, load: str = "", *, level: float = 0.5, frames: int = 20, end: float = TYPICAL_DURATION
+    specimen: Predictor, load: str = "", *, level: float = 0.5, frames: int = 20, end: float = TYPICAL_DURATION
 ) -> History:
     """A test without outputs that a specimen can be simulated in: one load held, at 800 C, frames from time zero on.
 
@@ -38,21 +41,21 @@ def typical_history(
     """
     from creepkit.language.elastic import Elastic
 
-    record: Any = getattr(specimen, "specimen", specimen)
+    record: Predictor = specimen.specimen
     loads = loads_of(record)
     chosen = next((one for one in loads if one.name == load), None) or (
         Load(load or "stress", "stress") if load or not loads else loads[0]
     )
-    conditions = dict(getattr(record, "conditions", None) or {})
+    conditions = dict(record.conditions)
     value = TYPICAL_VALUES.get(chosen.quantity, TYPICAL_STRESS)
     low, high = conditions.get("modulus", (150e3, 150e3))
     plan = History(
-        name=f"typical test of {getattr(record, 'name', type(record).__name__)}",
+        name=f"typical test of {record.label}",
         times=np.linspace(0.0, end, frames),
         outputs={},
         loading=_held(chosen, value),
         temperature=TYPICAL_TEMPERATURE,
-        specimen=getattr(record, "name", "uniaxial"),
+        specimen=record.name or "uniaxial",
         elastic=Elastic(round(math.sqrt(low * high), 3)),
         includes_elastic=chosen.name == "stress",
     )
@@ -63,9 +66,9 @@ def typical_history(
     return plan.replace(loading=_held(chosen, float(f"{value * scale:.6g}")))
 
 
-def _reference_scale(record: Any, plan: History) -> float:
+def _reference_scale(record: Predictor, plan: History) -> float:
     """The factor on a load that makes its reference stress the typical one; 1 where the specimen does not say."""
-    if not hasattr(record, "reference_stress"):
+    if not record.states("reference_stress"):
         return 1.0
     try:
         stress = float(np.max(record.reference_stress(plan), initial=0.0))

@@ -59,7 +59,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
         "m": _unit("length", 1e3, "metre", "meter"),
         "um": _unit("length", 1e-3, "µm", "μm", "micron", "microns"),
         "nm": _unit("length", 1e-6),
-        "in": _unit("length", 25.4, "inch", "inches"),
+        "in": _unit("length", 25.4, "inch", "inches", "in."),
         "mm2": _unit("area", 1.0, "mm²", "mm^2", "sq mm"),
         "cm2": _unit("area", 100.0, "cm²", "cm^2"),
         "in2": _unit("area", 645.16, "in²", "in^2", "sq in"),
@@ -86,7 +86,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
             *("temperature", 1.0 / 1.8, "°f", "ºf", "℉", "degf", "deg f", "deg. f", "fahrenheit", "of"),
             offset=ZERO_CELSIUS - 32.0 / 1.8,
         ),
-        "1": _unit("strain", 1.0, "-", "mm/mm", "m/m", "in/in", "fraction"),
+        "1": _unit("strain", 1.0, "-", "mm/mm", "m/m", "in/in", "in./in.", "fraction"),
         "pct": _unit("strain", 1e-2, "%", "percent", "per cent"),
         "permille": _unit("strain", 1e-3, "‰", "per mille", "promille", "mm/m", "1e-3", "10^-3", "10-3", "10⁻³"),
         "microstrain": _unit(

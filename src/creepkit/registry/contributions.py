@@ -167,8 +167,8 @@ def hook_location(function: Any) -> str:
 def _specimen_problem(specimen: Any) -> str:
     """What is wrong with the record of a specimen, as the end of a sentence; "" where files and options can use it."""
     try:
-        outputs, loads, lengths = (tuple(getattr(specimen, name, ())) for name in ("outputs", "loads", "dimensions"))
-        outputs += tuple(getattr(specimen, "optional_outputs", ())) if outputs else ()
+        outputs, loads, lengths = map(tuple, (specimen.outputs, specimen.loads, specimen.dimensions))
+        outputs += tuple(specimen.optional_outputs) if outputs else ()
         known = (*(str(name) for name in outputs), *(one.name for one in loads), *(one.name for one in lengths))
     except Exception as error:
         return (
@@ -199,7 +199,7 @@ def _missing_members(contribution: object, required: type) -> str:
         name for one in required.__mro__ for name in vars(one) if getattr(one, "_is_protocol", False) and name[0] != "_"
     ]
     missing = [name for name in members if not hasattr(contribution, name)]
-    return f"; it has no {', '.join(missing)}" if missing else ""
+    return f"; it has no {', '.join(missing)}" if missing else f"; derive its class from ck.{required.__name__}"
 
 
 def _remedy(returned: Any) -> str:

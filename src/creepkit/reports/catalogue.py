@@ -91,7 +91,7 @@ def specimen_to_json(entry: Registered[Specimen]) -> dict[str, Any]:
         "units": {o: o.unit for o in outputs_of(specimen)},
         "loads": {load.name: load.unit for load in loads_of(specimen)},
         "lengths_mm": {d.name: d.default for d in dimensions_of(specimen)},
-        "nuisances": list(getattr(specimen, "nuisances", ())),
+        "nuisances": list(specimen.nuisances),
         "provenance": str(entry.provenance),
     }
 

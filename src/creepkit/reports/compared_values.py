@@ -113,7 +113,7 @@ def compared_values(fit: Identification) -> ComparedValues | None:
     if not fit.histories or fit.predictor is None:
         return None
     predictor = fit.predictor
-    predictor = CompositePredictor(dict(predictor)) if isinstance(predictor, Mapping) else predictor
+    predictor = CompositePredictor.of(predictor)
     try:
         tests = [thinned_history(h, fit.settings.frames) for h in fit.histories]
         used = compares_rupture_times(fit.law, fit.settings)

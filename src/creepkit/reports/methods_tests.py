@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from creepkit.inverse.composite_predictor import predictor_for, reduced_order_model_of, underlying_specimen
 from creepkit.inverse.reference_conditions import reference_temperature
 from creepkit.language.printing import arrhenius_exponent
 from creepkit.laws.paper import PAPER
@@ -129,24 +128,19 @@ def models(fit: Identification) -> list[str]:
     predictor = fit.predictor
     if predictor is None:
         return sentences
-    specimen = underlying_specimen(predictor)
-    if specimen is not predictor and not isinstance(getattr(predictor, "predictors", None), Mapping):
-        sentences[0] = f"The tests were predicted by a surrogate of the specimen '{printable(_name_of(specimen))}'."
+    specimen = predictor.specimen
+    if specimen is not predictor and not predictor.parts:
+        sentences[0] = f"The tests were predicted by a surrogate of the specimen '{printable(specimen.label)}'."
     tests: dict[str, tuple[Any, list[History]]] = {}
     for history in fit.histories:
-        own = predictor_for(specimen, history)
-        tests.setdefault(_name_of(own), (own, []))[1].append(history)
+        own = specimen.for_history(history)
+        tests.setdefault(own.label, (own, []))[1].append(history)
     for piece, histories in tests.values():
-        if hasattr(piece, "model_text"):
-            sentences.append(sentence(piece.model_text(histories)))
-    if reduced_order_model_of(predictor) is not None:
+        if text := piece.model_text(histories):
+            sentences.append(sentence(text))
+    if predictor.reduced_order_model() is not None:
         sentences.append("The global search used the reduced-order model of these finite elements.")
     return sentences
-
-
-def _name_of(specimen: object) -> str:
-    """The name of a specimen; that of its class where it has none."""
-    return str(getattr(specimen, "name", type(specimen).__name__))
 
 
 # ---- laws ------------------------------------------------------------------------------------------------------------

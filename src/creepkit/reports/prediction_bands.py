@@ -14,11 +14,10 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.inverse.defect_correction import with_correction_at_frames
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.records import SECONDS_PER_HOUR, Prediction, is_logarithmic, output_unit
 from creepkit.reports.figures import set_range
 
@@ -67,7 +66,9 @@ def _fitted_curves(fit: Identification) -> FittedCurves:
         )
     histories, coordinates = fit.histories, fit.coordinates
     nuisances = fit.nuisance_values(histories)
-    prediction = predict_with_sensitivities(fit.predictor, fit.law, coordinates.theta(fit.u), histories, nuisances)
+    prediction = fit.predictor.predict(
+        fit.law, coordinates.theta(fit.u)[None], histories, nuisances=nuisances, sensitivities=True
+    )
     assert prediction.jacobian is not None
     with np.errstate(invalid="ignore"):
         jacobian = prediction.jacobian[0] @ coordinates.jacobian(fit.u)
@@ -78,8 +79,7 @@ def _fitted_curves(fit: Identification) -> FittedCurves:
     for k, test in enumerate(fit.tests):
         for output_fit in test.outputs:
             prediction.values[:, k, :, prediction.outputs.index(output_fit.output)] += output_fit.offset
-    quantile = interval_quantile(fit.freedom)
-    return FittedCurves(prediction, quantile * np.sqrt(np.maximum(variance, 0.0)))
+    return FittedCurves(prediction, NORMAL_QUANTILE * np.sqrt(np.maximum(variance, 0.0)))
 
 
 def _nuisance_jacobian(fit: Identification, prediction: Prediction) -> Floats:

@@ -87,9 +87,10 @@ def plotted_series(test: History, outputs: Mapping[str, Floats]) -> dict[str, Fl
 
     outputs : {name: (frames,)} in the units of the specimen.
     """
-    stated = getattr(specimen_of(test), "plotted_series", None)
-    if stated is not None:
-        return dict(stated(outputs))
+    specimen = specimen_of(test)
+    drawn: dict[str, Floats] | None = None if specimen is None else specimen.plotted_series(outputs)
+    if drawn is not None:
+        return drawn
     output = output_named(growing_output(test), test.specimen)
     return {output.label: np.asarray(outputs[output], float)} if output in outputs else {}
 

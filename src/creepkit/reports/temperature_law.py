@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.discovery.regression import INFINITE_FREEDOM
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, delta_method
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import equations, unit_text, value_cells
 from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, Verbatim, as_text
@@ -62,7 +61,7 @@ def _plot_parameter(axes: Any, temperature_law: TemperatureLaw, coordinates: Coo
     values = shown_of(estimates.theta)
     pairs = zip(estimates.theta, estimates.covariance, strict=True)
     deviations = np.array([delta_method(shown_of, *pair)[1] for pair in pairs], float)
-    half_widths = interval_quantile(INFINITE_FREEDOM) * deviations
+    half_widths = NORMAL_QUANTILE * deviations
     bounds = [law.table[name].to_internal(b) * scale for b in law.table[name].bounds]
     low, high = (-np.inf, np.inf) if is_rate else bounds  # beyond which no interval goes
     error_bars = np.maximum([np.minimum(half_widths, values - low), np.minimum(half_widths, high - values)], 0.0)
@@ -76,7 +75,9 @@ def _plot_parameter(axes: Any, temperature_law: TemperatureLaw, coordinates: Coo
         drawn[form] = curve
         axes.plot(T, curve, lw=1.8 if first else 1.0, label=f"{form} {_form_weight(temperature_law, k, form):.2f}")
         if first:
-            quantile = interval_quantile(candidate.degrees_of_freedom)
+            from scipy.stats import t as student
+
+            quantile = float(student.ppf(0.975, candidate.degrees_of_freedom))
             half = quantile * _curve_standard_deviations(shown_of, candidate, T)
             axes.fill_between(T, curve - half, curve + half, color="C0", alpha=0.15, lw=0)
     every = np.concatenate([*drawn.values()])

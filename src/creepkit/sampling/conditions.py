@@ -85,14 +85,14 @@ class SpecimenConditions:
 
 def record_of(specimen: Predictor) -> Any:
     """The specimen itself, or the one that a reduced-order model or a surrogate stands for."""
-    return getattr(specimen, "specimen", specimen)
+    return specimen.specimen
 
 
 def specimen_conditions(specimen: Predictor) -> SpecimenConditions:
     """The conditions of a specimen; DatasetError, with the attribute to add, where its record does not say them."""
     record = record_of(specimen)
     load, stated = _sampled_load(record)
-    own: Mapping[str, str] = getattr(record, "dataset_names", {})
+    own: Mapping[str, str] = record.dataset_names
     first, second, jump = (own.get(name, name) for name in (f"{load.name}_1", f"{load.name}_2", JUMP))
     lengths = dimensions_of(record)
     others = (MODULUS, TEMPERATURE, END, *(length.name for length in lengths))
@@ -113,7 +113,7 @@ def specimen_conditions(specimen: Predictor) -> SpecimenConditions:
 
 def _sampled_load(record: Any) -> tuple[Load, Mapping[str, Range]]:
     """The load that data sets draw, and the ranges that the specimen states."""
-    loads, stated = loads_of(record), getattr(record, "conditions", None)
+    loads, stated = loads_of(record), record.conditions
     if not loads:
         raise DatasetError(
             f"specimen '{record.name}' does not say what is imposed on it, which a data set draws: add the attribute "
@@ -139,10 +139,9 @@ def planned_loading(specimen: Predictor, load: Load, levels: tuple[float, float]
     The specimen's own where it states planned_loading(levels, jump_time). Else the first level is there at once, and a
     short ramp leads to the second, so that what jumps with the load is told from creep.
     """
-    own = getattr(record_of(specimen), "planned_loading", None)
+    own: Loading | None = record_of(specimen).planned_loading(levels, jump_time)
     if own is not None:
-        loading: Loading = own(levels, jump_time)
-        return loading
+        return own
     first, second = levels
     if first == second:
         return constant_load(load.name, first)
@@ -153,7 +152,7 @@ def planned_loading(specimen: Predictor, load: Load, levels: tuple[float, float]
 
 def own_names(specimen: Predictor, given: Mapping[str, Any]) -> dict[str, Any]:
     """Conditions {name: (...)} by the names of the specimen's data sets, where some have the general ones."""
-    own: Mapping[str, str] = getattr(record_of(specimen), "dataset_names", {})
+    own: Mapping[str, str] = record_of(specimen).dataset_names
     renamed = {own.get(name, name): value for name, value in given.items()}
     if len(renamed) < len(given):
         twice = next(name for name in given if name in own and own[name] in given)
@@ -198,7 +197,7 @@ def creep_output(specimen: Predictor) -> CreepOutput:
 def check_stated(specimen: Predictor, name: str, meaning: str) -> None:
     """DatasetError, with what it is to give, where the specimen's record has no such method."""
     record = record_of(specimen)
-    if not hasattr(record, name):
+    if not record.states(name):
         raise DatasetError(
             f"specimen '{record.name}' does not say {meaning}, which a data set needs: add the method "
             f"{name}(self, history)"
@@ -207,8 +206,8 @@ def check_stated(specimen: Predictor, name: str, meaning: str) -> None:
 
 def tested_piece(specimen: Predictor, plan: History, nuisances: Mapping[str, float]) -> tuple[Any, History]:
     """The specimen with the lengths that a test and its nuisances {kind: value} state, and the test as they say."""
-    record = record_of(specimen)
-    return record.of_test(plan, nuisances) if hasattr(record, "of_test") else (record, plan)
+    piece, test = record_of(specimen).of_test(plan, nuisances)
+    return piece, test
 
 
 def mean_reference_stress(piece: Any, test: History) -> float:

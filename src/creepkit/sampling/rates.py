@@ -326,7 +326,7 @@ class ReferenceStress:
 def reference_stress_of(specimen: Specimen) -> ReferenceStress:
     """The reference of a specimen; DatasetError, with the attribute to add, where its record does not say it."""
     known, visible = specimen_conditions(specimen), creep_output(specimen).visible
-    scaling: LoadScaling | None = getattr(record_of(specimen), "load_scaling", None)
+    scaling: LoadScaling | None = record_of(specimen).load_scaling
     if scaling is None:
         check_stated(specimen, "reference_stress", "which von Mises stress, MPa, stands for a test")
         growth = "by how much its output grows for each unit of strain at the reference stress"

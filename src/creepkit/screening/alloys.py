@@ -21,11 +21,10 @@ import numpy as np
 
 from creepkit.errors import FitError, HistoryError, nearest
 from creepkit.files.delimited_text import parse_number
-from creepkit.inverse.composite_predictor import CompositePredictor, predictor_for
 from creepkit.inverse.reference_conditions import detect_creep, distinct_loads
 from creepkit.readers.table import CellTable
 from creepkit.readers.text_files import read_table
-from creepkit.records import History, Predictor, is_logarithmic, outputs_of_test
+from creepkit.records import History, Predictor, is_logarithmic
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ def limitations(alloy: Alloy, predictor: Predictor) -> tuple[str, ...]:
     specimens = sorted({t.specimen for t in tests})
     if len(specimens) > 1:
         notes.append(f"tests of several specimens ({', '.join(specimens)}) are identified together")
-    for name in outputs_of_test(predictor_for(predictor, tests[0]), tests[0])[1:]:
+    for name in predictor.for_history(tests[0]).outputs_of_test(tests[0])[1:]:
         lacking = [t.name for t in tests if name not in t.outputs]
         if lacking:
             notes.append(f"no {name} in {len(lacking)} of {len(tests)} tests: the stress exponent is known the less")
@@ -79,11 +78,11 @@ def limitations(alloy: Alloy, predictor: Predictor) -> tuple[str, ...]:
 def _check_specimens(alloy: Alloy, predictor: Predictor) -> None:
     """One predictor serves one specimen; several need one each."""
     specimens = sorted({test.specimen for test in alloy.tests})
-    if isinstance(predictor, CompositePredictor):
-        unpredicted = [kind for kind in specimens if kind not in predictor.predictors]
-        remedy = f"using= names predictors for {', '.join(predictor.predictors)}; add it" if unpredicted else ""
+    if predictor.parts:
+        unpredicted = [kind for kind in specimens if kind not in predictor.parts]
+        remedy = f"using= names predictors for {', '.join(predictor.parts)}; add it" if unpredicted else ""
     else:
-        specimen_name = getattr(getattr(predictor, "specimen", predictor), "name", specimens[0])
+        specimen_name = predictor.specimen.name
         unpredicted = [kind for kind in specimens if kind != specimen_name]
         remedy = f"using= predicts {specimen_name}; give using= a predictor for each, or screen them apart"
     if unpredicted:
@@ -105,7 +104,7 @@ def _check_creep(alloy: Alloy, creep_outputs: Sequence[tuple[History, str]]) -> 
 
 def _creep_output(test: History, predictor: Predictor) -> str:
     """The output that grows with creep."""
-    outputs = outputs_of_test(predictor_for(predictor, test), test)
+    outputs = predictor.for_history(test).outputs_of_test(test)
     return str(outputs[0]) if outputs else next(iter(test.outputs), "output")
 
 

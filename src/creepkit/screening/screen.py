@@ -22,9 +22,9 @@ from typing import ClassVar, Literal
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, FitError, HistoryError
 from creepkit.files.writing import hashed_stem
-from creepkit.inverse.composite_predictor import CompositePredictor, predictor_for_law, underlying_specimen
+from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.confirmation import Confirmation, confirm, outside_domain
-from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash, single_threaded
+from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
@@ -75,7 +75,7 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
     if job.dense_law is not None:
         dense, sparse = _fit_dense_law(job, job.dense_law, alloy, notes)
     confirmation = _confirm_best(job, best, alloy, notes)
-    predictor = job.predictor if confirmation is None else underlying_specimen(job.predictor)
+    predictor = job.predictor if confirmation is None else job.predictor.specimen
     return AlloyResult(
         alloy.name,
         laws=tuple(WeightedLaw(r.fit, r.excess, r.weight) for r in ranking.laws),
@@ -86,7 +86,7 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
         dense_fit=dense,
         sparse_fit=sparse,
         confirmation=confirmation,
-        predicted=_predict_tests(best, alloy.tests, predictor_for_law(predictor, best.law)),
+        predicted=_predict_tests(best, alloy.tests, predictor.for_law(best.law)),
         notes=(*notes, *best.notes),
     )
 
@@ -111,7 +111,7 @@ def _confirm_best(job: ScreeningJob, best: Identification, alloy: Alloy, notes: 
     if job.confirm is False or (job.confirm is not True and not outside_domain(best)):
         return None
     try:
-        return confirm(best, alloy.tests, underlying_specimen(job.predictor))
+        return confirm(best, alloy.tests, job.predictor.specimen)
     except CreepkitError as error:
         notes.append(f"not confirmed: {error}")
         return None
@@ -161,8 +161,8 @@ class ScreeningJob:
 
     def on_one_thread(self) -> ScreeningJob:
         """The same with predictors that start no threads."""
-        surrogate = None if self.surrogate is None else single_threaded(self.surrogate)
-        return replace(self, predictor=single_threaded(self.predictor), surrogate=surrogate)
+        surrogate = None if self.surrogate is None else self.surrogate.single_threaded()
+        return replace(self, predictor=self.predictor.single_threaded(), surrogate=surrogate)
 
     def run(self, number: int) -> TaskResult:
         """Screen an alloy and write its result, and its best identification beside it, which other commands take."""
@@ -261,7 +261,7 @@ def screen(
         job = ScreeningJob(
             alloys=group_by_alloy(tests),
             laws=_distinct_laws(CANDIDATE_LAWS if laws is None else laws),
-            predictor=CompositePredictor(predictors) if isinstance(predictors, dict) else predictors,
+            predictor=CompositePredictor.of(predictors),
             surrogate=options.through,
             settings=replace(options.settings, weights="automatic"),
             dense_law=None if options.dense is None else resolve_law(options.dense),

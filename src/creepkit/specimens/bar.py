@@ -11,7 +11,7 @@ import numpy as np
 from creepkit import integration, kernels
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.integration.time_discretisation import SDIRK4_TEXT
-from creepkit.records import History, HistoryPrediction, Prediction, Status, assemble_prediction
+from creepkit.records import History, HistoryPrediction, NuisanceValues, Prediction, Status, assemble_prediction
 from creepkit.specimens.point_specimen import PointSpecimen
 from creepkit.specimens.run import Run, run_from_outputs
 
@@ -94,10 +94,10 @@ class Bar(PointSpecimen):
         states = {symbol.name: result.states[0, reached, k] for k, symbol in enumerate(law.states)}
         return replace(run, creep_strain=result.of(0)[0, reached], states=states)
 
-    def predict_plain(
-        self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool
+    def predict_batch(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues, sensitivities: bool
     ) -> Prediction:
-        """Predict histories without nuisances; theta : (candidates, parameters) internal values."""
+        """Predict histories; theta : (candidates, parameters) internal values."""
         result = self._integrate(law, theta, self._tests(histories), sensitivities)
         return self._observed_prediction(histories, result)
 

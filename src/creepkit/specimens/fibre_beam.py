@@ -22,15 +22,10 @@ from creepkit.arrays import Floats, frozen
 from creepkit.errors import SolveError
 from creepkit.integration import FibreInput, FibreModel, FibreTest, IntegrationSettings
 from creepkit.integration.time_discretisation import SDIRK4_TEXT
-from creepkit.records import History, Load, NuisanceValues, Output, Prediction, Program, Status
-from creepkit.records.prediction_assembly import (
-    HistoryPrediction,
-    assemble_prediction,
-    broadcast_candidates,
-    check_nuisances,
-)
+from creepkit.records import History, NuisanceValues, Prediction, Program, Status
 from creepkit.specimens.bar import SEARCH_TOLERANCE
 from creepkit.specimens.run import Run, run_from_outputs
+from creepkit.specimens.separate_tests import TestResponse, predict_separately
 from creepkit.specimens.settings_checks import check_ranges
 from creepkit.specimens.test_piece import TestPiece
 
@@ -81,9 +76,6 @@ class FibreBeam(TestPiece, ABC):
     strain_limit: float = 1.0
     max_steps: int = 2000
 
-    title: ClassVar[str]
-    outputs: ClassVar[tuple[Output, ...]]
-    loads: ClassVar[tuple[Load, ...]]
     relaxes: ClassVar[bool] = False
     """Whether the deflection is prescribed and the force observed."""
 
@@ -163,52 +155,29 @@ class FibreBeam(TestPiece, ABC):
         moved = np.abs(history.outputs[output] - elastic)[history.used]
         return float(np.max(moved[np.isfinite(moved)], initial=0.0)) / self.growth_per_strain(history)
 
-    def predict(
-        self,
-        law: CreepLaw,
-        theta: Floats,
-        histories: Sequence[History],
-        *,
-        nuisances: NuisanceValues | None = None,
-        sensitivities: bool = False,
+    def predict_batch(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues, sensitivities: bool
     ) -> Prediction:
-        """Predict the output of each history at its times, with exact derivatives; see records.Predictor.
+        """Predict the output of each history at its times, with exact derivatives.
 
         theta : (candidates, parameters) internal values.
         """
-        check_nuisances(nuisances or (), self.nuisances, f"specimen '{self.name}'")
-        theta, of_tests = broadcast_candidates(theta, nuisances, len(histories))
-        kernel, reasons = kernels.lower(law, "compiled"), []
-        parts = []
-        for k, history in enumerate(histories):
-            rows = []
-            for c in range(len(theta)):
-                own = {kind: float(given[c, k]) for kind, given in of_tests.items()}
-                rows.append(self._one(kernel, theta[c], history, own, sensitivities))
-            reasons += [row.reason for row in rows if row.reason]
-            slopes = np.stack([row.slopes for row in rows]) if sensitivities else None
-            count = theta.shape[1]
-            parts.append(
-                HistoryPrediction(
-                    np.stack([row.values for row in rows])[..., None],
-                    np.array([int(row.status) for row in rows], np.int64),
-                    np.array([row.end_time for row in rows]),
-                    None if slopes is None else slopes[:, :, None, :count],
-                    {} if slopes is None else {kind: slopes[:, :, None, count + a] for a, kind in enumerate(of_tests)},
-                )
-            )
-        result = assemble_prediction(parts, histories, self.outputs, len(theta))
-        return replace(result, reason=next(iter(reasons), ""))
+        kernel = kernels.lower(law, "compiled")
+
+        def respond(row: Floats, k: int, of_test: Mapping[str, float]) -> TestResponse:
+            return self._one(kernel, row, histories[k], of_test, sensitivities)
+
+        return predict_separately(respond, theta, histories, nuisances, self.outputs)
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> Run:
         """Run one test: what its history would show at its times, and how it ended."""
         theta = law.to_internal(law.values(values))[0]
         row = self._one(kernels.lower(law, "compiled"), theta, plan, {}, False)
-        return run_from_outputs(Run, plan, self.outputs, row.values[:, None], row.status, row.end_time, row.reason)
+        return run_from_outputs(Run, plan, self.outputs, row.values, row.status, row.end_time, row.reason)
 
     def _one(
         self, kernel: CompiledLaw, theta: Floats, history: History, nuisances: Mapping[str, float], sensitivities: bool
-    ) -> _BeamRow:
+    ) -> TestResponse:
         """One candidate in one test, with the derivatives to its parameters and to its nuisances."""
         piece, tested = self.of_test(history, nuisances)
         moved = [_input(piece, kind, nuisances, tested) for kind in nuisances] if sensitivities else []
@@ -249,7 +218,10 @@ class FibreBeam(TestPiece, ABC):
             for a, each in enumerate(moved):
                 slopes[:, theta.size + a] += each.elastic_share * piece._elastic_output(tested)
                 slopes[:, theta.size + a] += each.factor_share * piece._creep_factor(tested) * creep
-        return _BeamRow(values, slopes, status, end, reason)
+        if not sensitivities:
+            return TestResponse(values[:, None], status, end, reason)
+        of_nuisances = {kind: slopes[:, None, theta.size + a] for a, kind in enumerate(nuisances)}
+        return TestResponse(values[:, None], status, end, reason, slopes[:, None, : theta.size], of_nuisances)
 
     def _elastic_output(self, tested: History) -> Floats:
         """The output without creep, (times,): mm, or N."""
@@ -292,17 +264,6 @@ def _modulus_program(elastic: Elastic, temperature: Program) -> Program:
     levels, which = np.unique(np.concatenate(T), return_inverse=True)
     moduli = np.array([float(elastic.at(float(level)).E) for level in levels])
     return Program(np.concatenate(times), moduli[which])
-
-
-@dataclass(frozen=True, eq=False)
-class _BeamRow:
-    """values : (times,); slopes : (times, parameters + nuisances)."""
-
-    values: Floats
-    slopes: Floats
-    status: Status
-    end_time: float
-    reason: str
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -120,31 +120,25 @@ class FiniteElementRun(Run):
         return rows if wanted.ndim else np.asarray(rows[0])
 
 
-_RunType = TypeVar("_RunType", bound=FiniteElementRun)
-
-
 def run_test(
-    kind: type[_RunType],
-    test: FiniteElementTest,
-    law: CreepLaw,
-    values: Mapping[str, float],
-    reduction: Reduction | None = None,
-) -> _RunType:
-    """Simulate one test and keep all of it; by a reduced-order model, displacements alone."""
-    kernel = kernels.lower(law, "compiled")
+    test: FiniteElementTest, law: CreepLaw, values: Mapping[str, float], reduction: Reduction | None = None
+) -> Any:
+    """Simulate one test and keep all of it, as the kind of run of its specimen has it."""
+    kernel, piece = kernels.lower(law, "compiled"), test.piece
     theta = law.to_internal(law.values(values))[0]
     if reduction is None:
-        simulation = test.simulate(kernel, theta, solver_settings(test.piece), keep_points=True)
+        simulation = test.simulate(kernel, theta, solver_settings(piece), keep_points=True)
     else:
-        simulation = test.simulate(kernel, theta, reduction.settings, reduction.model_of(test.piece))
+        simulation = test.simulate(kernel, theta, reduction.settings, reduction.model_of(piece))
     status, end_time, reason = simulation.status, simulation.end_time, simulation.reason
     if reduction is None:
         rate_failure = rate_failure_of(kernel, theta, simulation, test.load_history.temperature)
         if rate_failure is not None:
             status, end_time, reason = Status.NOT_CONVERGED, *rate_failure
+    rows = simulation.at(piece.observed_outputs(test.load, simulation), test.history.times)
     return run_from_outputs(
-        kind, test.stated_history(), test.outputs, simulation.at(test.observed(simulation), test.history.times),
-        status, end_time, reason, test=test, simulation=simulation, states=tuple(map(str, law.states)),
+        piece.run_kind, test.stated_history(), piece.outputs, rows, status, end_time, reason, test=test,
+        simulation=simulation, states=tuple(map(str, law.states)),
     )  # fmt: skip
 
 

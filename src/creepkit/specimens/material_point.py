@@ -19,12 +19,14 @@ from creepkit import integration, kernels
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
+from creepkit.integration.tensor_point import von_mises
 from creepkit.integration.time_discretisation import SDIRK2_TEXT
 from creepkit.records import (
     TENSOR_COMPONENTS,
     History,
     HistoryPrediction,
     Load,
+    NuisanceValues,
     Output,
     PointLoading,
     Prediction,
@@ -95,10 +97,10 @@ class MaterialPoint(PointSpecimen):
 
     # ---- one history at a time -------------------------------------------------------------------------------------
 
-    def predict_plain(
-        self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool
+    def predict_batch(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues, sensitivities: bool
     ) -> Prediction:
-        """Predict histories without nuisances; theta : (candidates, parameters) internal values."""
+        """Predict histories; theta : (candidates, parameters) internal values."""
         kernel = kernels.lower(law, "compiled")
         steps = DIFFERENCE_STEP * np.array([1.0 if p.scale == "log" else np.inf for p in law.params.values()])
         steps = np.where(np.isinf(steps), DIFFERENCE_STEP * np.maximum(1.0, np.abs(theta)), steps)
@@ -240,8 +242,7 @@ class PointRun(Run):
     @property
     def mises(self) -> Floats:
         """The von Mises stress, (times,) MPa."""
-        deviator = self.stress - self.stress[:, :3].mean(axis=1)[:, None] * np.array([1, 1, 1, 0, 0, 0])
-        return np.asarray(np.sqrt(1.5 * (deviator**2 @ np.array([1, 1, 1, 2, 2, 2]))))
+        return von_mises(self.stress)
 
 
 def run_material_point(specimen: MaterialPoint, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
@@ -268,9 +269,6 @@ def run_material_point(specimen: MaterialPoint, law: CreepLaw, values: Mapping[s
         equivalent=result.equivalent[output_rows],
         states=states,
     )
-
-
-_SHEAR_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 
 def compliance(elastic: tuple[float, float]) -> Floats:
@@ -301,6 +299,5 @@ def elastic_von_mises(loading: PointLoading, elastic: tuple[float, float] | None
         stress[:, strain_controlled] = np.linalg.solve(
             flexibility[np.ix_(strain_controlled, strain_controlled)], elastic_residual.T
         ).T
-    deviator = stress - stress[:, :3].mean(axis=1)[:, None] * np.array([1, 1, 1, 0, 0, 0])
-    levels = np.unique(np.sqrt(1.5 * (deviator**2 @ _SHEAR_WEIGHTS)))
+    levels = np.unique(von_mises(stress))
     return np.asarray(levels[levels > 0])

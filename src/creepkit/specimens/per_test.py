@@ -5,8 +5,7 @@ from __future__ import annotations
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,13 +13,8 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import CreepkitError, SolveError, quoted
-from creepkit.records import History, Load, Prediction, Status
-from creepkit.records.prediction_assembly import (
-    HistoryPrediction,
-    assemble_prediction,
-    broadcast_candidates,
-    check_nuisances,
-)
+from creepkit.records import History, Prediction, Status
+from creepkit.specimens.separate_tests import TestResponse, predict_separately
 from creepkit.specimens.test_piece import TestPiece
 
 if TYPE_CHECKING:
@@ -50,10 +44,6 @@ class PerTest(TestPiece, ABC):
     lengths, nuisance parameters and errors are done here, sensitivities by differences where they are asked for.
     """
 
-    name: str
-    title: str
-    outputs: tuple[str, ...]
-    loads: tuple[Load, ...] = ()
     workers: int = 1
 
     @abstractmethod
@@ -67,52 +57,31 @@ class PerTest(TestPiece, ABC):
         SolveError where these values cannot be solved for: the candidate then counts as one that did not converge.
         """
 
-    def predict(
-        self,
-        law: CreepLaw,
-        theta: Floats,
-        histories: Sequence[History],
-        *,
-        nuisances: NuisanceValues | None = None,
-        sensitivities: bool = False,
+    def predict_batch(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues, sensitivities: bool
     ) -> Prediction:
-        """All candidates in all tests, see records.Predictor; derivatives are left to differences.
+        """All candidates in all tests; derivatives are left to differences.
 
         theta : (candidates, parameters) internal values.
         """
-        check_nuisances(nuisances or (), self.nuisances, f"specimen '{self.name}'")
-        theta, of_tests = broadcast_candidates(theta, nuisances, len(histories))
-        columns = law.from_internal(theta)
-        values = [{name: float(column[c]) for name, column in columns.items()} for c in range(len(theta))]
 
-        def outcome(task: tuple[int, int]) -> tuple[Floats, Status, float, str]:
-            c, k = task
-            own = {kind: float(given[c, k]) for kind, given in of_tests.items()}
-            return self._checked(law, values[c], histories[k], own)
+        def respond(row: Floats, k: int, of_test: Mapping[str, float]) -> TestResponse:
+            values = {name: float(column[0]) for name, column in law.from_internal(row[None]).items()}
+            return self._checked(law, values, histories[k], of_test)
 
-        tasks = [(c, k) for k in range(len(histories)) for c in range(len(theta))]
-        if self.workers > 1:
-            with ThreadPoolExecutor(self.workers) as pool:
-                found = list(pool.map(outcome, tasks))
-        else:
-            found = [outcome(task) for task in tasks]
-        parts = []
-        for k in range(len(histories)):
-            rows, status, ends, _ = zip(*found[k * len(theta) : (k + 1) * len(theta)], strict=True)
-            parts.append(HistoryPrediction(np.stack(rows), np.array(status, np.int64), np.array(ends, float)))
-        reason = next((reason for *_, reason in found if reason), "")
-        return replace(assemble_prediction(parts, histories, self.outputs, len(theta)), reason=reason)
+        return predict_separately(respond, theta, histories, nuisances, self.outputs, self.workers)
 
     def _checked(
         self, law: CreepLaw, values: Mapping[str, float], history: History, nuisances: Mapping[str, float]
-    ) -> tuple[Floats, Status, float, str]:
-        """Outputs (times, outputs), status, end and reason of one candidate; errors name test, values and line."""
+    ) -> TestResponse:
+        """What one() gives; errors name test, values and line."""
         end = float(history.times[-1])
         piece, tested = self.of_test(history, nuisances)
         try:
             found = piece.one(law, values, tested, nuisances)
         except SolveError as error:
-            return np.full((history.times.size, len(self.outputs)), np.nan), Status.NOT_CONVERGED, 0.0, str(error)
+            nothing = np.full((history.times.size, len(self.outputs)), np.nan)
+            return TestResponse(nothing, Status.NOT_CONVERGED, 0.0, str(error))
         except CreepkitError as error:
             raise SolveError(f"{self._place(values, history)}: {error}") from error
         except (Exception, SystemExit) as error:  # of the author's code, whatever it is
@@ -133,7 +102,7 @@ class PerTest(TestPiece, ABC):
                 f"{self._place(values, history)}: one() gave the status {quoted(repr(found.status))}; use ck.Status"
             )
         ended = end if np.isnan(found.end_time) else found.end_time
-        return self._rows(found, values, history), found.status, ended, ""
+        return TestResponse(self._rows(found, values, history), found.status, ended)
 
     def _rows(self, found: OneTest, values: Mapping[str, float], history: History) -> Floats:
         missing = [name for name in self.outputs if name not in found.outputs]

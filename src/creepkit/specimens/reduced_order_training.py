@@ -9,14 +9,11 @@ were trained on.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 from sympy import exp
 
@@ -156,19 +153,21 @@ def trained_basis(
         points = int(np.clip(POINT_SHARE * models[0].weights.size, FEWEST_POINTS, MOST_POINTS))
     settings = SolverSettings(deflection_limit=settings.deflection_limit, strain_limit=settings.strain_limit)
     key = _key(models, settings, modes, points)
-    if key not in _in_memory():
-        basis = _read(_file(key), models[0])
+    if key not in _IN_MEMORY:
+        folder = cache_folder("reduced_bases")
+        path = None if folder is None else folder / f"{key}.safetensors"
+        basis = None if path is None else _read(path, models[0])
         if basis is None:
-            data = snapshots(power_law_runs(models, RUNS), settings)
-            basis = train(data, modes, points, settings.deflection_limit)
-            _keep(basis, _file(key))
-        _in_memory()[key] = basis
-    return _in_memory()[key]
+            basis = train(snapshots(power_law_runs(models, RUNS), settings), modes, points, settings.deflection_limit)
+            arrays = {"modes": basis.modes, "points": basis.points, "factors": basis.factors}
+            with suppress(OSError, CreepkitError):  # then the next process trains it again
+                if path is not None:
+                    write_safetensors(path, arrays, {}, _FORMAT, internal=True)
+        _IN_MEMORY[key] = basis
+    return _IN_MEMORY[key]
 
 
-@cache
-def _in_memory() -> dict[str, ReducedBasis]:
-    return {}
+_IN_MEMORY: dict[str, ReducedBasis] = {}
 
 
 _FORMAT = DocumentFormat(
@@ -190,38 +189,11 @@ def _key(models: Sequence[FiniteElementModel], settings: SolverSettings, modes: 
     return digest.hexdigest()[:32]
 
 
-def _file(key: str) -> Path | None:
-    """Where a basis is kept; None where it cannot be."""
-    folder = cache_folder("reduced_bases")
-    return None if folder is None else folder / f"{key}.safetensors"
-
-
-def _keep(basis: ReducedBasis, path: Path | None) -> None:
-    """Write a basis; where nothing can be written it is trained again by the next process."""
-    if path is None:
-        return
-    arrays = {"modes": basis.modes, "points": basis.points, "factors": basis.factors}
-    with suppress(OSError, CreepkitError):
-        write_safetensors(path, arrays, {"sha256": _checksum(arrays)}, _FORMAT, internal=True)
-
-
-def _read(path: Path | None, model: FiniteElementModel) -> ReducedBasis | None:
-    """The basis of a file of ours; None where there is none for this mesh, or not as it was written."""
-    if path is None:
-        return None
+def _read(path: Path, model: FiniteElementModel) -> ReducedBasis | None:
+    """The basis of a file of ours; None where there is none for this mesh."""
     try:
-        arrays, header = read_safetensors(path, _FORMAT)
-        modes, points, factors = (arrays[name] for name in ("modes", "points", "factors"))
+        arrays, _ = read_safetensors(path, _FORMAT)
+        basis = ReducedBasis(*(arrays[name] for name in ("modes", "points", "factors")))
     except (CreepkitError, KeyError):
         return None
-    sound = header.get("sha256") == _checksum(arrays) and modes.shape[1:] == model.nodes.shape
-    return ReducedBasis(modes, points, factors) if sound else None
-
-
-def _checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
-    """SHA-256 of arrays (...,) by name: of names, types, shapes and bytes."""
-    digest = hashlib.sha256()
-    for name, array in sorted(arrays.items()):
-        digest.update(f"{name} {array.dtype} {array.shape}\n".encode())
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()
+    return basis if basis.modes.shape[1:] == model.nodes.shape else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -31,15 +31,6 @@ class Run(Presentable, History, text="reports.simulation:run_text"):
     status: Status = Status.COMPLETE
     end_time: float = 0.0
     reason: str = ""
-
-
-@runtime_checkable
-class Runnable(Protocol):
-    """A specimen that says more of one test than its outputs: how it ended and why, and what else it keeps."""
-
-    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> Run:
-        """Run the test that a history without outputs describes."""
-        ...
 
 
 def run_from_outputs(

@@ -10,7 +10,15 @@ from typing import Any, Self
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
-from creepkit.records import Dimension, History, Program, check_geometry, check_load, dimension_named
+from creepkit.records import (
+    Dimension,
+    History,
+    Specimen,
+    check_geometry,
+    check_load,
+    dimension_named,
+    warmer_and_stiffer,
+)
 
 BASIC_NUISANCES = ("temperature", "modulus")
 """Kinds that every test piece follows: they change the history itself."""
@@ -35,7 +43,7 @@ def dimension(
     )
 
 
-class TestPiece:
+class TestPiece(Specimen):
     """A specimen whose subclasses are frozen dataclasses; what `dimension()` marks are its lengths.
 
     `self.span` in its methods is the length of the test at hand: what the test states, or a nuisance parameter that is
@@ -43,8 +51,6 @@ class TestPiece:
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
-
-    name: str
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
         """SolveError, with its signature, where a method that a subclass has to write is missing."""
@@ -57,13 +63,13 @@ class TestPiece:
         return super().__new__(cls)
 
     @property
-    def dimensions(self) -> tuple[Dimension, ...]:
+    def dimensions(self) -> tuple[Dimension, ...]:  # type: ignore[override]
         """The lengths of the test piece, with its own values as defaults."""
         marked = (f for f in _fields_of(self) if "dimension" in f.metadata)
         return tuple(Dimension(f.name, float(getattr(self, f.name)), **f.metadata["dimension"]) for f in marked)
 
     @property
-    def nuisances(self) -> tuple[str, ...]:
+    def nuisances(self) -> tuple[str, ...]:  # type: ignore[override]
         """Kinds of explicit nuisances that predict() understands: lengths, temperature and modulus."""
         return (*(name for d in self.dimensions for name in d.names), *BASIC_NUISANCES)
 
@@ -104,13 +110,3 @@ class TestPiece:
 def _fields_of(record: object) -> tuple[Field[Any], ...]:
     """The fields of a dataclass; () of another class."""
     return tuple(getattr(type(record), "__dataclass_fields__", {}).values())
-
-
-def warmer_and_stiffer(history: History, temperature_change: float, modulus_change: float) -> History:
-    """A history that is so many K warmer, its modulus larger by that share."""
-    if temperature_change == 0.0 and modulus_change == 0.0:
-        return history
-    program, elastic = history.temperature_program(), history.elastic
-    if elastic is not None:
-        elastic = replace(elastic, E=elastic.E * (1.0 + modulus_change))
-    return history.replace(temperature=Program(program.times, program.values + temperature_change), elastic=elastic)

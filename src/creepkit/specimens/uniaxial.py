@@ -19,7 +19,18 @@ from creepkit import integration
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.records import History, Load, Loading, Output, Prediction, Specimen, Status, StressSteps, TimesToStrain
+from creepkit.records import (
+    History,
+    Load,
+    Loading,
+    NuisanceValues,
+    Output,
+    Prediction,
+    Specimen,
+    Status,
+    StressSteps,
+    TimesToStrain,
+)
 from creepkit.specimens.bar import Bar, elastic_strain, observed_strain
 from creepkit.specimens.load_scaling import LoadScaling
 
@@ -44,6 +55,8 @@ class Uniaxial(Bar):
         "Its true stress is the stress that is held, or under a held load the nominal one times the exponential of the "
         "logarithmic creep strain."
     )
+    own_nuisances: ClassVar[tuple[str, ...]] = ("modulus",)
+    follows_to_rupture: ClassVar[bool] = True
     load_scaling: ClassVar[LoadScaling] = LoadScaling()
     """For sampling: the reference stress is the load itself."""
 
@@ -87,16 +100,23 @@ class Uniaxial(Bar):
             times_to_strain=predicted_times_to_strain(histories, levels, result),
         )
 
-    def modulus_derivative(self, result: Prediction, histories: Sequence[History], modulus_changes: Floats) -> Floats:
-        """Derivative of the strain, (candidates, tests, times, 1), to the relative change of the modulus.
+    def predict_batch(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues, sensitivities: bool
+    ) -> Prediction:
+        """Predict histories; the elastic part of a strain follows the relative change of the modulus.
 
-        It is that of the elastic part; modulus_changes : (tests,) the changes themselves.
+        theta : (candidates, parameters) internal values.
         """
-        slope = np.zeros_like(result.values)
+        result = super().predict_batch(law, theta, histories, {}, sensitivities)
+        if "modulus" not in nuisances:
+            return result
+        values, slope = result.values.copy(), np.zeros_like(result.values)
         for k, history in enumerate(histories):
             if history.includes_elastic:
-                slope[:, k, : history.times.size, 0] = -elastic_strain(history) / (1.0 + modulus_changes[k])
-        return slope
+                share, elastic = 1.0 + nuisances["modulus"][:, k, None], elastic_strain(history)
+                values[:, k, : history.times.size, 0] += elastic / share - elastic
+                slope[:, k, : history.times.size, 0] = -elastic / share**2
+        return replace(result, values=values, nuisance_jacobian={"modulus": slope} if sensitivities else {})
 
 
 @lru_cache(maxsize=4096)

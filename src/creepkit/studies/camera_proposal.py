@@ -286,7 +286,7 @@ def _covers(record: InstrumentRecord, times: Floats) -> bool:
 def _dimples(frames: Frames) -> tuple[tuple[str, ...], str]:
     """The test pieces that frames show, or why none is seen."""
     try:
-        region = specimen_by_name(WATCHED).surface_region  # type: ignore[attr-defined]
+        region = specimen_by_name(WATCHED).surface_region
         return tuple(find_domes(frames, reference_plate(frames), region).centers), ""
     except (CreepkitError, OSError) as error:
         return (), " ".join(str(error).split())

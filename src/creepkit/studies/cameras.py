@@ -25,16 +25,7 @@ from creepkit.instruments.imposed import Imposed
 from creepkit.instruments.reading_options import RecordOptions
 from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.options import values_of_table
-from creepkit.records import (
-    ZERO_CELSIUS,
-    History,
-    Loading,
-    Nuisance,
-    Specimen,
-    SupportsSurfaceObservation,
-    dimensions_of,
-    loads_of,
-)
+from creepkit.records import ZERO_CELSIUS, History, Loading, Nuisance, Specimen, dimensions_of, loads_of
 from creepkit.registry.reading import frame_files
 from creepkit.reports.contents import Exclusion
 from creepkit.studies import arguments
@@ -204,8 +195,8 @@ class StudyCamera:
         key = ("specimen", "name") if of_study else self.key(*(["specimen"] if self.part.specimen else []))
         with self.file.at(*key):
             found = arguments.specimen_of_study(self.file) if of_study else ck.specimen(self.part.specimen or WATCHED)
-        if not isinstance(found, SupportsSurfaceObservation):
-            watched = [n for n, s in ck.available("specimens").items() if isinstance(s, SupportsSurfaceObservation)]
+        if not found.is_watched:
+            watched = [n for n, s in ck.available("specimens").items() if s.is_watched]
             what = f"specimen '{found.name}' does not say how cameras see its surface; {nearest(found.name, watched)}"
             raise self.file.error(key, what)
         return found

@@ -145,7 +145,7 @@ def _identification(summary: DataSummary) -> dict[str, Any]:
         "laws": laws,
         "damage": damage,
         "damage_of_tension": damage <= {"kachanov-rabotnov", "sinh-damage"},
-        "reduced": [name for name, one in reduced_order_models().items() if {getattr(one, "name", name)} == specimens],
+        "reduced": [name for name, one in reduced_order_models().items() if {one.name} == specimens],
         "lengths": [length for length in lengths if length.tolerance > 0][:1],
         "longer": longer,
     }

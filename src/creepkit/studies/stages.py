@@ -149,7 +149,7 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
 
     def make(results: Results, tick: Tick) -> Ranking:
         watched = [one for one in tests if "extraction" in one.labels and one.elastic is None]  # by cameras
-        known = {name: getattr(one, "conditions", {}) for name, one in known_specimens().items()}
+        known = {name: one.conditions for name, one in known_specimens().items()}
         needing = [one.name for one in watched if "modulus" in known[one.specimen]]
         if needing:
             where = "modulus [GPa] of the table of alloys, or modulus_GPa of [[camera]]"

@@ -19,15 +19,7 @@ from creepkit.errors import DatasetError, SurrogateError
 from creepkit.jobs.progress import ProgressCallback
 from creepkit.kernels.log_form import log_form
 from creepkit.language import CreepLaw
-from creepkit.records import (
-    Dimension,
-    History,
-    Program,
-    Specimen,
-    SupportsReducedOrderModel,
-    dimension_named,
-    dimensions_of,
-)
+from creepkit.records import Dimension, History, Program, Specimen, dimension_named, dimensions_of
 from creepkit.sampling.conditions import MODULUS, TEMPERATURE
 
 if TYPE_CHECKING:
@@ -351,11 +343,12 @@ def base_model(specimen: Any, base: str) -> Any:
         from creepkit.surrogates.reference_stress_model import ReferenceStressModel
 
         return ReferenceStressModel(specimen)
-    if not isinstance(specimen, SupportsReducedOrderModel):
+    model = specimen.reduced_order_model()
+    if model is None:
         raise SurrogateError(
             f"specimen '{specimen.name}' has no reduced-order model; use base='none' or base='reference-stress'"
         )
-    return specimen.reduced_order_model()
+    return model
 
 
 def hold_last_value(values: Floats) -> Floats:

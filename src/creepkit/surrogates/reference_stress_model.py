@@ -20,12 +20,11 @@ from creepkit.records import (
     History,
     HistoryPrediction,
     NuisanceValues,
-    Output,
     Prediction,
+    Predictor,
     Program,
     Specimen,
     assemble_prediction,
-    broadcast_candidates,
     constant_load,
 )
 from creepkit.sampling.conditions import check_stated, creep_output, mean_reference_stress, tested_piece
@@ -39,7 +38,7 @@ SETTINGS = IntegrationSettings(rtol=1e-4, strain_limit=10.0)
 
 
 @dataclass(frozen=True)
-class ReferenceStressModel:
+class ReferenceStressModel(Predictor):
     """The output that grows with creep: growth_per_strain(history) times the creep strain at the reference stress.
 
     specimen : the one whose record states both; its output must grow with creep.
@@ -57,35 +56,35 @@ class ReferenceStressModel:
             )
 
     @property
-    def name(self) -> str:
+    def name(self) -> str:  # type: ignore[override]
         """Of what it is a model."""
         return f"{self.specimen.name} at its reference stress"
 
     @property
-    def outputs(self) -> tuple[Output, ...]:
+    def outputs(self) -> tuple[str, ...]:  # type: ignore[override]
         """The output that grows with creep."""
         return (creep_output(self.specimen).output,)
 
-    def predict(
-        self,
-        law: CreepLaw,
-        theta: Floats,
-        histories: Sequence[History],
-        *,
-        nuisances: NuisanceValues | None = None,
-        sensitivities: bool = False,
+    @property
+    def nuisances(self) -> tuple[str, ...]:  # type: ignore[override]
+        """As the specimen's."""
+        return self.specimen.nuisances
+
+    def predict_batch(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues, sensitivities: bool
     ) -> Prediction:
-        """The output of each history at its times; see records.Predictor. Derivatives are left to differences.
+        """The output of each history at its times; derivatives are left to differences.
 
         theta : (candidates, parameters) internal values.
         """
         kernel = kernels.lower(law, "compiled")
-        theta, of_tests = broadcast_candidates(theta, nuisances, len(histories))
         every, parts = np.arange(len(theta)), []
-        for rows in every[:, None] if of_tests else [every]:  # with nuisances each candidate has test pieces of its own
+        for rows in (
+            every[:, None] if nuisances else [every]
+        ):  # with nuisances each candidate has test pieces of its own
             tests = []
             for k, history in enumerate(histories):
-                values = {kind: float(of_test[rows[0], k]) for kind, of_test in of_tests.items()}
+                values = {kind: float(of_test[rows[0], k]) for kind, of_test in nuisances.items()}
                 tests.append(tested_piece(self.specimen, history.replace(outputs={}, standard_deviation={}), values))
             points = [_point_test(*test) for test in tests]
             found = integration.integrate(kernel, theta[rows], points, settings=SETTINGS)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -28,11 +28,7 @@ from creepkit.records import (
     Predictor,
     Specimen,
     Status,
-    SupportsReducedOrderModel,
-    SupportsRefinement,
     assemble_prediction,
-    broadcast_candidates,
-    check_nuisances,
     dimension_named,
     known_specimens,
     outputs_of,
@@ -232,24 +228,26 @@ class NetworkQuery:
         return directions
 
 
-class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
+class Surrogate(Predictor, Presentable, text="reports.surrogate:surrogate_text"):
     """A trained network in the place of a specimen; a records.Predictor.
 
     It predicts at the frames of its training, and between them linearly in time. recipe, weights, metadata : what it
     was trained as, the arrays of its network, and what is known of its training.
     """
 
+    is_surrogate: ClassVar[bool] = True
+
     def __init__(self, recipe: ParameterGru, weights: Weights, metadata: SurrogateMetadata) -> None:
         self.recipe, self.weights, self.metadata = recipe, weights, metadata
         self.network = recipe.network(weights, metadata)
 
     @property
-    def name(self) -> str:
+    def name(self) -> str:  # type: ignore[override]
         """Which kind of surrogate it is, and of what."""
         return f"{self.recipe.kind} of {self.specimen.name}"
 
     @property
-    def title(self) -> str:
+    def title(self) -> str:  # type: ignore[override]
         """One line for people."""
         return f"{self.specimen.title}, by a network ({self.recipe.kind}) trained on law '{self.metadata.law.name}'"
 
@@ -259,14 +257,19 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
         return self.metadata.specimen
 
     @property
-    def outputs(self) -> tuple[str, ...]:
+    def outputs(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of what is predicted."""
         return self.metadata.outputs
 
     @property
-    def nuisances(self) -> tuple[str, ...]:
+    def nuisances(self) -> tuple[str, ...]:  # type: ignore[override]
         """The nuisances whose inputs were varied."""
         return self._history_inputs.nuisances
+
+    def single_threaded(self) -> Surrogate:
+        """The same network in the place of a specimen that starts no threads."""
+        specimen: Any = self.specimen.single_threaded()
+        return Surrogate(self.recipe, self.weights, replace(self.metadata, specimen=specimen))
 
     def outside_class(self, law: CreepLaw) -> str:
         """Why it does not predict a law, in a sentence; "" where it does."""
@@ -276,30 +279,21 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
             return str(error)
         return ""
 
-    def predict(
-        self,
-        law: CreepLaw,
-        theta: Floats,
-        histories: Sequence[History],
-        *,
-        nuisances: NuisanceValues | None = None,
-        sensitivities: bool = False,
+    def predict_batch(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues, sensitivities: bool
     ) -> Prediction:
-        """Predict each history's outputs at its times; see records.Predictor. theta : (candidates, parameters).
+        """Predict each history's outputs at its times; theta : (candidates, parameters) internal values.
 
         A row outside the domain of the training has its values all the same, and Status.OUTSIDE_DOMAIN. A law outside
         the class of the training has Status.OUTSIDE_CLASS, a `reason`, and NaN: nothing bounds the error there.
         """
         for history in histories:
             check_history(self.metadata, history)
-        check_nuisances(nuisances or (), self.nuisances, "this surrogate", SurrogateError)
         reason = self.outside_class(law)
         if reason:
-            candidates = len(broadcast_candidates(theta, nuisances, len(histories))[0])
             remedy = f"simulate it with the specimen '{self.specimen.name}' itself"
-            return unpredicted(histories, self.outputs, candidates, Status.OUTSIDE_CLASS, f"{reason}; {remedy}")
+            return unpredicted(histories, self.outputs, len(theta), Status.OUTSIDE_CLASS, f"{reason}; {remedy}")
         theta = complete_parameters(self.metadata.law, law, theta)
-        theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
         frames = prediction_frames(self.metadata.grid, histories)
         inputs, law_inputs, based = self._history_inputs, self._law_inputs, self.recipe.base != "none"
         tests = [*zip(histories, frames, strict=True)]
@@ -334,7 +328,7 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
         return self.network.weight_count
 
     @property
-    def error(self) -> dict[str, float]:
+    def error(self) -> dict[str, float]:  # type: ignore[override]
         """{output: standard deviation of its error}, in the output's unit, from the validation rows.
 
         1.25 times the mean absolute error, that of a Gaussian: rare large errors would widen every interval.
@@ -344,26 +338,11 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
 
     def reduced_order_model(self) -> Predictor:
         """A model for global searches: that of the specimen, if it has one, else the network itself."""
-        if isinstance(self.specimen, SupportsReducedOrderModel):
-            return self.specimen.reduced_order_model()
-        return self
-
-    @property
-    def tolerances(self) -> Mapping[str, float]:
-        """Relative standard deviations of lengths that nobody measured better: those of the specimen."""
-        return getattr(self.specimen, "tolerances", {})
+        return self.specimen.reduced_order_model() or self
 
     def refined(self) -> Predictor:
         """What it stands for: the specimen itself, on the finer discretisation where it has one."""
-        return self.specimen.refined() if isinstance(self.specimen, SupportsRefinement) else self.specimen
-
-    def reference_stress(self, history: History) -> Floats:
-        """The reference von Mises stresses, (levels,) MPa: the specimen's, or those that are prescribed."""
-        specimen_stress = getattr(self.specimen, "reference_stress", None)
-        if specimen_stress is not None:
-            return np.asarray(specimen_stress(history))
-        levels = np.unique(history.load_levels)
-        return np.asarray(levels[levels > 0])
+        return self.specimen.refined() or self.specimen
 
     @property
     def file_header(self) -> dict[str, Any]:
@@ -424,16 +403,13 @@ class Surrogate(Presentable, text="reports.surrogate:surrogate_text"):
         )
 
 
-def reduced_order_models() -> dict[str, SupportsReducedOrderModel]:
-    """{name of a surrogate: the known specimen whose reduced-order model it is}.
+def reduced_order_models() -> dict[str, Predictor]:
+    """{name of a surrogate: the reduced-order model of a known specimen}.
 
     The name is the specimen's `surrogate_name`, by default its own.
     """
-    return {
-        getattr(specimen, "surrogate_name", name): specimen
-        for name, specimen in known_specimens().items()
-        if isinstance(specimen, SupportsReducedOrderModel)
-    }
+    known = {name: (one, one.reduced_order_model()) for name, one in known_specimens().items()}
+    return {one.surrogate_name or name: model for name, (one, model) in known.items() if model is not None}
 
 
 SUFFIX = ".safetensors"
@@ -448,7 +424,7 @@ def surrogate(name_or_path: str | Path) -> Predictor:
     """
     text = str(name_or_path)
     if isinstance(name_or_path, str) and not text.endswith(SUFFIX) and text in (named := reduced_order_models()):
-        return named[text].reduced_order_model()
+        return named[text]
     if not (text.endswith(SUFFIX) or Path(text).exists()):
         choices = nearest(text, reduced_order_models())
         raise SurrogateError(f"no surrogate is called '{text}', and there is no such file; {choices}")

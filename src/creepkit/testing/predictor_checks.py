@@ -18,11 +18,11 @@ from creepkit.records import (
     History,
     Output,
     Prediction,
+    Predictor,
     Status,
     dimension_named,
     outputs_of,
     outputs_of_tests,
-    predict_with,
     typical_history,
 )
 from creepkit.registry import default_registry
@@ -48,9 +48,6 @@ RELATED = {"reduced_order_model": 0.25, "refined": 0.1}
 """By how much such a model may differ, of the largest value of an output."""
 
 
-UNKNOWN_NUISANCE = "no_such_kind"
-
-
 STEPS = {"temperature": 0.5, "modulus": 0.01}
 """Of central differences in nuisances; lengths move by half a per cent."""
 
@@ -66,7 +63,7 @@ class PredictorCase:
     theta : (1, parameters) internal values. histories : two or more tests of different lengths.
     """
 
-    predictor: Any
+    predictor: Predictor
     law: CreepLaw
     theta: Floats
     histories: Sequence[History]
@@ -86,15 +83,14 @@ class PredictorCase:
         histories: Sequence[History] | None = None,
         nuisances: Mapping[str, Floats] | None = None,
         sensitivities: bool = False,
-        using: Any = None,
+        using: Predictor | None = None,
         law: CreepLaw | None = None,
     ) -> Prediction:
         """A prediction that was checked for shape.
 
         theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}.
         """
-        return predict_with(
-            using or self.predictor,
+        return (using or self.predictor).predict(
             law or self.law,
             self.theta if theta is None else theta,
             self.histories if histories is None else histories,
@@ -103,7 +99,7 @@ class PredictorCase:
         )
 
 
-def default_histories(predictor: object) -> list[History]:
+def default_histories(predictor: Predictor) -> list[History]:
     """Two tests of different lengths and loads, from the record of a specimen."""
     first = typical_history(predictor, frames=20)
     second = typical_history(predictor, level=0.45, frames=11, end=0.6 * float(first.times[-1]))
@@ -122,16 +118,17 @@ def law_of_check(predictor: Any, law: CreepLaw | str | None, history: History) -
     values_warm = {**values, "A": float(rate * np.exp(-3e5 / 8.314462618 * change)), "Q": 3e5}
     with suppress(CreepkitError):  # a closed form of Norton's law alone
         theta = warm.to_internal(warm.values(values_warm))
-        prediction_or_refusal(lambda: predict_with(predictor, warm, theta, [history]))
+        prediction_or_refusal(lambda: predictor.predict(warm, theta, [history]))
         return warm, values_warm
-    predict_with(predictor, norton, norton.to_internal(norton.values(values)), [history])  # says why it cannot
+    predictor.predict(norton, norton.to_internal(norton.values(values)), [history])  # says why it cannot
     return norton, values
 
 
 def norton_at(predictor: Any, history: History) -> tuple[float, dict[str, float]]:
     """A, MPa^-4/s, and values of Norton's law with n = 4: a creep strain of half a per cent at the end of a test."""
-    record = getattr(predictor, "specimen", predictor)
-    found = float(np.max(record.reference_stress(history), initial=0.0)) if hasattr(record, "reference_stress") else 0.0
+    record = predictor.specimen
+    stated = record.reference_stress(history) if record.states("reference_stress") else 0.0
+    found = float(np.max(stated, initial=0.0))
     level = found if 0.0 < found < np.inf else 100.0
     rate = TYPICAL_STRAIN / float(history.times[-1]) / level**4
     return rate, {"A": rate, "n": 4.0}
@@ -162,7 +159,7 @@ def largest_difference(first: Floats, second: Floats) -> float:
 @finding("outputs")
 def check_outputs(case: PredictorCase) -> str:
     """Outputs have names, and those of a test are among them."""
-    outputs = tuple(getattr(case.predictor, "outputs", ()))
+    outputs = tuple(case.predictor.outputs)
     assert outputs, "none; state outputs = (ck.Output('deflection', 'length'),)"
     stated = outputs_of_tests(case.predictor, case.histories)
     unknown = [name for name in stated if name not in outputs_of(case.predictor)]
@@ -255,7 +252,7 @@ def check_pickling(case: PredictorCase) -> str:
 def check_sensitivities(case: PredictorCase) -> str:
     """Derivatives to the law's internal parameters against central differences."""
     history = case.histories[:1]
-    found = case.predict(histories=history, sensitivities=True)
+    found = case.predictor.predict_batch(case.law, case.theta, history, {}, True)
     if found.jacobian is None:
         return "none, differences are taken in their place"
     gap = largest_difference(case.predict(histories=history).values, found.values)
@@ -302,7 +299,7 @@ def nuisance_value(case: PredictorCase, kind: str) -> tuple[float, float]:
     return float(length.default), step
 
 
-@finding("nuisance {}", each=lambda case: getattr(case.predictor, "nuisances", ()))
+@finding("nuisance {}", each=lambda case: case.predictor.nuisances)
 def check_nuisance(case: PredictorCase, kind: str) -> str:
     """Each declared kind is taken, with its derivative where that is given."""
     history, (value, step) = case.histories[:1], nuisance_value(case, kind)
@@ -324,18 +321,6 @@ def check_nuisance(case: PredictorCase, kind: str) -> str:
     return f"{detail}, derivative {excess:.1e} beyond what differences leave open"
 
 
-@finding("an undeclared nuisance is refused")
-def check_unknown_nuisance(case: PredictorCase) -> str:
-    """A nuisance of a kind that there is not is an error."""
-    refusal = refusal_of(
-        lambda: case.predict(histories=case.histories[:1], nuisances={UNKNOWN_NUISANCE: np.array([[0.1]])}),
-        f"nuisance '{UNKNOWN_NUISANCE}' is taken in silence; call creepkit.records.check_nuisances() in predict()",
-    )
-    other = "raised TypeError" in refusal and UNKNOWN_NUISANCE not in refusal
-    assert not other, f"{refusal}; take nuisances= and sensitivities= in predict()"
-    return refusal
-
-
 def refusal_of(call: Callable[[], object], remedy: str) -> str:
     """The one line that a call is refused in; remedy : what to say where it is not."""
     try:
@@ -346,7 +331,7 @@ def refusal_of(call: Callable[[], object], remedy: str) -> str:
     raise AssertionError(remedy)
 
 
-@finding("{}()", each=lambda case: [method for method in RELATED if hasattr(case.predictor, method)])
+@finding("{}()", each=lambda case: [method for method in RELATED if case.predictor.states(method)])
 def check_related_model(case: PredictorCase, method: str) -> str:
     """A reduced-order model and a refined predictor have the same outputs and about the same values."""
     history = case.histories[-1:]

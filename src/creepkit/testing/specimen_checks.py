@@ -22,7 +22,6 @@ from creepkit.records import (
     dimensions_of,
     loading_of,
     loads_of,
-    predict_with,
     typical_history,
 )
 from creepkit.registry import default_registry
@@ -52,7 +51,7 @@ FOLLOWED = 1e-3
 @finding("quantities of outputs")
 def check_quantities(case: PredictorCase) -> str:
     """Outputs have a quantity, unit and noise."""
-    plain = [str(o) for o in getattr(case.predictor, "outputs", ()) if not isinstance(o, Output)]
+    plain = [str(o) for o in case.predictor.outputs if not isinstance(o, Output)]
     assert not plain, f"'{plain[0]}' is a plain name; write ck.Output('{plain[0]}', 'length') with its quantity"
     return "stated"
 
@@ -60,7 +59,7 @@ def check_quantities(case: PredictorCase) -> str:
 @finding("reference stress")
 def check_reference_stress(case: PredictorCase) -> str:
     """The stress that stands for a test is positive, MPa."""
-    if not hasattr(case.predictor, "reference_stress"):
+    if not case.predictor.states("reference_stress"):
         assert {load.name for load in loads_of(case.predictor)} == {"stress"}, (
             "reference_stress(history) is missing; return the von Mises stress, MPa, that stands for a test"
         )
@@ -86,7 +85,7 @@ def check_frozen(case: PredictorCase) -> str:
             f"{error}; a specimen is a key of dictionaries: let every field be hashable, a tuple for a list"
         ) from None
     if settings is not None and hasattr(specimen, "replace"):
-        lengths = {length.name: length.default for length in getattr(specimen, "dimensions", ())}
+        lengths = {length.name: length.default for length in specimen.dimensions}
         same = specimen.replace(**{name: value for name, value in lengths.items() if hasattr(specimen, name)})
         equal = same == specimen and hash(same) == hash(specimen)
         assert equal, "replace() with its own lengths gives another specimen"
@@ -111,7 +110,7 @@ def check_loads(case: PredictorCase) -> str:
 def check_load(case: PredictorCase, load: Load) -> str:
     """Every load that is declared works."""
     plan = typical_history(case.predictor, load.name, frames=8)
-    found = predict_with(case.predictor, case.law, case.theta, [plan])
+    found = case.predictor.predict(case.law, case.theta, [plan])
     status = Status(int(found.status[0, 0]))
     assert status is Status.COMPLETE and np.isfinite(found.of(0)).all(), (
         f"a typical test ends early, {status.text}{f': {found.reason}' if found.reason else ''}; state the range of "
@@ -193,7 +192,7 @@ def check_other_law(case: PredictorCase, name: str) -> str:
 def check_length(case: PredictorCase, length: Any) -> str:
     """Each length is followed when a test states it, as it is when it is a nuisance parameter."""
     assert isinstance(length, Dimension), f"{length!r} is none; write ck.dimension(50.0) for a field"
-    kinds = getattr(case.predictor, "nuisances", ())
+    kinds = case.predictor.nuisances
     kind = next((kind for kind in length.names if kind in kinds), None)
     assert kind is not None, f"it is no nuisance parameter; add '{length.name}' to nuisances"
     if not length.of_piece:

@@ -41,7 +41,7 @@ def creepkit_readers():
 """
 
 
-class Steady:
+class Steady(ck.Predictor):
     """Closed form of steady creep, A s^n t, that ends as it is told to."""
 
     name = "steady"
@@ -49,9 +49,7 @@ class Steady:
     def __init__(self, status: Status = Status.COMPLETE, end: float = np.inf) -> None:
         self.status, self.end = status, end
 
-    def predict(
-        self, law: ck.CreepLaw, theta: np.ndarray, histories: Sequence[History], *, sensitivities: bool = False
-    ) -> Prediction:
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities) -> Prediction:
         times, values = histories[0].times, law.from_internal(theta[0])
         stress = histories[0].loading.program().at(times)
         strain = np.where(times <= self.end, values["A"] * stress ** values["n"] * times, np.nan)

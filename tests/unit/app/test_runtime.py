@@ -11,7 +11,6 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import Program, RecordedLoading
 from creepkit.registry import default_registry
-from creepkit.specimens.bulge.finite_elements import BulgeTest
 from helpers.export_cases import LAWS
 from helpers.javascript import run_in_node
 from helpers.page_runtime import in_page, pairs, values_that_creep
@@ -249,7 +248,7 @@ def test_the_coarse_model_is_near_and_the_section_is_that_of_the_modes(model, da
     amplitude = np.array(full["outputs"]["amplitude"])
     np.testing.assert_allclose(np.array(fast["outputs"]["amplitude"])[3:], amplitude[3:], rtol=0.02)
     assert fast["steps"] < full["steps"]
-    mesh = BulgeTest.model_of(model.specimen)
+    mesh = model.specimen.finite_elements()
     rest, places = (np.reshape(full[name], (-1, 2)) for name in ("rest", "places"))
     np.testing.assert_allclose(rest, mesh.nodes, atol=1e-12)
     run = model.run(STRAIN_HARDENING, values, planned())

@@ -20,7 +20,7 @@ from creepkit.dataset.dataset import COLUMNS
 from creepkit.dataset.generation import GenerationJob
 from creepkit.dataset.simulation import empty_dataset, rounded_outputs, simulate_rows
 from creepkit.errors import DatasetError
-from creepkit.records import Status, SupportsReducedOrderModel
+from creepkit.records import Status
 from creepkit.sampling.criteria import BURST_TIME_FACTOR, SimulationOutcome, paper_criteria
 from creepkit.sampling.domains import sampling_design
 from helpers.dataset_runs import assert_same
@@ -66,8 +66,8 @@ def test_a_failed_sample_is_data_with_its_text(data):
 def test_a_sample_that_does_not_converge_at_all_has_failed(tmp_path):
     @dataclass(frozen=True)
     class Stuck(type(BAR)):
-        def predict(self, law, theta, histories, **options):
-            found = super().predict(law, theta, histories, **options)
+        def predict_batch(self, law, theta, histories, nuisances, sensitivities):
+            found = super().predict_batch(law, theta, histories, nuisances, sensitivities)
             nothing = np.full_like(found.values, np.nan)
             return replace(found, values=nothing, status=found.status + 2, end_times=found.end_times * 0)
 
@@ -337,10 +337,10 @@ def test_whether_samples_are_screened_decides_what_a_generation_is(tmp_path):
     assert len(prints) == 2
 
 
-class Misled:
+class Misled(ck.Predictor):
     """A stand-in that a law of a plugin makes fail."""
 
-    def predict(self, law, theta, histories):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         raise ZeroDivisionError("of no use")
 
 
@@ -354,7 +354,6 @@ class Fragile(type(ck.specimen("uniaxial"))):
 
 def test_a_stand_in_that_fails_leaves_it_to_the_simulation():
     bar = Fragile()
-    assert isinstance(bar, SupportsReducedOrderModel)
     design = sampling_design(NORTON, bar, "paper", every=21600.0)
     found = simulate_rows(design, empty_dataset(design, bar, {}), 1, 0, 16)
     assert not found.failures

@@ -237,8 +237,8 @@ def test_curves_with_noise_of_their_own_lie_inside(fit):
 
 def test_draws_that_the_solver_does_not_finish_are_left_out_and_said(fit):
     class Weak(type(BAR)):
-        def predict(self, law, theta, histories, **options):
-            made = super().predict(law, theta, histories, **options)
+        def predict_batch(self, law, theta, histories, nuisances, sensitivities):
+            made = super().predict_batch(law, theta, histories, nuisances, sensitivities)
             if len(theta) > 20:
                 made.status[:10] = Status.NOT_CONVERGED
             return made

@@ -257,7 +257,7 @@ TESTS = [h.replace(standard_deviation={"strain": SD}) for h in bars("X")]
 
 
 @dataclass(frozen=True)
-class Stranger:
+class Stranger(ck.Predictor):
     """Predicts what a bar does, and something more in strain; says that it ended as `status` tells."""
 
     more: float = 0.0
@@ -265,7 +265,7 @@ class Stranger:
     name: str = "stranger"
     outputs: tuple[str, ...] = ("strain",)
 
-    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         found = BAR.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
         status, ends = np.full_like(found.status, int(self.status)), np.full(found.end_times.shape, 3600.0)
         return replace(found, values=found.values + self.more, status=status, end_times=ends)

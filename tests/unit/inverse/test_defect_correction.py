@@ -1,6 +1,6 @@
 """Defect correction: predictors that are wrong by known amounts, and what comes back with and without the exact one."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,9 +16,8 @@ from creepkit.inverse.identification_document import identification_from_json, i
 from creepkit.inverse.identify import identify
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.language import CreepLaw
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, Prediction, Predictor, Status
+from creepkit.records import Predictor, Status
 from creepkit.reports.prediction_bands import fitted_curves
 from helpers.steady_rate_predictor import planted
 from helpers.two_outputs_predictor import TwoOutputs, with_two_outputs
@@ -43,7 +42,7 @@ def relative(values: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Coarse:
+class Coarse(Predictor):
     """Predicts what `TwoOutputs` does, with an error; refined() is without it, where it is offered."""
 
     defect: Callable[[np.ndarray, np.ndarray], np.ndarray] = additive
@@ -51,9 +50,7 @@ class Coarse:
     name: str = "coarse"
     outputs: tuple[str, ...] = EXACT.outputs
 
-    def predict(
-        self, law: CreepLaw, theta: np.ndarray, histories: Sequence[History], *, sensitivities: bool = False
-    ) -> Prediction:
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         found = EXACT.predict(law, theta, histories, sensitivities=sensitivities)
         values = np.array(found.values)
         for k, h in enumerate(histories):
@@ -75,7 +72,7 @@ class Stopping(TwoOutputs):
 
     status: Status = Status.COMPLETE
 
-    def predict(self, law, theta, histories, *, sensitivities=False):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         found = EXACT.predict(law, theta, histories, sensitivities=sensitivities)
         status = np.array(found.status)
         status[:, 0] = int(self.status)

@@ -217,7 +217,7 @@ def test_a_rate_without_a_temperature_is_that_at_the_reference_temperature(fit_o
     np.testing.assert_array_equal(fit.rate(80.0), fit.rate(80.0, fit.reference.temperature))
     assert fit.reference.temperature == 1025.0
     assert fit.adequacy.explains  # of simulated tests without noise: what they round is no bend over the stress
-    assert "MPa and 752 °C" in fit.details()
+    assert "MPa, 752 °C" in fit.details()
 
 
 # ---- candidates ------------------------------------------------------------------------------------------------------

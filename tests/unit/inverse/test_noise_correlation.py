@@ -95,7 +95,7 @@ class Logarithmic(Steady):
 
     outputs = ("strain", "amplitude")
 
-    def predict(self, law, theta, histories, *, sensitivities=False):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         found = Steady().predict(law, theta, histories, sensitivities=True)
         gain = np.array([1.0, 40.0])
         jacobian = found.jacobian * gain[:, None] if sensitivities else None

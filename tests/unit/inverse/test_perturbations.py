@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.composite_predictor import predict
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor
@@ -83,7 +82,7 @@ def test_the_clock_argument_is_a_simulation_with_a_program_of_temperature(law, l
     tests = bars(law, [loading])
     effects, problem, linear = effects_of(law, tests)
     up, down = (
-        predict(BAR, law, theta(law)[None], tests, nuisances={DRIFT: np.array([[sign * 0.05]])}).values[0, 0, :, 0]
+        BAR.predict(law, theta(law)[None], tests, nuisances={DRIFT: np.array([[sign * 0.05]])}).values[0, 0, :, 0]
         for sign in (1.0, -1.0)
     )
     expected = (up - down) / 0.1 * USUAL_DRIFT

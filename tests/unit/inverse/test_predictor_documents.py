@@ -22,12 +22,12 @@ TESTS = bars("X")
 
 
 @dataclass(frozen=True)
-class Foreign:
+class Foreign(ck.Predictor):
     """A predictor that no plugin registers."""
 
     name: str = "foreign"
 
-    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         return BAR.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
 
 

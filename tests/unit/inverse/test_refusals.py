@@ -163,8 +163,8 @@ class Failing(Steady):
     def __init__(self, fails=lambda theta, tests: np.ones((len(theta), len(tests)), bool)) -> None:
         self.fails = fails
 
-    def predict(self, law, theta, histories, *, sensitivities=False):
-        found = super().predict(law, theta, histories, sensitivities=sensitivities)
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
+        found = super().predict_batch(law, theta, histories, nuisances, sensitivities)
         failed = self.fails(theta, histories)
         status = np.where(theta[:, 1:] > 6.0, int(Status.OUTSIDE_CLASS), int(Status.NOT_CONVERGED))
         return replace(

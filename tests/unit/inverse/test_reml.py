@@ -13,7 +13,7 @@ from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, cov
 from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.residuals import life_sensitivity, orthogonal_distance
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.uncertainty.laplace_approximation import restricted_covariance
+from creepkit.inverse.uncertainty.laplace_approximation import restricted_covariance, with_freedom
 from creepkit.inverse.variance_components import (
     LinearisedProblem,
     estimate_variance_components,
@@ -77,7 +77,7 @@ def test_what_a_predictor_states_of_its_error_is_not_asked_of_the_data():
         ("amplitude", "correlation_length"),
     }
     assert weighting.unestimated_drift_components(white(0.3, ("amplitude",), drift=0.1)) == set()
-    assert restricted_covariance(linear, scatter, ())[1] < 10.0
+    assert (restricted_covariance(linear, scatter, ())[1] < 10.0).all()
     assert restricted_covariance(linear, scatter, (), weighting.unestimated_drift_components(scatter))[
         1
     ] == pytest.approx(22.0, rel=1e-3)
@@ -89,6 +89,20 @@ def test_the_mean_of_a_few_tests_has_their_number_less_one():
     linear = replace(linear, residuals=replace(linear.residuals, log_rate_sensitivity=np.ones((5, 3))))
     scatter = NoiseModel({"strain": OutputNoise(1e-4)}, rate=0.3)
     assert restricted_covariance(linear, scatter, ())[1] == pytest.approx(4.0, rel=1e-3)
+
+
+def test_what_every_curve_shows_has_more_degrees_of_freedom_than_what_tests_scatter_in():
+    """Of 5 tests with 30 readings, balanced: the mean has T - 1, a slope within tests T (N - 1) - 1."""
+    x = np.linspace(-1.0, 1.0, 30)
+    design = np.repeat(np.stack([np.ones(30), x], axis=-1)[None], 5, axis=0)
+    linear = linear_model(np.zeros((5, 30)), design)
+    linear = replace(linear, residuals=replace(linear.residuals, log_rate_sensitivity=np.ones((5, 30))))
+    scatter = NoiseModel({"strain": OutputNoise(0.1)}, rate=0.3)
+    covariance, freedom = restricted_covariance(linear, scatter, ())
+    assert freedom == pytest.approx([4.0, 144.0], rel=1e-3)
+    widths = 1.959964 * np.sqrt(np.diag(with_freedom(covariance, freedom)))
+    exact = [2.776445 * np.sqrt((0.3**2 + 0.1**2 / 30) / 5), 1.976575 * 0.1 / np.sqrt(5 * (x**2).sum())]
+    assert widths == pytest.approx(exact, rel=1e-3)
 
 
 def test_a_prior_counts_where_its_unknown_stands_at_its_bound():

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import predict, predict_with_sensitivities
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
 from creepkit.language import Elastic, arrhenius
@@ -42,7 +41,7 @@ def rate(stress=90.0, temperature=1040.0):
 def strain(nuisances, test=None, predictor=FINE, law=LAW, theta=THETA):
     test = test or bar("one")
     given = {key: np.array([[value]]) for key, value in nuisances.items()}
-    return predict(predictor, law, theta[None], [test], nuisances=given).values[0, 0, :, 0]
+    return predictor.predict(law, theta[None], [test], nuisances=given).values[0, 0, :, 0]
 
 
 # ---- values ------------------------------------------------------------------------------------------------------
@@ -84,14 +83,14 @@ def test_a_rate_step_reaches_internal_variables_and_hardening_laws():
 def test_derivatives_of_bars_are_those_of_differences(key):
     tests, (value, step) = [bar("one"), bar("two", 70.0, 1060.0, 12000.0, 20)], STEPS[key]
     values = {key: np.array([[value, 0.5 * value]])}
-    found = predict_with_sensitivities(BAR, LAW, THETA, tests, values)
-    up, down = (predict(FINE, LAW, THETA[None], tests, nuisances={key: values[key] + s}).values for s in (step, -step))
+    found = BAR.predict(LAW, THETA[None], tests, nuisances=values, sensitivities=True)
+    up, down = (FINE.predict(LAW, THETA[None], tests, nuisances={key: values[key] + s}).values for s in (step, -step))
     expected = (up - down) / (2 * step)
     largest = np.nanmax(np.abs(expected))
     assert largest > 0
     present = np.isfinite(expected)
     np.testing.assert_allclose(found.nuisance_jacobian[key][present], expected[present], atol=1e-3 * largest)
-    plain = predict_with_sensitivities(BAR, LAW, THETA, tests, {key: 0.0 * values[key]})
+    plain = BAR.predict(LAW, THETA[None], tests, nuisances={key: 0.0 * values[key]}, sensitivities=True)
     assert plain.jacobian.shape == found.jacobian.shape == (1, 2, 24, 1, 3)
 
 
@@ -106,9 +105,10 @@ def test_derivatives_of_finite_elements_are_those_of_differences(key):
     )  # fmt: skip
     (value, step), coarse, fine = STEPS[key], Bulge(refinement=0.5), Bulge(refinement=0.5, tolerance=1e-4)
     values = {key: np.array([[value]])}
-    found = predict_with_sensitivities(coarse, LAW, THETA, [test], values).nuisance_jacobian[key][0, 0, :, 0]
+    found = coarse.predict(LAW, THETA[None], [test], nuisances=values, sensitivities=True)
+    found = found.nuisance_jacobian[key][0, 0, :, 0]
     up, down = (
-        predict(fine, LAW, THETA[None], [test], nuisances={key: values[key] + s}).values[0, 0, :, 0]
+        fine.predict(LAW, THETA[None], [test], nuisances={key: values[key] + s}).values[0, 0, :, 0]
         for s in (step, -step)
     )
     expected = (up - down) / (2 * step)

@@ -5,7 +5,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import reduced_order_model_of
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
@@ -169,7 +168,7 @@ def test_errors_common_to_tests_are_the_covariance_of_all_of_them_as_one_matrix(
 
 def test_tests_together_are_known_no_worse_than_the_best_of_them_alone():
     """A bar, a dimple and three beams of one alloy: the exponent and the coefficient, each beside the narrowest."""
-    dimple = reduced_order_model_of(Bulge())
+    dimple = Bulge().reduced_order_model()
     using = {"uniaxial": Uniaxial(), "three-point-bend": ck.specimen("three-point-bend"), "bulge": dimple}
     times, rng = np.geomspace(600.0, 360e3, 40), np.random.default_rng(0)
 

@@ -11,7 +11,7 @@ from creepkit.quality import FRAME_FLAG_KINDS, check_data_quality, exclude_suspe
 from creepkit.quality.idle_time import idle_parts
 from creepkit.quality.loading_strain import unstated_loading_strain
 from creepkit.readers.reading import creepkit_readers, read_histories
-from creepkit.records import History, Prediction, PressureJump, StressSteps
+from creepkit.records import History, Prediction, Predictor, PressureJump, StressSteps
 from helpers.paths import SHARED, needs_shared_data
 
 DATA = SHARED
@@ -20,10 +20,10 @@ HOUR = 3600.0
 TIMES = np.arange(1, 97) * 150.0
 
 
-class ElasticDimple:
+class ElasticDimple(Predictor):
     """Shows 749 mm x (1 + 830 x)^-.723 of amplitude, x = P/E: a published fit for the dimple of .5 mm thickness."""
 
-    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         (history,) = histories
         x = history.loading.program().at(history.times) / history.elastic.E
         value = 749 * x * (1 + 830 * x) ** -0.723

@@ -119,18 +119,6 @@ def test_two_readings_at_the_time_of_a_step_state_it(read):
     np.testing.assert_allclose(history.outputs["strain"], [0, 0.01, 0.021, 0.03, 0.04])
 
 
-def test_numbered_steps(read):
-    head = HOT + "# stress_1_MPa: 100\n# stress_2_MPa: 110\n# stress_3_MPa: 120\n"
-    times, steps = np.array([0.0, 10, 20, 20.1, 30, 40, 40.1, 50]) * 3600, [1, 1, 1, 2, 2, 2, 3, 3]
-    body = "time_s,step,strain_pct\n" + rows(times, steps, times / 1e6)
-    expected = StressSteps(((0.0, 100.0), (20.1 * 3600, 110.0), (40.1 * 3600, 120.0)))
-    assert read(head + body).loading == expected
-    with pytest.raises(HistoryError, match="x.csv:11: step 3 has no level; write stress_3 with its unit"):
-        read(head.replace("# stress_3_MPa: 120\n", "") + body)
-    with pytest.raises(HistoryError, match="'stress_3_MPa' has no meaning beside the other conditions"):
-        read(head + "# jump_time_h: 20\ntime_s,strain_pct\n0,0\n10,1\n")
-
-
 def test_a_record_with_ramps_and_noise_stays_a_program(read):
     stress = 100.0 + np.array([0, 0.01, 0, 8, 16, 20, 20.01, 20, 20, 20.01, 20, 20])
     history = read(HOT + "time_s,strain_pct,stress_MPa\n" + rows(STEP_TIMES, STRAIN, stress))

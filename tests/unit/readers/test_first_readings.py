@@ -104,3 +104,15 @@ def test_tubes_of_several_diameters(read):
     assert "that of a tube always includes it" in tests[0].labels["assumed"]
     with pytest.raises(HistoryError, match='specimen = "tube" \\(or specimen = "open-tube"\\)'):
         read(TUBES.replace("# specimen: tube\n", ""))
+
+
+def test_points_of_a_plot(tmp_path):
+    """Sets side by side, in the order of the clicks, the first left of the axis."""
+    text = "650C 100MPa,,650C 120MPa,\nX,Y,X,Y\n-0.5,0,-0.5,0\n60,0.4,90,0.9\n30,0.2,40,0.5\n"
+    (tmp_path / "fig7.csv").write_text(text)
+    with pytest.raises(HistoryError, match="'X' and 'Y' are columns of a plot") as caught:
+        ck.read_histories(tmp_path)
+    (tmp_path / "tests.toml").write_text(f'["*.csv"]\n{caught.value.entry(caught.value.choices[0])}\n')
+    first, second = ck.read_histories(tmp_path)
+    assert (first.condition, second.condition) == ("650 °C, 100 MPa", "650 °C, 120 MPa")
+    np.testing.assert_allclose(second.outputs["strain"], [0.0, 0.005, 0.009])

@@ -83,13 +83,6 @@ def test_another_laboratory_is_a_declaration(tmp_path):
     np.testing.assert_allclose(history.outputs["strain"], [0, 0.02])
 
 
-def test_key_cannot_lead_out_of_the_folder(tmp_path):
-    (tmp_path / "A_creep.csv").write_text("secret")
-    index = "test,temperature_C,stress_MPa\nA,980,230\nB,980,140\n../A,980,1\n"
-    with pytest.raises(HistoryError, match=r"index.csv:4: test '../A' has no file"):
-        INDEXED_FILES.read(folder(tmp_path, files(index)))
-
-
 def test_what_an_empty_cell_of_the_index_leaves_unknown_is_said(tmp_path):
     index = "key,temperature_C,stress_MPa,youngs_MPa,state,product\na/1,900,25,,Ruptured,\na/2,950,20,144000,,Base\n"
     first, second = INDEXED_TABLE.read(folder(tmp_path, {"index.csv": index, "curves.csv": CURVES}))

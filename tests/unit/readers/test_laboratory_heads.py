@@ -40,11 +40,12 @@ def test_a_german_table(tmp_path: Path) -> None:
 
 def test_titles_above_conditions_and_remarks_beside_frames(tmp_path: Path) -> None:
     conditions = [["Program Z, 2024"], [], ["Test", "Stress (MPa)", "Temperature (°C)"], ["Z1", 120, 650]]
-    frames = [["Test Z1"], ["Time (h)", "Creep strain (%)", "Remark"], [0, 0.0, "start"], [1, 0.01], [5, 0.02]]
+    frames = [["Test Z1"], ["Temperature", 650, "°C"], ["Time (h)", "Creep strain (%)", "Remark"]]
+    frames += [[0, 0.0, "start"], [1, 0.01], [5, 0.02]]
     file = workbook(tmp_path / "program.xlsx", {"Summary": conditions, "Z1": frames})
     (test,) = ck.read_histories(file)
     assert (test.loading.program().values.tolist(), test.temperature) == ([120.0], 923.15)
-    assert (test.times.size, test.labels["line 3"]) == (3, "start")
+    assert (test.times.size, test.labels["line 4"]) == (3, "start")
 
 
 def test_values_with_units_above_pairs_are_conditions(tmp_path: Path) -> None:
@@ -423,14 +424,6 @@ def test_marks_are_asked_about_unless_a_note_explains_them(tmp_path, cell):
 def test_a_note_of_tests_that_run_is_asked_about(tmp_path):
     with pytest.raises(Question, match="the note 'The last test is still running' may speak of tests"):
         read(tmp_path, "T (C),Stress (MPa),tr (h)\n600,320,4454\n600,260,23220\n\nThe last test is still running\n")
-
-
-def test_a_title_an_encoding_and_decimal_commas(tmp_path):
-    text = "Prüfprotokoll\n\nProbe;Temp. [°C];Spannung [MPa];min. Kriechrate [%/h];Bruchzeit [h];Bemerkung\n" \
-           "K1;600;120,5;1,5e-04;900;\nK2;600;100;2,5e-05;>5000;läuft noch\n"  # fmt: skip
-    first, second = read(tmp_path, text, "cp1252")
-    assert (first.name, first.minimum_rate) == ("K1", pytest.approx(1.5e-6 / HOUR))
-    assert (second.unruptured, second.labels["Bemerkung"]) == (True, "läuft noch")
 
 
 def test_a_constant_rate_of_strain_is_recognised(tmp_path):

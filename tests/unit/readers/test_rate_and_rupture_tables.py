@@ -71,11 +71,15 @@ NAMES = [
     ("elongation (%)", ("label elongation_pct", "")),
     ("Heat No", ("label heat", "")),
     ("strain rate (1/s)", ("", "")),
+    ("Rupture time [10^3 h]", ("rupture", "kh")),
+    ("min creep rate (%/1000h)", ("minimum_rate", "pct/kh")),
 ]
 
 
 def test_names_of_columns():
     assert [(name, (one.quantity, one.unit)) for name, one in ((n, column_called(n)) for n, _ in NAMES)] == NAMES
+    powers = {"Min. creep rate x 1E6 [1/h]": 1e-6, "MCR (1e-6 h-1)": 1e-6, "Minimum creep rate, 10-3 %/1000h": 1e-3}
+    assert {name: column_called(name).factor for name in powers} == powers
 
 
 REFUSED = [

@@ -12,19 +12,19 @@ import creepkit as ck
 from creepkit.errors import SolveError
 from creepkit.exporters.exporting import exported_text
 from creepkit.readers.reading import read_histories
-from creepkit.records import checked_prediction
+from creepkit.records.predictor import checked_prediction
 from helpers.mistakes import said_otherwise
 
 TIMES = np.linspace(100.0, 5000.0, 8)
 VALUES = {"A": 1e-14, "n": 4.0}
 
 
-class Broken:
+class Broken(ck.Specimen):
     """A specimen, reader and exporter whose code is wrong."""
 
     name, title, suffix, outputs, nuisances = "broken", "Broken", ".txt", ("strain",), ()
 
-    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         return np.zeros(3)[7]
 
     def accepts(self, path):
@@ -68,7 +68,7 @@ def test_what_a_plugin_raises_is_one_sentence_with_its_file_and_line(tmp_path: P
 
     at = rf" \({re.escape(__file__)}, line \d+\)"
     cases = (
-        (simulate(Broken()), rf"predictor 'broken': predict\(\) raised IndexError: index 7.*{at}"),
+        (simulate(Broken()), rf"predictor 'broken': predict_batch\(\) raised IndexError: index 7.*{at}"),
         (simulate(WithRun()), r"specimen 'broken': run\(\) raised OSError: the other program"),
         (read(Broken()), rf"read\(\) of reader 'broken' raised KeyError.*{at}"),
         (read(Asked(), Broken()), rf"accepts\(\) of reader 'broken' raised IndexError.*{at}$"),
@@ -97,7 +97,7 @@ BAR = ck.specimen("uniaxial")
 FRAMES = np.linspace(100.0, 5000.0, 20)
 
 
-class Stub:
+class Stub(ck.Predictor):
     """A plugin's specimen that returns the prediction of a bar, changed."""
 
     name, title, outputs, nuisances = "uniaxial", "Stub", ("strain",), ()
@@ -105,7 +105,7 @@ class Stub:
     def __init__(self, change) -> None:
         self.change = change
 
-    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         return self.change(BAR.predict(law, theta, histories, sensitivities=sensitivities))
 
 
@@ -120,7 +120,7 @@ def converted(name: str, kind):
 def test_a_prediction_that_is_none_is_one_sentence() -> None:
     histories, cases = [simulated(), simulated(stress=150.0).replace(name="b")], []
     for change, said in (
-        (lambda made: None, "a NoneType from predict\\(\\); it must return a Prediction"),
+        (lambda made: None, "a NoneType from predict_batch\\(\\); it must return a Prediction"),
         (lambda made: replace(made, values=made.values.tolist()), "a list as values; it must be an array of shape"),
         (lambda made: replace(made, values=made.values.ravel()), "values of shape .* it must be .* for what was asked"),
         (lambda made: replace(made, values=made.values[:, :, 1:]), "values of shape .* it must be .*20, 1\\)"),

@@ -9,7 +9,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError, PluginError, SolveError
-from creepkit.inverse.composite_predictor import predict_with_sensitivities
 from creepkit.records import Status
 from creepkit.specimens.per_test import OneTest, PerTest
 
@@ -97,7 +96,7 @@ def test_an_early_end_and_values_without_a_solution_are_results():
 def test_differences_leave_a_coefficient_off_that_is_off():
     """-inf has no neighbours: its derivative is zero, and nothing is warned of."""
     theta = NORTON.to_internal({"A": 0.0, "n": 4.0})
-    found = predict_with_sensitivities(Bar(), NORTON, theta[0], plans(60.0), {})
+    found = Bar().predict(NORTON, theta, plans(60.0), nuisances={}, sensitivities=True)
     np.testing.assert_array_equal(found.jacobian, np.zeros_like(found.jacobian))
 
 

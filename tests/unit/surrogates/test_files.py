@@ -11,7 +11,6 @@ import creepkit as ck
 from creepkit.errors import SurrogateError
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.files.writing import RECORD
-from creepkit.inverse.composite_predictor import refined_of
 from creepkit.surrogates.surrogate import SURROGATE, load_surrogate, surrogate
 
 HEADER = {"kind": "parameter-gru"}
@@ -118,7 +117,7 @@ def test_a_header_without_its_parts_says_so(tmp_path: Path) -> None:
 def test_the_surrogate_of_the_dimple_is_the_reduced_order_model_of_the_bulge_specimen() -> None:
     model = surrogate("dimple")
     assert model == ck.specimen("bulge").reduced_order_model()
-    assert refined_of(model) == ck.specimen("bulge").refined()
+    assert model.refined() == ck.specimen("bulge").refined()
 
 
 def test_names_that_nobody_knows(tmp_path: Path) -> None:

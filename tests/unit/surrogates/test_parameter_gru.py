@@ -220,7 +220,7 @@ def test_other_kinds_of_tests_are_refused(
     for model, data, history, told in cases:
         with pytest.raises(SurrogateError, match=told):
             model.predict(data.law, data.theta_of(0), [history])
-    with pytest.raises(SurrogateError, match="does not know the nuisance 'window'; it knows modulus, thickness"):
+    with pytest.raises(SolveError, match="does not know the nuisance 'window'; it knows modulus, thickness"):
         bulging.predict(plates.law, plates.theta_of(0), [plate], nuisances={"window": np.ones((1, 1))})
 
 

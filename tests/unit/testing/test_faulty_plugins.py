@@ -160,7 +160,7 @@ HOOKS: dict[str, tuple[str, str, bool]] = {
         True,
     ),
     "a specimen whose name raises": (
-        "import creepkit as ck\nclass S:\n    title = 's'\n    outputs = ('x',)\n    def predict(self): ...\n"
+        "import creepkit as ck\nclass S(ck.Specimen):\n    title = 's'\n    outputs = ('x',)\n"
         "    @property\n    def name(self):\n        raise OSError('no licence')\n"
         "@ck.hookimpl\ndef creepkit_specimens():\n    return [S()]\n",
         "OSError: no licence",

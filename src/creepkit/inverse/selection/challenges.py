@@ -28,7 +28,6 @@ from scipy.stats import chi2
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, FitError
-from creepkit.inverse.composite_predictor import reduced_order_model_of
 from creepkit.inverse.defect_correction import difference_of_predictors
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -303,7 +302,7 @@ def _least_excess(
 
     It is sought by the reduced-order model, then by the predictor itself.
     """
-    reduced = reduced_order_model_of(problem.predictor)
+    reduced = problem.predictor.reduced_order_model()
     if reduced is not None:
         difference = difference_of_predictors(best.problem, best.x, reduced)
         cheap = problem.with_predictor(reduced).with_correction(difference)

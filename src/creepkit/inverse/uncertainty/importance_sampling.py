@@ -21,7 +21,6 @@ from scipy.stats import chi2, multivariate_t, norm, qmc
 from creepkit import limits
 from creepkit.arrays import ArrayLike, Floats, single_threaded_blas
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import predictor_for_law, reduced_order_model_of, search_predictor_of
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
@@ -84,9 +83,9 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     cheaper : a predictor of the same tests that samples are drawn through, by default the reduced-order model.
     """
     problem = fit.least_squares_problem
-    cheaper = cheaper or reduced_order_model_of(problem.predictor)
+    cheaper = cheaper or problem.predictor.reduced_order_model()
     if cheaper is not None:
-        problem = with_cheaper_predictor(problem, fit.x, search_predictor_of(cheaper))
+        problem = with_cheaper_predictor(problem, fit.x, cheaper.for_search())
     posterior = Posterior.from_identification(replace(fit, problem=problem))
     centre, seed, shape = np.array(fit.u), fit.settings.seed, _first_shape(fit, posterior)
     samples = _samples_by_quadratic_residuals(posterior, centre, shape, seed)
@@ -143,7 +142,7 @@ def sample_posterior(
         the fit's, such as a surrogate where the fit's is a finite element model.
     """
     limits.check_number("draws", draws, limits.DRAWS_OF_POSTERIOR, FitError)
-    sampled = fit if using is None else fit.with_histories(fit.histories, predictor_for_law(using, fit.law))
+    sampled = fit if using is None else fit.with_histories(fit.histories, using.for_law(fit.law))
     with single_threaded_blas():
         posterior = Posterior.from_identification(sampled)
         shape = _first_shape(fit, posterior)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import norm
 from scipy.stats import t as student
 
 from creepkit.arrays import Floats
@@ -39,20 +40,20 @@ def restricted_covariance(
     noise_model: NoiseModel,
     nuisances: Sequence[Nuisance],
     fixed: Collection[tuple[str, str]] = (),
-    parameter_count: int | None = None,
-) -> tuple[Floats, float]:
-    """Posterior covariance of x = (u, e) by likelihood, (unknowns, unknowns), and its degrees of freedom.
+) -> tuple[Floats, Floats]:
+    """Posterior covariance of x = (u, e) by likelihood, (unknowns, unknowns), and its degrees of freedom, (unknowns,).
 
-    fixed : (output, component) that are known beside those that nuisances give. parameter_count : of the law; the
-    degrees of freedom are the median over its parameters, by default over all unknowns.
-    Unknowns at their bounds count here as all others: their intervals reach inwards.
+    fixed : (output, component) that are known beside those that nuisances give. The variance of an unknown that the
+    scatter between tests decides is known worse than that of one which every curve shows: each has degrees of freedom
+    of its own, NaN where no observation depends on it. Unknowns at their bounds count here as all others: their
+    intervals reach inwards.
     """
     unconstrained = replace(linearised, free=np.ones_like(linearised.free))
     factor = CovarianceFactor.of_residuals(linearised.residuals, noise_model)
     solution = unconstrained.solve(factor)
     components = [component for component in _estimated_components(noise_model, nuisances) if component not in fixed]
     if not components:
-        return solution.covariance, 1e9
+        return solution.covariance, np.full(len(solution.covariance), NORMAL_FREEDOM)
     covariance_derivatives = [_covariance_derivative(linearised.residuals, noise_model, *one) for one in components]
     projected = [
         np.einsum("tep,tef,tfq->pq", solution.weighted_jacobian, s, solution.weighted_jacobian, optimize=True)
@@ -67,10 +68,22 @@ def restricted_covariance(
     with np.errstate(over="ignore"):  # a variance that nothing makes uncertain has a freedom without bound
         freedom = 2.0 * np.diag(solution.covariance) ** 2 / np.maximum(variance_of_variance, 1e-300)
     determined = (unconstrained.jacobian != 0).any(axis=(0, 1))
-    if not determined[:parameter_count].any():
-        return solution.covariance, MINIMUM_FREEDOM
-    median = np.median(freedom[:parameter_count][determined[:parameter_count]])
-    return solution.covariance, float(np.clip(median, MINIMUM_FREEDOM, 1e9))
+    return solution.covariance, np.where(determined, np.clip(freedom, MINIMUM_FREEDOM, NORMAL_FREEDOM), np.nan)
+
+
+def median_freedom(freedom: Floats) -> float:
+    """Of those that the tests determine; the least where there are none. freedom : (n,)."""
+    known = freedom[np.isfinite(freedom)]
+    return float(np.median(known)) if known.size else MINIMUM_FREEDOM
+
+
+def with_freedom(covariance: Floats, freedom: Floats) -> Floats:
+    """The covariance of the normal distribution whose 95 % intervals are those of Student's t, (n, n).
+
+    covariance : (n, n). freedom : (n,) degrees of freedom of each variance, NaN of one that is a prior's.
+    """
+    scale = student.ppf(0.975, np.nan_to_num(freedom, nan=NORMAL_FREEDOM)) / NORMAL_QUANTILE
+    return np.asarray(covariance * np.outer(scale, scale))
 
 
 def _information(
@@ -161,9 +174,8 @@ class Estimate:
     verdict: str
 
 
-def interval_quantile(freedom: float) -> float:
-    """Half width of a 95 % interval in standard deviations."""
-    return float(student.ppf(0.975, max(freedom, 1.0)))
+NORMAL_QUANTILE, NORMAL_FREEDOM = float(norm.ppf(0.975)), 1e9
+"""Half width of a 95 % interval in standard deviations; degrees of freedom of a variance that is known."""
 
 
 def positive_semidefinite(covariance: Floats) -> Floats:
@@ -199,10 +211,8 @@ def covariance_of_values(
     return np.asarray(solution.covariance @ (meat + np.diag(linearised.precision)) @ solution.covariance)
 
 
-def parameter_estimates(
-    law: CreepLaw, coordinates: Coordinates, u: Floats, covariance: Floats, quantile: float
-) -> tuple[Estimate, ...]:
-    """Intervals of the author's parameters, `quantile` standard deviations to each side.
+def parameter_estimates(law: CreepLaw, coordinates: Coordinates, u: Floats, covariance: Floats) -> tuple[Estimate, ...]:
+    """95 % intervals of the author's parameters.
 
     u : (parameters,) conditioned coordinates; covariance : (parameters, parameters) theirs.
     """
@@ -214,7 +224,7 @@ def parameter_estimates(
         low, high = (param.to_internal(b) for b in param.bounds)
         value = min(max(value, low), high)
         value = low if value - low < 1e-9 * (high - low) else high if high - value < 1e-9 * (high - low) else value
-        a, b = max(value - quantile * standard_deviation, low), min(value + quantile * standard_deviation, high)
+        a, b = (min(max(value + side * NORMAL_QUANTILE * standard_deviation, low), high) for side in (-1.0, 1.0))
         middle, bottom, top = (param.from_internal(float(v)) for v in (value, a, b))
         verdict = verdict_of_interval(param, float(value), (float(a), float(b)))
         results.append(Estimate(name, middle, bottom, top, param.unit, verdict))

@@ -15,7 +15,7 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, delta_method
 from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, MixtureDistribution
 from creepkit.inverse.uncertainty.quantities import (
     CoordinateFunction,
@@ -107,24 +107,16 @@ class ModelAverage(RateStatements, Presentable, text="reports.inference:model_av
         location, scale = (np.stack([each[k] for each in normals]) for k in (0, 1))
         if quantity is log_rate:
             at = np.asarray(stress, float), np.asarray(T, float)
-            misses = [
-                f.misfit_half_widths(g, *at) / interval_quantile(f.freedom)
-                for f, g in zip(self.fits, functions, strict=True)
-            ]
+            misses = [f.misfit_half_widths(g, *at) / NORMAL_QUANTILE for f, g in zip(self.fits, functions, strict=True)]
             scale = np.stack([np.hypot(own, more) for own, more in zip(scale, misses, strict=True)])
-        return MixtureDistribution(np.array(self.weights), degrees_of_freedom(self.fits), location, scale)
-
-
-def degrees_of_freedom(fits: Sequence[Identification]) -> Floats:
-    """(fits,) degrees of freedom of their intervals."""
-    return np.array([min(max(fit.freedom, 1.0), NORMAL_FREEDOM) for fit in fits])
+        return MixtureDistribution(np.array(self.weights), np.full(len(self.fits), NORMAL_FREEDOM), location, scale)
 
 
 def _normal_under_law(fit: Identification, function: CoordinateFunction) -> tuple[Floats, Floats]:
     """Value and standard deviation under one law; never quite zero, so that a mixture of certainties has quantiles."""
     if fit.samples is not None:
         _, low, high = fit.interval_of(function)
-        middle, sd = 0.5 * (low + high), 0.5 * (high - low) / interval_quantile(fit.freedom)
+        middle, sd = 0.5 * (low + high), 0.5 * (high - low) / NORMAL_QUANTILE
     else:
         middle, sd = delta_method(function, fit.u, fit.covariance)
     return middle, np.maximum(sd, 1e-12 * np.maximum(np.abs(middle), 1.0))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from numbers import Real
 from typing import Any, ClassVar, NamedTuple, TypeAlias
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
+from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import Mesh, strip_mesh, strip_nodes
 
 EDGES = ("bottom", "rim")
@@ -124,6 +126,12 @@ class DimpleGeometry:
                 "as many elements each way as 1, the mesh for production"
             )
         return mesh_layout(self._dimensions(), float(refinement))
+
+
+@lru_cache(maxsize=256)
+def model_of_geometry(geometry: DimpleGeometry, refinement: float) -> FiniteElementModel:
+    """The finite element model of a dimple; kept, for a fit needs it a thousand times."""
+    return finite_element_model(geometry.mesh(refinement))
 
 
 def _nodes(size: DimpleDimensions, layout: MeshLayout) -> Floats:

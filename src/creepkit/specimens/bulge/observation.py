@@ -9,8 +9,10 @@ same with measured points.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
@@ -24,20 +26,11 @@ from creepkit.fem.surface_interpolation import (
     surface_interpolation_with_slopes,
 )
 from creepkit.records import Output
-from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
+from creepkit.specimens.bulge.outputs import MOST_RINGS, OBSERVED, RING_OUTPUTS
 
 if TYPE_CHECKING:  # heavy, and a list of specimens needs none of it
     from creepkit.fem.time_interpolation import TimeInterpolation
-
-
-from collections.abc import Sequence
-from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
-
-from creepkit.specimens.bulge.outputs import MOST_RINGS
-
-if TYPE_CHECKING:
-    from creepkit.fem.time_interpolation import TimeInterpolation
+    from creepkit.specimens.bulge.gaussian_fit import GaussianFit
 
 
 Form = Literal["profile", "field", "rings"]
@@ -70,7 +63,7 @@ class ProfileSampling(NamedTuple):
 
     shares: Floats
     nodes: SurfaceInterpolation
-    fit: ProfileOutputs
+    fit: GaussianFit | RingDisplacements
 
 
 @dataclass(frozen=True)
@@ -289,24 +282,6 @@ def checked_ring_radii(radii: Sequence[Any]) -> tuple[float, ...]:
             "mm, as in radii=(0, 2, 4)"
         )
     return tuple(float(r) for r in radii)
-
-
-class ProfileOutputs(Protocol):
-    """Outputs of profiles that are sampled at some radii: a GaussianFit, or RingDisplacements."""
-
-    def observe(self, profiles: Floats, derivatives: bool) -> tuple[Floats, Floats]:
-        """Outputs (frames, outputs); derivatives (frames or 0, outputs, radii) to the displacements at the radii.
-
-        profiles : (frames, nodes) mm.
-        """
-        ...
-
-    def observe_at_times(self, profiles: Floats, steps: TimeInterpolation, times: Floats) -> tuple[Floats, Floats]:
-        """As `observe` of the accepted steps, interpolated: (times, outputs), and derivatives to nothing.
-
-        profiles : (steps, nodes) mm. times : (times,) s.
-        """
-        ...
 
 
 @dataclass(frozen=True, eq=False)

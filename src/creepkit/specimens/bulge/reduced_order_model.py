@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,21 +19,11 @@ from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.reduced_order_model import ReducedOrderModel
 from creepkit.fem.simulation import simulate
 from creepkit.fem.solver import SolverSettings
-from creepkit.records import (
-    PROGRAM_NUISANCES,
-    History,
-    NuisanceValues,
-    Output,
-    Prediction,
-    Predictor,
-    SupportsRefinement,
-)
-from creepkit.specimens.bulge.finite_elements import BulgeTest, model_of_geometry, radii_of_top
-from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.records import History, NuisanceValues, Output, Prediction, Predictor
+from creepkit.specimens.bulge.geometry import DimpleGeometry, model_of_geometry
 from creepkit.specimens.bulge.observation import DEFAULT_WINDOW, Observation
 from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
-from creepkit.specimens.bulge.settings import BulgeSettings
-from creepkit.specimens.finite_element_tests import Reduction, predict_tests, solver_settings
+from creepkit.specimens.finite_element_tests import FiniteElementTest, Reduction, predict_tests, solver_settings
 from creepkit.specimens.reduced_order_training import MODES, RAMP, power_law_runs, trained_basis
 
 if TYPE_CHECKING:
@@ -67,64 +57,64 @@ LENGTH_STEP = 1.05
 
 
 @dataclass(frozen=True)
-class BulgeReducedOrderModel:
+class BulgeReducedOrderModel(Predictor):
     """A bulge specimen in a reduced-order model; same outputs, nuisances and errors, and derivatives to all of them.
 
     Trained at the first prediction, in some seconds of CPU for each dimple, and kept on disk. modes, points : of the
     model; None for as many points as the mesh needs. searching : whether it is as coarse as a global search allows.
     """
 
-    specimen: BulgeSettings
+    specimen: Any
     modes: int = MODES
     points: int | None = None
     searching: bool = False
+    is_trained: ClassVar[bool] = True
     name: ClassVar[str] = "bulge, reduced-order model"
     title: ClassVar[str] = "Bulge test in a reduced-order model, for searches"
     optional_outputs: ClassVar[tuple[Output, ...]] = (*OBSERVED, *RING_OUTPUTS)
-    program_nuisances: ClassVar[tuple[str, ...]] = PROGRAM_NUISANCES
 
     @property
-    def outputs(self) -> tuple[Output, ...]:
+    def outputs(self) -> tuple[str, ...]:  # type: ignore[override]
         """As the specimen's."""
-        return self.specimen.outputs
+        return tuple(self.specimen.outputs)
 
     @property
-    def nuisances(self) -> tuple[str, ...]:
+    def nuisances(self) -> tuple[str, ...]:  # type: ignore[override]
         """As the specimen's."""
-        return self.specimen.nuisances
+        return tuple(self.specimen.nuisances)
 
-    def outputs_of_test(self, history: History) -> tuple[Output, ...]:
+    @property
+    def own_nuisances(self) -> tuple[str, ...]:
         """As the specimen's."""
-        return self.specimen.outputs_of_test(history)
+        return tuple(self.specimen.own_nuisances)
 
-    def predict(
-        self,
-        law: CreepLaw,
-        theta: Floats,
-        histories: Sequence[History],
-        *,
-        nuisances: NuisanceValues | None = None,
-        sensitivities: bool = False,
+    def outputs_of_test(self, history: History) -> tuple[str, ...]:
+        """As the specimen's."""
+        return tuple(self.specimen.outputs_of_test(history))
+
+    def predict_batch(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues, sensitivities: bool
     ) -> Prediction:
-        """Predict what is observed of each history at its times; see records.Predictor.
+        """Predict what is observed of each history at its times.
 
         theta : (candidates, parameters) internal values.
         """
-        return predict_tests(
-            BulgeTest, self.specimen, law, theta, histories, nuisances or {}, sensitivities,
-            Reduction(self.reduced_model_of, self._settings(sensitivities)),
-        )  # fmt: skip
+        reduction = Reduction(self.reduced_model_of, self._settings(sensitivities))
+        return predict_tests(self.specimen, law, theta, histories, nuisances, sensitivities, reduction)
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
         """Run one test, keeping displacements of the whole dimple; stresses are known at some points only, see fields.
 
         A field of the run is a SolveError.
         """
-        from creepkit.specimens.bulge.run import BulgeRun
         from creepkit.specimens.finite_element_run import run_test
 
         reduction = Reduction(self.reduced_model_of, self._settings(False))
-        return run_test(BulgeRun, BulgeTest.of(self.specimen, plan, {}), law, values, reduction)
+        return run_test(FiniteElementTest.of(self.specimen, plan, {}), law, values, reduction)  # type: ignore[no-any-return]
+
+    def single_threaded(self) -> BulgeReducedOrderModel:
+        """The same model of a specimen that starts no threads."""
+        return replace(self, specimen=self.specimen.single_threaded())
 
     def for_search(self) -> BulgeReducedOrderModel:
         """The same model in longer steps."""
@@ -139,10 +129,10 @@ class BulgeReducedOrderModel:
         newton = 1e-3 * tolerance  # with and without derivatives, so that values are the same
         return settings._replace(tolerance=tolerance, newton=newton, growth=SEARCH_GROWTH)
 
-    def reduced_model_of(self, piece: BulgeSettings) -> ReducedOrderModel:
+    def reduced_model_of(self, piece: Any) -> ReducedOrderModel:
         """The reduced-order model of a test piece."""
         if piece.mesh is not None:
-            model = BulgeTest.model_of(piece)
+            model = piece.finite_elements()
             basis = trained_basis([model], solver_settings(self.specimen), modes=self.modes, points=self.points)
             return ReducedOrderModel(model, basis)
         reduced = _model_of_geometry(self.specimen, piece.geometry, self.modes, self.points)
@@ -158,7 +148,7 @@ class BulgeReducedOrderModel:
         return self.reduced_model_of(self.specimen)
 
     @property
-    def error(self) -> dict[str, float]:
+    def error(self) -> dict[str, float]:  # type: ignore[override]
         """{output: standard deviation of its error}, in the output's unit, from runs that training did not see.
 
         1.25 times the mean absolute error, that of a Gaussian: rare large errors would widen every interval. On rings
@@ -167,15 +157,10 @@ class BulgeReducedOrderModel:
         *of_fit, largest = _output_errors(self)
         return {**dict(zip(OBSERVED, of_fit, strict=True)), **dict.fromkeys(RING_OUTPUTS, largest)}
 
-    def reference_stress(self, history: History) -> Floats:
-        """As the specimen's, (levels,) MPa."""
-        return self.specimen.reference_stress(history)
-
-    def refined(self) -> Predictor:
+    def refined(self) -> Predictor | None:
         """What it stands for: the specimen itself on its finer discretisation."""
-        if not isinstance(self.specimen, SupportsRefinement):
-            raise SolveError("the specimen of this reduced-order model has no finer discretisation")
-        return self.specimen.refined()
+        refined: Predictor | None = self.specimen.refined()
+        return refined
 
 
 @lru_cache(maxsize=16)
@@ -185,8 +170,8 @@ def _output_errors(predictor: BulgeReducedOrderModel) -> tuple[float, ...]:
     On the specimen's own dimple, in its own window.
     """
     specimen = predictor.specimen
-    model, reduced = BulgeTest.model_of(specimen), predictor.reduced_model_of(specimen)
-    radii = radii_of_top(model)
+    model, reduced = specimen.finite_elements(), predictor.reduced_model_of(specimen)
+    radii = specimen.top_radii
     fit = specimen.observation
     if fit.form == "rings":
         fit = Observation(window=min(DEFAULT_WINDOW, float(radii[-1])))
@@ -212,9 +197,7 @@ def _with_leading_modes(model: ReducedOrderModel, count: int) -> ReducedOrderMod
 
 
 @lru_cache(maxsize=256)
-def _model_of_geometry(
-    specimen: BulgeSettings, geometry: DimpleGeometry, modes: int, points: int | None
-) -> ReducedOrderModel:
+def _model_of_geometry(specimen: Any, geometry: DimpleGeometry, modes: int, points: int | None) -> ReducedOrderModel:
     """The reduced-order model of a dimple; kept, for a fit needs it a thousand times."""
     refinement = specimen.refinement
     model = model_of_geometry(geometry, refinement)

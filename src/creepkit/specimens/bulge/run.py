@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,7 +12,6 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.presentation import present
-from creepkit.specimens.bulge.finite_elements import BulgeTest
 from creepkit.specimens.finite_element_run import STRESS_FIELD, FiniteElementRun
 
 if TYPE_CHECKING:
@@ -37,22 +36,20 @@ class StressRange(NamedTuple):
 class BulgeRun(FiniteElementRun):
     """A simulated bulge test.
 
-    See FiniteElementRun for fields and times. test : with the geometry and the operator of this test as well.
+    See FiniteElementRun for fields and times; its test has the geometry and the operator of this test as well.
     """
-
-    test: BulgeTest = field(repr=False)
 
     def displacement(self, radius: ArrayLike = 0.0, times: ArrayLike | None = None) -> Floats:
         """How far the top has risen, (times,) mm at one radius, (times, radii) at several.
 
         radius : number or (radii,) mm, at rest. times : number or (times,) s, by default those of the frames.
         """
-        rows = self._at(self._profiles, times) @ surface_interpolation(self.test.radii, radius).T
+        rows = self._at(self._profiles, times) @ surface_interpolation(self.test.piece.top_radii, radius).T
         return rows if np.ndim(radius) else np.asarray(rows[..., 0])
 
     def profile(self, times: ArrayLike | None = None) -> TopProfile:
         """The whole top, at the nodes of the mesh; times : number or (times,) s, by default those of the frames."""
-        return TopProfile(self.test.radii, self._at(self._profiles, times))
+        return TopProfile(self.test.piece.top_radii, self._at(self._profiles, times))
 
     def mises_range(self, times: ArrayLike | None = None, within: float | None = None) -> StressRange:
         """Least and greatest von Mises stress of the integration points at radii up to `within` mm.
@@ -79,4 +76,4 @@ class BulgeRun(FiniteElementRun):
     @property
     def _profiles(self) -> Floats:
         """(steps, top nodes) mm."""
-        return self.test.profiles(self.simulation)
+        return np.asarray(self.test.piece.observed(self.test.load, self.simulation))

@@ -221,8 +221,8 @@ def test_values_inside_their_bounds_need_none():
 class Shifted(Steady):
     """The same but for a constant factor: it agrees once it is corrected."""
 
-    def predict(self, law, theta, histories, *, sensitivities=False):
-        found = Steady.predict(self, law, theta, histories, sensitivities=sensitivities)
+    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
+        found = Steady.predict_batch(self, law, theta, histories, nuisances, sensitivities)
         jacobian = None if found.jacobian is None else 1.05 * found.jacobian
         return replace(found, values=1.05 * found.values, jacobian=jacobian)
 

@@ -12,16 +12,14 @@ from creepkit.fem.finite_element_model import finite_element_model
 from creepkit.fem.mesh import geometry_derivative
 from creepkit.fem.reduced_order_model import ReducedOrderModel
 from creepkit.fem.simulation import sensitivity_directions, simulate
-from creepkit.inverse.composite_predictor import prediction_errors_of, refined_of
 from creepkit.language import Elastic, parameters, principal_stress, strain, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, PressureJump, Status
-from creepkit.specimens.bulge.finite_elements import BulgeTest
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.reduced_order_model import nominal_geometry
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.finite_element_tests import solver_settings
+from creepkit.specimens.finite_element_tests import FiniteElementTest, solver_settings
 from helpers.fem_cases import lowered
 from helpers.literature_laws import RATE, damage, law, number, omega
 
@@ -87,7 +85,7 @@ def test_thickness() -> None:
     """u_z of the top to the apex thickness on nodes that move, at the very same steps: within 1e-6 of the largest."""
     creep, values = CASES["combined"]
     theta = creep.to_internal(values)[0]
-    setup = BulgeTest.of(SPECIMEN, history(), {})
+    setup = FiniteElementTest.of(SPECIMEN, history(), {})
     settings = solver_settings(SPECIMEN, exact=True)._replace(newton=1e-12)
     mesh, velocity = setup.piece.geometry.mesh(1.0), setup.piece.geometry.mesh_velocity("apex_thickness", 1.0)
     along = sensitivity_directions(
@@ -124,10 +122,10 @@ def with_top(specimen: Bulge):
 
 @pytest.mark.long_when_sanitized
 def test_stated_error_enters_the_covariance_and_the_specimen_corrects_it() -> None:
-    errors = prediction_errors_of(REDUCED)
+    errors = REDUCED.error
     assert set(errors) == set(SPECIMEN.optional_outputs)
     assert 1e-5 < errors["amplitude"] < 0.01
-    assert refined_of(REDUCED) == SPECIMEN.refined()
+    assert REDUCED.refined() == SPECIMEN.refined()
 
 
 def test_test_pieces_share_a_basis() -> None:

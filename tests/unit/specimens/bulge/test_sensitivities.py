@@ -20,9 +20,9 @@ from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw, Elastic, mean_stress, parameters, principal_stress, stress, temperature
 from creepkit.laws.combined import COMBINED
 from creepkit.records import History, PressureJump, Status
-from creepkit.specimens.bulge.finite_elements import BulgeTest
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.finite_element_tests import CandidateResponse, solver_settings
+from creepkit.specimens.finite_element_tests import FiniteElementTest, solver_settings
+from creepkit.specimens.separate_tests import TestResponse
 from helpers.literature_laws import RATE, damage, law, number, omega
 
 SPECIMEN = Bulge(refinement=0.5, threads=1)
@@ -58,12 +58,9 @@ class Base(NamedTuple):
     kernel: CompiledLaw
     theta: Floats
     history: History
-    made: BulgeTest
-    response: CandidateResponse
-
-    @property
-    def found(self) -> Simulation:
-        return self.response.simulation
+    made: FiniteElementTest
+    found: Simulation
+    response: TestResponse
 
 
 ON_RINGS = "combined, on rings"
@@ -82,18 +79,18 @@ def base(request) -> Base:
     )  # fmt: skip
     kernel = kernels.lower(creep, "compiled")
     theta = creep.to_internal(values)[0]
-    made = BulgeTest.of(SPECIMEN, history, NUISANCES, sensitivities=True)
-    response = made.respond(kernel, theta, SETTINGS)
-    assert response.simulation.status == Status.COMPLETE
-    return Base(kernel, theta, history, made, response)
+    made = FiniteElementTest.of(SPECIMEN, history, NUISANCES, sensitivities=True)
+    found = made.simulate(kernel, theta, SETTINGS)
+    assert found.status == Status.COMPLETE
+    return Base(kernel, theta, history, made, found, made.response(found))
 
 
 def seen(base: Base, theta: Floats | None = None, **nuisances: float) -> Floats:
     """Outputs (times, outputs) of the same steps with something changed."""
-    made = BulgeTest.of(SPECIMEN, base.history, {**NUISANCES, **nuisances})
+    made = FiniteElementTest.of(SPECIMEN, base.history, {**NUISANCES, **nuisances})
     theta = base.theta if theta is None else theta
     found = simulate(base.kernel, theta, made.model, made.load_history, settings=SETTINGS, same_steps_as=base.found)
-    return found.at(made.observed(found), base.history.times)
+    return found.at(made.piece.observed_outputs(made.load, found), base.history.times)
 
 
 def agree(exact: Floats, up: Floats, down: Floats, step: float) -> None:
@@ -107,7 +104,7 @@ def agree(exact: Floats, up: Floats, down: Floats, step: float) -> None:
 def test_every_parameter_of_the_law(base) -> None:
     for p, step in enumerate(1e-4 * np.maximum(1.0, np.abs(base.theta) / 10)):
         move = step * np.eye(base.theta.size)[p]
-        agree(base.response.law[:, :, p], seen(base, base.theta + move), seen(base, base.theta - move), step)
+        agree(base.response.jacobian[:, :, p], seen(base, base.theta + move), seen(base, base.theta - move), step)
 
 
 def test_every_nuisance_but_lengths(base) -> None:
@@ -134,7 +131,7 @@ def test_thickness_on_a_mesh_that_moves(base) -> None:
     step = 1e-5
     drift = base.made.piece.geometry.mesh_velocity("apex_thickness", SPECIMEN.refinement)[base.made.model.top, 0]
     assert np.abs(drift).max() > 0.01
-    operator, radii = base.made.observation, base.made.radii
+    operator, radii = base.made.piece.observation, base.made.piece.top_radii
     frames = [operator.observe(radii + s * drift, moved_profiles(base, s)) for s in (step, -step)]
     up, down = (base.found.at(each, base.history.times) for each in frames)
     agree(base.response.nuisances["thickness"], up, down, step)

@@ -1,1 +1,0 @@
-"""Specimens that are bodies of revolution, simulated by finite elements."""
