@@ -123,8 +123,9 @@ def describing(fit: Identification) -> Identification:
     Where it misses the shape of curves, by more noises than SHAPE_MISFIT, its likelihood is that of the misfit: values
     are those of frames of equal weight.
     """
-    contradicted = fit.adequacy is not None and fit.adequacy.rejects
-    if not contradicted or not fit.adequacy.discrepancy_in_noises > SHAPE_MISFIT or fit.predictor is None:
+    adequacy = fit.adequacy
+    is_missed = adequacy is not None and adequacy.rejects and adequacy.discrepancy_in_noises > SHAPE_MISFIT
+    if not is_missed or fit.predictor is None:
         return fit
     start, settings = StartingEstimate.from_identification(fit), replace(fit.settings, weights="noise")
     values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
