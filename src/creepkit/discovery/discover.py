@@ -17,7 +17,7 @@ from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.discovery.combinations import rank_combinations
 from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms, check_form_names
-from creepkit.discovery.regression import IsothermalEstimates, check_temperatures, isothermal_groups
+from creepkit.discovery.regression import MIN_TEMPERATURES, IsothermalEstimates, check_temperatures, isothermal_groups
 from creepkit.discovery.temperature_law import TemperatureLaw, refit, temperature_law_from_combinations
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.composite_predictor import CompositePredictor
@@ -25,7 +25,7 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import sound_tests, suspect_frames_note
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_temperature, with_arrhenius
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, temperature
@@ -304,10 +304,14 @@ def temperature_study(
             histories = [h.replace(elastic=moduli_fit.elastic) for h in histories]
     joint_fit = identify(with_arrhenius(law, histories), histories, predictor, settings=settings, progress=progress)
     isothermal_fits, failures = _isothermal_fits(law, histories, predictor, options.within, settings, progress)
-    notes += [*suspect_frames_note(histories), *failures]
+    notes += suspect_frames_note(histories)
     temperature_law = None
     try:
-        check_temperatures([fit.reference.temperature for fit in isothermal_fits] or [reference_temperature(histories)])
+        check_temperatures([group[0].mean_temperature for group in group_by_temperature(histories, options.within)])
+        if len(isothermal_fits) < MIN_TEMPERATURES:
+            known = f"forms of '{law.name}' need it at {MIN_TEMPERATURES} temperatures, each by itself"
+            raise FitError(f"{known}, and it is identified at {len(isothermal_fits)}: {'; '.join(failures)}")
+        notes += failures
     except FitError as error:
         notes.append(str(error))
     else:

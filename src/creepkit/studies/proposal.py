@@ -31,8 +31,8 @@ PLANNED_LAWS = ["norton", "strain-hardening", "time-hardening", "hyperbolic-sine
 """Of tests that cameras are still to be read of: those of Table 1 of Chen et al."""
 
 
-FEWEST_TEMPERATURES = 3
-"""For forms of temperature."""
+FEWEST_TEMPERATURES, FEWEST_RATES = 3, 3
+"""For forms of temperature; and minimum rates at each of these, where there is no curve: one more than A and n."""
 
 
 MOST_REMARKS = 20
@@ -111,7 +111,11 @@ def rendered(known: Mapping[str, Any]) -> str:
     template = environment.from_string(
         files("creepkit.studies").joinpath("proposed_study.toml.jinja").read_text("utf-8")
     )
-    limits = {"fewest_temperatures": FEWEST_TEMPERATURES, "fewest_ruptures": FEWEST_RUPTURES}
+    limits = {
+        "fewest_temperatures": FEWEST_TEMPERATURES,
+        "fewest_ruptures": FEWEST_RUPTURES,
+        "fewest_rates": FEWEST_RATES,
+    }
     return re.sub(r"\n{3,}", "\n\n", template.render({**known, **limits})).rstrip("\n") + "\n"
 
 
@@ -258,6 +262,18 @@ class DataSummary:
     def framed(self) -> list[History]:
         """Tests with frames or a minimum rate, from which a law can be identified."""
         return [h for h in self.tests if h.outputs or h.minimum_rate is not None]
+
+    @property
+    def law_at_each(self) -> int:
+        """How many temperatures have tests of which a law may be identified: a curve, or enough minimum rates."""
+        levels = list[tuple[float, int]]()
+        for test in sorted(self.framed, key=lambda one: one.mean_temperature):
+            count = FEWEST_RATES if test.outputs else 1
+            if levels and test.mean_temperature <= levels[-1][0] + SAME_TEMPERATURE:
+                levels[-1] = levels[-1][0], levels[-1][1] + count
+            else:
+                levels.append((test.mean_temperature, count))
+        return sum(count >= FEWEST_RATES for _, count in levels)
 
     @property
     def with_curves(self) -> bool:

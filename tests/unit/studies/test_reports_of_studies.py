@@ -237,6 +237,18 @@ def test_damage_is_proposed_for_tables_where_it_is_installed(folder, monkeypatch
     assert "# No law of damage is installed: rupture times of tests without curves are not used to identify." in text
 
 
+def test_forms_of_temperature_are_proposed_where_each_temperature_has_tests_enough(folder):
+    table = folder / "data" / "table.csv"
+    assert "\n[temperature]\n" in propose_study(folder / "data", folder / "study.toml").text
+    rows = table.read_text().splitlines()
+    table.write_text("\n".join([*rows[:5], rows[6], rows[11]]) + "\n")  # one rate at 600, and at 650 °C
+    assert "\n[temperature]\n" not in propose_study(folder / "data", folder / "study.toml").text
+    study = ck.temperature_study("norton", ck.read_histories(folder / "data"))
+    (note,) = (one for one in study.notes if "identified at" in one)
+    assert note.startswith("forms of 'norton' need it at 3 temperatures, each by itself, and it is identified at 1")
+    assert "at 600 °C alone" in note
+
+
 def test_a_default_study_of_a_law_without_damage_gives_the_rates(folder):
     fit = identified(folder, 'laws = ["norton"]')
     values = {e.name: e for e in fit.estimates}
