@@ -20,7 +20,7 @@ BUDGET = {
     "cli": 2347,
     "core": 67,
     "dataset": 765,
-    "discovery": 1401,
+    "discovery": 1405,
     "experiments": 1562,
     "exporters": 2658,
     "extraction": 1302,
@@ -29,14 +29,14 @@ BUDGET = {
     "forecasts": 1403,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 10850,
+    "inverse": 10849,
     "jobs": 251,
     "kernels": 1703,
     "language": 1494,
     "laws": 136,
     "modules": 781,
     "quality": 1470,
-    "readers": 5566,
+    "readers": 5582,
     "records": 2256,
     "registry": 615,
     "reports": 6167,
@@ -44,13 +44,13 @@ BUDGET = {
     "sampling": 1026,
     "screening": 682,
     "specimens": 3338,
-    "studies": 3046,
+    "studies": 3060,
     "surrogates": 1635,
     "testing": 1839,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29836
+TESTS = 29857
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
@@ -46,7 +47,7 @@ from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.table_heads import with_weak_sources
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, words_of
 from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, dimensions_of, known_specimens, specimen_of
 
 if TYPE_CHECKING:
@@ -93,8 +94,7 @@ def assemble_history(
     assert temperature is not None
     is_named = conditions.states("specimen")
     specimen, outputs = _specimen_and_outputs(conditions, frames, loading.quantity, columns)
-    if not is_named:
-        _record_unstated(conditions, specimen)
+    _record_unstated(conditions, specimen, is_named)
     strain_measure = conditions.take_choice(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
@@ -314,11 +314,26 @@ def _lengths_by_default(specimen: str, geometry: Mapping[str, float]) -> dict[st
 _BY_ITS_COLUMNS = "specimen {} by its columns with lengths by default: "
 
 
-def _record_unstated(conditions: StatedConditions, specimen: str) -> None:
-    """Record, before all else that is assumed, a specimen that columns alone tell, and its lengths by default."""
-    if lengths := _lengths_by_default(specimen, conditions.geometry):
+def _record_unstated(conditions: StatedConditions, specimen: str, is_named: bool) -> None:
+    """Record a specimen that columns alone tell, before all else that is assumed, and lengths by default.
+
+    Of a specimen that is named those count of which some are stated. A length that a label may state is asked for.
+    """
+    lengths = _lengths_by_default(specimen, conditions.geometry)
+    for name in lengths:
+        words = {*name.split("_")}
+        said = {key: _LENGTH.fullmatch(text) for key, text in conditions.labels.items()}
+        if found := {key: one for key, one in said.items() if one and words <= {*words_of(key).split()}}:
+            label = quoted(next(iter(found)), 60)
+            what = f"'{label}' is a label, and no {name} of the {specimen} is stated; how many mm is it?"
+            raise conditions.question(what, f"{name}_mm", *(float(one[1].replace(",", ".")) for one in found.values()))
+    if lengths and (not is_named or conditions.geometry.keys() & conditions.terms.dimensions):
         listed = "; ".join(f"{name} {length:g}" for name, length in lengths.items())
-        conditions.record_assumption(f"{_BY_ITS_COLUMNS.format(specimen)}{listed} mm", first=True)
+        what = "lengths by default: " if is_named else _BY_ITS_COLUMNS.format(specimen)
+        conditions.record_assumption(f"{what}{listed} mm", first=not is_named)
+
+
+_LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?mm")
 
 
 def questions_of_assumed(history: History) -> list[Question]:

@@ -135,8 +135,14 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("od", "o.d.", "outside diameter", "tube diameter", "aussendurchmesser", "außendurchmesser"),
         *("diamètre extérieur",),
     ),
-    "span": ("outer span", "support span", "auflagerabstand", "stützweite"),
-    "inner_span": ("inner span", "load span", "loading span"),
+    "span": (
+        *("outer span", "support span", "outer support span", "lower span", "outer roller spacing", "support distance"),
+        *("auflagerabstand", "stützweite", "äußere stützweite", "portée", "distance entre appuis"),
+    ),
+    "inner_span": (
+        *("inner span", "load span", "loading span", "inner loading span", "inner support span", "upper span"),
+        *("inner roller spacing", "innere stützweite", "laststützweite", "lastabstand", "portée intérieure"),
+    ),
     "width": ("specimen width", "breite", "probenbreite", "largeur"),
     "thickness": (
         *("specimen thickness", "wall thickness", "wall", "dicke", "probendicke", "wandstärke", "wanddicke"),

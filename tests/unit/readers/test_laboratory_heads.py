@@ -459,3 +459,21 @@ def test_remarks_of_tests_that_do_not_count(tmp_path):
     framed = "# stress_MPa: 12\n# temperature_C: 600\n# label note: do not use\ntime_h;strain_pct\n0;0\n1;0.1\n2;0.15\n"
     (tmp_path / "f.csv").write_text(framed)
     assert [flag.kind for flag in ck.check_data_quality(ck.read_histories(tmp_path / "f.csv"))] == ["remark"]
+
+
+BEAM = "specimen,four-point-bend\nWidth,4,mm\nHeight,3,mm\n{}\nLoad,72,N\nT (C),1300\n\nTime (h),deflection (mm)\n"
+
+
+def test_the_spans_of_a_beam_are_read_by_their_usual_names_and_never_silently_by_default(tmp_path):
+    path = tmp_path / "beam.csv"
+
+    def read(*spans):
+        path.write_text(BEAM.format("\n".join(f"{one},mm" for one in spans)) + "0,0\n1,0.001\n2,0.002\n")
+        (test,) = ck.read_histories(path)
+        return test
+
+    for outer, inner in (("Outer span", "Inner span"), ("Support span", "Loading span"), ("Stützweite", "Lastabstand")):
+        assert read(f"{outer},60", f"{inner},25").geometry == {"width": 4, "height": 3, "span": 60, "inner_span": 25}
+    assert read("Outer span,60").labels["assumed"].endswith("lengths by default: inner_span 20 mm")
+    with pytest.raises(HistoryError, match=r"'Major span' is a label, and no span .* span_mm = 60 \(or span_mm = 25\)"):
+        read("Major span,60", "Minor span,25")
