@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 136,
     "modules": 781,
     "quality": 1470,
-    "readers": 5582,
+    "readers": 5737,
     "records": 2256,
     "registry": 615,
     "reports": 6167,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29857
+TESTS = 29890
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -34,11 +34,12 @@ from creepkit.errors import HistoryError
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.conditions import noise_correlation_text
+from creepkit.readers.parts_of_tests import read_tests
 from creepkit.readers.questions import collected, raise_all
 from creepkit.readers.table import CellTable
 from creepkit.readers.table_heads import is_frame, names_time, sources_of_names
-from creepkit.readers.table_layouts import TabulatedTest, tests_in
-from creepkit.readers.text_files import peek_table, read_head_alone, read_text_table
+from creepkit.readers.table_layouts import TabulatedTest
+from creepkit.readers.text_files import peek_table, read_head_alone
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
 from creepkit.records import (
     UNKNOWN_DURATION,
@@ -83,7 +84,8 @@ class HistoryCsvReader:
         head = read_head_alone(path)
         if head and any(key.startswith(("minimum_rate", "rupture", "ended")) for key in head):
             return [assemble_without_frames(path.stem, head, self.vocabulary, location=str(path), source=str(path))]
-        return histories_of_tests(tests_in(read_text_table(path), self.vocabulary), path, self.vocabulary)
+        first, tests = read_tests(path, self.vocabulary)
+        return histories_of_tests(tests, first, self.vocabulary)
 
 
 def _has_numbers(grid: CellTable) -> bool:

@@ -26,6 +26,8 @@ from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_reada
 from creepkit.readers.columns_of_tests import column_called, head_of_tests
 from creepkit.readers.frames import unknown_text
 from creepkit.readers.history_csv import histories_of_tests
+from creepkit.readers.parts_of_tests import parts_beside
+from creepkit.readers.questions import Question
 from creepkit.readers.table import (
     CellTable,
     SourceText,
@@ -39,6 +41,7 @@ from creepkit.readers.table import (
 )
 from creepkit.readers.table_heads import names_time
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
+from creepkit.readers.tests_file import SEPARATE
 from creepkit.readers.vocabulary import HeaderVocabulary, names_tests, words_of
 from creepkit.records import History
 
@@ -323,6 +326,11 @@ class SpreadsheetReader:
     def read(self, path: Path) -> list[History]:
         """Return the histories in all sheets."""
         check_readable(path, SPREADSHEET_FILE)
+        if parts_beside(path):
+            what = (
+                "is by its name a part of a test, and parts in spreadsheets are not joined: put their rows below one "
+            )
+            raise Question(path, str(path), f"{what}another in one sheet. Or is it a test?", "parts", (SEPARATE,))
         left_out = {name.casefold() for name in self.vocabulary.ignored}
         sheets = [sheet for sheet in read_sheets(path) if sheet.sheet.casefold() not in left_out]
         framed = [sheet for sheet in sheets if holds_frames(sheet, self.vocabulary)]

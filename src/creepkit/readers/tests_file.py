@@ -10,7 +10,7 @@
 
 A table holds for the files that its pattern matches, later ones over earlier ones. Its keys are conditions as they
 stand in the head of a file; `columns`, {name as written: what it is}; `ended`, a word for all tests, or {text, code or
-name of a test: ruptured, stopped or label}.
+name of a test: ruptured, stopped or label}; `parts`, whether files that are parts of a test are joined or separate.
 """
 
 from __future__ import annotations
@@ -36,15 +36,21 @@ ANSWERS = FileKind("answers about tests", HistoryError, "correct or remove it", 
 _ENDS = (RUPTURED, STOPPED, LABEL)
 
 
+JOINED, SEPARATE = "joined", "separate"
+"""What `parts` may say of files that are parts of one test."""
+
+
 class Answers(NamedTuple):
     """What tests.toml says of one file.
 
-    stated : {condition: text and place}. columns : {name as written: what it is}. ended : {text: end}.
+    stated : {condition: text and place}. columns : {name as written: what it is}. ended : {text: end}. parts : whether
+    parts of a test are joined.
     """
 
     stated: dict[str, tuple[str, str]]
     columns: dict[str, str]
     ended: dict[str, str]
+    parts: str = ""
 
     def added_to(self, vocabulary: HeaderVocabulary) -> HeaderVocabulary:
         """The vocabulary of a reader with the answers."""
@@ -77,6 +83,8 @@ def answers_of(path: Path) -> Answers:
             for key, value in table.items():
                 if key == "columns":
                     found.columns.update(value)
+                elif key == "parts":
+                    found = found._replace(parts=value)
                 elif key == "ended" and isinstance(value, dict):
                     found.ended.update({text.casefold(): end for text, end in value.items()})
                 else:
@@ -115,6 +123,8 @@ def _problem(key: str, value: Any, known: Terms) -> str:
     if key == "columns":
         is_table = isinstance(value, dict) and all(isinstance(one, str) and one for one in value.values())
         return "" if is_table else 'write {name of a column = what it is}, such as {Dehnung = "strain_pct"}'
+    if key == "parts":
+        return "" if value in (JOINED, SEPARATE) else f"is {quoted(repr(value))}; allowed: {JOINED}, {SEPARATE}"
     if key == "ended":
         values = list(value.values()) if isinstance(value, dict) else [value]
         wrong = [one for one in values if one not in (_ENDS if isinstance(value, dict) else _ENDS[:2])]
@@ -122,7 +132,9 @@ def _problem(key: str, value: Any, known: Terms) -> str:
     if known.is_condition(key):
         is_single = isinstance(value, (str, int, float)) and not isinstance(value, bool)
         return "" if is_single else "write a number or a text"
-    near = get_close_matches(key, ["columns", "ended"], 1)
+    near = get_close_matches(key, ["columns", "ended", "parts"], 1)
     meant = near[0] if near else known.suggestion(key)
-    allowed = "allowed are columns, ended, and conditions as in the head of a file, such as stress_MPa or specimen"
+    allowed = (
+        "allowed are columns, ended, parts, and conditions as in the head of a file, such as stress_MPa or specimen"
+    )
     return f"is no key; did you mean '{meant}'?" if meant else f"is no key; {allowed}"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.errors import HistoryError
 from creepkit.testing.reader_checks import history_difference
 from helpers.creep_schema import LIS, SERIES_NAME, document, value
 
@@ -160,3 +161,43 @@ def test_a_rupture_time_without_load_control_says_what_was_assumed(tmp_path: Pat
 def test_the_first_files_are_in_the_code_page_of_windows(tmp_path: Path):
     (test,) = ck.read_histories(write(tmp_path, document(), encoding="cp1252"))
     assert test.times.size == 4
+
+
+# One test in several files.
+
+
+def parts(folder: Path, names: list[str], head: str, starts: tuple[float, ...]) -> list[Any]:
+    """The tests of files of a creep at 0.001 % an hour, whose clocks and strains begin at these times."""
+    for k, (name, start) in enumerate(zip(names, starts, strict=True), 1):
+        rows = "".join(f"{start + h:g},{(start + h) / 1000 + 0.01:g}\n" for h in range(11))
+        first = f"{head.format(k)}\n" if head else ""
+        (folder / name).write_text(f"{first}Stress (MPa),120\nTemperature (C),700\nTime (h),Strain (%)\n{rows}")
+    return ck.read_histories(folder)
+
+
+def test_parts_of_a_test_are_joined_or_asked_about(tmp_path: Path) -> None:
+    cases = (
+        (["R1_part1.csv", "R1_part2.csv"], ""),
+        (["R1_1of2.csv", "R1_2of2.csv"], ""),
+        (["R1_1.csv", "R1_2.csv"], "Creep test R1, part {} of 2"),
+        (["a.csv", "b.csv"], "Versuch R1, Teil {} von 2"),
+        (["R1-1.csv", "R1-2.csv"], "Essai R1, partie {}/2"),
+    )
+    for k, (names, head) in enumerate(cases):
+        (folder := tmp_path / str(k)).mkdir()
+        (test,) = parts(folder, names, head, (0.0, 12.0))  # times go on
+        assert test.times[-1] == 22 * 3600.0, names
+        assert test.times.size == 22
+        assert f"parts joined whose times go on: {names[0]}; {names[1]}" in test.labels["assumed"]
+        with pytest.raises(HistoryError, match='its clock begins anew: are the parts one test.*parts = "joined"'):
+            parts(folder, names, head, (0.0, 0.0))
+        for answer, ends in (("joined", [20.0]), ("separate", [10.0, 10.0])):
+            (folder / "tests.toml").write_text(f'["*.csv"]\nparts = "{answer}"\n')
+            tests = ck.read_histories(folder)
+            assert [one.times[-1] / 3600.0 for one in tests] == ends, names
+            for one, hours in zip(tests, ends, strict=True):
+                assert np.ptp(one.outputs["strain"]) == pytest.approx(hours * 1e-5), names
+        (folder / "tests.toml").unlink()
+        (folder / names[0]).unlink()
+        with pytest.raises(HistoryError, match="is part 2 of a test, and part 1 is not beside it"):
+            ck.read_histories(folder)

@@ -1,0 +1,178 @@
+"""One test in several files: `part 2 of 3` in the head, or R1_part2.csv, becomes one table of frames.
+
+Where the times of each part go on from those of the part before, the frames follow one another. Where the clock begins
+anew it is asked whether the parts are one test, `parts` in tests.toml: `joined`, each part begins where the one before
+ended, in time and in strain; or `separate`, tests of their own.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+from creepkit.errors import HistoryError, quoted
+from creepkit.files.delimited_text import float_of, is_number
+from creepkit.readers.questions import Question
+from creepkit.readers.table import CellTable, SourceText, TableRow
+from creepkit.readers.table_heads import is_frame
+from creepkit.readers.table_layouts import TabulatedTest, tests_in
+from creepkit.readers.tests_file import JOINED, SEPARATE, answers_of
+from creepkit.readers.text_files import peek_table, read_text_table
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms
+from creepkit.records.quantities import LENGTH
+
+_IN_HEAD = re.compile(
+    r"\b(?:part|teil|partie)\.?\s*(?P<number>\d{1,2})\s*(?:of|von|de|sur|/)\s*(?P<total>\d{1,2})\b", re.IGNORECASE
+)
+_IN_NAME = re.compile(
+    r"(?:(?:^|[ _.-]+|(?<=\d))(?:part|teil|partie)[ _.-]?(?P<number>\d{1,2})"
+    r"(?:[ _.-]?(?:of|von|de|sur)[ _.-]?(?P<total>\d{1,2}))?"
+    r"|[ _.-]+(?P<one>\d{1,2})(?:of|von|sur)(?P<all>\d{1,2}))$",
+    re.IGNORECASE,
+)
+
+
+class Part(NamedTuple):
+    """A file that is a part of a test: which, of how many, 0 where that is not said; what its other parts share."""
+
+    number: int
+    total: int
+    test: tuple[str, str]
+    path: Path
+
+
+def read_tests(path: Path, vocabulary: HeaderVocabulary) -> tuple[Path, list[TabulatedTest]]:
+    """The first file of the tests in a file, and these tests: of a part of a test the whole test.
+
+    Question where parts lack, or where it is open whether the parts are one test; HistoryError for what is wrong in
+    them.
+    """
+    parts = parts_beside(path)
+    if not parts:
+        return path, list(tests_in(read_text_table(path), vocabulary))
+    answers = [answers_of(one.path) for one in parts]
+    if len({(str({k: v[0] for k, v in a.stated.items()}), str(a.columns), str(a.ended)) for a in answers}) > 1:
+        raise HistoryError(f"{path}: tests.toml says other things of other parts of its test; give them one pattern")
+    found = [list(tests_in(read_text_table(one.path), vocabulary)) for one in parts]
+    if any(len(tests) != 1 for tests in found):
+        what = "is a part of several tests, which are not joined; are these tests of their own?"
+        raise Question(path, str(path), what, "parts", (SEPARATE,))
+    return parts[0].path, [_joined(path, parts, [tests[0] for tests in found], vocabulary)]
+
+
+def parts_beside(path: Path) -> list[Part]:
+    """The parts of the test of which a file is one, in their order; [] of a whole test, and of parts said separate."""
+    own = _part(path, path.stat().st_mtime_ns)
+    if own is None or answers_of(path).parts == SEPARATE:
+        return []
+    alike = re.sub(r"\d+", "#", path.stem)
+    others = [one for one in path.parent.iterdir() if one.suffix == path.suffix and one.is_file()]
+    if own.test[0]:
+        others = [one for one in others if re.sub(r"\d+", "#", one.stem) == alike]
+    found = [_part(one, one.stat().st_mtime_ns) for one in others]
+    parts = sorted(one for one in found if one is not None and one.test == own.test)
+    numbers, total = [one.number for one in parts], max(one.total for one in parts)
+    if numbers == [1] and total < 2:
+        return []
+    if lacking := sorted({*range(1, max(total, *numbers, 1) + 1)} - {*numbers}):
+        listed = " and ".join(map(str, lacking))
+        what = f"is part {own.number} of a test, and part {listed} is not beside it; put it there. Or is this a test?"
+        raise Question(path, str(path), what, "parts", (SEPARATE,))
+    if twice := [one for one, other in pairwise(parts) if one.number == other.number]:
+        what = f"and another file say that they are part {twice[0].number} of one test"
+        raise HistoryError(f"{twice[0].path}: this {what}; correct one of them")
+    return parts
+
+
+@lru_cache(4096)
+def _part(path: Path, changed: int) -> Part | None:
+    """Which part of a test a file is; changed : when it was, for the cache."""
+    head, name = _IN_HEAD.search(_head(path)), _IN_NAME.search(path.stem)
+    if name:
+        number = int(name["number"] or name["one"])
+        total = int(name["total"] or name["all"] or (head["total"] if head else 0))
+        return Part(number, total, (path.stem[: name.start()], ""), path)
+    if not head:
+        return None
+    number = int(head["number"])
+    text = f"{head.string[: head.start()]}{head.string[head.end() :]}"
+    numbered = re.fullmatch(rf"(.*?)[ _.-]*0*{number}", path.stem)
+    return Part(number, int(head["total"]), (numbered[1] if numbered else "", text), path)
+
+
+def _head(path: Path) -> str:
+    """The line above the frames of a file that says which part of a test it is; "" where none does."""
+    table = peek_table(path)
+    if table is None:
+        return ""
+    said = [entry.text for entry in table.header.values()]
+    for row in table.rows:
+        if is_frame(row, table):
+            break
+        said.append(" ".join(filter(None, row.cells)))
+    return next(filter(_IN_HEAD.search, said), "")
+
+
+def _joined(
+    path: Path, parts: Sequence[Part], tests: Sequence[TabulatedTest], vocabulary: HeaderVocabulary
+) -> TabulatedTest:
+    """The test of all parts."""
+    first, known = tests[0], vocabulary.terms()
+    for part, test in zip(parts, tests, strict=True):
+        if list(test.table.columns) != list(first.table.columns):
+            what = f"has other columns than part 1, {quoted(parts[0].path.name)}; make them the same"
+            raise HistoryError(f"{part.path}: {what}")
+        for key, entry in _conditions(test, known).items():
+            other = _conditions(first, known).get(key, entry)
+            if not entry.says_the_same(other):
+                what = f"'{key}' is {quoted(entry.text)}, and in part 1 {quoted(other.text)}; parts of a test have one"
+                raise HistoryError(f'{entry.location}: {what}; give each its steps, or write parts = "{SEPARATE}"')
+    columns = [known.quantity(name) for name in first.table.columns]
+    time = columns.index("time") if "time" in columns else None
+    listed = "; ".join(one.path.name for one in parts)
+    rows, note = [row for test in tests for row in test.table.rows], "whose times go on"
+    if time is not None and _begins_anew(tests, time):
+        if answers_of(path).parts != JOINED:
+            what = "is a part of a test, and its clock begins anew: are the parts one test, each from where the one "
+            what += "before ended, in time and strain, or tests of their own?"
+            raise Question(path, str(path), what, "parts", (JOINED, SEPARATE))
+        kinds = known.columns.kinds
+        moved = [time, *(k for k, q in enumerate(columns) if q and (q.startswith("strain") or kinds[q] is LENGTH))]
+        rows, note = _in_one_clock([test.table for test in tests], moved), "each from the end of the one before"
+    entries = {key: entry for test in reversed(tests) for key, entry in test.entries.items()} | dict(first.entries)
+    table = replace(first.table, rows=rows).assuming(f"parts joined {note}: {listed}")
+    return TabulatedTest(first.name or parts[0].test[0] or parts[0].path.stem, entries, table)
+
+
+def _conditions(test: TabulatedTest, known: Terms) -> dict[str, SourceText]:
+    """What a part states of its test, without its labels."""
+    stated = {key: one for key, one in test.entries.items() if known.is_condition(key) and not key.startswith("label ")}
+    return {one.key: one for one in test.table.sources if one.key != "name"} | stated
+
+
+def _begins_anew(tests: Iterable[TabulatedTest], time: int) -> bool:
+    """Whether the time of a part begins before that of the one before ended, where times are numbers."""
+    ends = [(test.table.rows[0].cells[time], test.table.rows[-1].cells[time], test.table.dialect) for test in tests]
+    if not all(is_number(one, dialect) for *both, dialect in ends for one in both):
+        return False
+    numbers = [(float_of(one.replace(",", ".")), float_of(other.replace(",", "."))) for one, other, _ in ends]
+    return any(start < end for (_, end), (start, _) in pairwise(numbers))
+
+
+def _in_one_clock(tables: Sequence[CellTable], moved: Sequence[int]) -> list[TableRow]:
+    """The frames of all parts; the first of each is the last of the one before, in the columns that are moved."""
+    rows = list(tables[0].rows)
+    for table in tables[1:]:
+        sign = table.dialect.decimal
+        last, first = ([float_of(row.cells[k].replace(sign, ".")) for k in moved] for row in (rows[-1], table.rows[0]))
+        for row in table.rows[1:]:
+            cells = list(row.cells)
+            for k, end, start in zip(moved, last, first, strict=True):
+                cells[k] = f"{float_of(cells[k].replace(sign, '.')) - start + end:.12g}".replace(".", sign)
+            rows.append(TableRow(row.line, cells))
+    return rows
