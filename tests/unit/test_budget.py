@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 136,
     "modules": 781,
     "quality": 1470,
-    "readers": 5737,
+    "readers": 5834,
     "records": 2256,
     "registry": 615,
     "reports": 6167,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29890
+TESTS = 29925
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
