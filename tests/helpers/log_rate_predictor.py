@@ -9,6 +9,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Prediction, Predictor, constant_stress
@@ -72,7 +73,10 @@ def known_scatter(
     """
     settings = IdentificationSettings(starts=2, sobol_points=8, nuisances=nuisances, usual_errors="none")
     fit = identify(law, tests, using or LogRates(), settings=settings)
-    return replace(fit, noise_model=NoiseModel({"amplitude": OutputNoise(noise=sd)}), freedom=1e9)
+    known = NoiseModel({"amplitude": OutputNoise(noise=sd)})
+    assert fit.linearised is not None
+    covariance = covariance_of_values(fit.linearised, known)[: fit.u.size, : fit.u.size]
+    return replace(fit, noise_model=known, covariance=covariance, freedom=1e9)
 
 
 def least_squares(tests: Sequence[History], sd: float) -> tuple[np.ndarray, np.ndarray]:

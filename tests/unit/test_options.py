@@ -94,7 +94,7 @@ def test_public_functions_show_their_options_with_defaults() -> None:
         parameters = inspect.signature(function).parameters
         assert "changes" not in parameters
         for one in fields(ck.IdentificationSettings):
-            expected = "likelihood" if (function, one.name) == (ck.select, "weights") else one.default
+            expected = "automatic" if (function, one.name) == (ck.select, "weights") else one.default
             assert parameters[one.name].default == expected, one.name
 
 

@@ -87,8 +87,8 @@ class KnownLaw:
         shared = tuple(count + k for k, n in enumerate(nuisances.nuisances) if n.scope != "test")
         kept = [*range(count), *shared]
         marginal = scaled_inverse(scaled_inverse(information)[np.ix_(kept, kept)])
-        by_likelihood = fit.settings.weights == "likelihood" or np.any(held)
-        sandwich = np.eye(len(marginal)) if by_likelihood else _sandwich(fit.by_tests_alone.covariance, marginal)
+        is_altered = bool(np.any(held))
+        sandwich = np.eye(len(marginal)) if is_altered else _sandwich(fit.by_tests_alone.covariance, marginal)
         chi_square = float((factor.whiten(residuals.values) ** 2).sum())
         of_kept = np.broadcast_to(held, information.shape)[np.ix_(kept, kept)]
         return cls(fit, problem, noise_model, fit.x, shared, marginal, chi_square, sandwich, of_kept)

@@ -117,7 +117,8 @@ def test_weights():
     assert parse_weights("paper") == "paper"
     assert parse_weights("amplitude=0.99, width=0.005") == {"amplitude": 0.99, "width": 0.005}
     with pytest.raises(
-        FitError, match="--weights amplitude is not known; write noise.likelihood.equal.paper.NAME=NUMBER,..., such as"
+        FitError,
+        match="--weights amplitude is not known; write automatic.noise.likelihood.equal.paper.NAME=NUMBER,..., such as",
     ):
         parse_weights("amplitude")
 

@@ -64,7 +64,7 @@ SAME_BASIN = 0.1
 """Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
 
 
-FIRST_STEPS, CONTINUED = Tolerances(max_steps=3), 2
+FIRST_STEPS, CONTINUED = Tolerances(max_steps=3), 3
 """Of every start of least squares, and how many of the best ends of these steps are refined to the end."""
 
 
