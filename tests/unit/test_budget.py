@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29925
+TESTS = 29926
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

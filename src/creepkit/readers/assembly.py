@@ -317,7 +317,8 @@ _BY_ITS_COLUMNS = "specimen {} by its columns with lengths by default: "
 def _record_unstated(conditions: StatedConditions, specimen: str, is_named: bool) -> None:
     """Record a specimen that columns alone tell, before all else that is assumed, and lengths by default.
 
-    Of a specimen that is named those count of which some are stated. A length that a label may state is asked for.
+    Of a specimen that is named these count where no more lengths are by default than are stated. A length that a label
+    may state is asked for.
     """
     lengths = _lengths_by_default(specimen, conditions.geometry)
     for name in lengths:
@@ -327,7 +328,7 @@ def _record_unstated(conditions: StatedConditions, specimen: str, is_named: bool
             label = quoted(next(iter(found)), 60)
             what = f"'{label}' is a label, and no {name} of the {specimen} is stated; how many mm is it?"
             raise conditions.question(what, f"{name}_mm", *(float(one[1].replace(",", ".")) for one in found.values()))
-    if lengths and (not is_named or conditions.geometry.keys() & conditions.terms.dimensions):
+    if lengths and (not is_named or len(conditions.geometry.keys() & conditions.terms.dimensions) >= len(lengths)):
         listed = "; ".join(f"{name} {length:g}" for name, length in lengths.items())
         what = "lengths by default: " if is_named else _BY_ITS_COLUMNS.format(specimen)
         conditions.record_assumption(f"{what}{listed} mm", first=not is_named)
