@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 136,
     "modules": 781,
     "quality": 1470,
-    "readers": 5834,
+    "readers": 5840,
     "records": 2256,
     "registry": 615,
     "reports": 6167,

@@ -8,7 +8,7 @@ ended, in time and in strain; or `separate`, tests of their own.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
@@ -155,11 +155,13 @@ def _conditions(test: TabulatedTest, known: Terms) -> dict[str, SourceText]:
     return {one.key: one for one in test.table.sources if one.key != "name"} | stated
 
 
-def _begins_anew(tests: Iterable[TabulatedTest], time: int) -> bool:
+def _begins_anew(tests: Sequence[TabulatedTest], time: int) -> bool:
     """Whether the time of a part begins before that of the one before ended, where times are numbers."""
     ends = [(test.table.rows[0].cells[time], test.table.rows[-1].cells[time], test.table.dialect) for test in tests]
     if not all(is_number(one, dialect) for *both, dialect in ends for one in both):
         return False
+    for test in tests:
+        test.table.numbers(test.table.columns[time])  # or an error with the place in its part
     numbers = [(float_of(one.replace(",", ".")), float_of(other.replace(",", "."))) for one, other, _ in ends]
     return any(start < end for (_, end), (start, _) in pairwise(numbers))
 
@@ -168,11 +170,15 @@ def _in_one_clock(tables: Sequence[CellTable], moved: Sequence[int]) -> list[Tab
     """The frames of all parts; the first of each is the last of the one before, in the columns that are moved."""
     rows = list(tables[0].rows)
     for table in tables[1:]:
-        sign = table.dialect.decimal
+        sign, dialect = table.dialect.decimal, table.dialect
+        if not all(is_number(row.cells[k], dialect) for row in (rows[-1], table.rows[0]) for k in moved):
+            what = "a cell of the first row, or of the last of the part before, is no number"
+            raise HistoryError(f"{table.location(table.rows[0].line)}: {what}, and parts are joined there; correct it")
         last, first = ([float_of(row.cells[k].replace(sign, ".")) for k in moved] for row in (rows[-1], table.rows[0]))
         for row in table.rows[1:]:
             cells = list(row.cells)
             for k, end, start in zip(moved, last, first, strict=True):
-                cells[k] = f"{float_of(cells[k].replace(sign, '.')) - start + end:.12g}".replace(".", sign)
+                if is_number(cells[k], dialect):
+                    cells[k] = f"{float_of(cells[k].replace(sign, '.')) - start + end:.12g}".replace(".", sign)
             rows.append(TableRow(row.line, cells))
     return rows
