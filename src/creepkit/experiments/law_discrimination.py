@@ -332,7 +332,7 @@ def _refit_in_full(
     observations = ObservationVector.from_histories(histories, measured.predictor).with_noise_of(measured.observations)
     nuisances = nuisances_of_planned(law, further, of_made=True)
     problem = replace(
-        measured, histories=histories, observations=observations, evaluations=EvaluationCache()
+        measured.about_rates(law.x, None), histories=histories, observations=observations, evaluations=EvaluationCache()
     ).with_nuisances(nuisances)
     known = {(n.key, n.owner): n.value for n in law.fit.nuisances}
     begun = [law.fit.u] if starts is None else list(starts)

@@ -197,3 +197,21 @@ def test_tests_together_are_known_no_worse_than_the_best_of_them_alone():
                        for param, e in zip(NORTON.table.values(), fit.estimates, strict=True)])  # fmt: skip
     *alone, together = widths
     assert (np.array(together) < np.min(alone, axis=0)).all(), widths
+
+
+def test_values_profiles_and_samples_are_one_estimate_whatever_errors_are_included():
+    """Of nine planted curves, within 0.2 standard deviations; errors that vanish move nothing."""
+    curves, law = ck.read_histories(ck.example_data("planted creep curves")), ck.law("strain-hardening")
+    none, vanishing, usual = (
+        ck.identify(law.times(ck.arrhenius(T_ref=1073.15)), curves, weights="likelihood", starts=1, usual_errors=errors)
+        for errors in ("none", {"temperature": 1e-6}, "usual")
+    )
+    sd = np.sqrt(np.diag(none.covariance))
+    np.testing.assert_allclose(vanishing.u, none.u, atol=1e-3 * sd.min())
+    samples = usual.sample(draws=1000).u
+    profiles = [usual.profile(name).best for name in ("n", "m")]
+    values = [usual.values[name] for name in ("n", "m")]
+    widths = [(one.high - one.low) / 3.92 for one in usual.by_tests_alone.estimates if one.name in ("n", "m")]
+    assert (np.abs(usual.u - none.u) < 0.2 * sd).all()
+    assert (np.abs(samples.mean(axis=0) - usual.u) < 0.2 * sd).all()
+    assert (np.abs(np.subtract(profiles, values)) < 0.2 * np.array(widths)).all()

@@ -18,7 +18,7 @@ from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import describing, identify, identify_values
+from creepkit.inverse.identify import describing, identify
 from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
@@ -188,8 +188,7 @@ def _try_to_identify(
     """
     start = None if previous_fit is None else StartingEstimate.from_identification(previous_fit)
     try:
-        run = identify if sampled else identify_values
-        return run(law, histories, using, settings=settings, start=start)
+        return identify(law, histories, using, settings=settings, start=start, values_only=not sampled)
     except CreepkitError as error:
         failed[law.name] = str(error)
         return None
