@@ -35,7 +35,7 @@ BUDGET = {
     "language": 1494,
     "laws": 136,
     "modules": 781,
-    "quality": 1470,
+    "quality": 1295,
     "readers": 5840,
     "records": 2256,
     "registry": 615,
