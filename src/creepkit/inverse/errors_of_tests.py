@@ -32,9 +32,9 @@ from creepkit.inverse.perturbations import (
     test_conditions,
 )
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.rate_perturbations import RatePerturbations
 from creepkit.inverse.residuals import life_sensitivity
 from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values
+from creepkit.inverse.uncertainty.rate_scatter import redundant_rates
 from creepkit.inverse.variance_components import LinearisedProblem
 
 SCATTER_NODES = 60
@@ -102,7 +102,7 @@ def _usual_scatter(
         return np.zeros(tests)
     own = any(n.kind == "temperature" for n in settings.nuisances)
     kelvin, load = 0.0 if own else included.get("temperature", 0.0), included.get("load", 0.0)
-    redundant = RatePerturbations(linear, noise_model, scatter_known=True).contrasts if noise_model.rate > 0 else 0
+    redundant = redundant_rates(linear, noise_model) if noise_model.rate > 0 else 0
     added = []
     for test in range(tests):
         per_kelvin = log_rate_per_kelvin(problem, x, *test_conditions(problem, test))
