@@ -568,8 +568,8 @@ class _RefitCache:
         self.fitted[tuple(best.forms.values())] = replace(best, fit=fit)
 
     def _identify(self, law: CreepLaw, start: Floats | None) -> Identification:
-        estimate = StartingEstimate(start, reference=self.estimates.reference)
-        return identify(law, self.histories, self.predictor, settings=self.settings, start=estimate, values_only=True)
+        estimate = StartingEstimate(start, reference=self.estimates.reference, values_only=True)
+        return identify(law, self.histories, self.predictor, settings=self.settings, start=estimate)
 
     def _starts(
         self, law: CreepLaw, regression: FormCombination, joint_fit: Identification | None

@@ -20,7 +20,7 @@ from creepkit.inverse.defect_correction import (
     shift_of_values,
     with_correction_at_frames,
 )
-from creepkit.inverse.errors_of_tests import error_covariances, errors_of_tests
+from creepkit.inverse.errors_of_tests import LIFE, RATE, error_covariances, errors_of_tests
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
@@ -72,7 +72,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor, Status, is_length_nuisance, is_logarithmic
+from creepkit.records import History, Predictor, Status, is_length_nuisance
 
 MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
@@ -93,7 +93,6 @@ def identify(
     through: Predictor | None = None,
     start: StartingEstimate | None = None,
     progress: IterationCallback | None = None,
-    values_only: bool = False,
 ) -> Identification:
     """Identify the parameters of `law` from `histories` by a global search, then by their likelihood.
 
@@ -104,7 +103,6 @@ def identify(
         values and intervals are those of `using`.
     A surrogate that does not know this class of laws is replaced by its specimen, or left out; a note says so.
     start : an estimate to begin from instead of a global search.
-    values_only : no samples of the posterior where a value is at its bound, and no refit without a test that is off.
     """
     settings = settings or IdentificationSettings()
     automatic = settings.weights == "automatic"
@@ -116,7 +114,7 @@ def identify(
         best, outcome, numerical_error = _estimated(law, histories, using, settings, search, through, start, progress)
         fit = _reported(histories, best, outcome, numerical_error)
         fit = replace(fit, notes=(*left_out, *fit.notes, *widened_notes(law, fit.law), *notes))
-        if values_only:
+        if start is not None and start.values_only:
             return fit
         if automatic and misses_shape(fit):
             return describing(fit)
@@ -153,8 +151,8 @@ def _without_one_test(fit: Identification) -> Identification:
     first, *rest = adequacy.explanations
     others = [h for h in fit.histories if h.name not in first.tests]
     try:
-        start, using = StartingEstimate.from_identification(fit), fit.least_squares_problem.predictor
-        without = identify(fit.law, others, using, settings=fit.settings, start=start, values_only=True)
+        start = StartingEstimate.from_identification(fit, values_only=True)
+        without = identify(fit.law, others, fit.least_squares_problem.predictor, settings=fit.settings, start=start)
     except CreepkitError:
         return fit
     values = {e.name: (e.value, e.low, e.high) for e in without.estimates}
@@ -173,9 +171,7 @@ def _beside_the_others(fit: Identification, without: Identification, test: int, 
     log_factors[test] = found.size
     linear = problem.about_rates(x, log_factors).linearised(x)
     others = RateExplanations(problem, x, linear, without.noise_model)
-    logarithmic = all(map(is_logarithmic, problem.observations.outputs))
-    sizes = others.rates.median_log_factors if logarithmic else others.rates.own_log_factors
-    size = float(sizes[test])
+    size = float(others.scatter.log_factor[test])
     return others.one_test(test, found.odds, size if np.isfinite(size) else found.size)
 
 
@@ -309,7 +305,7 @@ def _reported(
         working_noise = with_single_value_weight(best.noise, problem.observations)
         covariance = covariance_of_values(linear, noise_model, working_noise)
     unmodelled = perturbations(
-        problem, linear, noise_model, histories, None if errors is None else errors.perturbations, working_noise
+        problem, linear, noise_model, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
     )
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     rates = RateExplanations(problem, x, judged, noise_model)

@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.errors_of_tests import TestErrors, errors_of_tests
+from creepkit.inverse.errors_of_tests import errors_of_tests, with_errors
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.problem import NOTEWORTHY_FACTOR, LeastSquaresProblem
+from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.problem import LARGEST_FACTOR, NOTEWORTHY_FACTOR, LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
 from creepkit.inverse.variance_components import LinearisedProblem, restricted_log_likelihood, scaled_inverse
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, robust_test_weights, with_single_value_weight
@@ -68,7 +69,7 @@ class EstimationResult:
 
     problem : with the priors of nuisance parameters, and about the rates of tests, as they were estimated.
     linear : the problem made linear at the values. noise : under which values were found. errors : of tests, that the
-    covariance holds beside it, None for none. converged : whether the last refinement ended by itself.
+    covariance holds beside it. converged : whether the last refinement ended by itself.
     """
 
     problem: LeastSquaresProblem
@@ -76,7 +77,7 @@ class EstimationResult:
     noise: NoiseModel
     log_likelihood: float
     converged: bool = True
-    errors: TestErrors | None = None
+    errors: tuple[Perturbation, ...] = ()
 
     @property
     def x(self) -> Floats:
@@ -142,8 +143,7 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         problem, residuals = about_own_rates(problem, linear.x, linear.residuals, noise)
         linear = replace(problem.linearised(linear.x, residuals), free=free)
         errors = errors_of_tests(problem, linear.x, linear, noise)
-        covariance = residuals if errors is None else errors.within(residuals)
-        solution = linear.solve(CovarianceFactor.of_residuals(covariance, noise))
+        solution = linear.solve(CovarianceFactor.of_residuals(with_errors(linear, errors).residuals, noise))
         found = replace(found, problem=problem, linear=linear, errors=errors)
         if (np.abs(solution.step) <= LAST_STEP * np.sqrt(np.diag(solution.covariance))).all():
             break
@@ -177,7 +177,7 @@ def about_own_rates(
     residuals : of the problem at x, with the weights of tests. As it is where its rates are those that are predicted.
     """
     for _ in range(MOST_RATE_STEPS):
-        log_factors = predicted_random_effects(residuals, noise)[1]
+        log_factors = np.clip(predicted_random_effects(residuals, noise)[1], -LARGEST_FACTOR, LARGEST_FACTOR)
         known = 0.0 if problem.log_factors is None else problem.log_factors
         if np.abs(log_factors - known).max() < NOTEWORTHY_FACTOR:
             break

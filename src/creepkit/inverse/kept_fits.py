@@ -179,7 +179,6 @@ def _key(law: Any, histories: Any, predictor: Predictor, how: Mapping[str, Any])
     """Hash of all that decides an identification."""
     start, through = how.get("start"), how.get("through")
     parts = {
-        "values_only": bool(how.get("values_only")),
         "versions": {name: version(name) for name in COMPUTING},
         "code": code_fingerprint(),
         "law": [law.name, law.fingerprint, [(name, repr(p.bounds), repr(p.off)) for name, p in law.table.items()]],
@@ -190,7 +189,10 @@ def _key(law: Any, histories: Any, predictor: Predictor, how: Mapping[str, Any])
         "search": repr(how.get("search")),
         "start": None
         if start is None
-        else [None if start.u is None else np.asarray(start.u).tolist(), repr(start.nuisances), repr(start.reference)],
+        else [
+            None if start.u is None else np.asarray(start.u).tolist(),
+            repr([start.nuisances, start.reference, start.values_only]),
+        ],
     }
     return short_hash(canonical_json(parts))
 

@@ -72,6 +72,11 @@ NOTEWORTHY_FACTOR = 0.03
 """Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
 
 
+LARGEST_FACTOR = 1.0
+"""Of ln rate of a test, up to which its curve is simulated with that factor: one that is further off may break at its
+own rate before it was measured."""
+
+
 class EvaluationCache:
     """The residuals of the last few points, and how many candidates were evaluated; one candidate is all tests once.
 
@@ -178,10 +183,11 @@ class LeastSquaresProblem:
     def about_rates(self, x: Floats, log_factors: Floats | None) -> LeastSquaresProblem:
         """The same about other rates of tests near x (unknowns,); log_factors : (tests,) their ln, or None.
 
-        Where some rate has no coefficient of its own, none has such a factor.
+        None is larger than LARGEST_FACTOR; where some rate has no coefficient of its own, none has such a factor.
         """
         if log_factors is None or not self.coordinates.every_rate_has_coefficient:
             return replace(self, log_factors=None, rate_shift=None)
+        log_factors = np.clip(log_factors, -LARGEST_FACTOR, LARGEST_FACTOR)
         there = replace(self, log_factors=log_factors, rate_shift=None)
         return replace(there, rate_shift=log_factors[:, None] * there.residuals(x).log_rate_sensitivity)
 

@@ -186,9 +186,11 @@ def _try_to_identify(
 
     sampled : whether its posterior is sampled where that is needed; not of what is identified again.
     """
-    start = None if previous_fit is None else StartingEstimate.from_identification(previous_fit)
+    start = None if sampled else StartingEstimate(None, values_only=True)
+    if previous_fit is not None:
+        start = StartingEstimate.from_identification(previous_fit)
     try:
-        return identify(law, histories, using, settings=settings, start=start, values_only=not sampled)
+        return identify(law, histories, using, settings=settings, start=start)
     except CreepkitError as error:
         failed[law.name] = str(error)
         return None
