@@ -90,14 +90,7 @@ def data_digest(problem: LeastSquaresProblem) -> str:
     for array in (observations.values, observations.times, observations.present, observations.output_index):
         digest.update(np.ascontiguousarray(array).tobytes())
     names = [h.name for h in problem.histories]
-    method = (
-        names,
-        observations.outputs,
-        observations.transforms,
-        settings.loss,
-        settings.test_loss,
-        settings.nuisances,
-    )
+    method = (names, observations.outputs, observations.transforms, settings.test_loss, settings.nuisances)
     digest.update(repr(method).encode())
     return digest.hexdigest()[:16]
 

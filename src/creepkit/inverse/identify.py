@@ -107,7 +107,7 @@ def identify(
     settings = settings or IdentificationSettings()
     automatic = settings.weights == "automatic"
     if automatic:
-        settings = replace(settings, weights="likelihood" if settings.loss == "linear" else "noise")
+        settings = replace(settings, weights="likelihood")
     using, through, notes = predictors_for_law(law, using, through)
     histories, left_out = compared_tests(law, histories, settings)
     with single_threaded_blas():
@@ -224,7 +224,6 @@ def _best_estimate(
     estimator = _working_estimator(problem)
     known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in search_outcome.starts]
-    problem = replace(problem, loss=problem.settings.loss)
     limits, noise = IterationLimits(), None
     if through is not None and start.u is None:
         best = _best_of(problem.with_predictor(through), starts, estimator, APPROXIMATE_LIMITS, progress)
@@ -380,9 +379,7 @@ def _reported(
         predictor=problem.predictor,
         search_trace=search_outcome.trace,
         linearised=linear,
-        problem=replace(
-            problem, covariance_factor=CovarianceFactor.of_residuals(residuals, noise_model), loss="linear"
-        ),
+        problem=problem.with_covariance(CovarianceFactor.of_residuals(residuals, noise_model)),
     )
 
 

@@ -79,5 +79,4 @@ def search_problem(problem: LeastSquaresProblem, predictor: Predictor) -> LeastS
 
     The likelihoods decide between its minima, since the covariance is not yet known. Its unknowns are u alone.
     """
-    loss = "soft_l1" if problem.settings.loss == "linear" else problem.settings.loss
-    return replace(problem.with_predictor(predictor).with_fixed_nuisances(), loss=loss)
+    return replace(problem.with_predictor(predictor).with_fixed_nuisances(), robust=True)

@@ -101,8 +101,8 @@ class LeastSquaresProblem:
     """A law against histories under a covariance; the unknowns are x = (u, e).
 
     histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
-    bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. loss : of the whitened
-        residuals, as scipy names it. penalty : what is added to half the chi-square.
+    bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. robust : whether a single
+        residual far off counts less, as in a search. penalty : what is added to half the chi-square.
     correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
         against a more exact one (see inverse.defect_correction), or None.
     log_factors : (tests,) ln of the factors on the rates of tests about which residuals are taken, None for the law's
@@ -120,7 +120,7 @@ class LeastSquaresProblem:
     bounds: Bounds
     settings: IdentificationSettings
     covariance_factor: CovarianceFactor
-    loss: str = "linear"
+    robust: bool = False
     penalty: Penalty | None = None
     correction: Floats | None = None
     log_factors: Floats | None = None
@@ -353,7 +353,7 @@ class LeastSquaresProblem:
         """
         inside = self.bounds.of(range(self.parameter_count)).clip(u)
         whitened = self.whiten(np.moveaxis(self.candidate_residuals(inside), 0, -1)).T
-        total = 0.5 * robust_loss(whitened**2, self.loss).sum(axis=1)
+        total = 0.5 * (robust_loss(whitened**2) if self.robust else whitened**2).sum(axis=1)
         total += 0.5 * (self.bound_penalties.residuals(inside) ** 2).sum(axis=1)
         if self.penalty is not None:
             total += self.penalty.values(inside)
@@ -392,7 +392,7 @@ class LeastSquaresProblem:
         if nuisances.size:
             scale[-nuisances.size :] = np.minimum(nuisances.sd, self.bounds.width[-nuisances.size :])
         minimum = bounded_least_squares(
-            system, inside, self.bounds, scale, tolerances or Tolerances(), fixed=fixed, loss=self.loss
+            system, inside, self.bounds, scale, tolerances or Tolerances(), fixed=fixed, robust=self.robust
         )
         assert minimum.whitened_residuals is not None
         return replace(minimum, whitened_residuals=minimum.whitened_residuals[: self.observations.count])

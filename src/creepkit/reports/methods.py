@@ -251,8 +251,6 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
             "The noise of a reading has a log-normal prior about the noise that its test states, with a standard "
             f"deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
         )
-    if settings.loss != "linear":
-        yield f"Readings far off have less weight by the loss '{settings.loss}'."
     if settings.test_loss == "student":
         yield f"Tests far from the others have less weight by Student's distribution{cite('student')}."
     if fit.numerical_error is not None:
