@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError, FitWarning
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+from creepkit.language import CreepLaw, temperature
 from creepkit.records import ZERO_CELSIUS
+from creepkit.records.units import celsius_text
 
 RANGE_TOLERANCE = 1e-3
 """Relative distance from a range within which a point counts as inside: 1 K at 1000 K."""
@@ -19,6 +22,12 @@ UNITS = {"stress": " MPa", "temperature": " K", "time": " h", "strain": ""}
 
 
 HOUR = 3600.0
+
+
+UNSEEN_RUPTURE = (
+    "no fitted test broke: this is when the bar would tear by the growth of strain alone; damage breaks it sooner"
+)
+"""Of a rupture that a law without ruptures among its tests predicts."""
 
 
 def extrapolation_text(
@@ -64,33 +73,48 @@ WRONG_UNIT_MARGIN = 100.0
 """K below the fitted range from which on a temperature that would lie in it in degrees Celsius is refused."""
 
 
-def check_kelvin(ranges: Mapping[str, tuple[float, float]], temperature: ArrayLike | None) -> None:
-    """FitError for a temperature far below the fitted ones that would be near them if it were meant in C.
+def check_temperature(
+    laws: Sequence[CreepLaw], ranges: Mapping[str, tuple[float, float]], given: ArrayLike | None
+) -> None:
+    """FitError for a temperature of which nothing is known: a law has none, or in C it would be near the fitted ones.
 
-    temperature : number or (...,) K.
+    given : number or (...,) K, or None.
     """
-    if temperature is None or "temperature" not in ranges:
+    if given is None or "temperature" not in ranges:
         return
     low, high = ranges["temperature"]
-    for value in np.atleast_1d(np.asarray(temperature, float)).ravel():
+    values = np.atleast_1d(np.asarray(given, float)).ravel()
+    for value in values:
         kelvin = float(value) + ZERO_CELSIUS
         if value < low - WRONG_UNIT_MARGIN and low - WRONG_UNIT_MARGIN <= kelvin <= high + WRONG_UNIT_MARGIN:
             raise FitError(
                 f"temperature {value:g} K lies {low - value:.0f} K below the fitted tests ({low:.4g} to {high:.4g} K); "
                 f"temperatures are in K: if {value:g} °C is meant, give {kelvin:g}; if not, pass warn=False"
             )
+    beyond = np.maximum(low - values, values - high)
+    isothermal = [law.name for law in laws if not law.uses(temperature)]
+    if isothermal and beyond.max(initial=0.0) > ISOTHERMAL_RANGE:
+        asked, name = float(values[np.argmax(beyond)]), isothermal[0]
+        raise FitError(
+            f"law '{name}' has no temperature, and its tests were at {celsius_text(low, high)}: nothing is known of "
+            f"{celsius_text(asked)}; add tests at another temperature, or fit the law times an activation energy of "
+            f"the literature, such as ck.law('{name}').times(ck.arrhenius(T_ref={low:.6g}, Q=300e3)) in J/mol"
+        )
 
 
 def warn_of_extrapolation(
-    ranges: Mapping[str, tuple[float, float]], point: Mapping[str, ArrayLike | None], stacklevel: int = 4
+    laws: Sequence[CreepLaw],
+    ranges: Mapping[str, tuple[float, float]],
+    point: Mapping[str, ArrayLike | None],
+    stacklevel: int = 4,
 ) -> None:
-    """FitWarning where a point lies outside the fitted ranges, one for all; FitError for a temperature in Celsius.
+    """FitWarning where a point lies outside the fitted ranges, one for all; FitError as of check_temperature.
 
     point : {name: numbers (...,), or None} in MPa, K, - and s.
     stacklevel : frames above this one that the warning names: 4 for the caller of the method that calls
         this, which checks its arguments in a frame of its own.
     """
-    check_kelvin(ranges, point.get("temperature"))
+    check_temperature(laws, ranges, point.get("temperature"))
     sentence = extrapolation_text(ranges, point)
     if sentence:
         warnings.warn(sentence, FitWarning, stacklevel=stacklevel)
