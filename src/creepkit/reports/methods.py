@@ -94,8 +94,8 @@ def _search(fit: Identification, contents: ReportContents, references: Reference
     seed = f" (seed {settings.seed})"
     if how.startswith("multi-start"):
         return (
-            f"Parameters were sought within their bounds from {plural(settings.starts, 'start')}, picked out of at "
-            f"most {settings.sobol_points} points of a Sobol' sequence{references.cite('sobol')}{seed}{end}"
+            f"Parameters were sought within their bounds from at most {plural(settings.starts, 'start')}, picked out of "
+            f"at most {settings.sobol_points} points of a Sobol' sequence{references.cite('sobol')}{seed}{end}"
         )
     if "swarm" in how:
         return f"Parameters were sought within their bounds by a particle swarm{references.cite('swarm')}{seed}{end}"
