@@ -34,7 +34,7 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
 from creepkit.inverse.reference_conditions import reference_temperature
-from creepkit.quality.copies import duplicate_tests
+from creepkit.quality.repeats import duplicate_tests
 from creepkit.records import History
 
 LEVEL = 0.95

@@ -21,7 +21,7 @@ from time_comparison import loading_strains, measured_time_to_strain, times_to_s
 import creepkit as ck
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures
 from creepkit.inverse.selection import rank
-from creepkit.quality.copies import duplicate_tests
+from creepkit.quality.repeats import duplicate_tests
 
 STRAIN_LIMIT = 0.05
 """Frames above it are left out."""

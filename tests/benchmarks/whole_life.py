@@ -23,7 +23,7 @@ from time_comparison import times_to_rupture
 import creepkit as ck
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures
 from creepkit.inverse.selection import rank
-from creepkit.quality.copies import duplicate_tests
+from creepkit.quality.repeats import duplicate_tests
 
 HEADS = (
     "law",

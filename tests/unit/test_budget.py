@@ -14,7 +14,7 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 319,
+    "api": 316,
     "app": 603,
     "cameras": 931,
     "cli": 2347,
@@ -24,33 +24,33 @@ BUDGET = {
     "experiments": 1562,
     "exporters": 2658,
     "extraction": 1302,
-    "fem": 1805,
+    "fem": 1480,
     "files": 1380,
     "forecasts": 1403,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 10849,
+    "inverse": 10726,
     "jobs": 251,
     "kernels": 1703,
     "language": 1494,
     "laws": 136,
     "modules": 781,
-    "quality": 1470,
+    "quality": 1295,
     "readers": 5840,
-    "records": 2256,
+    "records": 2247,
     "registry": 615,
-    "reports": 6167,
-    "rupture_assessment": 1787,
+    "reports": 5662,
+    "rupture_assessment": 1697,
     "sampling": 1026,
-    "screening": 682,
-    "specimens": 3338,
-    "studies": 3060,
-    "surrogates": 1635,
+    "screening": 623,
+    "specimens": 3236,
+    "studies": 3055,
+    "surrogates": 1391,
     "testing": 1839,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29926
+TESTS = 29737
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

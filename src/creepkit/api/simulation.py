@@ -84,17 +84,13 @@ def _simulated(law: CreepLaw, using: Predictor, values: Mapping[str, float], pla
 
 
 @checked
-def check_data_quality(
-    histories: Sequence[History], specimen: Predictor | str | None = None, *, activation_energy: float | None = None
-) -> DataQuality:
+def check_data_quality(histories: Sequence[History], *, activation_energy: float | None = None) -> DataQuality:
     """Return what looks wrong: frames, tests far from others, and what happened in several tests at one time.
 
-    specimen : what the first frames are compared with, which should show its elastic deflection; without it, none.
     activation_energy : J/mol, with which a factor on the creep rate is put as a step of temperature; 400e3 by default.
     """
     from creepkit.quality import ACTIVATION_ENERGY
     from creepkit.quality import check_data_quality as run
 
-    predictor = None if specimen is None else resolve_predictor(specimen)
     energy = ACTIVATION_ENERGY if activation_energy is None else activation_energy
-    return run(list(histories), predictor, activation_energy=energy)
+    return run(list(histories), activation_energy=energy)

@@ -152,7 +152,7 @@ def _screen(
             histories, laws, surrogate, compositions=compositions, to=to, options=options, workers=workers,
             progress=progress.tick,
         )  # fmt: skip
-    written = [plate.to_csv(to / "plate.csv"), plate.to_hdf5(to / "plate.h5")]
+    written = [plate.to_csv(to / "plate.csv")]
     if plate.identified:
         written += [to / "fits", *plate.plot(to / "pictures")]
     print_screening(plate, written, as_json)
@@ -188,7 +188,7 @@ def _truncate_at_strain(histories: list[History], limit: float) -> list[History]
 def _tell_assumptions(histories: list[History]) -> None:
     """What readers assumed of the tests, for a fit rests on it, and tests that may be one."""
     from creepkit.quality import without_copies
-    from creepkit.quality.copies import duplicate_tests
+    from creepkit.quality.repeats import duplicate_tests
     from creepkit.reports.histories import assumptions_text
 
     for line in assumptions_text(histories).splitlines():

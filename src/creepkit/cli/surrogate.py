@@ -129,7 +129,7 @@ def sweep(
         OutputPath("folder"),
     ],
     sizes: Annotated[dict[str, Any], NetworkSizes],
-    network: Annotated[dict[str, Any], ParameterGru, ("target", "base", "inputs")],
+    network: Annotated[dict[str, Any], ParameterGru, ("target",)],
     training: Annotated[
         dict[str, Any], Training, ("epochs", "batch", "rate", "schedule", "patience", "early_stop", "clip")
     ],

@@ -22,10 +22,10 @@ from creepkit.fem.mesh import (
     Mesh,
     check_elements,
     half_bandwidth,
+    order_by_neighbours,
     outline,
     strip_mesh,
 )
-from creepkit.fem.mesh_builder import order_by_neighbours
 
 SAME_PLACE = 1e-9
 """mm; nodes that are nearer to one another are one node where two sections are joined."""
@@ -156,8 +156,7 @@ class Section:
         new[kept] = np.arange(kept.size)
         order = np.arange(kept.size)
         better = order_by_neighbours(elements, kept.size)
-        place = np.empty_like(better)
-        place[better] = order
+        place = np.argsort(better)
         if half_bandwidth(place[elements]) < half_bandwidth(elements):
             order, elements, new = better, place[elements], np.where(new >= 0, place[new], -1)
         number = new[number]

@@ -1,9 +1,8 @@
 """Data quality: checks of measured histories, each flag stated with numbers; nothing is dropped unless asked for.
 
 Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one with the
-readings of another, one far from its replicates or from the trend of the others, a modulus off the trend, a first
-frame that is not elastic, strain of loading that nothing states, a strain above 100 %, a record of load or temperature
-that contradicts the stated program.
+readings of another, replicates that differ, strain of loading that nothing states, a strain above 100 %, a record of
+load or temperature that contradicts the stated program. What one test says against all others, a fit tells.
 Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load,
 idle time in which nothing crept.
 """
@@ -18,17 +17,11 @@ import numpy as np
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
-from creepkit.quality.comparison import (
-    first_frame_deviations,
-    modulus_trend_outliers,
-    replicate_deviations,
-    temperature_trend_outliers,
-)
-from creepkit.quality.copies import copied_tests, repeated_rows
 from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ranges_text
 from creepkit.quality.frames import decreasing_frames, outlier_frames, unloading_frames
 from creepkit.quality.idle_time import idle_flags
 from creepkit.quality.loading_strain import unstated_loading_strain
+from creepkit.quality.repeats import copied_tests, repeated_rows, replicate_deviations
 from creepkit.quality.rig import (
     ACTIVATION_ENERGY,
     common_rate_changes,
@@ -37,7 +30,7 @@ from creepkit.quality.rig import (
     rate_change_flag,
     record_flags,
 )
-from creepkit.records import History, Predictor
+from creepkit.records import History
 
 __all__ = [
     "ACTIVATION_ENERGY",
@@ -59,22 +52,18 @@ FRAME_FLAG_KINDS: tuple[FlagKind, ...] = ("unloading", "falling", "outlier")
 """Kinds that concern frames, which can be marked; the others question whole tests."""
 
 
-def check_data_quality(
-    histories: Sequence[History], specimen: Predictor | None = None, *, activation_energy: float = ACTIVATION_ENERGY
-) -> DataQuality:
+def check_data_quality(histories: Sequence[History], *, activation_energy: float = ACTIVATION_ENERGY) -> DataQuality:
     """Everything suspect in the histories, test by test, and what happened in several of them at once.
 
-    specimen : what predicts the elastic deflection of a first frame; without it first frames are not checked. Tests are
-    compared where they are of the same alloy and specimen and were loaded alike; one clock is supposed for tests of one
-    kind of specimen whose frames were taken at the same times. activation_energy : J/mol, of the creep rate.
+    Tests are compared where they are of the same alloy and specimen and were loaded alike; one clock is supposed for
+    tests of one kind of specimen whose frames were taken at the same times. activation_energy : J/mol, of the creep
+    rate.
     """
     if not (np.isfinite(activation_energy) and activation_energy > 0):
         raise HistoryError(f"an activation energy of {activation_energy:g} J/mol is not above zero; try 400e3")
     framed = [_frame_flags(history, FRAME_FLAG_KINDS) for history in histories]
     flags = [flag for each in framed for flag in each]
     flags += [flag for rule in TEST_RULES for flag in rule(histories)]
-    if specimen is not None:
-        flags += first_frame_deviations(histories, specimen)
     order = {history.name: k for k, history in enumerate(histories)}
     flags.sort(key=lambda flag: order[flag.tests[0]])
     sound = [
@@ -96,7 +85,7 @@ def _replicate_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
     differing = list(replicate_deviations(histories))
     yield from differing
     for k, reason in _row_reasons(histories).items():
-        if histories[k].name not in [flag.history for flag in differing]:
+        if histories[k].name not in [name for flag in differing for name in flag.tests]:
             yield QualityFlag((histories[k].name,), "replicate", (), reason)
 
 
@@ -130,7 +119,9 @@ def remark_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
 
 
 TEST_RULES: tuple[Callable[[Sequence[History]], Iterable[QualityFlag]], ...] = (
-    *(_copy_flags, _replicate_flags, temperature_trend_outliers, modulus_trend_outliers, _large_strains),
+    _copy_flags,
+    _replicate_flags,
+    _large_strains,
     remark_flags,
 )
 """What questions whole tests, each by itself or beside the others."""

@@ -15,9 +15,9 @@ import numpy as np
 from scipy.special import chdtrc
 
 from creepkit.arrays import Floats
-from creepkit.quality.copies import duplicate_tests
 from creepkit.quality.flags import QualityFlag
 from creepkit.quality.frames import FEWEST_FRAMES, LOAD_TOLERANCE, TEMPERATURE_TOLERANCE, load_segments
+from creepkit.quality.repeats import duplicate_tests
 from creepkit.quality.smooth_curve import RateStep, SmoothCurve, robust_spread, smooth_curve
 from creepkit.records import History, growing_output, output_named
 from creepkit.records.recorded_programs import running_median

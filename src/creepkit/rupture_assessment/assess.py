@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest
-from creepkit.inverse.information_criteria import aicc_penalty, bic_penalty, criterion_weights
+from creepkit.inverse.information_criteria import bic_penalty, criterion_weights
 from creepkit.records import History
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.assessment import (
@@ -191,8 +191,7 @@ def _ranked(
                 fits.append(fit)
     if not fits:
         return (), rejected
-    penalty = bic_penalty if settings.criterion == "bic" else aicc_penalty
-    scores = [-2.0 * fit.log_likelihood + penalty(fit.parameter_count, fit.observations) for fit in fits]
+    scores = [-2.0 * fit.log_likelihood + bic_penalty(fit.parameter_count, fit.observations) for fit in fits]
     excess, by_fit = criterion_weights(scores)
     degrees = Counter(fit.method for fit in fits)
     shares = by_fit / [degrees[fit.method] for fit in fits]  # every method has the same weight before the tests
@@ -209,7 +208,6 @@ def _fit(
         tests,
         conditions_of(tests, tensile),
         degree=degree,
-        distribution=settings.distribution,
         fixed=settings.fixed.get(name, {}),
         level=settings.level,
     )

@@ -3,13 +3,12 @@
 The likelihood is marginal, with right-censored run-outs and random effects of heats and laboratories.
 
 log10 of the time of a test is m + b + s e, with m by the method, b the sum of the effects of its heat and laboratory,
-each normal with mean 0, and e standard normal ("lognormal" times) or of the smallest extreme value ("weibull" times). A
-test that broke contributes its density, a run-out the probability that it lasts longer (Tobin (1958), Econometrica 26,
-24).
+each normal with mean 0, and e standard normal. A test that broke contributes its density, a run-out the probability
+that it lasts longer (Tobin (1958), Econometrica 26, 24).
 
 Effects are integrated out. With one kind of effect by adaptive Gauss-Hermite quadrature about the mode of each effect
 (Liu, Pierce (1994), Biometrika 81, 624), with two by Laplace's approximation about their joint mode. Both are exact, to
-rounding, for lognormal times without run-outs: there the integrand is Gaussian.
+rounding, without run-outs: there the integrand is Gaussian.
 
 All functions take several candidates at once, so that derivatives by differences cost one call.
 """
@@ -23,11 +22,12 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.sparse import csr_array
 from scipy.special import log_ndtr, logsumexp, stdtrit
 
-from creepkit.arrays import Bools, Floats, Ints
+from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError
-from creepkit.rupture_assessment.methods import Basis, Centre, Conditions, Distribution, RuptureMethod
+from creepkit.rupture_assessment.methods import Basis, Centre, Conditions, RuptureMethod
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
 from creepkit.rupture_assessment.rupture_fit import (
     LEAST_SCALE,
@@ -62,18 +62,15 @@ class GroupedTimes:
     log_time: Floats
     censored: Bools
     members: tuple[Floats, ...]
-    distribution: Distribution
 
     @classmethod
-    def of(
-        cls, log_time: Floats, censored: Bools, groups: Mapping[str, Sequence[str]], distribution: Distribution
-    ) -> GroupedTimes:
+    def of(cls, log_time: Floats, censored: Bools, groups: Mapping[str, Sequence[str]]) -> GroupedTimes:
         """With the groups by name, in their order."""
         members = []
         for values in groups.values():
             levels = sorted(set(values))
             members.append(np.array([[float(v == level) for level in levels] for v in values]))
-        return cls(log_time, censored, tuple(members), distribution)
+        return cls(log_time, censored, tuple(members))
 
     def log_likelihood(self, mean: Floats, scale: Floats, scatter: Floats) -> Floats:
         """(candidates,) marginal log-likelihoods.
@@ -93,11 +90,6 @@ class GroupedTimes:
     def _terms(self, mean: Floats, scale: Floats) -> tuple[Floats, Floats, Floats]:
         """Log-density, or log-probability to last, and its first two derivatives by the mean; (..., tests) each."""
         z = (self.log_time - mean) / scale
-        if self.distribution == "weibull":
-            growth = np.exp(np.minimum(z, 300.0))
-            broken = ~self.censored
-            value = np.where(broken, z - np.log(scale), 0.0) - growth
-            return value, (growth - broken) / scale, -growth / scale**2
         lasting = log_ndtr(-z)
         exponent = np.minimum(-0.5 * z**2 - HALF_LOG_TAU - lasting, 700.0)
         hazard = np.minimum(np.exp(exponent), np.maximum(z, 0.0) + 1.0)  # of which it never has more: rounding
@@ -114,11 +106,12 @@ class GroupedTimes:
         effects = np.zeros(scatter.shape)
         precision = scatter**-2.0
         limit = LARGEST_STEP * scale[:, None]
-        first_level, second_level, order, starts = _shared_tests(members)
+        one, other = np.nonzero(members.T @ members)  # pairs of levels that share tests, which are few of all pairs
+        shared = csr_array(members[:, one] * members[:, other])
         for _ in range(MODE_STEPS):
             _, first, second = self._terms(mean + effects @ members.T, scale[:, None])
             hessian = precision[:, :, None] * np.eye(scatter.shape[1])
-            hessian[:, first_level, second_level] -= np.add.reduceat(second[:, order], starts, axis=1)
+            hessian[:, one, other] -= second @ shared
             gradient = first @ members - precision * effects
             step = np.clip(np.linalg.solve(hessian, gradient[..., None])[..., 0], -limit, limit)
             effects = effects + step
@@ -166,19 +159,6 @@ class GroupedTimes:
         return np.split(modes[0], np.cumsum(sizes)[:-1])
 
 
-def _shared_tests(members: Floats) -> tuple[Ints, Ints, Ints, Ints]:
-    """Pairs of levels (pairs,) (pairs,) that share tests; those tests, pair after pair, and where each pair's begin.
-
-    members : (tests, levels) of zeros and ones. A product of matrices would take all pairs, of which few share a test.
-    """
-    levels = [np.flatnonzero(row) for row in members]
-    triples = np.array([(i, j, test) for test, own in enumerate(levels) for i in own for j in own])
-    triples = triples[np.lexsort(triples.T[::-1])]
-    new = np.any(np.diff(triples[:, :2], axis=0) != 0, axis=1)
-    starts = np.concatenate([[0], np.flatnonzero(new) + 1])
-    return triples[starts, 0], triples[starts, 1], triples[:, 2], starts
-
-
 GRADIENT_STEP, HESSIAN_STEP = 1e-5, 3e-4
 """Of central differences, in coordinates of order one."""
 
@@ -190,9 +170,6 @@ MOST_NUMBERS = 200_000
 
 NEWTON_STEPS = 6
 """After the quasi-Newton method: to the last digits."""
-
-EXTREME_VALUE_VARIANCE = np.pi**2 / 6.0
-"""Of the smallest extreme value of scale one."""
 
 LEAST_INDEPENDENCE = 1e-9
 """Smallest singular value of the scaled functions of a method at which its coefficients are determined."""
@@ -277,19 +254,12 @@ def centre_of(tests: RuptureTests) -> Centre:
 
 
 def fit_method(
-    method: RuptureMethod,
-    tests: RuptureTests,
-    at: Conditions,
-    *,
-    degree: int,
-    distribution: Distribution,
-    fixed: Mapping[str, float],
-    level: float,
+    method: RuptureMethod, tests: RuptureTests, at: Conditions, *, degree: int, fixed: Mapping[str, float], level: float
 ) -> RuptureFit:
     """The maximum of the likelihood; FitError where the tests do not determine the coefficients."""
     centre = centre_of(tests)
     basis = method.basis(at, degree, fixed, centre)
-    times = GroupedTimes.of(tests.log_time, tests.censored, tests.groups, distribution)
+    times = GroupedTimes.of(tests.log_time, tests.censored, tests.groups)
     problem = _scaled(method, basis, times, tests.ruptured)
     point = _minimum(problem, _start(problem, tests))
     location, count = problem.location_count, problem.linear.shape[1]
@@ -319,7 +289,6 @@ def fit_method(
     return RuptureFit(
         method.name,
         degree,
-        distribution,
         dict(fixed),
         centre,
         estimates[:count],
@@ -430,9 +399,8 @@ def _variance_freedom(problem: _Scaled, point: Floats, scale: float, scatter: Fl
     columns = problem.linear
     if problem.bilinear is not None:
         columns = np.column_stack([columns + point[count] * problem.bilinear, problem.bilinear @ point[:count]])
-    within = scale**2 * (EXTREME_VALUE_VARIANCE if problem.times.distribution == "weibull" else 1.0)
     members = [m[broken] for m in problem.times.members]
-    return variance_freedom(columns[broken], members, within, [float(v) for v in scatter**2])
+    return variance_freedom(columns[broken], members, scale**2, [float(v) for v in scatter**2])
 
 
 def _covariance(problem: _Scaled, point: Floats, corrected: Floats) -> Floats:

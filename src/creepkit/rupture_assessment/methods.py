@@ -26,16 +26,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import SECONDS_PER_HOUR
-
-Distribution = Literal["lognormal", "weibull"]
-"""Of rupture times at one condition."""
 
 LN10 = float(np.log(10.0))
 

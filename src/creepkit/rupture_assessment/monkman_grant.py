@@ -12,7 +12,7 @@ from creepkit.records import SECONDS_PER_HOUR
 from creepkit.rupture_assessment.fitting import fit_method
 from creepkit.rupture_assessment.methods import MINIMUM_RATE, MONKMAN_GRANT, Conditions
 from creepkit.rupture_assessment.observed_tests import RuptureTests
-from creepkit.rupture_assessment.rupture_fit import LogTimeDistribution, RuptureFit, StudentLogTime
+from creepkit.rupture_assessment.rupture_fit import RuptureFit, StudentLogTime
 
 UNUSED_ENERGY = 300e3
 """J/mol, of a rate law of tests at one temperature; it is used at that temperature alone."""
@@ -29,20 +29,18 @@ class MinimumRateRelation:
     times: RuptureFit
     rates: RuptureFit
 
-    def log_time(self, at: Conditions, of: str) -> LogTimeDistribution:
+    def log_time(self, at: Conditions, of: str) -> StudentLogTime:
         """Distribution of log10 of a time in hours; by the rate where it is known, else by the rate law."""
         if np.isfinite(at.rate).all():
             return self.times.log_time(at, of)
         log_rate = self.rates.log_time(at, of)
-        assert isinstance(log_rate, StudentLogTime)
         predicted = replace(at, rate=10.0**log_rate.median / SECONDS_PER_HOUR)
         by_rate = self.times.log_time(predicted, of)
-        assert isinstance(by_rate, StudentLogTime)
         m = self.times["m"].value
         spread = np.hypot(by_rate.spread, m * log_rate.spread)
         return StudentLogTime(by_rate.median, spread, np.minimum(by_rate.freedom, log_rate.freedom))
 
-    def test_scatter(self, at: Conditions) -> LogTimeDistribution:
+    def test_scatter(self, at: Conditions) -> StudentLogTime:
         """Distribution of log10 of the time of one test over the median time of its heat, by its rate."""
         return self.times.test_scatter(at)
 
@@ -53,18 +51,14 @@ def fit_relation(tests: RuptureTests, with_rate: RuptureTests, *, level: float) 
     if not known.any():
         raise FitError("no test has a minimum creep rate, which monkman-grant needs; add minimum_rate to the tests")
     both = tests[known]
-    times = fit_method(
-        MONKMAN_GRANT, both, _conditions(both), degree=1, distribution="lognormal", fixed={}, level=level
-    )
+    times = fit_method(MONKMAN_GRANT, both, _conditions(both), degree=1, fixed={}, level=level)
     log_rates = replace(
         with_rate,
         log_time=frozen(np.log10(with_rate.minimum_rate * SECONDS_PER_HOUR)),
         censored=frozen(np.zeros(len(with_rate)), dtype=bool),
     )
     fixed = {"Q": UNUSED_ENERGY} if with_rate.isothermal else {}
-    rates = fit_method(
-        MINIMUM_RATE, log_rates, _conditions(with_rate), degree=1, distribution="lognormal", fixed=fixed, level=level
-    )
+    rates = fit_method(MINIMUM_RATE, log_rates, _conditions(with_rate), degree=1, fixed=fixed, level=level)
     return MinimumRateRelation(times, rates)
 
 

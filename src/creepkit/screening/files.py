@@ -1,19 +1,4 @@
-"""Files of a screening: one JSON file an alloy, a CSV table and one HDF5 file of the whole plate.
-
-JSON is validated strictly on reading and nothing in it is evaluated. The HDF5 file is read by any HDF5 reader without
-creepkit. Its attributes: `format` "creepkit-plate", `layout` 1, `units` "MPa, mm, s, K". A group `alloys` has a group
-for each alloy, numbered from 0000 in the order of the plate:
-
-    alloys/0000                  attributes: alloy, class, law (empty without one), verdict, reason, decisive, notes
-      laws/0                     an identified law, best first; attributes: law, weight, excess (of BIC), converged
-        values, low, high  (P,)  parameters in the author's units and their 95 % intervals; attribute `names` (P,)
-        u            (P,)        conditioned coordinates; covariance (P, P) of them
-      rate, local_exponent (3,)  at 100 MPa: value, low, high, of the best law
-      tests/0                    attributes: name, condition, temperature
-        times (frames,) s, used (frames,); measured/OUTPUT (frames,), predicted/OUTPUT (frames,) of the best law
-        loading (breakpoints, 2) s and MPa
-      confirmation               attributes: holds, verdict, using; chi_square (tests, outputs), difference likewise
-"""
+"""Files of a screening: one JSON file an alloy, read strictly, and a CSV table of the whole plate."""
 
 from __future__ import annotations
 
@@ -21,12 +6,9 @@ import csv
 import io
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from creepkit.errors import FitError
-from creepkit.files.hdf5_files import write_hdf5
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, ValueCodec
@@ -35,8 +17,7 @@ from creepkit.inverse.confirmation import ConfirmedOutput
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import CODEC as FIT_CODEC
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
-from creepkit.records import History
-from creepkit.screening.results import AlloyResult, PredictedOutputs, WeightedLaw, mean_relative_squared_error
+from creepkit.screening.results import AlloyResult, mean_relative_squared_error
 
 if TYPE_CHECKING:
     from creepkit.screening.results import ScreeningResult
@@ -73,71 +54,6 @@ def read_result(path: Path) -> AlloyResult:
         return CODEC.from_json(AlloyResult, content)
     except RecordError as error:
         raise FitError(f"{path}: {error}; {ALLOY_RESULT.remedy}") from None
-
-
-HDF5_FORMAT, HDF5_LAYOUT, HDF5_UNITS = "creepkit-plate", 1, "MPa, mm, s, K"
-
-
-def write_plate(plate: ScreeningResult, path: Path) -> Path:
-    """Write the file; it is whole or absent."""
-    with write_hdf5(path, FitError) as file:
-        file.attrs.update({"format": HDF5_FORMAT, "layout": HDF5_LAYOUT, "units": HDF5_UNITS})
-        for k, result in enumerate(plate.results):
-            group = file.create_group(f"alloys/{k:04d}")
-            group.attrs.update({"alloy": result.alloy, "class": plate.class_of(result.alloy)})
-            _write_result(group, result)
-            for n, test in enumerate(plate.histories[result.alloy]):
-                _write_test(group.create_group(f"tests/{n}"), test, result.predicted.get(test.name, {}))
-    return path
-
-
-def _write_result(group: Any, result: AlloyResult) -> None:
-    group.attrs.update(
-        law=result.best.law.name if result.identified else "",
-        verdict=result.verdict,
-        reason=result.failure,
-        decisive=result.decisive,
-        notes="\n".join(result.notes),
-    )
-    for k, weighted in enumerate(result.laws):
-        _write_law(group.create_group(f"laws/{k}"), weighted)
-    if result.identified:
-        for name in COMPARED:
-            group[name] = np.array([float(v) for v in getattr(result.best, name)(COMPARISON_STRESS, warn=False)])
-    if result.confirmation is not None:
-        made = result.confirmation
-        names = list(dict.fromkeys(o.output for t in made.tests for o in t.outputs))
-        values = {name: np.full((len(made.tests), len(names)), np.nan) for name in ("chi_square", "difference")}
-        for row, test in enumerate(made.tests):
-            for one in test.outputs:
-                column = names.index(one.output)
-                values["chi_square"][row, column] = one.simulation_errors.chi_square
-                values["difference"][row, column] = one.rms_difference
-        own = group.create_group("confirmation")
-        own.attrs.update(holds=made.confirmed, verdict=made.verdict, using=made.predictor_name, outputs=names)
-        own.update(values)
-
-
-def _write_law(group: Any, weighted: WeightedLaw) -> None:
-    fit = weighted.fit
-    group.attrs.update(
-        law=fit.law.name, weight=weighted.weight, excess=weighted.bic_difference, converged=fit.converged
-    )
-    group.attrs["names"] = [e.name for e in fit.estimates]
-    for name in ("value", "low", "high"):
-        group["values" if name == "value" else name] = np.array([getattr(e, name) for e in fit.estimates])
-    group["u"], group["covariance"] = fit.u, fit.covariance
-
-
-def _write_test(group: Any, test: History, predicted: PredictedOutputs) -> None:
-    temperature = float(np.mean(test.temperature_program().values))
-    group.attrs.update({"name": test.name, "condition": test.condition, "temperature": temperature})
-    program = test.loading.program()
-    group["times"], group["used"] = test.times, test.used
-    group["loading"] = np.stack([program.times, program.values], axis=1)
-    for source, rows in (("measured", test.outputs), ("predicted", predicted)):
-        for name, values in rows.items():
-            group[f"{source}/{name}"] = values
 
 
 COMPARISON_STRESS = 100.0

@@ -176,10 +176,6 @@ class ScreeningResult(Presentable, text="reports.screening:screening_text"):
         """Write one row an alloy: class, law, weight, values with intervals, rate, misfits, notes."""
         return present("screening.files:write_csv", self, Path(path))
 
-    def to_hdf5(self, path: str | Path) -> Path:
-        """Write everything that is a number: values, covariances, tests as measured and as predicted."""
-        return present("screening.files:write_plate", self, Path(path))
-
     def plot(self, folder: str | Path) -> list[Path]:
         """Draw measured against identified displacement, misfit with and without sparsity, and shares of laws."""
         return present("reports.screening:plot_screening", self, Path(folder))

@@ -18,16 +18,15 @@ import numpy as np
 from creepkit import limits
 from creepkit.arrays import ArrayLike, Bools, Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import SurrogateError, nearest
+from creepkit.errors import SurrogateError
 from creepkit.jobs.progress import ProgressCallback as ProgressCallback
 from creepkit.options import Options, option
-from creepkit.records import Specimen, outputs_of
-from creepkit.surrogates.network_evaluation import ParameterNetwork, RecurrentCell, SampleArrays, Weights
+from creepkit.records import Specimen
+from creepkit.surrogates.network_evaluation import ParameterNetwork, SampleArrays, Weights
 from creepkit.surrogates.parameter_inputs import (
     SERIES_INPUTS,
     LawInputs,
     LoadHistoryInputs,
-    base_outputs,
     constant_inputs,
     load_history_arrays,
 )
@@ -197,38 +196,21 @@ class SurrogateMetadata:
 class ParameterGru(Options, title="settings of a network", error=SurrogateError, prefix="ParameterGru: "):
     """A recurrent network whose inputs are a law's parameters and the load: the paper's, at its defaults.
 
-    hidden, layers, cell : of the network; cell "gru" or "lstm".
-    inputs : inputs at each frame, of "load" (at the frame, all that the paper uses), "mean_load" (since the
-        frame before: it tells when between two frames the load jumped), "time" and "step". () is "load" alone, and for
-        grids that stretch with the test "load", "mean_load", "time" and "step".
-    target : "value" of the first output, its "log", or "record": the log where the specimen's record says that it is
-        compared by its logarithm.
-    base : "none"; or "reduced-order": the specimen's reduced-order model predicts the first output, and the network
-        corrects the logarithm of it; or "reference-stress": a material point at the reference stress of the specimen's
-        record does. Derivatives are then left to differences.
+    Its input at each frame is the load there, all that the paper uses; for grids that stretch with the test also the
+    mean load since the frame before, which tells when between two frames the load jumped, the time and the step.
+
+    hidden, layers : of the network. target : "value" of the first output, or its "log".
     """
 
     hidden: int = option(128, "Units of a layer.", limits.HIDDEN)
     layers: int = option(3, "Layers.", limits.LAYERS)
-    cell: RecurrentCell = option("gru", "Of the network.")
-    inputs: tuple[str, ...] = option((), "Of load, mean_load, time and step; by default what the grid needs.")
-    target: Literal["value", "log", "record"] = option("value", "Of the first output; record: as its record says.")
-    base: Literal["none", "reduced-order", "reference-stress"] = option("none", "The model that the network corrects.")
+    target: Literal["value", "log"] = option("value", "Of the first output.")
     training: Training = field(default_factory=Training)
 
     kind: ClassVar[Literal["parameter-gru"]] = "parameter-gru"
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "inputs", tuple(self.inputs))
-        super().__post_init__()
-        for name in self.inputs:
-            if name not in SERIES_INPUTS:
-                raise SurrogateError(f"ParameterGru: there is no input '{name}': {nearest(name, SERIES_INPUTS)}")
-
-    # ---- for the training ------------------------------------------------------------------------------------------
-
     def sample_arrays(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleArrays:
-        """Arrays of a data set: constants, series, targets, mask, base, and "domain" for the applicability domain."""
+        """Arrays of a data set: constants, series, targets, mask, and "domain" for the applicability domain."""
         law, history_inputs = LawInputs(data.law), self._history_inputs(data)
         mask = np.asarray(np.isfinite(data.values).all(axis=-1))
         constants, series, domain_rows = load_history_arrays(data, history_inputs, progress)
@@ -238,8 +220,6 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
             "series": series,
             "targets": np.where(mask[..., None], data.values, 0.0),
         }
-        if self.base != "none":
-            arrays["base"] = base_outputs(data, self.base, progress)
         single = {name: np.asarray(v, np.float32) for name, v in arrays.items()}
         return {**single, "mask": mask, "domain": np.concatenate([rows, domain_rows], axis=1)}
 
@@ -248,8 +228,7 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
         from creepkit.surrogates.parameter_network import ParameterModule
 
         sizes = samples["constants"].shape[-1], samples["series"].shape[-1], len(data.outputs)
-        log, based = self._learns_logarithm(data.specimen), self.base != "none"
-        network = ParameterModule(sizes, self.hidden, self.layers, self.cell, logarithm=log, corrects_base=based)
+        network = ParameterModule(sizes, self.hidden, self.layers, logarithm=self.target == "log")
         return network.with_scales(samples, train)
 
     def metadata(
@@ -258,10 +237,9 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
         """Scales by name, the domain, and what was constant; train : (rows,) positions of training rows."""
         history_inputs, law = self._history_inputs(data), LawInputs(data.law)
         names = (*law.names, *history_inputs.constants)
-        series = (*history_inputs.series, *(["ln base"] if self.base != "none" else []))
         scaling = {
             "inputs": _scale_pairs(names, module.constants),
-            "series": _scale_pairs(series, module.series),
+            "series": _scale_pairs(history_inputs.series, module.series),
             "outputs": _scale_pairs(data.outputs, module.targets),
         }
         domain_names = (*law.names, *history_inputs.domain_inputs(data.planned_test(0), data.times(0)))
@@ -273,28 +251,13 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
 
     def network(self, weights: Weights, metadata: SurrogateMetadata) -> ParameterNetwork:
         """The trained network; SurrogateError where the weights are not those of this recipe."""
-        series = len(metadata.scaling["series"]) - (self.base != "none")
-        return ParameterNetwork.from_weights(
-            weights,
-            (len(metadata.scaling["inputs"]), series, len(metadata.outputs)),
-            (self.cell, self.hidden, self.layers),
-            logarithm=self._learns_logarithm(metadata.specimen),
-            corrects_base=self.base != "none",
-        )
-
-    # ---- parts -----------------------------------------------------------------------------------------------------
-
-    def series_inputs(self, relative: bool) -> tuple[str, ...]:
-        """What is seen at each frame."""
-        return self.inputs or (SERIES_INPUTS if relative else SERIES_INPUTS[:1])
+        sizes = len(metadata.scaling["inputs"]), len(metadata.scaling["series"]), len(metadata.outputs)
+        return ParameterNetwork.from_weights(weights, sizes, (self.hidden, self.layers), logarithm=self.target == "log")
 
     def history_inputs(self, specimen: Specimen, conditions: tuple[str, ...], relative: bool) -> LoadHistoryInputs:
         """The inputs that tests give: modulus, lengths and temperature that varied in training, and the series."""
         constants = constant_inputs(specimen, conditions)
-        return LoadHistoryInputs(specimen, constants, self.series_inputs(relative), relative)
-
-    def _learns_logarithm(self, specimen: Specimen) -> bool:
-        return self.target == "log" or (self.target == "record" and outputs_of(specimen)[0].logarithmic)
+        return LoadHistoryInputs(specimen, constants, SERIES_INPUTS if relative else SERIES_INPUTS[:1], relative)
 
     def _history_inputs(self, data: Dataset) -> LoadHistoryInputs:
         return self.history_inputs(data.specimen, data.condition_names, data.grid.relative)
@@ -319,5 +282,4 @@ class NetworkSizes(Options, title="sizes of networks", error=SurrogateError):
 
     layers: tuple[int, ...] = option((), "Numbers of layers.", limits.LAYERS)
     hidden: tuple[int, ...] = option((), "Units of a layer.", limits.HIDDEN)
-    cells: tuple[RecurrentCell, ...] = option((), "Of the network.")
     samples: tuple[int, ...] = option((), "Numbers of samples to learn from; all by default.", limits.SAMPLES)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -296,22 +296,6 @@ def _term_coefficient(law: CreepLaw, label: str) -> str | None:
     return None
 
 
-def base_outputs(data: Dataset, base: str, progress: ProgressCallback | None = None) -> Floats:
-    """(n, frames) first output by the model that is corrected; its last value after its end.
-
-    base : see base_model().
-    """
-    model = base_model(data.specimen, base)
-    values, theta = np.empty(data.values.shape[:2]), data.law.to_internal(data.parameters)
-    for k in range(len(data)):
-        plan = data.planned_test(k).replace(times=data.times(k))
-        prediction = model.predict(data.law, theta[k : k + 1], [plan])
-        values[k] = hold_last_value(prediction.values[0, 0, :, prediction.outputs.index(data.outputs[0])])
-        if progress is not None:
-            progress("base", k + 1, len(data), "")
-    return values
-
-
 def load_history_arrays(
     data: Dataset, history_inputs: LoadHistoryInputs, progress: ProgressCallback | None
 ) -> tuple[Floats, ...]:
@@ -332,27 +316,3 @@ def load_history_arrays(
     if not np.isfinite(series).all():
         raise DatasetError("the load of some sample of this data set is not a number; the file is damaged")
     return constants, series, domain_rows
-
-
-def base_model(specimen: Any, base: str) -> Any:
-    """The model that a network corrects: "reduced-order", the specimen's own, or "reference-stress", of its record.
-
-    SurrogateError where the specimen has none.
-    """
-    if base == "reference-stress":
-        from creepkit.surrogates.reference_stress_model import ReferenceStressModel
-
-        return ReferenceStressModel(specimen)
-    model = specimen.reduced_order_model()
-    if model is None:
-        raise SurrogateError(
-            f"specimen '{specimen.name}' has no reduced-order model; use base='none' or base='reference-stress'"
-        )
-    return model
-
-
-def hold_last_value(values: Floats) -> Floats:
-    """The values (..., frames) with their last finite one in the place of NaN after it, and none below zero."""
-    frames = np.where(np.isfinite(values), np.arange(values.shape[-1]), 0)
-    last_finite = np.maximum.accumulate(frames, axis=-1)
-    return np.nan_to_num(np.maximum(np.take_along_axis(values, last_finite, axis=-1), 0.0), nan=0.0)

@@ -10,8 +10,8 @@ import pytest
 
 import creepkit as ck
 from creepkit.quality import check_data_quality, repeated_row_notes, without_copies
-from creepkit.quality.copies import copied_tests, repeated_rows
 from creepkit.quality.curve_shapes import shows_primary_creep, shows_tertiary_creep
+from creepkit.quality.repeats import copied_tests, repeated_rows
 from creepkit.quality.rig import temperature_step
 from creepkit.quality.smooth_curve import smooth_curve
 from creepkit.readers.reading import creepkit_readers, read_histories

@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from creepkit.quality.copies import duplicate_tests
+from creepkit.quality.repeats import duplicate_tests
 from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, PressureJump
 from helpers.paths import SHARED, needs_shared_data

@@ -3,7 +3,6 @@
 import csv
 import dataclasses
 
-import h5py
 import numpy as np
 import pytest
 
@@ -53,17 +52,6 @@ def test_shares_of_laws_go_by_class_and_add_up_to_one(plate):
     assert list(plate.by_class()) == ["Fe-rich", "near-equimolar"]
     assert [sum(share.values()) for share in plate.law_fractions().values()] == pytest.approx([1.0, 1.0])
     assert plate.law_fractions()["Fe-rich"]["norton"] == pytest.approx(plate["X"].laws[0].weight)
-
-
-def test_the_numbers_file_holds_tests_and_covariances(plate, tmp_path):
-    with h5py.File(plate.to_hdf5(tmp_path / "plate.h5")) as file:
-        first = file["alloys/0000"]
-        assert dict(file.attrs) == {"format": "creepkit-plate", "layout": 1, "units": "MPa, mm, s, K"}
-        assert (first.attrs["alloy"], first.attrs["law"]) == ("X", "norton")
-        np.testing.assert_array_equal(first["laws/0/covariance"], plate["X"].best.covariance)
-        measured, predicted = (first[f"tests/0/{kind}/strain"][:] for kind in ("measured", "predicted"))
-        np.testing.assert_array_equal(measured, TWO[0].outputs["strain"])
-        np.testing.assert_allclose(predicted, measured, rtol=0.2)
 
 
 def test_a_confirmation_that_fails_is_a_note_and_no_failure(monkeypatch):

@@ -1,4 +1,4 @@
-"""Copies: tests with the readings of another test, which count once; repeated measurements differ in their noise.
+"""Tests under one condition: copies, which count once, rows of tables that say the same, replicates that differ.
 
 Two tests of one specimen under the same load and temperature are compared at the times that both have, each reading to
 half the last digit in which it is written (of the coarser of the two). That they agree everywhere is taken for a copy
@@ -9,7 +9,7 @@ as a simulation, the first alone. Readings that are written so coarsely that rep
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from math import erf, sqrt
 from typing import NamedTuple
@@ -17,8 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
+from creepkit.quality.flags import QualityFlag
 from creepkit.quality.frames import FEWEST_FRAMES, noise_standard_deviation
-from creepkit.records import History, Program, growing_output
+from creepkit.records import History, Program, growing_output, output_named
+from creepkit.records.units import celsius_text, time_text
 
 REPEAT_CHANCE = 1e-3
 """Largest chance of repeated measurements to agree so well, below which a test is a copy."""
@@ -33,8 +35,9 @@ COMMON_FRACTION = 0.5
 """Readings at times that both tests have, and their least fraction of the shorter record."""
 
 
-LOAD_TOLERANCE, TEMPERATURE_TOLERANCE = 2e-3, 0.6
-"""Relative, and K, of one condition: what is written in other units is rounded."""
+SAME, ALIKE = (2e-3, 0.6), (0.01, 3.0)
+"""Relative of the load, and K: of one condition, which may be written in other units and rounded; and of replicates,
+whose rates at 400 kJ/mol and 800 C then differ by 13 %."""
 
 
 VISIBLE_NOISE = 3.0
@@ -239,17 +242,66 @@ class _Condition(NamedTuple):
         end = float(history.times[-1]) if history.times.size else 0.0
         return cls(kind, history.alloy, history.loading.program(), history.temperature_program(), end)
 
-    def is_that_of(self, other: _Condition) -> bool:
+    def is_that_of(self, other: _Condition, tolerances: tuple[float, float] = SAME) -> bool:
         """Whether both are the same, over the time that both tests last."""
         if self.kind != other.kind or (self.alloy and other.alloy and self.alloy != other.alloy):
             return False
         largest = max(float(np.abs(program.values).max()) for program in (self.load, other.load))
-        return self._near(self.load, other.load, other.end, LOAD_TOLERANCE * largest) and self._near(
-            self.temperature, other.temperature, other.end, TEMPERATURE_TOLERANCE
+        end = min(self.end, other.end)
+        return _near(self.load, other.load, end, tolerances[0] * largest) and _near(
+            self.temperature, other.temperature, end, tolerances[1]
         )
 
-    def _near(self, own: Program, other: Program, other_end: float, tolerance: float) -> bool:
-        end = min(self.end, other_end)
-        times = np.concatenate([own.times, other.times, [end]])
-        times = times[times <= end]
-        return bool((np.abs(own.at(times) - other.at(times)) <= tolerance).all())
+
+def _near(one: Program, other: Program, end: float, tolerance: float) -> bool:
+    times = np.concatenate([one.times, other.times, [end]])
+    times = times[times <= end]
+    return bool((np.abs(one.at(times) - other.at(times)) <= tolerance).all())
+
+
+# ---- replicates ------------------------------------------------------------------------------------------------------
+
+
+REPLICATE_FACTOR, LOGARITHMIC_REPLICATE_FACTOR = 1.6, 3.0
+"""Between the creep of replicates. Deflections: three standard deviations of 2^0.5 times 11 %, which is what
+thicknesses that scatter by 5.5 % do to that of a dimple. Strains of bars, compared by their logarithms: rates scatter
+by a factor of two, and products and environments differ."""
+
+
+_COMPARISON_FRACTIONS = np.linspace(0.2, 1.0, 9)
+"""Fractions of the common time at which replicates are compared; the median counts, as the end of a failing test may
+differ."""
+
+
+def replicate_deviations(histories: Sequence[History]) -> Iterator[QualityFlag]:
+    """Pairs of replicates of which one creeps much more than the other; which of them is odd, a fit can tell."""
+    conditions = [_Condition.of(history) for history in histories]
+    for a, b in combinations(range(len(histories)), 2):
+        one, two = histories[a], histories[b]
+        if growing_output(one) != growing_output(two) or not conditions[a].is_that_of(conditions[b], ALIKE):
+            continue
+        end = min(_last_used_time(one), _last_used_time(two))
+        growth = np.array([[_growth(test, share * end) for test in (one, two)] for share in _COMPARISON_FRACTIONS])
+        growth = growth[(growth > 0.0).all(axis=1)]
+        ratio = float(np.median(growth[:, 0] / growth[:, 1])) if growth.size else 1.0
+        logarithmic = output_named(growing_output(one), one.specimen).logarithmic
+        if max(ratio, 1.0 / ratio) >= (LOGARITHMIC_REPLICATE_FACTOR if logarithmic else REPLICATE_FACTOR):
+            reason = (
+                f"{one.name} grows {ratio:.2f} times as much as its replicate {two.name} (to {time_text(end)} by "
+                f"{_growth(one, end):.3g} and {_growth(two, end):.3g}), at {celsius_text(one.mean_temperature)} and "
+                f"{celsius_text(two.mean_temperature)}"
+            )
+            yield QualityFlag((one.name, two.name), "replicate", (), reason)
+
+
+def _last_used_time(history: History) -> float:
+    return float(history.times[history.used][-1]) if history.used.any() else 0.0
+
+
+def _growth(history: History, end: float) -> float:
+    """Growth of the leading output from the first used frame to a time; 0 if it is not known."""
+    y = history.outputs.get(growing_output(history), np.full(history.times.size, np.nan))
+    usable = history.used & np.isfinite(y) & (history.times > 0)
+    if usable.sum() < 2 or _last_used_time(history) < end * (1 - 1e-9):
+        return 0.0
+    return float(np.interp(end, history.times[usable], y[usable]) - y[usable][0])
