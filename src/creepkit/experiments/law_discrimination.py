@@ -102,10 +102,9 @@ class LawCriterion:
         for a, name in enumerate(self.names):
             Q = self._increments(a, histories, at_draws)
             score = (self.excess + penalty + Q[:count].T).T
-            own = [k for k, alteration in enumerate(self.altered) if alteration.law == a]
-            beyond = np.array([self.altered[k].excess + self.altered[k].penalty for k in own])
-            more = (beyond + np.array([Q[count + k] - Q[a] for k in own]).reshape(-1, Q.shape[1]).T).T
-            before = _shares(np.append(self.excess, self.excess[a] + beyond)[:, None])
+            own = [(k, one.excess + one.penalty) for k, one in enumerate(self.altered) if one.law == a]
+            more = np.array([beyond + Q[count + k] - Q[a] for k, beyond in own]).reshape(-1, Q.shape[1])
+            before = _shares(np.append(self.excess, [self.excess[a] + beyond for _, beyond in own])[:, None])
             after = _shares(np.concatenate([score, score[a] + more]))
             information += weight[a] * float(np.mean(np.log(np.maximum(after[a], 1e-300)) - np.log(before[a])))
             decided = _shares(score) > DECISIVE_WEIGHT
