@@ -39,8 +39,8 @@ def candidates(histories: Sequence[History]) -> list[CreepLaw]:
 
     Laws of steady creep are Norton's and, where three stresses or more differ by half, Garofalo's sine, or a threshold
     stress where the exponent falls as the stress rises; with primary creep where a third of the curves show it or
-    relax, else beside hardening by strain and by time. Where a third of the curves show tertiary creep, or where a table
-    states rupture times, laws with damage are added.
+    relax, else beside hardening by strain and by time. Where a third of the curves show tertiary creep, or where a
+    table states rupture times, laws with damage are added.
     """
     tests = [h for h in histories if h.outputs or h.minimum_rate is not None]
     if not tests:
