@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.extrapolation import check_temperature, extrapolation_text
+from creepkit.inverse.extrapolation import check_isothermal, check_kelvin, extrapolation_text
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.challenges import NOT_EXCLUDED, AlteredLaw, altered_laws
 from creepkit.inverse.selection.ranking import Ranking, rank, ranking_from_scores
@@ -171,7 +171,9 @@ def task_of(remaining: RemainingLaws, goal: Goal | None, budget: float | None) -
         )
     altered = remaining.altered() if goal == "law" or (goal is None and remaining.ranking is not None) else []
     if isinstance(goal, DerivedQuantity):
-        check_temperature([fit.law for fit in remaining.fits], remaining.fits[0].ranges, goal.point.get("temperature"))
+        asked, ranges = goal.point.get("temperature"), remaining.fits[0].ranges
+        check_kelvin(ranges, asked)
+        check_isothermal([fit.law for fit in remaining.fits], ranges, asked)
     chosen: Goal = goal if goal is not None else "law" if several or altered else "parameters"
     return DesignTask(remaining, chosen, budget, altered if chosen == "law" else [])
 

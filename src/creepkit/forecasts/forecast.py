@@ -18,7 +18,7 @@ from creepkit.forecasts.draws import check_tolerances, law_draws
 from creepkit.forecasts.forecast_of_test import forecast_test
 from creepkit.forecasts.results import TestForecast
 from creepkit.inverse.composite_predictor import CompositePredictor
-from creepkit.inverse.extrapolation import check_temperature
+from creepkit.inverse.extrapolation import check_isothermal
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
@@ -123,7 +123,7 @@ def forecast(
     given = DEFAULT_TARGETS if targets is None else targets
     asked = {output: [float(v) for v in np.atleast_1d(values)] for output, values in given.items()}
     for history in histories:
-        check_temperature([f.law for f, _ in weighted], weighted[0][0].ranges, history.temperature_program().values)
+        check_isothermal([f.law for f, _ in weighted], weighted[0][0].ranges, history.temperature_program().values)
     predictors = [_predictor(weighted[0][0], history, using) for history in histories]
     if tolerances:
         check_tolerances(

@@ -73,32 +73,39 @@ WRONG_UNIT_MARGIN = 100.0
 """K below the fitted range from which on a temperature that would lie in it in degrees Celsius is refused."""
 
 
-def check_temperature(
-    laws: Sequence[CreepLaw], ranges: Mapping[str, tuple[float, float]], given: ArrayLike | None
-) -> None:
-    """FitError for a temperature of which nothing is known: a law has none, or in C it would be near the fitted ones.
+def check_kelvin(ranges: Mapping[str, tuple[float, float]], given: ArrayLike | None) -> None:
+    """FitError for a temperature far below the fitted ones that would be near them if it were meant in C.
 
     given : number or (...,) K, or None.
     """
     if given is None or "temperature" not in ranges:
         return
     low, high = ranges["temperature"]
-    values = np.atleast_1d(np.asarray(given, float)).ravel()
-    for value in values:
+    for value in np.atleast_1d(np.asarray(given, float)).ravel():
         kelvin = float(value) + ZERO_CELSIUS
         if value < low - WRONG_UNIT_MARGIN and low - WRONG_UNIT_MARGIN <= kelvin <= high + WRONG_UNIT_MARGIN:
             raise FitError(
                 f"temperature {value:g} K lies {low - value:.0f} K below the fitted tests ({low:.4g} to {high:.4g} K); "
                 f"temperatures are in K: if {value:g} °C is meant, give {kelvin:g}; if not, pass warn=False"
             )
-    beyond = np.maximum(low - values, values - high)
+
+
+def check_isothermal(
+    laws: Sequence[CreepLaw], ranges: Mapping[str, tuple[float, float]], given: ArrayLike | None
+) -> None:
+    """FitError for another temperature than that of the tests where a law has none; given : as of check_kelvin."""
     isothermal = [law.name for law in laws if not law.uses(temperature)]
-    if isothermal and beyond.max(initial=0.0) > ISOTHERMAL_RANGE:
-        asked, name = float(values[np.argmax(beyond)]), isothermal[0]
+    if given is None or "temperature" not in ranges or not isothermal:
+        return
+    (low, high), name = ranges["temperature"], isothermal[0]
+    values = np.atleast_1d(np.asarray(given, float)).ravel()
+    beyond = np.maximum(low - values, values - high)
+    if beyond.max(initial=0.0) > ISOTHERMAL_RANGE:
         raise FitError(
             f"law '{name}' has no temperature, and its tests were at {celsius_text(low, high)}: nothing is known of "
-            f"{celsius_text(asked)}; add tests at another temperature, or fit the law times an activation energy of "
-            f"the literature, such as ck.law('{name}').times(ck.arrhenius(T_ref={low:.6g}, Q=300e3)) in J/mol"
+            f"{celsius_text(float(values[np.argmax(beyond)]))}; add tests at another temperature, or fit the law times "
+            f"an activation energy of the literature, such as ck.law('{name}').times(ck.arrhenius(T_ref={low:.6g}, "
+            "Q=300e3)) in J/mol"
         )
 
 
@@ -108,13 +115,14 @@ def warn_of_extrapolation(
     point: Mapping[str, ArrayLike | None],
     stacklevel: int = 4,
 ) -> None:
-    """FitWarning where a point lies outside the fitted ranges, one for all; FitError as of check_temperature.
+    """FitWarning where a point lies outside the fitted ranges, one for all; FitError of a wrong temperature.
 
     point : {name: numbers (...,), or None} in MPa, K, - and s.
     stacklevel : frames above this one that the warning names: 4 for the caller of the method that calls
         this, which checks its arguments in a frame of its own.
     """
-    check_temperature(laws, ranges, point.get("temperature"))
+    check_kelvin(ranges, point.get("temperature"))
+    check_isothermal(laws, ranges, point.get("temperature"))
     sentence = extrapolation_text(ranges, point)
     if sentence:
         warnings.warn(sentence, FitWarning, stacklevel=stacklevel)
