@@ -18,7 +18,7 @@ from creepkit.errors import DatasetError
 from creepkit.jobs.worker_process import error_text
 from creepkit.records import Predictor, Status
 from creepkit.sampling.conditions import creep_output, hold_times
-from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion, SimulationOutcome
+from creepkit.sampling.domains import DrawCriterion, OutcomeCriterion, SimulationOutcome
 
 if TYPE_CHECKING:
     from creepkit.records import Specimen

@@ -18,14 +18,11 @@ from creepkit import limits
 from creepkit.arrays import single_threaded_blas
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
-from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig
 from creepkit.experiments.design_task import DesignTask, Goal, RemainingLaws, task_of
-from creepkit.experiments.expectations import Expectation, PrecisionCriterion
-from creepkit.experiments.known_laws import KnownLaw
-from creepkit.experiments.law_discrimination import Alteration, LawCriterion
+from creepkit.experiments.expectations import Alteration, Expectation, LawCriterion, PrecisionCriterion
 from creepkit.experiments.planned_design import ALIKE, Design, PlannedTest
-from creepkit.experiments.planned_outcomes import PlannedOutcomes
-from creepkit.experiments.rig import Rig, rigs_for
+from creepkit.experiments.planned_outcomes import KnownLaw, PlannedOutcomes
+from creepkit.experiments.rig import CandidateTest, Rig, candidates_given, grid_of_rig, rigs_for
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import MINIMUM_TESTS

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.errors import FitError
-from creepkit.experiments.candidate_tests import CandidateTest
 from creepkit.experiments.expectations import Expectation
+from creepkit.experiments.rig import CandidateTest
 from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:

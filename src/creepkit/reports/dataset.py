@@ -11,8 +11,7 @@ from creepkit.arrays import Bools
 from creepkit.dataset.dataset import summary
 from creepkit.reports.blocks import aligned
 from creepkit.reports.terminal import print_json, tell, tell_written
-from creepkit.sampling.criteria import OutcomeCriterion
-from creepkit.sampling.domains import Acceptance, SamplingDomain
+from creepkit.sampling.domains import Acceptance, OutcomeCriterion, SamplingDomain
 from creepkit.sampling.domains import acceptance as evaluate_acceptance
 
 if TYPE_CHECKING:

@@ -15,8 +15,14 @@ from creepkit.records import growing_output, output_named, specimen_of
 from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import draw_parity, make_folder, panel_grid, panels_of, save_figure
 from creepkit.reports.terminal import print_json, print_table, tell
-from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
-from creepkit.screening.results import AlloyResult, mean_chi_square, mean_relative_squared_error
+from creepkit.screening.results import (
+    COMPARISON_STRESS,
+    AlloyResult,
+    confirmation_text,
+    mean_chi_square,
+    mean_relative_squared_error,
+    result_columns,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -25,8 +25,8 @@ from creepkit.presentation import Presentable, present
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.checks import AssessmentCheck
+from creepkit.rupture_assessment.fitting import MinimumRateRelation
 from creepkit.rupture_assessment.methods import METHODS, Conditions
-from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
 from creepkit.rupture_assessment.observed_tests import RuptureTests
 from creepkit.rupture_assessment.rupture_fit import RuptureFit, RuptureParameter, VarianceFreedom, power_of_ten
 from creepkit.rupture_assessment.strength import (

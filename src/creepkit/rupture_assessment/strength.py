@@ -16,8 +16,8 @@ from scipy.interpolate import PchipInterpolator
 
 from creepkit.arrays import Floats
 from creepkit.records.units import celsius_text
+from creepkit.rupture_assessment.fitting import MinimumRateRelation
 from creepkit.rupture_assessment.methods import Conditions
-from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
 from creepkit.rupture_assessment.rupture_fit import MixedLogTime, RuptureFit, power_of_ten
 

@@ -42,7 +42,6 @@ from creepkit.records import History, Predictor
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictors
 from creepkit.registry.reading import read_histories
-from creepkit.screening import files
 from creepkit.screening.alloys import (
     Alloy,
     Compositions,
@@ -51,7 +50,14 @@ from creepkit.screening.alloys import (
     limitations,
     resolve_compositions,
 )
-from creepkit.screening.results import AlloyResult, PredictedOutputs, ScreeningResult, WeightedLaw
+from creepkit.screening.results import (
+    AlloyResult,
+    PredictedOutputs,
+    ScreeningResult,
+    WeightedLaw,
+    read_result,
+    write_result,
+)
 
 
 def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
@@ -169,7 +175,7 @@ class ScreeningJob:
         result = replace(screen_alloy(self, self.alloys[number]), fingerprint=self.fingerprint(number))
         if result.identified:
             result.best.save(self.path(number).parent / FITS_FOLDER / self.path(number).name)
-        files.write_result(result, self.path(number))
+        write_result(result, self.path(number))
         return TaskResult(number, "done", accepted=int(result.identified))
 
     @cached_property
@@ -338,7 +344,7 @@ def _stored_result(job: ScreeningJob, number: int) -> AlloyResult | None:
     if not path.exists():
         return None
     try:
-        result = files.read_result(path)
+        result = read_result(path)
     except FitError as error:
         _log.warning("%s", error)
         return None
@@ -350,7 +356,7 @@ def _completed_result(job: ScreeningJob, outcome: TaskResult) -> AlloyResult:
     if outcome.status != "done":
         return AlloyResult(job.alloys[outcome.number].name, failure=outcome.text)
     try:
-        return files.read_result(job.path(outcome.number))
+        return read_result(job.path(outcome.number))
     except FitError as error:
         return AlloyResult(job.alloys[outcome.number].name, failure=str(error))
 

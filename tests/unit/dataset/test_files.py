@@ -21,8 +21,7 @@ from creepkit.dataset.generation import GenerationJob
 from creepkit.dataset.simulation import empty_dataset, rounded_outputs, simulate_rows
 from creepkit.errors import DatasetError
 from creepkit.records import Status
-from creepkit.sampling.criteria import BURST_TIME_FACTOR, SimulationOutcome, paper_criteria
-from creepkit.sampling.domains import sampling_design
+from creepkit.sampling.domains import BURST_TIME_FACTOR, SimulationOutcome, paper_criteria, sampling_design
 from helpers.dataset_runs import assert_same
 from helpers.planted_sampling import BAR, GRID, Planted, Raising, strain, stress_of
 from helpers.written_files import names_in

@@ -8,9 +8,8 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.experiments.candidate_tests import grid_of_rig
 from creepkit.experiments.design import design
-from creepkit.experiments.rig import Rig, rigs_of
+from creepkit.experiments.rig import Rig, grid_of_rig, rigs_of
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
