@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from creepkit.arrays import Ints
 from creepkit.dataset.dataset import FAILED, NOT_SIMULATED, Dataset, empty_columns
@@ -70,10 +69,6 @@ TOO_MANY_FAILURES = 8
 """First samples of a shard after whose failure, all of them, the shard is given up."""
 
 
-REJECTED_DIGITS = 12
-"""Binary digits of the histories of rejected samples, 1 part in 4000: these serve inspection, not training."""
-
-
 def empty_dataset(design: SamplingDomain, specimen: Specimen, provenance: dict[str, object]) -> Dataset:
     """The data set of a design with no samples in it yet."""
     names: dict[str, Any] = {
@@ -107,17 +102,7 @@ def simulate_rows(design: SamplingDomain, header: Dataset, seed: int, first: int
             failures[row] = error_text(error)
             if len(failures) == attempt == TOO_MANY_FAILURES:
                 raise DatasetError(f"the first {attempt} simulations all failed: {failures[row]}") from error
-    rejected = samples.reasons != 0
-    samples.values[rejected] = rounded_outputs(samples.values[rejected])
     return replace(samples, failures=failures)
-
-
-def rounded_outputs(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The values (...,) rounded to REJECTED_DIGITS binary digits, which take a third of the space when compressed."""
-    fractions, exponents = np.frexp(values)
-    return np.asarray(
-        np.ldexp(np.round(fractions * 2**REJECTED_DIGITS) / 2**REJECTED_DIGITS, exponents), dtype=np.float32
-    )
 
 
 def _reasons_before(design: SamplingDomain, draws: Draws) -> Ints:

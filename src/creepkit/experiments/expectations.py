@@ -14,10 +14,9 @@ noise. To first order law b, refitted to the tests that were made and to this on
     Q_b = |r|^2 - r'K (A + K'K)^-1 K'r,    r = y - m_b
 
 more than before (see planned_outcomes): r'S^-1 r with S = I + K A^-1 K' the covariance of what b predicts. The
-chi-square of b then lies above that of a by Q_b - Q_a more than now, and weights follow as those of a ranking do. What
-a law with bounds, far from its estimates, leaves in truth is found for the best candidates by a refit in full: the
-search of an identification, from several starts, over all tests. Its ratio to the linear value corrects Q_b. Before
-that the step begins at the draw of the posterior of b which explains the outcome best.
+chi-square of b then lies above that of a by Q_b - Q_a more than now, and weights follow as those of a ranking do. For
+the best candidates the step begins at the draw of the posterior of b which explains the outcome best, and stays within
+the bounds of b. A chi-square that is expected by one step is off by up to a factor of two.
 
 The information is the mutual information of law and outcome (Box & Hill (1967), Technometrics 9, 57), in nats: the mean
 decrease of the entropy of the weights. A decisive verdict has to exclude more than the other laws: shares of them, and
@@ -29,31 +28,14 @@ they alter. The mean of chi-square over laws, with weights, is the T-criterion (
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError
-from creepkit.experiments.planned_outcomes import (
-    Expansion,
-    KnownLaw,
-    PlannedOutcomes,
-    nuisances_of_planned,
-    test_key,
-    values_of_nuisances,
-)
+from creepkit.experiments.planned_outcomes import Expansion, PlannedOutcomes
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
-from creepkit.inverse.initial_search import search_problem
-from creepkit.inverse.iterative_estimation import starting_point
-from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel
-from creepkit.inverse.observation_vector import ObservationVector
-from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
-from creepkit.inverse.residuals import residuals_at_measured_values
-from creepkit.inverse.search.local_refinement import Tolerances
-from creepkit.inverse.search.multistart import EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
-from creepkit.inverse.selection.challenges import NOT_EXCLUDED, AlteredLaw, FittedLaw, above_threshold, sum_with_share
+from creepkit.inverse.selection.challenges import NOT_EXCLUDED
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, gradient
 from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.language import CreepLaw
@@ -68,14 +50,12 @@ class ExpectedChiSquare:
     """One direction: if the reference law is true, by how much more the alternative is expected to miss the tests.
 
     current : difference of chi-squares now; expected : with the planned test, the median over the posterior.
-    refitted : whether the alternative law was refitted in full by the search of an identification.
     """
 
     reference_law: str
     alternative_law: str
     current: float
     expected: float
-    refitted: bool = False
 
 
 @dataclass(frozen=True)
@@ -196,25 +176,13 @@ POSTERIOR_DRAWS, POSTERIOR_REPEATS = 16, 12
 """Of the posterior itself, with a prediction each."""
 
 
-SMALLEST_REFITTED = 3.0
-"""A chi-square that is linearly less than this is not corrected: a ratio of it says nothing."""
-
-
-RATIO_LIMITS = (0.0, 5.0)
-"""Of the refitted over the linear chi-square."""
-
-
-REFIT_TOLERANCES = Tolerances(max_steps=20, tolerance=1e-5)
-"""Of a refit, from each of its starts."""
-
-
 @dataclass(eq=False)
 class LawCriterion:
     """The laws that remain, the first of the outcomes, and after them what else a verdict has to exclude.
 
     weights : (laws,) -. excess : (laws,) of the criterion of the ranking. chi_squares : (laws,) of the tests that were
-    made. frames : how many of them are independent. altered : the further laws. ratios : of refitted over linear
-    chi-squares, of tests and pairs.
+    made. frames : how many of them are independent. altered : of the further laws, the position of the law that each
+    alters, and its chi-square above that one's.
     """
 
     outcomes: PlannedOutcomes
@@ -222,10 +190,8 @@ class LawCriterion:
     excess: Floats
     chi_squares: Floats
     frames: float
-    altered: Sequence[Alteration] = ()
+    altered: Sequence[tuple[int, float]] = ()
     seed: int = 0
-    ratios: dict[tuple[object, int, int], float] = field(default_factory=dict)
-    _baseline: dict[int, float] = field(default_factory=dict)
     _deviations: dict[int, Floats] = field(default_factory=dict)
     _expansions: dict[int, Expansion] = field(default_factory=dict)
 
@@ -247,19 +213,18 @@ class LawCriterion:
         for a, name in enumerate(self.names):
             Q = self._increments(a, histories, at_draws)
             score = (self.excess + penalty + Q[:count].T).T
-            own = [k for k, alteration in enumerate(self.altered) if alteration.law == a]
-            more = np.array([self.altered[k].excess + Q[count + k] - Q[a] for k in own]).reshape(-1, Q.shape[1])
-            before = _shares(np.append(self.excess, [self.excess[a] + self.altered[k].excess for k in own])[:, None])
+            own = [(count + k, excess) for k, (law, excess) in enumerate(self.altered) if law == a]
+            more = np.array([excess + Q[k] - Q[a] for k, excess in own]).reshape(-1, Q.shape[1])
+            before = _shares(np.append(self.excess, [self.excess[a] + excess for _, excess in own])[:, None])
             after = _shares(np.concatenate([score, score[a] + more]))
             information += weight[a] * float(np.mean(np.log(np.maximum(after[a], 1e-300)) - np.log(before[a])))
             decided = _shares(score) > DECISIVE_WEIGHT
             right += weight[a] * float((decided[a] & (more > NOT_EXCLUDED).all(axis=0)).mean())
             wrong += weight[a] * float(np.delete(decided, a, axis=0).any(axis=0).mean())
-            current = [*(self.chi_squares - self.chi_squares[a]).tolist(), *(one.excess for one in self.altered)]
+            current = [*(self.chi_squares - self.chi_squares[a]).tolist(), *(excess for _, excess in self.altered)]
             for b in (b for b in self._compared(a) if b != a):
                 expected, other = current[b] + float(np.median(Q[b] - Q[a])), self.outcomes.laws[b].fit.law.name
-                refitted = (_key(histories), a, b) in self.ratios
-                chi_squares.append(ExpectedChiSquare(name, other, current[b], expected, refitted))
+                chi_squares.append(ExpectedChiSquare(name, other, current[b], expected))
         chi_squares.sort(key=lambda each: -weight[self.names.index(each.reference_law)])
         return Expectation(max(information, 0.0), probability=right, wrong=wrong, chi_squares=tuple(chi_squares))
 
@@ -278,16 +243,13 @@ class LawCriterion:
         noisy = np.repeat(y, repeats, axis=0) + noise
         increments = np.zeros((len(self.outcomes.laws), len(noisy)))
         for b in self._compared(a):
-            ratio = self.ratios.get((_key(histories), a, b), 1.0)
             increments[b] = self._least(b, a, histories, noisy, at_draws)
-            if ratio != 1.0:
-                increments[b] += (ratio - 1.0) * np.repeat(self._least(b, a, histories, y, at_draws), repeats)
         return increments
 
     def _compared(self, a: int) -> list[int]:
         """Positions of the laws, and of what a verdict for law a has to exclude."""
         count = len(self.names)
-        return [*range(count), *(count + k for k, alteration in enumerate(self.altered) if alteration.law == a)]
+        return [*range(count), *(count + k for k, (law, _) in enumerate(self.altered) if law == a)]
 
     def _least(self, b: int, a: int, histories: Sequence[History], y: Floats, at_draws: bool) -> Floats:
         """(outcomes,) increase of chi-square of law b at outcomes y (outcomes, data), under the covariance of law a.
@@ -349,78 +311,11 @@ class LawCriterion:
             total += weight[a] * float(ruptures.any(axis=0).mean())
         return total
 
-    # ---- refits in full ----------------------------------------------------------------------------------------------
-
-    def directions(self) -> list[tuple[int, int]]:
-        """All directions (true, alternative), those of most weight first, then those to altered laws."""
-        count = len(self.names)
-        pairs = [(a, b) for a in range(count) for b in range(count) if a != b]
-        pairs.sort(key=lambda pair: -self.weights[pair[0]] * self.weights[pair[1]])
-        return pairs + [(alteration.law, count + k) for k, alteration in enumerate(self.altered)]
-
-    def refit(self, histories: Sequence[History], a: int, b: int) -> bool:
-        """Correct the expected chi-square of one direction by a refit of b to what a predicts, at the median draw.
-
-        Whether it was done: not where that chi-square is so small that nothing is to be corrected.
-        """
-        y, _ = self._true_outcomes(a, histories, True)
-        law, linear = self.outcomes.laws[b], self._least(b, a, histories, y, True)
-        chosen = int(np.argsort(linear)[linear.size // 2])
-        if linear[chosen] < SMALLEST_REFITTED:
-            return False
-        truth, deviation = self.outcomes.laws[a], self._drawn(a, True)[1 + chosen]
-        try:
-            made = _as_if_made(truth, deviation, histories)
-            if b < len(self.names):
-                refitted = _refit_in_full(law, self._noise_model, made)[1] - self._baseline_of(b)
-            else:
-                altered = self.altered[b - len(self.names)]
-                own, _ = _refit_in_full(truth, self._noise_model, made, [truth.fit.u + deviation[: truth.size]])
-                found = altered.refitted(own, self._noise_model, made)
-                excess = 0.0 if found is None else found.excess
-                refitted = excess - altered.excess + float(self._least(a, a, histories, y[[chosen]], True)[0])
-        except CreepkitError:  # no start can be predicted: the linear value stands
-            return False
-        self.ratios[_key(histories), a, b] = float(np.clip(refitted / linear[chosen], *RATIO_LIMITS))
-        return True
-
-    @property
-    def _noise_model(self) -> NoiseModel:
-        return self.outcomes.laws[0].noise_model
-
-    def _baseline_of(self, b: int) -> float:
-        if b not in self._baseline:
-            self._baseline[b] = _refit_in_full(self.outcomes.laws[b], self._noise_model, [])[1]
-        return self._baseline[b]
-
-
-@dataclass(frozen=True, eq=False)
-class Alteration:
-    """What a verdict for one law has to exclude.
-
-    law : position of that law. excess : chi-square of the altered law above that law's. other : of a sum, what is known
-    of the law that has a share; None for a threshold.
-    """
-
-    law: int
-    excess: float
-    other: KnownLaw | None = None
-
-    def refitted(self, own: FittedLaw, noise_model: NoiseModel, further: Sequence[History]) -> AlteredLaw | None:
-        """The altered law fitted to further tests too, as a challenge does; own : the law itself, fitted to these."""
-        if self.other is None:
-            return above_threshold(own)
-        return sum_with_share(own, _refit_in_full(self.other, noise_model, further)[0])
-
 
 def _shares(scores: Floats) -> Floats:
     """(laws, outcomes) weights of scores (laws, outcomes), which are -2 ln of evidence."""
     weights = np.exp(-0.5 * (scores - scores.min(axis=0)))
     return np.asarray(weights / weights.sum(axis=0))
-
-
-def _key(histories: Sequence[History]) -> object:
-    return tuple(test_key(h) for h in histories)
 
 
 def _projected(r: Floats, K: Floats, information: Floats) -> Floats:
@@ -445,61 +340,3 @@ def _bounded_steps(curvature: Floats, downhill: Floats, lower: Floats, upper: Fl
             rest = downhill[rows][:, free] - steps[rows][:, pattern] @ curvature[np.ix_(pattern, free)]
             steps[np.ix_(rows, free)] = np.linalg.solve(curvature[np.ix_(free, free)], rest.T).T
     return np.asarray(np.clip(steps, lower, upper))
-
-
-def _as_if_made(truth: KnownLaw, deviation: Floats, planned: Sequence[History]) -> list[History]:
-    """Planned tests with what a law predicts at a deviation (q,) as if it had been measured, without noise."""
-    base, predictor = truth.measured.observations, truth.measured.predictor
-    named = [replace(h, name=f"plan {k}") for k, h in enumerate(planned)]
-    nuisances = nuisances_of_planned(truth, named)
-    e = values_of_nuisances(nuisances, truth, deviation[truth.size :])
-    theta = truth.fit.coordinates.theta(truth.fit.u + deviation[: truth.size])
-    prediction = predictor.predict(truth.fit.law, theta[None], named, nuisances=nuisances.predictor_values(e))
-    made = []
-    for k, history in enumerate(named):
-        values = {name: prediction.of(k)[:, j] for j, name in enumerate(prediction.outputs) if name in base.outputs}
-        sd = {name: np.full(history.times.size, float(base.noise[base.outputs.index(name)])) for name in values}
-        finite = np.asarray(np.isfinite(np.stack([*values.values()])).all(axis=0), bool)
-        made.append(history.replace(outputs=values, standard_deviation=sd, used=finite))
-    return [history for history in made if history.used.any()]
-
-
-def _refit_in_full(
-    law: KnownLaw, noise_model: NoiseModel, further: Sequence[History], starts: Sequence[Floats] | None = None
-) -> tuple[FittedLaw, float]:
-    """A law fitted to the tests that were made and to further ones, and its least chi-square with all penalties.
-
-    starts : of u (parameters,); by default the estimates and, with further tests, the minima of the search of
-    identify().
-    """
-    measured = law.measured
-    histories = (*measured.histories, *further)
-    observations = ObservationVector.from_histories(histories, measured.predictor).with_noise_of(measured.observations)
-    nuisances = nuisances_of_planned(law, further, of_made=True)
-    problem = replace(
-        measured, histories=histories, observations=observations, evaluations=EvaluationCache()
-    ).with_nuisances(nuisances)
-    known = {(n.key, n.owner): n.value for n in law.fit.nuisances}
-    begun = [law.fit.u] if starts is None else list(starts)
-    if further and starts is None:
-        broad = LeastSquaresProblem.from_histories(
-            law.fit.law, histories, measured.predictor, law.fit.settings, law.fit.reference
-        )
-        searched = search_problem(broad, measured.predictor.for_search())
-        minima = MultiStart().minima(searched).minima
-        begun += [m.x for m in distinct(minima, searched.bounds, equal_predictions=EQUAL_REDUCED_ORDER_PREDICTIONS)]
-    own = replace(noise_model, outputs={name: noise_model[name] for name in observations.outputs})
-    weights = np.concatenate([[test.weight for test in law.fit.tests], np.ones(len(further))])
-    found = []
-    for u in begun:
-        x = problem.bounds.clip(starting_point(nuisances, u, known))
-        residuals = replace(
-            problem.residuals(x),
-            present=observations.present,
-            offset_sensitivity=residuals_at_measured_values(observations).offset_sensitivity,
-        )
-        residuals = residuals.with_test_weights(weights)
-        under = problem.with_covariance(CovarianceFactor.of_residuals(residuals, own))
-        minimum = under.minimise(x, tolerances=REFIT_TOLERANCES)
-        found.append((FittedLaw(under, minimum.x), 2.0 * float(minimum.cost)))
-    return min(found, key=lambda pair: pair[1])

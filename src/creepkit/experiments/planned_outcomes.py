@@ -193,10 +193,10 @@ def _cholesky(covariance: Floats) -> Floats:
     return np.asarray(scale[:, None] * np.linalg.cholesky(covariance / np.outer(scale, scale)))
 
 
-def nuisances_of_planned(law: KnownLaw, planned: Sequence[History], *, of_made: bool = False) -> NuisanceParameters:
+def nuisances_of_planned(law: KnownLaw, planned: Sequence[History]) -> NuisanceParameters:
     """The nuisance parameters of planned tests beside those of the tests that were made, for the planned ones alone.
 
-    A planned test is of the length that it states, whatever was measured of others. of_made : for all of the tests.
+    A planned test is of the length that it states, whatever was measured of others.
     """
     measured, made = law.measured, law.measured.histories
     nuisances = NuisanceParameters.from_histories(law.fit.settings.nuisances, [*made, *planned], measured.predictor)
@@ -208,17 +208,13 @@ def nuisances_of_planned(law: KnownLaw, planned: Sequence[History], *, of_made: 
         if n.is_length and n.scope == "test" and owner in by_name:
             length = dimension_named(measured.predictor.for_history(by_name[owner]), n.kind)
             mean[k] = by_name[owner].geometry.get(length.name, mean[k]) if length is not None else mean[k]
-    first = 0 if of_made else len(made)
-    index = {key: positions[first:] for key, positions in nuisances.test_index.items()}
+    index = {key: positions[len(made) :] for key, positions in nuisances.test_index.items()}
     return replace(nuisances, mean=mean, sd=sd, test_index=index)
 
 
-def values_of_nuisances(nuisances: NuisanceParameters, law: KnownLaw, deviation: Floats | None = None) -> Floats:
-    """(nuisances,) as estimated, of planned tests their prior means; deviation : (shared,) from the estimates."""
+def values_of_nuisances(nuisances: NuisanceParameters, law: KnownLaw) -> Floats:
+    """(nuisances,) as estimated, of planned tests their prior means."""
     known = {(n.key, n.owner): n.value for n in law.fit.nuisances}
-    if deviation is not None:
-        shared = [law.fit.nuisances[k - law.size] for k in law.shared]
-        known |= {(n.key, n.owner): n.value + float(d) for n, d in zip(shared, deviation, strict=True)}
     parameters = zip(nuisances.nuisances, nuisances.owners, nuisances.mean, strict=True)
     return np.array([known.get((n.key, owner), float(mean)) for n, owner, mean in parameters])
 
@@ -307,10 +303,6 @@ class PlannedOutcomes:
     def outcome(self, history: History, law: int) -> PlannedOutcome:
         """That of one test that was added."""
         return self._known[test_key(history)][law][law]
-
-    def is_known(self, history: History) -> bool:
-        """Whether a test was added."""
-        return test_key(history) in self._known
 
     def drawn(
         self, history: History, law: int, deviations: Floats, under: int | None = None

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, replace
-from functools import partial
 from itertools import product
-from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -102,19 +100,8 @@ class Rig(Options, title="settings of a rig", error=FitError):
                 raise FitError(f"a rig's {name} must be lengths in mm above zero, found {values}")
         object.__setattr__(self, "levels", (low, high))
         object.__setattr__(self, "temperatures", tuple(temperatures))
-        object.__setattr__(self, "dimensions", MappingProxyType(dimensions))
+        object.__setattr__(self, "dimensions", dimensions)
         super().__post_init__()
-
-    def __hash__(self) -> int:
-        return hash((self.specimen, self.levels, self.longest_hours, self.temperatures, *self.dimensions.items()))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        state = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return partial(Rig, **{**state, "dimensions": dict(self.dimensions)}), ()
-
-    def replace(self, **changes: Any) -> Rig:
-        """The same rig with some fields changed."""
-        return self.changed(changes)
 
     def refusal(self, history: History) -> str:
         """Why this rig cannot make a planned test, in a sentence; "" where it can."""
@@ -390,17 +377,10 @@ NOT_PLANNED = "components"
 """The load of a material point: there are too many of it to plan."""
 
 
-def candidates_given(histories: Sequence[History | CandidateTest], rigs: Sequence[Rig]) -> list[CandidateTest]:
+def candidates_given(histories: Sequence[History], rigs: Sequence[Rig]) -> list[CandidateTest]:
     """Planned tests that a user gives, with names of their own; FitError for one that no rig can make."""
     candidates = []
     for given in histories:
-        if isinstance(given, CandidateTest):
-            if not (given.histories and 0 < given.hours < np.inf):
-                raise FitError(f"the planned test '{given.description}' needs a history and a machine time above zero")
-            for history in given.histories:
-                _rig_for(history, rigs)
-            candidates.append(given)
-            continue
         rig = _rig_for(given, rigs)
         planned = replace(given, name=f"plan: {given.name}", outputs={}, standard_deviation={})
         hours = float(given.times[-1]) / 3600.0 + rig.setup_hours

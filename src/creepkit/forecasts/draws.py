@@ -46,10 +46,6 @@ LARGEST_TOLERANCES = {"modulus": 0.3, "temperature": 100.0, "temperature drift":
 """Standard deviations, in the unit of the kind: relative, K, K, ln of a factor."""
 
 
-LARGEST_OF_LENGTH = 0.25
-"""Standard deviation of a length over the length itself."""
-
-
 SOURCES = {
     "test": "scatter between tests",
     "heat": "scatter between heats",
@@ -252,14 +248,6 @@ def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[Histor
             )
         if not any(predictor.for_history(h).follows(kind) for h in histories):
             raise FitError(f"the tolerance of '{kind}' means nothing to the specimens of these tests; leave it out")
-        for history in histories if is_length_nuisance(kind) else ():
-            own = predictor.for_history(history)
-            length = prior_mean(Nuisance(kind), history, own) if own.follows(kind) else np.inf
-            if sd > LARGEST_OF_LENGTH * length:
-                raise FitError(
-                    f"the tolerance of '{kind}' is {sd:g} mm, of test '{history.name}' with {length:g} mm; at most "
-                    f"{LARGEST_OF_LENGTH * length:g} mm is allowed"
-                )
 
 
 def dimension_draws(

@@ -18,7 +18,7 @@ import creepkit as ck
 from creepkit.dataset import storage
 from creepkit.dataset.dataset import COLUMNS
 from creepkit.dataset.generation import GenerationJob
-from creepkit.dataset.simulation import empty_dataset, rounded_outputs, simulate_rows
+from creepkit.dataset.simulation import empty_dataset, simulate_rows
 from creepkit.errors import DatasetError
 from creepkit.records import Status
 from creepkit.sampling.domains import BURST_TIME_FACTOR, SimulationOutcome, paper_criteria, sampling_design
@@ -73,12 +73,6 @@ def test_a_sample_that_does_not_converge_at_all_has_failed(tmp_path):
     stuck = simulated(tmp_path, specimen=Stuck(), rows=7)
     assert set(stuck.failures.values()) == {"not converged from 0 s on, with nothing to show before"}
     assert len(stuck.failures) == (stuck.reasons == -1).sum() == (stuck.conditions[:, 0] <= 120.0).sum()
-
-
-def test_histories_of_rejected_samples_keep_one_part_in_4000(tmp_path):
-    values = np.array([0.0, np.nan, 1e-30, -3.14159, 5000.5], dtype=np.float32)
-    np.testing.assert_allclose(rounded_outputs(values), values, rtol=1.3e-4)
-    assert not (rounded_outputs(values).view(np.uint32) & 0xFFF)[[0, 2, 3, 4]].any()
 
 
 def test_what_is_written_is_read(data, tmp_path):

@@ -193,7 +193,7 @@ class AlteredLaw:
 
     x : (unknowns,) its values. excess : its chi-square above that of the best law.
     constraints : (rows, unknowns) derivatives over tolerances of what was held, such as the share of a second law.
-    other : name of the law that has a share of a sum, else "". description : what it is, for people.
+    description : what it is, for people.
     """
 
     kind: Kind
@@ -201,7 +201,6 @@ class AlteredLaw:
     x: Floats
     excess: float
     constraints: Floats
-    other: str
     description: str
 
 
@@ -222,7 +221,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     if _are_one_function(problem, x, own_terms):
         return None
     description = f"its sum with {other.law.name}, tried with {100 * SHARE:.0f} % of the rate carried by it,"
-    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.law.name, description)
+    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), description)
 
 
 def above_threshold(best: FittedLaw) -> AlteredLaw:
@@ -240,7 +239,7 @@ def above_threshold(best: FittedLaw) -> AlteredLaw:
     excess, x = _least_excess(best, problem, x, fixed={position: threshold})
     held = np.zeros((1, x.size))
     held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
-    return AlteredLaw("threshold", problem, x, excess, held, "", f"{law.name} of {threshold:.3g} MPa")
+    return AlteredLaw("threshold", problem, x, excess, held, f"{law.name} of {threshold:.3g} MPa")
 
 
 def _comparison_text(excess: float) -> str:
