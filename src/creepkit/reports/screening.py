@@ -156,7 +156,7 @@ def _draw_by_class(
 def _plot_misfits(plate: ScreeningResult) -> Figure:
     """Misfit of the reduced law against that of the dense one (Fig. 7b): Eq. (4), and in units of noise."""
     figure, panels = panel_grid(2, 2, 4.3, 4.6)
-    fits = {one.alloy: (one.dense_fit, one.reduced_fit) for one in plate.identified if one.dense_fit is not None}
+    fits = {one.alloy: (one.dense_fit, one.best) for one in plate.identified if one.dense_fit is not None}
     for axes, (title, measure) in zip(panels, MISFIT_MEASURES, strict=True):
         values = np.array([[measure(one) for one in pair] for pair in fits.values()])
         finite = values[np.isfinite(values)]

@@ -272,8 +272,7 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
         check_conditions([temperature])
         if not 0 < stress < 1e9:
             raise FitError(f"stress is {stress!r}; give MPa above zero")
-        T, s = np.array([float(temperature)]), np.array([float(stress)])
-        at = Conditions(s, T, self.tensile(T), np.full(1, np.nan))
+        at = Conditions.isotherm(np.array([float(stress)]), temperature, self.tensile)
         models = self.models(method)
         ends = [curve for (kind, _), curve in bound_curves(models, at, self.settings.level).items() if kind == of]
         curves = [mixed(models, at, of).quantile(0.5), *ends]

@@ -244,11 +244,11 @@ def _hessian(cost: Cost, point: Floats) -> Floats:
     return np.asarray(matrix + np.tril(matrix, -1).T)
 
 
-def conditions_of(tests: RuptureTests, tensile: TensileStrength) -> Conditions:
+def conditions_of(tests: RuptureTests, tensile: TensileStrength | None = None) -> Conditions:
     """The conditions of tests; tensile : of temperatures, where a test does not state its own."""
-    strength = np.where(
-        np.isfinite(tests.tensile_strength), tests.tensile_strength, tensile(np.asarray(tests.temperature))
-    )
+    strength = tests.tensile_strength
+    if tensile is not None:
+        strength = np.where(np.isfinite(strength), strength, tensile(np.asarray(tests.temperature)))
     return Conditions(tests.stress, tests.temperature, strength, tests.minimum_rate)
 
 
@@ -491,14 +491,14 @@ def fit_relation(tests: RuptureTests, with_rate: RuptureTests, *, level: float) 
     if not known.any():
         raise FitError("no test has a minimum creep rate, which monkman-grant needs; add minimum_rate to the tests")
     both = tests[known]
-    times = fit_method(MONKMAN_GRANT, both, _conditions(both), degree=1, fixed={}, level=level)
+    times = fit_method(MONKMAN_GRANT, both, conditions_of(both), degree=1, fixed={}, level=level)
     log_rates = replace(
         with_rate,
         log_time=frozen(np.log10(with_rate.minimum_rate * SECONDS_PER_HOUR)),
         censored=frozen(np.zeros(len(with_rate)), dtype=bool),
     )
     fixed = {"Q": UNUSED_ENERGY} if with_rate.isothermal else {}
-    rates = fit_method(MINIMUM_RATE, log_rates, _conditions(with_rate), degree=1, fixed=fixed, level=level)
+    rates = fit_method(MINIMUM_RATE, log_rates, conditions_of(with_rate), degree=1, fixed=fixed, level=level)
     return MinimumRateRelation(times, rates)
 
 
@@ -520,8 +520,3 @@ def curvature_probability(with_rate: RuptureTests) -> float:
         left.append(float(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2)))
     freedom = len(y) - len(line) - 1
     return float(f_distribution.sf((left[0] - left[1]) * freedom / max(left[1], 1e-300), 1, freedom))
-
-
-def _conditions(tests: RuptureTests) -> Conditions:
-    unknown: Floats = np.full(len(tests), np.nan)
-    return Conditions(tests.stress, tests.temperature, unknown, tests.minimum_rate)

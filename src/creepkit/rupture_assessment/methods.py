@@ -51,6 +51,12 @@ class Conditions:
     tensile_strength: Floats
     rate: Floats
 
+    @classmethod
+    def isotherm(cls, stress: Floats, temperature: float, tensile: Callable[[Floats], Floats]) -> Conditions:
+        """Stresses (points,) MPa at one temperature, K, without rates; tensile : strength, MPa, by temperature in K."""
+        T = np.full(stress.shape, float(temperature))
+        return cls(stress, T, tensile(T), np.full(stress.shape, np.nan))
+
 
 @dataclass(frozen=True)
 class Centre:

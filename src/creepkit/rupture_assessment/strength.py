@@ -110,8 +110,7 @@ def strength_estimates(
     if np.isfinite(limit):
         highest = min(highest, TENSILE_LIMIT * limit)
     stress = np.geomspace(lowest, highest, GRID_POINTS)
-    shape = stress.shape
-    at = Conditions(stress, np.full(shape, temperature), np.full(shape, limit), np.full(shape, np.nan))
+    at = Conditions.isotherm(stress, temperature, tensile)
     median = mixed(models, at, "mean").quantile(0.5)
     tested = (stress >= 0.99 * tests.stress.min()) & (stress <= 1.01 * tests.stress.max())
     start = int(np.argmin(np.where(tested, np.abs(median - np.median(tests.log_time)), np.inf)))

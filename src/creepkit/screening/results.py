@@ -52,7 +52,7 @@ class AlloyResult:
     laws : identified laws, best first; failed_laws : {law: why it could not be identified}.
     verdict : one sentence on which law it is; equivalents : on each pair of laws that the tests cannot separate.
     failure : why there is no law; empty otherwise.
-    dense_fit, sparse_fit : the law without sparsity and what a penalty made of it, where they were requested.
+    dense_fit : the law without sparsity, where it was requested.
     predicted : {test: {output: (frames,) mm or strain}} of the best law with the test's own nuisances and offsets, by
         the specimen where it was confirmed. cpu_seconds : CPU time of the identification.
     decisive : whether the ranking of its laws is (see inverse.selection.ranking).
@@ -66,7 +66,6 @@ class AlloyResult:
     equivalents: tuple[str, ...] = ()
     failure: str = ""
     dense_fit: Identification | None = None
-    sparse_fit: Identification | None = None
     confirmation: Confirmation | None = None
     predicted: Mapping[str, PredictedOutputs] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -90,16 +89,11 @@ class AlloyResult:
         """Names of the laws that the tests cannot rule out, best first."""
         return tuple(w.fit.law.name for k, w in enumerate(self.laws) if k == 0 or w.weight > CREDIBLE_WEIGHT)
 
-    @property
-    def reduced_fit(self) -> Identification:
-        """The law that is compared with the dense one: what a penalty left of it, else the best of all."""
-        return self.best if self.sparse_fit is None else self.sparse_fit
-
     def with_tests(self, tests: tuple[History, ...], predictor: Predictor) -> AlloyResult:
         """The same with its tests and predictor attached to every identification, for predictions and plots."""
         laws = tuple(replace(w, fit=w.fit.with_histories(tests, predictor)) for w in self.laws)
-        dense, sparse = (f and f.with_histories(tests, predictor) for f in (self.dense_fit, self.sparse_fit))
-        return replace(self, laws=laws, dense_fit=dense, sparse_fit=sparse)
+        dense = self.dense_fit and self.dense_fit.with_histories(tests, predictor)
+        return replace(self, laws=laws, dense_fit=dense)
 
 
 def mean_relative_squared_error(fit: Identification) -> float:
@@ -195,7 +189,7 @@ class ScreeningResult(Presentable, text="reports.screening:screening_text"):
 
 ALLOY_RESULT = DocumentFormat(
     "creepkit-alloy-result",
-    2,
+    3,
     FileKind("the result of an alloy", FitError, "remove it, and it is worked out again"),
     remedy="remove it, and it is worked out again",
 )
@@ -262,12 +256,10 @@ def result_columns(plate: ScreeningResult, result: AlloyResult) -> dict[str, str
     for one in (o for test in (confirmation.tests if confirmation is not None else ()) for o in test.outputs):
         simulated.setdefault(one.output, []).append(one.simulation_errors.chi_square)
     columns |= {f"confirmed_chi_square_{name}": _number_text(sum(v) / len(v)) for name, v in simulated.items()}
-    columns["loss_reduced"] = _number_text(mean_relative_squared_error(result.reduced_fit))
+    columns["loss_reduced"] = _number_text(mean_relative_squared_error(fit))
     columns["loss_dense"] = (
         "" if result.dense_fit is None else _number_text(mean_relative_squared_error(result.dense_fit))
     )
-    if result.sparse_fit is not None:
-        columns["law_by_penalty"] = result.sparse_fit.law.name
     for e in fit.estimates:
         ends = {e.name: e.value, f"{e.name}_low": e.low, f"{e.name}_high": e.high}
         columns |= {name: _number_text(v) for name, v in ends.items()}
