@@ -17,7 +17,7 @@ from creepkit import limits
 from creepkit.arrays import single_threaded_blas
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
-from creepkit.experiments.design_task import DesignTask, Goal, RemainingLaws, task_of
+from creepkit.experiments.design_task import DesignTask, Goal
 from creepkit.experiments.expectations import Expectation, LawCriterion, PrecisionCriterion
 from creepkit.experiments.planned_design import ALIKE, Design, PlannedTest
 from creepkit.experiments.planned_outcomes import KnownLaw, PlannedOutcomes
@@ -74,14 +74,15 @@ def design(
     if budget is not None and budget <= 0:
         raise FitError(f"the budget is {budget:g} h; it must be above zero")
     limits.check_number("seed", seed, limits.SEED, FitError)
-    remaining = RemainingLaws.of(source)
-    rigs = rigs_for(remaining.fits[0], rig)
+    task = DesignTask.of(source, goal, budget)
+    rigs = rigs_for(task.laws[0], rig)
     if candidates is not None and not len(candidates):
         raise FitError("candidates= takes a list of planned histories, found none")
-    search = _Search(task_of(remaining, goal, budget), rigs, seed, progress)
-    if search.nothing_to_do is not None:
-        return search.nothing_to_do
-    planned = _grids(remaining.fits, rigs, budget) if candidates is None else candidates_given(candidates, rigs)
+    if task.obstacle:
+        names, weights = tuple(fit.law.name for fit in task.laws), tuple(task.weights.tolist())
+        return Design(task.goal_name, names, weights, (), budget=budget, obstacle=task.obstacle)
+    search = _Search(task, rigs, seed, progress)
+    planned = _grids(task.laws, rigs, budget) if candidates is None else candidates_given(candidates, rigs)
     if budget is not None:
         planned = [c for c in planned if c.hours <= 1.0001 * budget]
         if not planned:
@@ -115,18 +116,9 @@ class _Search:
             self.criterion = _law_criterion(task, self.outcomes, seed)
         else:
             quantity = task.goal if isinstance(task.goal, DerivedQuantity) else None
-            self.criterion = PrecisionCriterion(self.outcomes, task.remaining.weights, quantity, seed)
+            self.criterion = PrecisionCriterion(self.outcomes, task.weights, quantity, seed)
         self.tests: list[PlannedTest] = []
         self.left_out: dict[str, str] = {}
-
-    @property
-    def nothing_to_do(self) -> Design | None:
-        """The answer where no test can help."""
-        task = self.task
-        if not task.obstacle:
-            return None
-        names = tuple(fit.law.name for fit in task.laws)
-        return Design(task.goal_name, names, task.weights, (), budget=task.budget, obstacle=task.obstacle)
 
     def run(self, planned: Sequence[CandidateTest], *, refuse: bool = False) -> Design:
         """The design; refuse : whether it is an error that no test can be made, as where a user names them."""
@@ -141,7 +133,7 @@ class _Search:
         return Design(
             goal=task.goal_name,
             laws=tuple(fit.law.name for fit in task.laws),
-            weights=task.weights,
+            weights=tuple(task.weights.tolist()),
             tests=tuple(self.tests),
             left_out=tuple(self.left_out.items()),
             plan=plan,
@@ -277,7 +269,7 @@ def _histories(plan: Sequence[PlannedTest]) -> list[History]:
 
 
 def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> LawCriterion:
-    ranking = task.remaining.ranking
+    ranking = task.ranking
     assert ranking is not None
     ranked = [next(r for r in ranking.laws if r.fit is fit) for fit in task.laws]
     chi_squares = np.array([r.chi_square for r in ranked])
@@ -285,9 +277,7 @@ def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> La
         chi_squares = np.array([law.chi_square for law in outcomes.laws[: len(task.laws)]])
     excess = np.array([r.excess for r in ranked])
     altered = [(k, one.excess) for k, one in task.altered]
-    return LawCriterion(
-        outcomes, task.remaining.weights, excess, chi_squares, ranking.independent_frames, altered, seed
-    )
+    return LawCriterion(outcomes, task.weights, excess, chi_squares, ranking.independent_frames, altered, seed)
 
 
 def notes_of(laws: Sequence[Identification], rigs: Sequence[Rig]) -> tuple[str, ...]:

@@ -111,10 +111,9 @@ class PrecisionCriterion:
                 sds.append(float(np.exp(mean_logs[1])))
             if position == 0:
                 parameters = [self._parameter_sd(position, S, points) for S in (before, after)]
-        weight = self.weights / self.weights.sum()
-        sd, current_sd = (float(np.sqrt(weight @ np.square(v))) if v else float("nan") for v in (sds, current))
+        sd, current_sd = (float(np.sqrt(self.weights @ np.square(v))) if v else float("nan") for v in (sds, current))
         return Expectation(
-            float(weight @ gains), sd, current_sd, parameter_sd=parameters[1], current_parameter_sd=parameters[0]
+            float(self.weights @ gains), sd, current_sd, parameter_sd=parameters[1], current_parameter_sd=parameters[0]
         )
 
     @property
@@ -207,7 +206,7 @@ class LawCriterion:
 
         An altered law counts, for the information, as another law of as many parameters.
         """
-        weight, count = self.weights / self.weights.sum(), len(self.weights)
+        weight, count = self.weights, len(self.weights)
         penalty = self._penalties(histories)
         information, right, wrong, chi_squares = 0.0, 0.0, 0.0, []
         for a, name in enumerate(self.names):
@@ -304,11 +303,11 @@ class LawCriterion:
 
     def probability_of_rupture(self, histories: Sequence[History]) -> float:
         """That one of the tests ruptures, over the laws and the draws of their posteriors."""
-        weight, total = self.weights / self.weights.sum(), 0.0
+        total = 0.0
         for a in range(len(self.names)):
             deviations = self._drawn(a, True)
             ruptures = np.stack([self.outcomes.drawn(h, a, deviations)[2] for h in histories])
-            total += weight[a] * float(ruptures.any(axis=0).mean())
+            total += self.weights[a] * float(ruptures.any(axis=0).mean())
         return total
 
 

@@ -13,7 +13,7 @@ so criterion 4 is applied here to the growth of the output by creep within each 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -96,14 +96,9 @@ def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
     return holds
 
 
-BURST_TIME_FACTOR = 2.0
-"""How many times too early the reduced-order model must burst before that counts; that of the paper's test piece is
-within 1.6 as a rule."""
-
-
 @dataclass(frozen=True, eq=False)
 class SimulationOutcome:
-    """One simulated sample, or what the reduced-order model predicts of it.
+    """One simulated sample.
 
     times : (frames,) s. outputs : (frames, outputs) in their units; NaN after the end.
     hold_outputs : (4, outputs) at the end of the first ramp, just before the jump, at the end of the second ramp and
@@ -119,10 +114,6 @@ class SimulationOutcome:
     conditions: Mapping[str, float]
     column: int = 0
     falls: bool = False
-
-    def bursts_long_before(self, time: float) -> bool:
-        """Whether a reduced-order model bursts so early that a simulation is bound to burst before a time, s."""
-        return self.status == Status.RUPTURED and BURST_TIME_FACTOR * self.end_time < time
 
     @property
     def last_output(self) -> float:
@@ -165,10 +156,6 @@ class OutcomeCriterion(Criterion):
     def passes(self, outcome: SimulationOutcome) -> bool:
         """Whether the outcome meets it."""
         raise NotImplementedError
-
-    def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
-        """Whether the outcome by the reduced-order model shows that the simulation is bound to fail the criterion."""
-        return False
 
 
 @dataclass(frozen=True)
@@ -233,10 +220,6 @@ class SurvivesTime(OutcomeCriterion):
             return True
         return self.seconds is not None and outcome.status == Status.RUPTURED and outcome.end_time >= self.seconds
 
-    def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
-        """Whether the reduced-order model bursts so early that the simulation is bound to fail the criterion."""
-        return self.seconds is not None and screening_outcome.bursts_long_before(self.seconds)
-
 
 @dataclass(frozen=True)
 class CreepInEachHold(OutcomeCriterion):
@@ -250,14 +233,6 @@ class CreepInEachHold(OutcomeCriterion):
     def passes(self, outcome: SimulationOutcome) -> bool:
         """Whether the outcome meets it."""
         return all(growth > self.threshold for growth in outcome.creep_in_holds)
-
-    def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
-        """Whether the reduced-order model bursts long before the second hold begins.
-
-        Little creep is no reason. Under a nearly plastic law a clamped test piece creeps at its edge, where the stress
-        is high: a model that knows one stress predicted 1e-5 mm where the simulation had 0.02 mm.
-        """
-        return screening_outcome.bursts_long_before(float(screening_outcome.times[-2]))
 
 
 @dataclass(frozen=True)
@@ -332,7 +307,6 @@ class SamplingDomain:
     """A design that draws a law's parameters and the conditions of its tests from ranges.
 
     reference_stress : the stress that represents a test, and which rates are useful there.
-    screened : leave out simulations that the specimen's reduced-order model rejects; see dataset.simulation.
     """
 
     law: CreepLaw
@@ -340,7 +314,6 @@ class SamplingDomain:
     grid: TimeGrid
     criteria: tuple[Criterion, ...]
     reference_stress: ReferenceStress
-    screened: bool = field(default=False, kw_only=True)
 
     name: ClassVar[str]
     """The word for it."""
@@ -386,7 +359,6 @@ class PaperDomain(SamplingDomain):
     """
 
     name: ClassVar[str] = "paper"
-    screened: bool = field(default=True, kw_only=True)
 
     def draw(self, first: int, count: int, seed: int) -> Draws:
         """Return rows of the sequence: parameters first, then conditions."""
