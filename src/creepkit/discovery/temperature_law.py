@@ -79,26 +79,20 @@ MAX_COMBINATIONS_WRITTEN = 20
 """Combinations that are written, best first."""
 
 
-WRITTEN = [
-    "law",
-    "isothermal_law",
-    "T_ref",
-    "temperature_range",
-    "criterion_data",
-    "estimates",
-    "plausible_forms",
-    "fit",
-    "notes",
-]
-"""Fields that are written as they are."""
-
-
 def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
     """The result as JSON-able data."""
     estimates = temperature_law.isothermal_estimates
     content: dict[str, Any] = {
         "creepkit": version("creepkit"),
-        **{name: getattr(temperature_law, name) for name in (*WRITTEN, "fit", "notes")},
+        "law": temperature_law.law,
+        "isothermal_law": temperature_law.isothermal_law,
+        "T_ref": temperature_law.T_ref,
+        "temperature_range": temperature_law.temperature_range,
+        "criterion_data": temperature_law.criterion_data,
+        "estimates": temperature_law.estimates,
+        "plausible_forms": temperature_law.plausible_forms,
+        "fit": temperature_law.fit,
+        "notes": temperature_law.notes,
         "candidates": [
             {
                 "forms": candidate.forms,
