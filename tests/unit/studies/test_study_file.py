@@ -188,7 +188,7 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
         (BASE + "bounds = { n = [1, 1e308] }\n", 5, "at most 1e+100"),
         (BASE + 'predictor = "dimpel"\n', 5, "did you mean 'dimple'"),
         (BASE + 'predictor = "/etc/passwd"\n', 5, "absolute"),
-        (BASE + 'suspect_frames = "lin"\n', 5, "must be one of these: exclude, "),
+        (BASE + 'test_loss = "lin"\n', 5, "must be one of these: gaussian, "),
         (BASE + 'without_nuisances = ["offst"]\n', 5, "did you mean 'offset'"),
         (BASE + '[[identification.nuisances]]\nkind = "thicknes"\n', 6, "thickness"),
         (BASE + '[[identification.nuisances]]\nkind = "thickness"\nsd = 0.1\n', 7, "given as sd_mm"),
