@@ -136,7 +136,7 @@ def sweep(
     Interrupted at any moment, the same command goes on where it was.
     """
     from creepkit.dataset.storage import read_dataset
-    from creepkit.reports.surrogate import size_study_rows
+    from creepkit.reports.surrogate import size_study_rows, size_study_to_json
     from creepkit.surrogates.training import size_study
 
     _set_threads(threads)
@@ -148,7 +148,7 @@ def sweep(
             progress=progress.tick,
         )  # fmt: skip
     if as_json:
-        print_json({"trainings": [vars(e) for e in trainings]})
+        print_json({"trainings": size_study_to_json(trainings)})
     else:
         print_table("", *size_study_rows(trainings))
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from creepkit.dataset.dataset import Dataset
     from creepkit.surrogates.surrogate import Surrogate
-    from creepkit.surrogates.training import SizeStudyResult
 
 
 MOST_POINTS = 4000
@@ -113,17 +112,38 @@ def write_surrogate_figures(surrogate: Surrogate, data: Dataset, folder: Path, n
     return paths
 
 
-def size_study_rows(results: Sequence[SizeStudyResult]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def size_study_to_json(models: Mapping[str, Surrogate]) -> list[dict[str, Any]]:
+    """Of each training its sizes, Eq. (4) of the validation rows at the best epoch and all others, and its file."""
+    rows = []
+    for file, model in models.items():
+        metadata, source = model.metadata, model.metadata.provenance
+        rows.append({
+            "hidden": model.recipe.hidden,
+            "layers": model.recipe.layers,
+            "samples": source["training_rows"],
+            "weight_count": model.weight_count,
+            "loss": metadata.metrics["loss"],
+            "training": metadata.curves["loss"][source["best_epoch"] - 1],
+            "epochs": source["epochs"],
+            "best_epoch": source["best_epoch"],
+            "outputs": {name: errors["rse"] for name, errors in metadata.metrics["outputs"].items()},
+            "losses": metadata.curves["rse"],
+            "file": file,
+        })  # fmt: skip
+    return rows
+
+
+def size_study_rows(models: Mapping[str, Surrogate]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """The heads and rows of a table, the best first."""
-    outputs = list(results[0].outputs) if results else []
-    sizes_and_losses = ("hidden", "layers", "samples", "weights", "loss (Eq. 4)", "training", "epochs", "best")
-    heads = (*sizes_and_losses, *(f"RSE {name}" for name in outputs))
+    results = sorted(size_study_to_json(models), key=lambda one: one["loss"])
+    outputs = list(results[0]["outputs"]) if results else []
+    heads = ("hidden", "layers", "samples", "weights", "loss (Eq. 4)", "training", "epochs", "best")
     rows = [
         (
-            *map(str, (one.hidden, one.layers, one.samples, one.weight_count)),
-            *(f"{one.loss:.4g}", f"{one.training:.4g}", str(one.epochs), str(one.best_epoch)),
-            *(f"{one.outputs[name]:.3g}" for name in outputs),
+            *(str(one[name]) for name in ("hidden", "layers", "samples", "weight_count")),
+            *(f"{one['loss']:.4g}", f"{one['training']:.4g}", str(one["epochs"]), str(one["best_epoch"])),
+            *(f"{one['outputs'][name]:.3g}" for name in outputs),
         )
-        for one in sorted(results, key=lambda one: one.loss)
+        for one in results
     ]
-    return heads, rows
+    return (*heads, *(f"RSE {name}" for name in outputs)), rows
