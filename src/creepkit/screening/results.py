@@ -27,21 +27,13 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import CODEC as FIT_CODEC
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
 from creepkit.inverse.selection import CREDIBLE_WEIGHT
+from creepkit.inverse.selection.ranking import RankedLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor
 from creepkit.screening.alloys import UNKNOWN_CLASS, Alloy, Compositions
 
 PredictedOutputs: TypeAlias = Mapping[str, Floats]
 """{output: (frames,) mm or strain} of one test."""
-
-
-@dataclass(frozen=True, eq=False)
-class WeightedLaw:
-    """An identified law of an alloy: its BIC less that of the best law, and its weight."""
-
-    fit: Identification
-    bic_difference: float
-    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +52,7 @@ class AlloyResult:
 
     alloy: str
     fingerprint: str = ""
-    laws: tuple[WeightedLaw, ...] = ()
+    laws: tuple[RankedLaw, ...] = ()
     failed_laws: Mapping[str, str] = field(default_factory=dict)
     verdict: str = ""
     equivalents: tuple[str, ...] = ()
@@ -198,6 +190,7 @@ ALLOY_RESULT = DocumentFormat(
 CODEC = RecordCodec(
     ranges={
         AlloyResult: {"predicted": ANY_NUMBER},
+        RankedLaw: {"chi_square": ANY_NUMBER},
         ConfirmedOutput: {"rms_difference": ANY_NUMBER},
         **FIT_CODEC.ranges,
     },

@@ -48,14 +48,7 @@ from creepkit.screening.alloys import (
     limitations,
     resolve_compositions,
 )
-from creepkit.screening.results import (
-    AlloyResult,
-    PredictedOutputs,
-    ScreeningResult,
-    WeightedLaw,
-    read_result,
-    write_result,
-)
+from creepkit.screening.results import AlloyResult, PredictedOutputs, ScreeningResult, read_result, write_result
 
 
 def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
@@ -80,7 +73,7 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
     predictor = job.predictor if confirmation is None else job.predictor.specimen
     return AlloyResult(
         alloy.name,
-        laws=tuple(WeightedLaw(r.fit, r.excess, r.weight) for r in ranking.laws),
+        laws=ranking.laws,
         failed_laws=dict(ranking.failed),
         verdict=ranking.verdict,
         decisive=ranking.decisive,
