@@ -19,7 +19,7 @@ BUDGET = {
     "cameras": 931,
     "cli": 2340,
     "core": 67,
-    "dataset": 735,
+    "dataset": 726,
     "discovery": 1373,
     "experiments": 1321,
     "exporters": 2658,
@@ -39,18 +39,18 @@ BUDGET = {
     "readers": 5840,
     "records": 2234,
     "registry": 615,
-    "reports": 5642,
-    "rupture_assessment": 1688,
-    "sampling": 1001,
-    "screening": 597,
+    "reports": 5640,
+    "rupture_assessment": 1669,
+    "sampling": 994,
+    "screening": 587,
     "specimens": 3184,
     "studies": 3055,
-    "surrogates": 1381,
+    "surrogates": 1369,
     "testing": 1797,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29550
+TESTS = 29540
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

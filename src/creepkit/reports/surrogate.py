@@ -112,30 +112,9 @@ def write_surrogate_figures(surrogate: Surrogate, data: Dataset, folder: Path, n
     return paths
 
 
-def size_study_to_json(models: Mapping[str, Surrogate]) -> list[dict[str, Any]]:
-    """Of each training its sizes, Eq. (4) of the validation rows at the best epoch and all others, and its file."""
-    rows = []
-    for file, model in models.items():
-        metadata, source = model.metadata, model.metadata.provenance
-        rows.append({
-            "hidden": model.recipe.hidden,
-            "layers": model.recipe.layers,
-            "samples": source["training_rows"],
-            "weight_count": model.weight_count,
-            "loss": metadata.metrics["loss"],
-            "training": metadata.curves["loss"][source["best_epoch"] - 1],
-            "epochs": source["epochs"],
-            "best_epoch": source["best_epoch"],
-            "outputs": {name: errors["rse"] for name, errors in metadata.metrics["outputs"].items()},
-            "losses": metadata.curves["rse"],
-            "file": file,
-        })  # fmt: skip
-    return rows
-
-
-def size_study_rows(models: Mapping[str, Surrogate]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def size_study_rows(trainings: Sequence[Mapping[str, Any]]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """The heads and rows of a table, the best first."""
-    results = sorted(size_study_to_json(models), key=lambda one: one["loss"])
+    results = sorted(trainings, key=lambda one: one["loss"])
     outputs = list(results[0]["outputs"]) if results else []
     heads = ("hidden", "layers", "samples", "weights", "loss (Eq. 4)", "training", "epochs", "best")
     rows = [

@@ -7,7 +7,7 @@ resumed from a checkpoint gives the same result.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -364,3 +364,24 @@ def _with_task_name(progress: ProgressCallback | None, name: str) -> ProgressCal
     if progress is None:
         return None
     return lambda task, done, total, note: progress(f"{name}, {task}", done, total, note)
+
+
+def size_study_to_json(models: Mapping[str, Surrogate]) -> list[dict[str, Any]]:
+    """Of each training its sizes, Eq. (4) of the validation rows at the best epoch and all others, and its file."""
+    rows = []
+    for file, model in models.items():
+        metadata, source = model.metadata, model.metadata.provenance
+        rows.append({
+            "hidden": model.recipe.hidden,
+            "layers": model.recipe.layers,
+            "samples": source["training_rows"],
+            "weight_count": model.weight_count,
+            "loss": metadata.metrics["loss"],
+            "training": metadata.curves["loss"][source["best_epoch"] - 1],
+            "epochs": source["epochs"],
+            "best_epoch": source["best_epoch"],
+            "outputs": {name: errors["rse"] for name, errors in metadata.metrics["outputs"].items()},
+            "losses": metadata.curves["rse"],
+            "file": file,
+        })  # fmt: skip
+    return rows
