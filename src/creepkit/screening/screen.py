@@ -32,8 +32,7 @@ from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.selection.discrimination import equivalent_laws
 from creepkit.inverse.selection.select import select
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.penalties import L2, Subsets, check_penalty
-from creepkit.inverse.sparsity.term_selection import identify_full, identify_reduced
+from creepkit.inverse.sparsity.term_selection import identify_sparse
 from creepkit.jobs.progress import ProgressCallback, duration_text
 from creepkit.jobs.worker_pools import ProcessWorkers, process_count
 from creepkit.jobs.worker_process import TaskResult, run_task
@@ -99,8 +98,7 @@ def _fit_dense_law(
     try:
         if job.penalty is None:
             return identify(law, alloy.tests, job.predictor, settings=settings, through=job.surrogate), None
-        dense_fit, reductions = identify_full(law, alloy.tests, job.predictor, job.surrogate, settings, None)
-        return dense_fit, identify_reduced(job.penalty, dense_fit, reductions)
+        return identify_sparse(law, alloy.tests, job.predictor, settings=settings, through=job.surrogate)
     except CreepkitError as error:
         notes.append(f"misfit without sparsity is not known: {error}")
         return None, None
@@ -145,7 +143,7 @@ class ScreeningJob:
     surrogate: Predictor | None
     settings: IdentificationSettings
     dense_law: CreepLaw | None
-    penalty: L2 | Subsets | None
+    penalty: Literal["subsets"] | None
     confirm: bool | str
     folder: Path
     task_name: ClassVar[str] = "alloy"
@@ -205,7 +203,7 @@ class ScreeningOptions:
     through : a surrogate in which laws of several terms are searched before the predictor gives values (see
         identify()).
     dense : the law whose misfit without sparsity is compared with the reduced one's (Fig. 7b), None for none.
-    penalty : what makes the reduced law of it, such as Subsets(); by default the reduced law is the best candidate.
+    penalty : what makes the reduced law of it, "subsets"; by default the reduced law is the best candidate.
     confirm : whether the best law is simulated by the specimen itself: True, False, or "when in doubt", that is where
         a surrogate says that its prediction lies outside its domain.
     """
@@ -213,14 +211,12 @@ class ScreeningOptions:
     settings: IdentificationSettings = field(default_factory=IdentificationSettings)
     through: Predictor | None = None
     dense: CreepLaw | str | None = DENSE_LAW
-    penalty: L2 | Subsets | None = None
+    penalty: Literal["subsets"] | None = None
     confirm: bool | Literal["when in doubt"] = "when in doubt"
 
     def __post_init__(self) -> None:
-        if self.penalty is not None:
-            check_penalty(self.penalty)
-            if self.dense is None:
-                raise FitError("a penalty reduces the dense law, and there is none; give dense=, such as 'combined'")
+        if self.penalty is not None and self.dense is None:
+            raise FitError("a penalty reduces the dense law, and there is none; give dense=, such as 'combined'")
         if self.confirm not in (True, False, "when in doubt"):
             raise FitError(f'confirm is {self.confirm!r}; allowed are True, False and "when in doubt"')
 
