@@ -61,10 +61,8 @@ def identify(
     if through == "auto":
         surrogate = through_for_law(surrogate, law)
     how: dict[str, Any] = {"settings": settings, "search": search, "through": surrogate, "progress": progress}
-    if penalty is None:
-        fit = identify_law(law, histories, predictor, **how)
-    else:
-        _, fit = identify_sparse(law, histories, predictor, **how)
+    run = identify_law if penalty is None else identify_sparse
+    fit = run(law, histories, predictor, **how)
     return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 

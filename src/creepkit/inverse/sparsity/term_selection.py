@@ -64,8 +64,8 @@ def identify_sparse(
     through: Predictor | None = None,
     settings: IdentificationSettings | None = None,
     progress: IterationCallback | None = None,
-) -> tuple[Identification, Identification]:
-    """A sum identified whole, and the law of those of its terms that the histories need, with its `sparsity`.
+) -> Identification:
+    """Identify the law of those terms of a sum that the histories need; what was dropped is recorded in `sparsity`.
 
     through : a surrogate by which terms are chosen; values and intervals are those of `using`.
     """
@@ -96,7 +96,7 @@ def identify_sparse(
         reduced=chosen.statistics(fit),
         observations=problem.observations.count,
     )
-    return full, replace(fit, search_trace=full.search_trace, sparsity=record)
+    return replace(fit, search_trace=full.search_trace, sparsity=record)
 
 
 @dataclass(frozen=True, eq=False)
