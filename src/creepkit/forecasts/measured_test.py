@@ -26,7 +26,8 @@ from creepkit.forecasts.drawn_law import DrawnLaw
 from creepkit.forecasts.draws import UncertainQuantity, systematic
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
 from creepkit.inverse.output_transforms import LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -152,7 +153,7 @@ class LinearForecast:
             by_joint,
             rate,
             jacobian[:, [count + k for k in own]] * np.array([dimensions[k].sd for k in own]),
-            covariance(residuals, noise_model)[0][np.ix_(present, present)],
+            CovarianceFactor.of_residuals(residuals, noise_model).blocks[0][np.ix_(present, present)],
             _white_noise(residuals, noise_model)[present],
             residuals.output_index[0][present],
             problem.observations.outputs,
@@ -248,8 +249,7 @@ class LinearForecast:
                 columns.append(components.offset * effect[:, None])
                 kinds.append((f"offset of {name}", 0.0, components.offset))
         design = np.concatenate(columns, axis=1)
-        without_offset = {n: replace(o, offset=0.0) for n, o in self.noise_model.outputs.items()}
-        noise = covariance(self.residuals, replace(self.noise_model, outputs=without_offset))[0]
+        noise = CovarianceFactor.of_residuals(self.residuals, self.noise_model.without_offsets).blocks[0]
         weighted = np.linalg.solve(noise[np.ix_(present, present)], design)
         posterior = np.linalg.inv(design.T @ weighted + np.eye(design.shape[1]))
         to_estimate = -posterior @ weighted.T
