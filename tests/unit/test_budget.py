@@ -21,15 +21,15 @@ BUDGET = {
     "core": 67,
     "dataset": 735,
     "discovery": 1373,
-    "experiments": 1321,
+    "experiments": 1322,
     "exporters": 2658,
     "extraction": 1302,
     "fem": 1427,
     "files": 1380,
-    "forecasts": 1287,
+    "forecasts": 1290,
     "instruments": 1282,
     "integration": 762,
-    "inverse": 10388,
+    "inverse": 10393,
     "jobs": 251,
     "kernels": 1703,
     "language": 1483,
@@ -44,13 +44,13 @@ BUDGET = {
     "sampling": 1001,
     "screening": 597,
     "specimens": 3184,
-    "studies": 3055,
+    "studies": 3053,
     "surrogates": 1381,
-    "testing": 1797,
+    "testing": 1796,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29550
+TESTS = 29588
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
