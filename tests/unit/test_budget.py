@@ -24,11 +24,11 @@ BUDGET = {
     "experiments": 1322,
     "exporters": 2658,
     "extraction": 1302,
-    "fem": 1427,
-    "files": 1380,
+    "fem": 1419,
+    "files": 1351,
     "forecasts": 1290,
     "instruments": 1282,
-    "integration": 762,
+    "integration": 758,
     "inverse": 10393,
     "jobs": 251,
     "kernels": 1703,
@@ -37,9 +37,9 @@ BUDGET = {
     "modules": 770,
     "quality": 1295,
     "readers": 5840,
-    "records": 2234,
-    "registry": 615,
-    "reports": 5642,
+    "records": 2225,
+    "registry": 612,
+    "reports": 5639,
     "rupture_assessment": 1688,
     "sampling": 1001,
     "screening": 597,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29588
+TESTS = 29511
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
