@@ -113,13 +113,12 @@ class VirtualCamera:
             displacements = moved - points + noise @ tilt.T
             lost = gone | (self._blobs(random, side, 0.5 * self.lost) if self.lost else False)
             valid = ~lost[chosen]
-            sigma = np.where(valid, 0.02, -1.0)
             return CameraFrame(
-                points[chosen], np.where(valid[:, None], displacements[chosen], 0.0), valid, sigma, float(times[index]),
+                points[chosen], np.where(valid[:, None], displacements[chosen], 0.0), valid, float(times[index]),
                 f"{name}, frame {index}",
             )  # fmt: skip
 
-        return Frames(name, times, frame, "virtual camera", "pixel")
+        return Frames(name, times, frame, "virtual camera")
 
     def _innovation(self, index: int, side: int) -> Floats:
         """Noise that begins in a frame; those before the first count from 10^6 on."""

@@ -53,7 +53,7 @@ def changed(frames, changes):
 
 
 def rebuilt(frame, **changes):
-    fields = ("points", "displacements", "valid", "confidence", "time", "source")
+    fields = ("points", "displacements", "valid", "time", "source")
     return CameraFrame(**{name: changes.get(name, getattr(frame, name)) for name in fields})
 
 
