@@ -30,7 +30,16 @@ class Dimple:
 
 
 def simulated_dimple(
-    frames=60, rest=25, interval=150.0, pressure=8.0, A=1e-16, n=5.2, law="norton", temperature=1050.0, refinement=1.0
+    frames=60,
+    rest=25,
+    interval=150.0,
+    pressure=8.0,
+    A=1e-16,
+    n=5.2,
+    law="norton",
+    temperature=1050.0,
+    refinement=1.0,
+    specimen=None,
 ) -> Dimple:
     """A dimple that creeps after `rest` frames without load.
 
@@ -38,7 +47,7 @@ def simulated_dimple(
     """
     loaded = interval * np.arange(1, frames - rest + 1)
     run = ck.simulate(
-        law, ck.specimen("bulge").replace(refinement=refinement), dict(A=A, n=n), times=loaded,
+        law, specimen or ck.specimen("bulge").replace(refinement=refinement), dict(A=A, n=n), times=loaded,
         loading=ck.PressureJump(pressure, pressure, 1e9),
         temperature=temperature, elastic=ck.Elastic(E=1e5, nu=0.3),
     )  # fmt: skip

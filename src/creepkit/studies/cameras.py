@@ -199,7 +199,10 @@ class StudyCamera:
             watched = [n for n, s in ck.available("specimens").items() if s.is_watched]
             what = f"specimen '{found.name}' does not say how cameras see its surface; {nearest(found.name, watched)}"
             raise self.file.error(key, what)
-        return found
+        with self.file.at(*self.key("lengths")):
+            piece: Any = found
+            lengths = arguments.lengths_of(self.file, self.key("lengths"), self.part.lengths, piece)
+            return piece.replace(**lengths) if lengths else found
 
     @cached_property
     def operator(self) -> str:
