@@ -1,7 +1,7 @@
 """Lag between the clock of a camera and that of an instrument, from the response to changes of load.
 
-One lag holds for the whole test: a clock that gains 1e-4, a poor quartz, moves it by less than its interval
-(docs/measured/clock_alignment.md).
+One lag holds for the whole test. That one clock gains on the other, which moves the lag within the test, widens its
+interval (docs/measured/clock_alignment.md).
 """
 
 from __future__ import annotations
@@ -29,6 +29,10 @@ from creepkit.records.recorded_programs import noise_of_readings
 FEWEST_FRAMES = 8
 UNIX_TIME = 1e8
 """s; larger times of a camera count from 1970: no test lasts three years."""
+
+
+DRIFT = 1e-4
+"""s/s, standard deviation of the gain of one clock on the other: 9 s a day, a poor quartz."""
 
 
 LEAST_RANGE = 10.0
@@ -180,7 +184,7 @@ def align_clocks(
     lag, tasks = _checked_best([_thinned(task, candidates[0]) for task in tasks], candidates, (low, high))
     frames = max(task.times.size for task in tasks)
     channels = ", ".join(dict.fromkeys(task.channel for task in tasks))
-    lags, probability = _posterior(tasks, lag, (low, high))
+    lags, probability = _with_drift(tasks, *_posterior(tasks, lag, (low, high)))
     interval = _interval(lags, probability)
     return ClockAlignment(zero, float(lags @ probability), interval, lags, probability, channels, frames)
 
@@ -355,6 +359,15 @@ def _posterior(tasks: Sequence[_Task], lag: float, search: tuple[float, float]) 
             lag = 0.5 * float(lags[relevant[0]] + lags[relevant[-1]])
     weights = np.exp(logs - logs.max())
     return lags, weights / weights.sum()
+
+
+def _with_drift(tasks: Sequence[_Task], lags: Floats, probability: Floats) -> tuple[Floats, Floats]:
+    """Lags and their probabilities where the clocks differ by a normal DRIFT: its mean effect over the test."""
+    span = max(task.times[-1] for task in tasks) - min(task.times[0] for task in tasks)
+    sd = max(DRIFT * span / 12.0**0.5, float(lags[1] - lags[0]))
+    wide = np.linspace(lags[0] - 4.0 * sd, lags[-1] + 4.0 * sd, FINE_LAGS)
+    weights = np.exp(-0.5 * ((wide[:, None] - lags) / sd) ** 2) @ probability
+    return wide, np.asarray(weights / weights.sum())
 
 
 def _together(each: Floats, lags: Floats) -> Floats:

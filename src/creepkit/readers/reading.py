@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import gc
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from functools import partial
 from glob import glob
 from pathlib import Path
@@ -13,14 +14,16 @@ from typing import Any, cast
 
 from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.delimited_text import refuse_unprintable
+from creepkit.files.reading import read_bytes
 from creepkit.hookspecs import hookimpl
 from creepkit.readers.creep_schema_json import CREEP_SCHEMA
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.readers.questions import ANSWERS_FILE, collected, raise_all
-from creepkit.readers.spreadsheets import SPREADSHEET
-from creepkit.readers.tests_file import answers_of
+from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
+from creepkit.readers.tests_file import answers_of, read_answers
 from creepkit.readers.tests_in_rows import TEST_TABLE
+from creepkit.readers.text_files import TABLE_FILE
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, Reader, accepts_path, histories_in
 
@@ -61,7 +64,37 @@ def read_histories(
                 _check_printable(history, source)
                 read.setdefault((history.source or str(source), history.name), (source, history))
     raise_all(errors)
-    return _with_unique_names(list(read.values()))
+    histories = _with_unique_names(list(read.values()))
+    said = {text.casefold() for one in histories for text in (one.name, *one.labels, *one.labels.values())}
+    for folder in {path if path.is_dir() else path.parent for path, _ in read.values()}:
+        raise_all(_ends_of_nothing(folder, said))
+    return histories
+
+
+def _ends_of_nothing(folder: Path, said: Collection[str]) -> Iterator[HistoryError]:
+    """Texts under `ended` in the answers of a folder that stand in none of its files; said : what tests say."""
+    file = folder / ANSWERS_FILE
+    for pattern, answers in read_answers(file).items() if file.is_file() else ():
+        ended = answers.get("ended")
+        ended = ended if isinstance(ended, dict) else {}
+        keys = {key: " ".join(key.casefold().removeprefix("()").split()) for key in ended}
+        missing = [key for key, text in keys.items() if not any(text in one for one in said)]
+        files = [path for path in sorted(folder.glob("*")) if missing and fnmatchcase(path.name, pattern)]
+        texts = [_text_of(path) for path in files if path.is_file()]
+        for key in missing:
+            if texts and not any(keys[key] in text for text in texts):
+                what = f"'{quoted(key)}' stands in no file of that name"
+                yield HistoryError(f'{file}: ["{quoted(pattern)}"] ended: {what}; correct or remove it')
+
+
+def _text_of(path: Path) -> str:
+    """The words of a file, its name and those of its sheets included, in small letters."""
+    if SPREADSHEET.accepts(path):
+        words = [text for one in read_sheets(path) for row in one.rows for text in (one.sheet, *row.cells)]
+    else:
+        content = read_bytes(path, TABLE_FILE)
+        words = [content.decode(one, "replace") for one in ("utf-8", "utf-16", "cp1252")]
+    return " ".join(" ".join([path.stem, *words]).casefold().split())
 
 
 def _histories_of(source: Path, readers: Sequence[Reader]) -> list[History]:
