@@ -64,7 +64,6 @@ plate = ck.screen(
 seconds = time.monotonic() - began
 print(f"\n{plate}")
 plate.to_csv(arguments.to / "plate.csv")
-plate.to_hdf5(arguments.to / "plate.h5")
 pictures = plate.plot(arguments.to / "pictures")
 
 # %%

@@ -110,8 +110,6 @@ from .screening.screen import ScreeningOptions as ScreeningOptions
 from .screening.screen import screen as screen
 from .specimens.axisymmetric import Axisymmetric as Axisymmetric
 from .specimens.axisymmetric import Displacements as Displacements
-from .specimens.bulge.field_fit import fit_field as fit_field
-from .specimens.bulge.field_fit import paper_parameters as paper_parameters
 from .specimens.per_test import OneTest as OneTest
 from .specimens.per_test import PerTest as PerTest
 from .specimens.test_piece import TestPiece as TestPiece

@@ -79,7 +79,7 @@ def by_method(tests, method, degree):
     """The same without the checks, which fit every method twice more."""
     observed, _, _ = rupture_tests(tests)
     at = conditions_of(observed, no_tensile_strength)
-    fit = fit_method(METHODS[method], observed, at, degree=degree, distribution="lognormal", fixed={}, level=0.95)
+    fit = fit_method(METHODS[method], observed, at, degree=degree, fixed={}, level=0.95)
     strengths = strength_estimates(
         [(fit, 1.0)], fit.name, observed, no_tensile_strength, hours=HOURS, temperature=TEMPERATURE, level=0.95
     )

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from creepkit.fem.mesh import Mesh
-from creepkit.fem.mesh_files import read_input_deck
 from creepkit.records import PressureJump, Program
 
 sys.path.append(str(Path(__file__).parent))
@@ -93,17 +92,6 @@ def test_the_text_of_a_deck() -> None:
         "U",
         "*END STEP",
     ]
-
-
-def test_the_mesh_reads_back(tmp_path: Path) -> None:
-    path = tmp_path / "block.inp"
-    path.write_text(deck().text())
-    mesh = read_input_deck(path, top=None)
-    where = [int(np.argmin(np.linalg.norm(mesh.nodes - node, axis=1))) for node in NODES]
-    np.testing.assert_allclose(mesh.nodes[where], NODES)
-    np.testing.assert_array_equal(mesh.held[where], BLOCK.held)
-    np.testing.assert_array_equal(mesh.elements, [where])
-    np.testing.assert_array_equal(mesh.pressed, [[where[0], where[4], where[1]]])
 
 
 @pytest.mark.parametrize(("edge", "side"), [((0, 4, 1), 1), ((1, 5, 2), 2), ((2, 6, 3), 3), ((3, 7, 0), 4)])

@@ -30,16 +30,7 @@ class Dimple:
 
 
 def simulated_dimple(
-    frames=60,
-    rest=25,
-    interval=150.0,
-    pressure=8.0,
-    A=1e-16,
-    n=5.2,
-    law="norton",
-    temperature=1050.0,
-    refinement=1.0,
-    specimen=None,
+    frames=60, rest=25, interval=150.0, pressure=8.0, A=1e-16, n=5.2, law="norton", refinement=1.0, specimen=None
 ) -> Dimple:
     """A dimple that creeps after `rest` frames without load.
 
@@ -49,7 +40,7 @@ def simulated_dimple(
     run = ck.simulate(
         law, specimen or ck.specimen("bulge").replace(refinement=refinement), dict(A=A, n=n), times=loaded,
         loading=ck.PressureJump(pressure, pressure, 1e9),
-        temperature=temperature, elastic=ck.Elastic(E=1e5, nu=0.3),
+        temperature=1050.0, elastic=ck.Elastic(E=1e5, nu=0.3),
     )  # fmt: skip
     top = run.test.model.top
     rise = run._at(np.asarray(run.simulation.displacements[:, top, 1]), loaded)

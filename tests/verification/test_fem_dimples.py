@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from creepkit.fem.mesh import discretize
-from creepkit.fem.mesh_files import read_input_deck, read_mesh
+from creepkit.fem.mesh_files import read_mesh
 from creepkit.fem.simulation import LoadHistory, Simulation
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.language import CreepLaw
@@ -21,6 +21,7 @@ from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import PressureJump, Program, Status
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import Observation
+from helpers.decks import mesh_of_deck
 from helpers.fem_cases import BENCHMARKS, course, run
 from helpers.paths import NO_SHARED_DATA
 
@@ -166,11 +167,11 @@ RADII = (0, 1, 2, 3, 4, 5, 6, 7.5)
     ],
     ids=lambda case: case[0],
 )
-def deck(request):
+def deck(request, tmp_path_factory):
     """The table of a deck's results, and ours on its mesh of 174 CAX8R: u_z along the top, fit, largest stress."""
     name, law, values = request.param
     table = np.genfromtxt(DECKS / f"{name}.csv", delimiter=",", names=True)
-    mesh = read_input_deck(DECKS / f"{name}.inp")
+    mesh = mesh_of_deck(DECKS / f"{name}.inp", tmp_path_factory.mktemp("deck"))
     made = run(mesh, course(RAMP, 14400.0, 1e5), law, values, tolerance=1e-3, newton=1e-6)
     assert made.status == Status.COMPLETE
     radii, profiles, times = mesh.nodes[mesh.top, 0], made.displacements[:, mesh.top, 1], table["time_s"]

@@ -74,7 +74,7 @@ def test_the_command_line_generates_and_trains_for_a_specimen_of_a_plugin_file(t
         made = creepkit(f"surrogate generate norton --specimen cantilever --samples 16 {ranges} --to {to} --workers 1")
         assert made.exit_code == 0, made.output
         assert "norton on cantilever" in made.output
-        sizes = "--hidden 4 --layers 1 --epochs 2 --base reference-stress"
+        sizes = "--hidden 4 --layers 1 --epochs 2 --target log"
         trained = creepkit(f"surrogate train {to} --to {model} {sizes}")
         assert trained.exit_code == 0, trained.output
         assert "parameter-gru of cantilever" in ck.surrogate(model).name

@@ -152,7 +152,7 @@ def _screen(
             histories, laws, surrogate, compositions=compositions, to=to, options=options, workers=workers,
             progress=progress.tick,
         )  # fmt: skip
-    written = [plate.to_csv(to / "plate.csv"), plate.to_hdf5(to / "plate.h5")]
+    written = [plate.to_csv(to / "plate.csv")]
     if plate.identified:
         written += [to / "fits", *plate.plot(to / "pictures")]
     print_screening(plate, written, as_json)

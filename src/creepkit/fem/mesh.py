@@ -143,17 +143,6 @@ def discretize(mesh: Mesh) -> Discretization:
     )
 
 
-def geometry_derivative(mesh: Mesh, velocity: Floats) -> GeometryDerivative:
-    """What exact shape derivatives need when the nodes move.
-
-    velocity : (nodes, 2) mm for each unit of the number of the geometry.
-    """
-    at = discretize(mesh)
-    moves = velocity[mesh.elements]
-    gradient = np.stack([np.einsum("epa,eai->epi", slopes, moves) for slopes in (at.by_radius, at.by_height)], axis=3)
-    return GeometryDerivative(gradient, np.einsum("epa,ea->ep", at.over_radius, moves[:, :, 0]))
-
-
 def local_tangents(nodes: Floats, places: Floats) -> Floats:
     """Derivatives (elements, places, 2 local, 2) of r and z to the local coordinates, mm.
 
@@ -216,6 +205,26 @@ def outline(elements: Ints) -> Ints:
     _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
     alone = np.sort(first[count == 1])
     return np.stack([alone // 4, alone % 4], axis=1)
+
+
+def order_by_neighbours(elements: Ints, count: int) -> Ints:
+    """The nodes (count,) in the order of reverse Cuthill and McKee; elements : (elements, 8) nodes of each."""
+    from scipy.sparse import coo_array  # loaded when it is needed, not when creepkit starts
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    pairs = elements[:, :, None], elements[:, None, :]
+    rows, columns = (np.broadcast_to(pair, (len(elements), 8, 8)).ravel() for pair in pairs)
+    graph = coo_array((np.ones(rows.size), (rows, columns)), shape=(count, count))
+    return np.asarray(reverse_cuthill_mckee(graph.tocsr(), symmetric_mode=True).astype(np.int64))
+
+
+def renumbered(mesh: Mesh) -> Mesh:
+    """The mesh numbered by reverse Cuthill-McKee, by radius or as it was, whichever has the smallest bandwidth."""
+    count = len(mesh.nodes)
+    orders = [np.arange(count), order_by_neighbours(mesh.elements, count), np.lexsort(mesh.nodes.T[::-1])]
+    best = min(orders, key=lambda order: half_bandwidth(np.argsort(order)[mesh.elements]))
+    new = np.argsort(best)
+    return Mesh(mesh.nodes[best], new[mesh.elements], mesh.held[best], new[mesh.pressed], new[mesh.top])
 
 
 class StripMesh(NamedTuple):

@@ -21,7 +21,7 @@ from creepkit.inverse.defect_correction import (
     shift_of_values,
     with_correction_at_frames,
 )
-from creepkit.inverse.errors_of_tests import error_covariances, errors_of_tests
+from creepkit.inverse.errors_of_tests import LIFE, RATE, error_covariances, errors_of_tests
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
@@ -75,7 +75,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor, Status, is_length_nuisance, is_logarithmic
+from creepkit.records import History, Predictor, Status, is_length_nuisance
 
 MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
 """How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
@@ -166,9 +166,7 @@ def _beside_the_others(fit: Identification, without: Identification, test: int, 
     log_factors[test] = found.size
     linear = at_rates(problem, linearised(problem, x, problem.residuals(x)), log_factors)
     others = RateExplanations(problem, x, linear, without.noise_model)
-    logarithmic = all(map(is_logarithmic, problem.observations.outputs))
-    sizes = others.rates.median_log_factors if logarithmic else others.rates.own_log_factors
-    size = float(sizes[test])
+    size = float(others.scatter.log_factor[test])
     return others.one_test(test, found.odds, size if np.isfinite(size) else found.size)
 
 
@@ -326,7 +324,7 @@ def _result(
     found_at = judged if by_likelihood else linear
     errors = best.errors if by_likelihood else errors_of_tests(problem, linear.x, linear, noise_model)
     unmodelled = perturbations(
-        problem, linear, noise_model, histories, None if errors is None else errors.perturbations, working_noise
+        problem, linear, noise_model, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
     )
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     rates = RateExplanations(problem, linear.x, judged, noise_model)

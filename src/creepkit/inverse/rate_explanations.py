@@ -8,9 +8,9 @@ derivatives to the unknowns and d those to ln rate, the evidence
 
     p(r | w) = mean over s of  int N(r + J dx + (w c) d; 0, C0 + s^2 d d') p(dx) p(c) dx dc
 
-is a mean over a logarithmic grid of s, for the few tests of a campaign do not show their scatter. C0, the noise,
-offsets and misfit of each test as they were estimated, is whitened once; what is left are small matrices of each test,
-so that all explanations of twelve tests cost a few hundredths of a second and no simulation.
+is a mean over s with its prior, for the few tests of a campaign do not show their scatter. C0 is the noise, offsets and
+misfit of each test as they were estimated. A curve says one number of its rate (see uncertainty.rate_scatter), so that
+all explanations of twelve tests cost a few hundredths of a second and no simulation.
 
 Occam's factor is in the evidence: a wide prior that the tests do not need costs. What an explanation was chosen from is
 counted too: one of n tests by ln n, a split into two groups by the ln of how many splits there are.
@@ -26,12 +26,12 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.explanation import Explanation, Kind, LeftOut
-from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
+from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.rate_perturbations import SMALLEST_FACTOR, Evidence, RatePerturbations
 from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
+from creepkit.inverse.uncertainty.rate_scatter import SMALLEST_FACTOR, Evidence, rate_scatter, redundant_rates
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import temperature
 from creepkit.language.symbols import GAS_CONSTANT
@@ -101,16 +101,16 @@ class RateExplanations:
 
     def __init__(self, problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise: NoiseModel) -> None:
         self.problem, self.x = problem, x
-        fixed = ("", "rate") in components_fixed_by_priors(problem.settings.nuisances, list(noise.outputs))
-        self.rates = RatePerturbations(linear, noise, scatter_known=fixed or not noise.rate > 0)
+        alike = replace(linear, residuals=linear.residuals.with_test_weights(np.ones(len(problem.histories))))
+        self.scatter = replace(rate_scatter(problem, alike, noise), members={})
         self.conditions = RateConditions.of_problem(problem)
         self.possible = len(problem.histories) >= FEWEST_TESTS and bool(linear.residuals.log_rate_sensitivity.any())
-        self.redundant = self.possible and self.rates.contrasts >= FEWEST_CONTRASTS
+        self.redundant = redundant_rates(linear, noise) if self.possible else 0
 
     @cached_property
     def found(self) -> tuple[Explanation, ...]:
         """What explains the rates better than scatter, likeliest first; with prior odds six times likelier at least."""
-        if not self.redundant:
+        if self.redundant < FEWEST_CONTRASTS:
             return ()
         found = [*self._of_law(), *self._of_tests(), *self._of_groups()]
         return tuple(sorted((e for e in found if e.odds > DECISIVE_ODDS), key=lambda e: -e.odds))
@@ -132,7 +132,7 @@ class RateExplanations:
 
     def _evidence(self, columns: Sequence[Floats], prior_sd: Sequence[float]) -> Evidence:
         weights = np.stack(columns, axis=1) if columns else np.zeros((len(self.problem.histories), 0))
-        return self.rates.evidence(weights, np.array(prior_sd, float))
+        return self.scatter.evidence(weights, np.array(prior_sd, float))
 
     @cached_property
     def _as_it_is(self) -> float:
@@ -193,7 +193,7 @@ class RateExplanations:
         """One test whose rate is its own; and others beside it, while each of them is likelier by as much again."""
         count, base, kept, total = len(self.problem.histories), self._as_it_is, list[int](), 0.0
         best: tuple[Evidence, tuple[str, ...]] | None = None
-        for _ in range(min(MOST_TESTS, (count - 1) // 3, self.rates.contrasts - 1)):
+        for _ in range(min(MOST_TESTS, (count - 1) // 3, self.redundant - 1)):
             tried = [
                 (self._evidence([self._only(j) for j in (*kept, k)], [FACTOR_SD] * (len(kept) + 1)), k)
                 for k in range(count)

@@ -16,7 +16,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.limits import HOTTEST
 from creepkit.presentation import present
 from creepkit.records.loading import Loading, Program, loading_text
-from creepkit.records.specimen_lookup import load_unit, output_unit
+from creepkit.records.specimen_lookup import load_unit
 from creepkit.records.units import celsius_text
 
 if TYPE_CHECKING:
@@ -220,16 +220,6 @@ class History:
         """(frames,) rows of pandas: time_s, the outputs with their units, and whether a frame is used."""
         return present("reports.dataframes:to_dataframe", self)
 
-    @classmethod
-    def from_dataframe(cls, frame: DataFrame, name: str, loading: Loading, temperature: float, **more: Any) -> History:
-        """A test of a table with the column time_s and one for each output, as `to_dataframe` names them.
-
-        frame : (frames,) rows. temperature : K. more : further fields, such as specimen or elastic.
-        """
-        outputs = {output: frame[column].to_numpy(float) for column in frame if (output := _output_of(column))}
-        used = frame["used"].to_numpy(bool) if "used" in frame else EVERY_FRAME
-        return cls(name, frame["time_s"].to_numpy(float), outputs, loading, temperature, used=used, **more)
-
     def _repr_html_(self) -> str:
         """For notebooks."""
         return present("reports.html.notebook:notebook_html", self)
@@ -306,10 +296,3 @@ class History:
         if np.ptp(kelvin) < 0.5:
             ends = (kelvin[0], kelvin[0])
         return f"{celsius_text(*ends, digits=0)}, {loading_text(self.loading, load_unit(self))}"
-
-
-def _output_of(column: str) -> str:
-    """The output that a column of a table holds; "" for time and for whether frames are used."""
-    name, _, unit = column.rpartition("_")
-    with_unit = bool(name) and output_unit(name) == unit
-    return "" if column in ("time_s", "used") else name if with_unit else column

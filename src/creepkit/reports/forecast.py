@@ -15,7 +15,7 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, hours_number
 from creepkit.reports.blocks import Block, Items, Paragraph, as_text
-from creepkit.reports.figures import empty_figure, save_figure, span, wrapped
+from creepkit.reports.figures import panel_grid, save_figure, span, wrapped
 from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.load_programs import kind_of_test
 from creepkit.reports.prediction_bands import axis_label
@@ -24,18 +24,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from creepkit.forecasts.banded_output import OutputForecast
     from creepkit.forecasts.forecast import Forecast
-    from creepkit.forecasts.measured_test import ExplainedNuisance, TestScore
-    from creepkit.forecasts.results import OutputForecast, TestForecast, TimeForecast
+    from creepkit.forecasts.forecast_of_test import TestForecast, TimeForecast
+    from creepkit.forecasts.measured_test import TestScore
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit
     from creepkit.reports.svg import PageFigures
 
 
 SHOWN_SHARE = 0.02
 """Of the variance: smaller parts of a band are not named."""
-
-
-LARGEST_LOG = 700.0
 
 
 def forecast_text(forecast: Forecast) -> str:
@@ -55,12 +53,9 @@ def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: 
             Paragraph("the tests contradict the law: bands and intervals are wider by what it misses of their rates")
         )
     if figures is not None and any(test.outputs for test in forecast.tests):
-        caption = (
-            f"Forecast with bands of {100 * forecast.level:g} % (drawn), and below it shares of the variance, which "
-        )
-        caption += "are of first order."
+        caption = f"Forecast with bands of {100 * forecast.level:g} %: of measured values, and of whole curves (paler)."
         description = (
-            "Forecast curves over time with pointwise and simultaneous bands, and what the variance is made of."
+            "Forecast curves over time with pointwise and simultaneous bands; the list below holds the numbers."
         )
         blocks.append(figures.picture(lambda: forecast_figure(forecast), f"Forecasts{of}", description, caption))
     for test in forecast.tests:
@@ -123,27 +118,16 @@ def _time_text(one: TimeForecast, end: float) -> str:
 
 
 def score_lines(score: TestScore) -> list[str]:
-    """How a measured test compares, in two lines."""
+    """How a measured test compares, in one line."""
     inside = ", ".join(
         f"{name} {100 * share:.0f} % of the frames in the band"
         + (" and the whole curve in the wider one" if score.whole_inside[name] else "")
         for name, share in score.inside.items()
     )
-    rms = ", ".join(f"{name} {before:.3g} to {score.rms_explained[name]:.3g}" for name, before in score.rms.items())
-    moved = [nuisance_text(one) for one in score.nuisances if abs(one.deviation) > 0.1]
     return [
         f"measured: {inside}; a test lies as far off, or farther, with probability {score.departure_p_value:.2g} "
-        f"(noise of its frames included: {score.p_value:.2g})",
-        f"with the law fixed, a rate, offsets and dimensions of its own describe {100 * score.explained:.0f} % of what "
-        f"differs (rms over noise: {rms}){': ' if moved else ''}{', '.join(moved)}",
+        f"(noise of its frames included: {score.p_value:.2g})"
     ]
-
-
-def nuisance_text(one: ExplainedNuisance) -> str:
-    """A nuisance and how far it lies from its prior mean."""
-    if one.kind == "rate":
-        return f"rate x {math.exp(min(one.value, LARGEST_LOG)):.3g} ({one.deviation:+.1f} sd)"
-    return f"{one.kind} {one.value:.4g} ({one.deviation:+.1f} sd)"
 
 
 def end_shares(one: OutputForecast) -> dict[str, float]:
@@ -188,11 +172,7 @@ def _test_to_json(test: TestForecast) -> dict[str, Any]:
         },
         "score": None
         if score is None
-        else {
-            **fields_to_json(score, "inside whole_inside freedom p_value departure_p_value log_score explained"),
-            **fields_to_json(score, "rms rms_explained"),
-            "nuisances": [fields_to_json(n, "kind value sd prior_mean prior_sd deviation") for n in score.nuisances],
-        },
+        else fields_to_json(score, "inside whole_inside freedom p_value departure_p_value log_score"),
     }
 
 
@@ -207,28 +187,7 @@ COLUMNS = 4
 """Tests side by side."""
 
 
-PART_COLOURS = {
-    "parameters of the law": "#3b6fb6",
-    "choice of the law": "#7b5ea7",
-    "scatter between tests": "#e08214",
-    "scatter between heats": "#f5b13d",
-    "scatter between laboratories": "#fbd98c",
-    "offset": "#9aa4ad",
-    "noise": "#cfd5da",
-    "misfit of the law": "#b2182b",
-    "numerical error": "#555555",
-}
-"""Of the parts of a band; dimensions have those of DIMENSION_COLOURS in turn."""
-
-
 TIME_COLOUR, RUPTURE_COLOUR = "#c51b7d", "#b2182b"
-
-
-DIMENSION_COLOURS = ("#4d9221", "#7fbc41", "#b8e186", "#276419")
-
-
-NAMED_SHARE, UNNAMED = 0.02, "#000000"
-"""Share of the variance from which a part stands in the legend, and the colour of others."""
 
 
 BELOW_EDGE = 0.04
@@ -244,31 +203,25 @@ SHOWN_RATIO = 1e-3
 
 
 def forecast_figure(forecast: Forecast, path: str | Path | None = None) -> Figure:
-    """Each test: its leading output with both bands, and below it what the band is made of over time.
+    """The leading output of each test with both bands, times to values and rupture, and what was measured.
 
     A single test shows all of its outputs. Tests beyond the first dozen are not drawn.
     """
-    tests = [t for t in forecast.tests if t.outputs][:MOST_DRAWN]
+    tests = [t for t in forecast.tests if t.outputs]
     if not tests:
         raise FitError("nothing is predicted of these tests, so there is nothing to draw")
-    columns, shown = min(COLUMNS, len(tests)), [[*t.outputs.values()][: None if len(tests) == 1 else 1] for t in tests]
-    rows, panels = -(-len(tests) // columns), max(map(len, shown))
-    width = max(4.4 * columns, 6.6)
-    figure = empty_figure(width, rows * (3.1 * panels + 1.7) + 1.1)
-    grid = figure.add_gridspec(rows, columns)
-    parts: dict[str, str] = {}
-    for k, (test, outputs) in enumerate(zip(tests, shown, strict=True)):
-        heights = [*[2.0] * len(outputs), 1.0]
-        cell = grid[k // columns, k % columns].subgridspec(len(heights), 1, height_ratios=heights, hspace=0.08)
-        *curves, shares = (figure.add_subplot(cell[j]) for j in range(len(heights)))
-        for axes, one in zip(curves, outputs, strict=True):
-            _draw_curve(axes, test, one)
-        curves[0].set_title(wrapped(f"{test.name}: {test.history.condition}", 4.4, 11.0), fontsize=8)
-        _draw_shares(shares, curves[0], outputs[0], parts)
-    _legend(figure, forecast, tests, parts)
-    left_out = len(forecast.tests) - len(tests)
+    drawn = [
+        (test, one) for test in tests[:MOST_DRAWN] for one in [*test.outputs.values()][: None if len(tests) == 1 else 1]
+    ]
+    figure, panels = panel_grid(len(drawn), COLUMNS, 4.4, 3.6)
+    for axes, (test, one) in zip(panels, drawn, strict=True):
+        _draw_curve(axes, test, one)
+        axes.set_title(wrapped(f"{test.name}: {test.history.condition}", 4.4, 11.0), fontsize=8)
+    _legend(figure, forecast, [test for test, _ in drawn])
+    left_out = len(forecast.tests) - len({test.name for test, _ in drawn})
     more = f" ({left_out} more tests are not drawn)" if left_out > 0 else ""
-    figure.suptitle(wrapped(f"forecast by {' or '.join(forecast.laws)}{more}", width), fontsize=10)
+    title = f"forecast by {' or '.join(forecast.laws)}{more}"
+    figure.suptitle(wrapped(title, float(figure.get_size_inches()[0])), fontsize=10)
     return save_figure(figure, path)
 
 
@@ -302,7 +255,8 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast) -> None:
     axes.set_xlim(0.95 * start, 1.03 * end)
     _draw_times(axes, test, one)
     axes.set_ylabel(axis_label(one.output), fontsize=8)
-    axes.tick_params(labelsize=7, labelbottom=False)
+    axes.set_xlabel("time, h", fontsize=8)
+    axes.tick_params(labelsize=7)
 
 
 def _time_end(test: TestForecast) -> float:
@@ -342,25 +296,7 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast) -> None:
             axes.plot([measured], [level], "x", color="black", ms=5, zorder=6)
 
 
-def _draw_shares(axes: Axes, above: Axes, one: OutputForecast, parts: dict[str, str]) -> None:
-    """Stacked shares of the variance over time, on the axis of the panel above; parts : {part: its colour}."""
-    positive = (one.times > 0) & np.isfinite(one.value)
-    hours = one.times[positive] / SECONDS_PER_HOUR
-    for part, share in one.shares.items():
-        if part not in parts and np.nanmax(share[positive], initial=0.0) >= NAMED_SHARE:
-            taken = sum(colour in DIMENSION_COLOURS for colour in parts.values())
-            parts[part] = PART_COLOURS.get(part) or DIMENSION_COLOURS[taken % len(DIMENSION_COLOURS)]
-    if hours.size:
-        stacked = np.stack([100 * values[positive] for values in one.shares.values()])
-        axes.stackplot(hours, stacked, colors=[parts.get(part, UNNAMED) for part in one.shares], lw=0)
-        span(axes, "x", above.get_xlim(), logarithmic=is_logarithmic(one.output))
-        axes.set_xlim(*above.get_xlim())
-    axes.set(ylim=(0, 100), xlabel="time, h")
-    axes.set_ylabel("variance, %", fontsize=8)
-    axes.tick_params(labelsize=7)
-
-
-def _legend(figure: Figure, forecast: Forecast, tests: Sequence[TestForecast], parts: dict[str, str]) -> None:
+def _legend(figure: Figure, forecast: Forecast, tests: Sequence[TestForecast]) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -378,6 +314,5 @@ def _legend(figure: Figure, forecast: Forecast, tests: Sequence[TestForecast], p
             for rupture, word, colour in times
             if rupture in drawn
         ),
-        *(Patch(color=colour, label=f"variance by {part}") for part, colour in parts.items()),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7)

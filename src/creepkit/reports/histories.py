@@ -29,9 +29,12 @@ MOST_VALUES = 4
 
 
 def histories_text(histories: Sequence[History]) -> str:
-    """A paragraph for one test; for several a row each, then what holds for all or some of them."""
-    if len(histories) < 2:
-        return "\n".join(line for history in histories for line in _lines(history))
+    """A line for each thing of one test; for several a row each, then what holds for all or some of them."""
+    if len(histories) == 1:
+        (test,) = histories
+        name, end, frames, _ = _row(test)
+        outputs = [_output_text(test, one) for one in test.outputs] or [_rate_text(test)]
+        return "\n  ".join([name, *outputs, f"frames: {frames}", end, *_remarks(histories)])
     table = _table(histories)
     return "\n".join([*aligned(table.columns, table.rows), *_remarks(histories)])
 
@@ -48,28 +51,30 @@ def _table(histories: Sequence[History]) -> Table:
 
 def _remarks(histories: Sequence[History]) -> list[str]:
     """What is prescribed, what strains are, lengths, what was assumed, and labels, with the number of tests each."""
-    total = len(histories)
-    remarks = [f"{text} ({_count_text(n, total)})" for text, n in Counter(map(kind_of_test, histories)).items()]
-    measures = Counter(_strain_text(history) for history in histories if "strain" in history.outputs)
-    remarks += [f"{text} ({_count_text(n, total)})" for text, n in measures.items()]
     values: dict[str, Counter[str]] = {}
     for history in histories:
         lengths = {name.replace("_", " "): f"{length:g} mm" for name, length in history.geometry.items()}
         labels = {f"label {key}": value for key, value in history.labels.items() if key != "assumed"}
         for key, value in {**lengths, **labels}.items():
             values.setdefault(key, Counter())[value] += 1
+    remarks = _counted(Counter(map(kind_of_test, histories)), len(histories))
+    remarks += _counted(Counter(_strain_text(h) for h in histories if "strain" in h.outputs), len(histories))
     remarks += filter(None, assumptions_text(histories).splitlines())
     for key, counts in values.items():
-        shown = [f"{value} ({_count_text(count, total)})" for value, count in counts.most_common(MOST_VALUES)]
         more = f" and {len(counts) - MOST_VALUES} more" if len(counts) > MOST_VALUES else ""
-        remarks.append(f"{key}: {'; '.join(shown)}{more}")
+        remarks.append(f"{key}: {'; '.join(_counted(counts, len(histories))[:MOST_VALUES])}{more}")
     return remarks
+
+
+def _counted(texts: Counter[str], total: int) -> list[str]:
+    """Texts, the commonest first, with the number of tests of which each is true."""
+    return [f"{text}{_count_text(count, total)}" for text, count in texts.most_common()]
 
 
 def _row(history: History) -> tuple[str, ...]:
     """Name, specimen and conditions; end; frames; outputs of a test."""
     count, unused = history.times.size, int((~np.asarray(history.used)).sum())
-    frames = f"{count} to {history.times[-1] / SECONDS_PER_HOUR:.4g} h{f', {unused} not used' if unused else ''}"
+    frames = f"{count} up to {history.times[-1] / SECONDS_PER_HOUR:.4g} h{f', {unused} not used' if unused else ''}"
     outputs = [_output_text(history, name) for name in history.outputs]
     if "strain" in history.outputs:
         outputs[0] = f"largest strain {100 * float(np.nanmax(np.abs(history.outputs['strain']))):.4g} %"
@@ -82,7 +87,7 @@ def _row(history: History) -> tuple[str, ...]:
 
 
 def _count_text(count: int, total: int) -> str:
-    return f"all {total} tests" if count == total else f"{count} of {total} tests"
+    return "" if total == 1 else f" (all {total} tests)" if count == total else f" ({count} of {total} tests)"
 
 
 def _strain_text(history: History) -> str:
@@ -96,24 +101,9 @@ def assumptions_text(histories: Sequence[History]) -> str:
         for text in filter(None, history.labels.get("assumed", "").split(", ")):
             groups.setdefault(re.sub(r"\d[\w.:+-]*", "0", text), []).append(text)
     return "\n".join(
-        f"assumed: {texts[0]}{' or the like' * (len(set(texts)) > 1)} ({_count_text(len(texts), len(histories))})"
+        f"assumed: {texts[0]}{' or the like' * (len(set(texts)) > 1)}{_count_text(len(texts), len(histories))}"
         for texts in groups.values()
     )
-
-
-def _lines(history: History) -> list[str]:
-    lines = [f"{history.name}: {history.specimen}{history.alloy and f', {history.alloy}'}, {program_text(history)}"]
-    lines += [f"  {_output_text(history, name)}" for name in history.outputs]
-    lines += [f"  {text}" for text in (_frames_text(history), _end_text(history)) if text]
-    if "strain" in history.outputs:
-        lines.append(f"  {_strain_text(history)}")
-    for name, length in history.geometry.items():
-        lines.append(f"  {name} {length:g}")
-    if assumed := history.labels.get("assumed"):
-        lines.append(f"  assumed: {assumed}")
-    if labels := [f"{key}: {value}" for key, value in history.labels.items() if key != "assumed"]:
-        lines.append(f"  labels: {'; '.join(labels)}")
-    return lines
 
 
 def _output_text(history: History, name: str) -> str:
@@ -122,14 +112,6 @@ def _output_text(history: History, name: str) -> str:
     deviation = history.standard_deviation.get(name)
     noise = "" if deviation is None else f", standard deviation {float(np.median(deviation)):.2g}"
     return f"{name} {first} to {last}{unit and f' {unit}'}{noise}"
-
-
-def _frames_text(history: History) -> str:
-    if not history.outputs:
-        return _rate_text(history)
-    count, unused = history.times.size, int((~np.asarray(history.used)).sum())
-    span = f"{history.times[0] / SECONDS_PER_HOUR:.4g} to {history.times[-1] / SECONDS_PER_HOUR:.4g} h"
-    return f"{count} frame{'s' if count > 1 else ''} from {span}{f', {unused} not used' if unused else ''}"
 
 
 def _rate_text(history: History) -> str:

@@ -18,7 +18,7 @@ from creepkit.inverse.perturbation import NOT_INCLUDED
 from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
 from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
-from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, kind_and_start, output_unit
+from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import (
     MOST_CAUTIONS,
@@ -36,7 +36,7 @@ from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, as_
 from creepkit.reports.compared_values import (
     LAW_RATE_MEANING,
     OWN_RATE_CHI_SQUARE,
-    compared_values,
+    compared_observations,
     judged_readings,
     misfit_of,
 )
@@ -234,7 +234,7 @@ def worst_tests(fit: Identification) -> list[int]:
 def _table_of_tests(fit: Identification) -> Table:
     """Of each test its misfits, and its minimum rate and life beside those by the law; empty columns are left out."""
     rows = []
-    compared, readings = compared_values(fit), judged_readings(fit)
+    observations, readings = compared_observations(fit), judged_readings(fit)
     for k, test in enumerate(fit.tests):
         first = test.outputs[0] if test.outputs else None
         unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
@@ -242,7 +242,7 @@ def _table_of_tests(fit: Identification) -> Table:
             (
                 test.name,
                 test.condition,
-                "not known" if compared is None else str(compared.by_test.get(test.name, 0)),
+                "not known" if observations is None else str(int(observations.present[k].sum())),
                 "–" if readings is None else number(readings.chi_square(k), 3),
                 "–" if readings is None else number(readings.misfit_of_common_rate(k), 3),
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
@@ -272,42 +272,25 @@ def _table_of_tests(fit: Identification) -> Table:
 
 def _sums(fit: Identification) -> list[str]:
     """Over all tests: the misfit of logarithmic strains, minimum rates and rupture times, predicted over measured."""
-    lines, name = [], logarithmic_output(fit)
-    if name:
+    lines, ruptures = [], rupture_rows(fit)
+    if name := logarithmic_output(fit):
         tests = [m for m in fit.tests if m.outputs and m.outputs[0].output == name]
-        label = "rms distance in ln strain and ln time" if rupture_rows(fit) else "rms of ln strain"
+        label = "rms distance in ln strain and ln time" if ruptures else "rms of ln strain"
         lines.append(f"{plural(len(tests), 'test')}, {sum(m.frames for m in tests)} readings: {label} {fit.rms:.3g}")
     rates = [m.minimum_rate for m in fit.tests if m.minimum_rate is not None]
-    if rates:
-        lines.append(f"minimum rates of {plural(len(rates), 'test')} without frames: {_spread(fit, rates)}")
-    ruptures = rupture_rows(fit)
-    broken, censored = [r for r in ruptures if not r.censored], [r for r in ruptures if r.censored]
-    if ruptures:
-        line = f"rupture: {len(broken)} of {plural(len(fit.tests), 'test')} broke"
-        line += f"; time {_spread(fit, broken)}" if broken else ""
-        unexpected = sum(r.predicted < r.measured for r in censored)
-        stopped = f"; {len(censored)} stopped before, of which {unexpected or 'none'} should have broken"
-        lines.append(line + (stopped if censored else ""))
-    unused = [m.rupture for m in fit.tests if m.rupture is not None and not m.rupture.used]
-    ratios = [end.ratio for end in unused if not end.censored and math.isfinite(end.ratio)]
-    if unused:
-        found = f": time predicted over measured {_ratios(ratios)}" if ratios else ""
-        lines.append(f"ends of {plural(len(unused), 'test')} were not used{found}")
+    for what, values in (("minimum rates of tests without frames", rates), ("rupture times", ruptures)):
+        known = [one.ratio for one in values if not one.censored and math.isfinite(one.ratio)]
+        inside = sum(one.low <= one.measured <= one.high for one in values if not one.censored)
+        if known:
+            span = f"{min(known):.2g} to {max(known):.2g}, median {median(known):.3g}"
+            lines.append(
+                f"{len(known)} {what}: predicted over measured {span}; {inside} within the 95 % interval of a single "
+                f"test{_if_the_law_holds(fit)}"
+            )
+    if stopped := [one for one in ruptures if one.censored]:
+        unexpected = sum(one.predicted < one.measured for one in stopped)
+        lines.append(f"{plural(len(stopped), 'test')} stopped before rupture, of which {unexpected} should have broken")
     return lines
-
-
-def _spread(fit: Identification, values: Sequence[SingleValue]) -> str:
-    """Predicted over measured, and how many lie within their intervals."""
-    known = [one.ratio for one in values if math.isfinite(one.ratio)]
-    inside = sum(one.low <= one.measured <= one.high for one in values)
-    return (
-        f"predicted over measured {_ratios(known) if known else 'not predicted'}; {inside} within the 95 % interval of "
-        f"a single test{_if_the_law_holds(fit)}"
-    )
-
-
-def _ratios(ratios: Sequence[float]) -> str:
-    return f"{min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}"
 
 
 def _if_the_law_holds(fit: Identification) -> str:
@@ -396,13 +379,6 @@ def noise_blocks(fit: Identification) -> list[Block]:
     if nuisances:
         heads = ("nuisance parameter", "of", "estimate", "prior", "unit", "deviation over sd of the prior")
         blocks.append(Table("nuisance parameters estimated beside the law", heads, nuisances, numeric=(2, 3, 5)))
-    for nuisance in fit.settings.nuisances:
-        known = (
-            n.prior_sd for n in fit.nuisances if n.key == nuisance.key and n.owner in (nuisance.tests or [n.owner])
-        )
-        if nuisance.sd is None and (sd := next(known, None)) is not None:
-            unit = nuisance_unit(kind_and_start(nuisance.key)[0])
-            blocks.append(Paragraph(f"{nuisance.key}: spread estimated as {sd:.3g} {unit}".rstrip()))
     return [*blocks, *_correlations(fit)]
 
 
@@ -412,30 +388,20 @@ def scatter_of_rates(fit: Identification) -> str:
     return "none detected" if 0.0 < rate <= UNDETECTED_SCATTER else f"{100 * rate:.2g} %"
 
 
-def rate_estimated(fit: Identification) -> bool:
-    """Whether the scatter of rates between tests was estimated from them."""
-    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
-    return bool(rates) and rates[0].sd is None and len(fit.tests) >= MINIMUM_TESTS
-
-
-def rate_scatter_sentence(fit: Identification, percent: str = "", tests: str = "") -> str:
-    """How much the creep rates of single tests scatter, and whether that was estimated, given, assumed or left out.
-
-    percent, tests : how much, and how many tests there are, where these are not those of this identification alone.
-    """
+def rate_scatter_sentence(fit: Identification) -> str:
+    """How much the creep rates of single tests scatter, and whether that was estimated, given, assumed or left out."""
     rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
     if not rates:
         return "No scatter of creep rates between tests was allowed: every test follows the law's own rate."
-    size = f"{percent or f'{number(100 * fit.noise_model.rate, 3)} %'} about the law (one standard deviation of their "
-    size += "logarithm)"
+    size = f"{number(100 * fit.noise_model.rate, 3)} % about the law (one standard deviation of their logarithm)"
     if rates[0].sd is not None:
         return f"The creep rates of single tests have a Gaussian prior: they scatter by {size}, as was given."
-    if rate_estimated(fit):
-        if fit.noise_model.rate <= UNDETECTED_SCATTER:
-            return "No scatter of the creep rates of single tests about the law was detected."
-        return f"The creep rates of single tests scatter by {size}, as was estimated."
-    cannot = f"{tests or plural(len(fit.tests), 'test')} cannot show it"
-    return f"How the creep rates of single tests scatter is not known, for {cannot}: the intervals hold for these."
+    if len(fit.tests) < MINIMUM_TESTS:
+        cannot = f"{plural(len(fit.tests), 'test')} cannot show it"
+        return f"How the creep rates of single tests scatter is not known, for {cannot}: the intervals hold for these."
+    if fit.noise_model.rate <= UNDETECTED_SCATTER:
+        return "No scatter of the creep rates of single tests about the law was detected."
+    return f"The creep rates of single tests scatter by {size}, as was estimated."
 
 
 def _judged_noise(fit: Identification, output: str) -> str:

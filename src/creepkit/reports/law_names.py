@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import sympy
@@ -12,7 +12,6 @@ import sympy
 from creepkit.exporters.documents import equations_in_latex, expression_mathml
 from creepkit.exporters.law_description import comment_lines
 from creepkit.language import CreepLaw, mean_stress, principal_stress, strain, stress, temperature, time
-from creepkit.language.printing import expression_text, state_equations
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.reports.answer import equations
 from creepkit.reports.blocks import Block, Formula, Paragraph, Rich, Table, Verbatim, number, printable, printable_lines
@@ -34,12 +33,8 @@ COMMON_WORD = re.compile(
 """At the beginning of a title, small within a sentence; other words may be names of people."""
 
 
-SENTENCE_WORD = re.compile(
-    r"a|above|alone|and|another|asked|at|be|best|but|by|carries|contradicted|decisive|does|each|effect|explains?|first|for|from|has|in|its?"
-    r"|laws?|least|more|most|nearly|noise|none|not|of|only|or|rates?|second|share|stress|sum|tests?|that|the|them|these"
-    r"|threshold|time|to|tried|was|weight|were|whether|which|with|would"
-)
-"""Words of findings, which stay words where a law is called by one of them."""
+DEPENDENCE = re.compile(r" with [\w -]+ temperature dependence$")
+"""At the end of a title of a law with temperature, which its equation shows."""
 
 
 def title_in_sentence(law: CreepLaw) -> str:
@@ -47,50 +42,28 @@ def title_in_sentence(law: CreepLaw) -> str:
 
     The name of a law that has no title.
     """
-    parts = re.sub(r"\s*\([A-Z]{2,4}\)", "", printable(law.title, LONGEST_TITLE)).split(" + ")
-    parts = [part.partition(": ")[0] for part in parts]
-    return " + ".join(map(_small, parts)) if law.title else printable(law.name, LONGEST_TITLE)
-
-
-def _small(title: str) -> str:
-    return f"{title[:1].lower()}{title[1:]}" if COMMON_WORD.match(title) else title
-
-
-DEPENDENCE = re.compile(r" with [\w -]+ temperature dependence$")
-"""At the end of a title of a law with temperature."""
-
-
-def _without_shared_dependence(titles: Mapping[str, str]) -> dict[str, str]:
-    """{name: title}, short where every title ends with the same dependence on temperature, which tells none apart."""
-    endings = {match[0] if (match := DEPENDENCE.search(title)) else "" for title in titles.values()}
-    if len(endings) != 1 or len(titles) < 2:
-        return dict(titles)
-    (ending,) = endings
-    return {name: title.removesuffix(ending) for name, title in titles.items()}
+    title = DEPENDENCE.sub("", printable(law.title or law.name, LONGEST_TITLE))
+    parts = [part.partition(": ")[0] for part in re.sub(r"\s*\([A-Z]{2,4}\)", "", title).split(" + ")]
+    return " + ".join(f"{one[:1].lower()}{one[1:]}" if COMMON_WORD.match(one) else one for one in parts)
 
 
 class LawNames:
     """Names of laws in a text, replaced by titles."""
 
-    def __init__(self, laws: Iterable[CreepLaw]) -> None:
-        titles = _without_shared_dependence({law.name: title_in_sentence(law) for law in laws})
+    def __init__(self, fits: Iterable[Identification]) -> None:
+        titles = {fit.law.name: title_in_sentence(fit.law) for fit in fits}
         shared = Counter(titles.values())
-        self.titles = {
-            name: title if shared[title] == 1 else f"{title} ({name})"  # which of them is meant, its name says
+        self.titles = {  # of two of one title the name says which is meant
+            name: title if shared[title] == 1 else f"{title} ({name})"
             for name, title in titles.items()
-            if not SENTENCE_WORD.fullmatch(name) and title != name
+            if title != name
         }
-        longest_first = sorted(self.titles, key=len, reverse=True)
-        self._pattern = re.compile(rf"(?<![\w*+-])(?:{'|'.join(map(re.escape, longest_first))})(?![\w*+(-])")
-
-    @classmethod
-    def of(cls, fits: Iterable[Identification]) -> LawNames:
-        """Those of all laws that were fitted."""
-        return cls({fit.law.name: fit.law for fit in fits}.values())
+        names = "|".join(map(re.escape, sorted(self.titles, key=len, reverse=True)))
+        self._pattern = re.compile(rf"(?<![\w*+-])(?:{names or '(?!)'})(?![\w*+(-])")
 
     def in_text(self, text: str) -> str:
         """The text with titles in place of names; longer words that begin or end with a name stay as they are."""
-        return self._pattern.sub(lambda name: self.titles[name[0]], text) if self.titles else text
+        return self._pattern.sub(lambda name: self.titles[name[0]], text)
 
 
 # ---- equations -------------------------------------------------------------------------------------------------------
@@ -129,12 +102,7 @@ def definition_blocks(laws: Iterable[CreepLaw]) -> list[Block]:
         for k, law in enumerate(shown, start=1)
         for line in (*comment_lines([f"Eq. ({k}): {title_in_sentence(law)}"], "%"), *equations_in_latex(law))
     ]
-    plain = [f"Eq. ({k}): {text}" for k, law in enumerate(shown, start=1) for text in _plain(law)]
-    return [
-        *blocks,
-        Verbatim("The same equations in LaTeX", printable_lines("\n".join(latex))),
-        Verbatim("The same equations as plain text", printable_lines("\n".join(plain))),
-    ]
+    return [*blocks, Verbatim("The same equations in LaTeX", printable_lines("\n".join(latex)))]
 
 
 def _symbols(k: int, law: CreepLaw) -> Table:
@@ -168,12 +136,3 @@ def _variables(laws: Sequence[CreepLaw]) -> Table:
         gas = _symbol(sympy.Symbol("R"))
         rows.append((gas, f"gas constant, {GAS_CONSTANT:g}", "J/(mol K)"))
     return Table("Symbols that these equations share", ("symbol", "meaning", "unit"), rows)
-
-
-def _plain(law: CreepLaw) -> list[str]:
-    """The equations of a law on lines of their own, in letters."""
-    rate = " + ".join(expression_text(term) for term in law.terms.values())
-    lines = [f"ε̇ = {rate}", *state_equations(law)]
-    for word, letter in (("stress", "σ"), ("strain", "ε"), ("time", "t"), ("temperature", "T")):
-        lines = [line.replace(word, letter) for line in lines]
-    return [printable(line.replace("**", "^"), 400) for line in lines]

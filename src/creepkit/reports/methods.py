@@ -1,251 +1,270 @@
-"""Methods as text for a paper: what was done, from the records alone, with numbered citations."""
+"""Methods as text for a paper: what was done, from the records alone, with numbered citations.
+
+Numbers that differ from material to material stand in the tables of the page.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
+
+import sympy
 
 from creepkit.inverse.adequacy import LARGEST_SCATTER
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.judging import SIGNIFICANCE
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
-from creepkit.inverse.nuisance_parameters import nuisance_unit
-from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
+from creepkit.inverse.observation_vector import FLOOR_NOISES, FLOOR_SHARE, MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
+from creepkit.inverse.output_transforms import LogTransform
 from creepkit.inverse.variance_components import NOISE_PRIOR_SD
 from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
-from creepkit.records import is_logarithmic, kind_and_start, output_unit
+from creepkit.language.printing import arrhenius_exponent
+from creepkit.laws.paper import PAPER
 from creepkit.reports.blocks import number, plural, printable, sentence, typeset
+from creepkit.reports.compared_values import compared_observations, reading_counts
 from creepkit.reports.design import order_text
-from creepkit.reports.identification import rate_estimated, rate_scatter_sentence
-from creepkit.reports.methods_tests import (
-    CITATIONS,
-    MOST_NAMED,
-    References,
-    compared_tests,
-    laws,
-    listed,
-    loading,
-    models,
-    of_all,
-)
+from creepkit.reports.identification import rate_scatter_sentence
+from creepkit.reports.law_names import title_in_sentence
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
+    from creepkit.language import CreepLaw
+    from creepkit.records import History
     from creepkit.reports.contents import ReportContents
     from creepkit.reports.findings import GroupFindings
 
 
-def identification_methods(
-    contents: ReportContents, found: Sequence[GroupFindings], references: References
-) -> list[list[str]]:
-    """Paragraphs on tests and laws, models, estimation, and ranking and adequacy; none where nothing was identified."""
-    if not found:
-        return []
-    alone = len(found) == 1
-    ranked = [one for one in found if one.ranking is not None]
-    return [
-        [*compared_tests(found), *of_all(found, loading), *laws(found, references)],
-        of_all(found, lambda one: models(one.fit)),
-        [*of_all(found, lambda one: _estimation(one, contents, references, numbers=alone)), *_scatter(found)],
-        [
-            *of_all(ranked, lambda one: ranking_sentences(one, references, numbers=alone)),
-            *adequacy_sentences(found, references),
-        ],
-    ]
+CITATIONS = {
+    "sobol": "I. M. Sobol' (1967), USSR Comput. Math. Math. Phys. 7(4), 86-112",
+    "trust region": "M. A. Branch, T. F. Coleman, Y. Li (1999), SIAM J. Sci. Comput. 21(1), 1-23",
+    "weighted least squares": "G. A. F. Seber, C. J. Wild (1989), Nonlinear Regression, Wiley, New York",
+    "reml": "H. D. Patterson, R. Thompson (1971), Biometrika 58, 545-554",
+    "satterthwaite": "F. E. Satterthwaite (1946), Biometrics Bull. 2, 110-114",
+    "bic": "G. Schwarz (1978), Ann. Stat. 6, 461-464",
+    "aicc": "C. M. Hurvich, C.-L. Tsai (1989), Biometrika 76, 297-307",
+    "larson-miller": "F. R. Larson, J. Miller (1952), Trans. ASME 74, 765",
+    "orr-sherby-dorn": "R. L. Orr, O. D. Sherby, J. E. Dorn (1954), Trans. ASM 46, 113",
+    "manson-haferd": "S. S. Manson, A. M. Haferd (1953), NACA TN 2890",
+    "wilshire": "B. Wilshire, A. J. Battenbough (2007), Mater. Sci. Eng. A 443, 156",
+    "monkman-grant": "F. C. Monkman, N. J. Grant (1956), Proc. ASTM 56, 593",
+    "lindley": "D. V. Lindley (1956), Ann. Math. Stat. 27, 986-1005",
+    "chen": f"{PAPER}, Eq. (S3)",
+    "student": "K. L. Lange, R. J. A. Little, J. M. G. Taylor (1989), J. Am. Stat. Assoc. 84, 881-896",
+    "swarm": "M. Clerc, J. Kennedy (2002), IEEE Trans. Evol. Comput. 6(1), 58-73",
+    "pysindy": "B. M. de Silva et al. (2020), J. Open Source Softw. 5(49), 2104",
+    "creepkit": f"The authors of creepkit, creepkit (software), version {version('creepkit')}, licence Apache-2.0",
+}
+"""{key: citation} of methods, and of creepkit as CITATION.cff has it; those of laws stand in the laws."""
 
 
-# ---- search ----------------------------------------------------------------------------------------------------------
+class References:
+    """Citations of a text, numbered in the order in which they are made."""
+
+    def __init__(self) -> None:
+        self.texts: dict[str, int] = {}
+
+    def cite(self, *citations: str) -> str:
+        """Numbers in brackets, after a space, of citations or keys of CITATIONS; "" for none."""
+        texts = [CITATIONS.get(c, printable(c, 400)) for c in citations]
+        numbers = sorted({self.texts.setdefault(text, len(self.texts) + 1) for text in texts})
+        return f" [{', '.join(map(str, numbers))}]" if numbers else ""
 
 
-def _estimation(found: GroupFindings, contents: ReportContents, references: References, *, numbers: bool) -> list[str]:
-    """How values and intervals were found; numbers : whether sizes of noise stand in it, as of one material alone."""
-    fit = found.fit
-    settings = fit.settings
-    sentences = [
-        _search(fit, contents, references),
-        _agreement(fit) if numbers else "",
-        "The bounds of the search are those of the table of symbols.",
-        *_weights(fit, references),
-        *_offsets(fit, numbers=numbers),
-        *_autocorrelation(fit, numbers=numbers),
-        _explicit_nuisances(fit),
-        _noise_priors(fit, numbers=numbers),
-        _penalty(found),
-    ]
-    if settings.loss != "linear":
-        sentences.append(f"Readings far off have less weight by the loss '{settings.loss}'.")
-    if settings.test_loss == "student":
-        sentences.append(
-            f"Tests far from the others have less weight by Student's distribution{references.cite('student')}."
-        )
-    if fit.numerical_error is not None:
-        sentences.append(
-            "The numerical error of the predictions was corrected at the optimum (defect correction), and a tenth of "
-            "it stays in the covariance."
-        )
-    return sentences
-
-
-def _search(fit: Identification, contents: ReportContents, references: References) -> str:
-    """How the optimum was sought, where that is known."""
-    settings, how = fit.settings, _search_name(fit, contents)
-    end = f", and refined by least squares in a trust region{references.cite('trust region')}."
-    seed = f" (seed {settings.seed})"
-    if how.startswith("multi-start"):
-        return (
-            f"Parameters were sought within their bounds from {plural(settings.starts, 'start')}, picked out of at "
-            f"most {settings.sobol_points} points of a Sobol' sequence{references.cite('sobol')}{seed}{end}"
-        )
-    if "swarm" in how:
-        return f"Parameters were sought within their bounds by a particle swarm{references.cite('swarm')}{seed}{end}"
-    return f"Parameters were sought within their bounds{end}"
-
-
-def _agreement(fit: Identification) -> str:
-    """How many ends of the search agree, where the identification says so."""
-    counts = [fit.provenance.get(name) for name in ("search_ends", "ends_at_best", "distinct_minima")]
-    if not all(isinstance(one, int) for one in counts):
-        return ""
-    ends, best, distinct = counts
-    if ends == 1:
-        return "The search ended once, so that it does not show whether another minimum is lower."
-    return (
-        f"For the best law {best} of {ends} ends of the search are the best minimum, and {distinct} of them are "
-        f"{'distinct local minima' if distinct != 1 else 'distinct'}."
-    )
-
-
-def _search_name(fit: Identification, contents: ReportContents) -> str:
-    """Of the search, as the identification or the study states it; "" where that is not known."""
-    stated: Any = fit.search_trace.search if fit.search_trace is not None else fit.provenance.get("search", "")
-    part = contents.provenance.settings.get("identification")
-    if not stated and isinstance(part, Mapping):
-        stated = part.get("search", "")
-    return str(stated).lower()
-
-
-# ---- weights and noise -----------------------------------------------------------------------------------------------
-
-
-def _weights(fit: Identification, references: References) -> list[str]:
-    settings = fit.settings
-    offsets = any(n.kind == "offset" for n in settings.nuisances)
-    estimated = [*(["offsets of tests"] if offsets else []), *(["the scatter of rates"] if rate_estimated(fit) else [])]
-    parts = listed(["white noise", "autocorrelated noise", *estimated])
-    noise = f"The {parts} were estimated by restricted maximum likelihood{references.cite('reml')}; 95 % intervals"
-    freedom = f"Satterthwaite's degrees of freedom{references.cite('satterthwaite')}"
-    if settings.weights == "likelihood":
-        return [
-            f"{noise} follow from the whole covariance with {freedom}. Parameters have weak Gaussian priors, with the "
-            "variance of a uniform distribution between their bounds."
+def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
+    """Paragraphs on tests and laws, models, estimation, comparison and the other stages, then the references."""
+    references = References()
+    cite = references.cite
+    source = f"The measured data are those of{cite(*contents.data_citations)}." if contents.data_citations else ""
+    fits = [one.fit for one in found]
+    paragraphs: list[Iterable[str]] = [[source]]
+    if found:
+        paragraphs += [
+            [*_tests(fits), *_each(fits, _loading), *_laws(found, cite)],
+            _each(fits, _models),
+            [*_each(fits, lambda fit: _estimation(fit, cite)), *_each(found, _sparsity)],
+            [*_each(found, lambda one: _comparison(one, cite)), *_adequacy(fits, cite)],
         ]
-    chen = references.cite("chen")
-    minimised = "The sum of the relative squared errors of the outputs was minimised"
-    if not isinstance(settings.weights, str):
-        weights = ", ".join(f"{name.replace('_', ' ')} {number(value, 3)}" for name, value in settings.weights.items())
-        values = f"{minimised}, with the weights {weights}."
-    else:
-        values = {
-            "noise": "Values were found by least squares of readings of equal weight.",
-            "equal": f"{minimised}, each output with equal weight.",
-            "paper": f"{minimised}, with 0.99 of the weight on the amplitude{chen}.",
-        }[settings.weights]
-    return [
-        values,
-        f"{noise} are those of the covariance of this weighted estimate under that noise"
-        f"{references.cite('weighted least squares')}, H⁻¹ (Jᵀ W C W J + P) H⁻¹ with H = Jᵀ W J + P, where J are the "
-        "derivatives of the residuals, W the weights, C the covariance of the noise and P the precision of the priors, "
-        f"with {freedom}.",
-    ]
+    paragraphs += [*_stages(contents, cite), _software(contents, found, cite)]
+    texts = [" ".join(filter(None, one)) for one in paragraphs]
+    numbered = "\n".join(f"[{k}] {text}" for text, k in references.texts.items())
+    return f"{typeset(chr(10).join(f'{text}{chr(10)}' for text in texts if text))}\n{numbered}".strip() + "\n"
 
 
-def _offsets(fit: Identification, *, numbers: bool) -> list[str]:
-    """The prior of offsets of tests; numbers : whether an estimated standard deviation is stated."""
-    offsets = [n for n in fit.settings.nuisances if n.kind == "offset"]
-    if not offsets:
-        return ["No offsets of tests were allowed."]
-    given = [n for n in offsets if n.sd is not None]
-    sizes = [
-        f"{name.replace('_', ' ')} {number(one.offset, 2)} {output_unit(name)}".rstrip()
-        for name, one in fit.noise_model.outputs.items()
-        if one.offset > 0
-    ]
-    was = "as was given" if len(given) == len(offsets) else "estimated from the tests"
-    stated = f" ({listed(sizes)})" if sizes and (numbers or given) else ""
-    return [
-        f"The offset of each output of a test has a Gaussian prior about zero, its standard deviation {was}{stated}."
-    ]
+def _each(found: Iterable[Any], sentences_of: Callable[[Any], Iterable[str]]) -> list[str]:
+    """The sentences on all materials, each once."""
+    return [*dict.fromkeys(text for one in found for text in sentences_of(one))]
 
 
-def _autocorrelation(fit: Identification, *, numbers: bool) -> list[str]:
-    """What is autocorrelated, and how; numbers : whether sizes and lengths are stated."""
-    noise = fit.noise_model
-    sentences = [
-        "Autocorrelated parts have the covariance s² exp(-d / l) at a distance d, in ln t of outputs that are compared "
-        f"by their logarithm and else in time over the duration of a test; those were kept by which the likelihood "
-        f"gains more than by chance in {100 * AUTOCORRELATION_CONFIDENCE:g} % of cases."
-    ]
-    if numbers and noise.discrepancy > 0:
-        logarithmic = any(is_logarithmic(name) for name in noise.outputs)
-        length = noise.discrepancy_length / (1.0 if logarithmic else LINEAR_COORDINATE_LENGTH)
-        sentences.append(
-            f"What the law cannot follow has s = {number(noise.discrepancy, 3)} times the noise of a reading and l = "
-            f"{number(length, 3)}."
+def listed(words: Sequence[str]) -> str:
+    """Words with commas, and 'and' before the last."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else "none"
+
+
+# ---- tests, laws and models ------------------------------------------------------------------------------------------
+
+
+def _tests(fits: Sequence[Identification]) -> Iterator[str]:
+    """How many tests and readings there are, and in what quantity these are compared."""
+    counts = [reading_counts(fit.histories, fit.settings.frames) for fit in fits]
+    measured, fitted = (sum(values) for values in zip(*((c.measured, c.fitted) for c in counts), strict=True))
+    materials = f" of {plural(len(fits), 'material')}" if len(fits) > 1 else ""
+    readings = f": {fitted} of {plural(measured, 'reading')} were fitted" if measured else ""
+    yield f"Creep laws were identified from {plural(sum(len(one.tests) for one in fits), 'test')}{materials}{readings}."
+    compared = _each(fits, _transforms)
+    if compared:
+        yield f"Compared were {listed(compared)}."
+    if any(one is not None and one.followed_to_rupture.any() for one in map(compared_observations, fits)):
+        yield (
+            "Readings of tests followed to rupture have orthogonal residuals: with a, the difference of predicted and "
+            "measured transformed strain at the time of a reading, and b, the difference of the logarithms of the "
+            "measured time and of the time at which the measured strain is predicted, the residual is "
+            "√2 |a b| / √(a² + b²) with the sign of a; rupture times have ln(measured / predicted), and tests stopped "
+            "before it count only where they lasted longer than predicted."
         )
-    return sentences
 
 
-def _noise_priors(fit: Identification, *, numbers: bool) -> str:
-    """The prior about noise that the tests state, where there is some."""
-    stated = [
-        f"{name.replace('_', ' ')} {number(one.stated, 3)}{f' {unit}' if (unit := output_unit(name)) else ''}"
-        for name, one in fit.noise_model.outputs.items()
-        if one.stated > 0
-    ]
-    if not stated:
-        return ""
-    return (
-        f"The noise of a reading has a log-normal prior about the noise that the tests state"
-        f"{f' ({listed(stated)})' if numbers else ''}, with a standard deviation of {number(NOISE_PRIOR_SD, 2)} of its "
-        "logarithm."
-    )
+def _transforms(fit: Identification) -> Iterator[str]:
+    observations = compared_observations(fit)
+    for output, transform in (
+        () if observations is None else zip(observations.outputs, observations.transforms, strict=True)
+    ):
+        name = output.replace("_", " ")
+        if output in (RUPTURE_OUTPUT, MINIMUM_RATE_OUTPUT):
+            yield f"{'rupture times' if output == RUPTURE_OUTPUT else 'minimum creep rates'} by their logarithms"
+        elif isinstance(transform, LogTransform):
+            floor = f"{100 * FLOOR_SHARE:g} % of the median end value and at least {FLOOR_NOISES:g} times the noise"
+            yield f"{name} ε as arsinh(ε / 2f), which is ln(ε / f) well above the floor f, {floor} of a reading"
+        else:
+            yield f"{name} linearly, divided by the standard deviation of its readings"
 
 
-def _scatter(found: Sequence[GroupFindings]) -> list[str]:
-    """How rates of tests scatter, with the range over all materials."""
-    ends = [f(100 * one.fit.noise_model.rate for one in found) for f in (min, max)]
-    counts = [f(len(one.fit.tests) for one in found) for f in (min, max)]
-    percent = " to ".join(dict.fromkeys(number(end, 3) for end in ends))
-    tests = plural(counts[0], "test") if counts[0] == counts[1] else f"{counts[0]} to {counts[1]} tests"
-    return of_all(found, lambda one: [rate_scatter_sentence(one.fit, f"{percent} %", tests)])
+def _loading(fit: Identification) -> Iterator[str]:
+    """What was held in uniaxial tests, what their strains are, and the elastic data that were used."""
+    controls = {str(getattr(h.loading, "control", "")) for h in fit.histories} - {""}
+    held = {"load": "Loads were held, so that the true stress grows with strain.", "stress": "True stresses were held."}
+    yield from (text for control, text in held.items() if control in controls)
+    strains = {(h.strain_measure, h.includes_elastic) for h in fit.histories if "strain" in h.outputs}
+    for measure, elastic in sorted(strains):
+        yield f"Strains are {measure} and {'contain' if elastic else 'do not contain'} the elastic strain on loading."
+    known = [h.elastic.at(h.mean_temperature) for h in fit.histories if h.elastic is not None]
+    if known:
+        moduli, ratios = _range([1e-3 * float(one.E) for one in known]), _range([float(one.nu) for one in known])
+        yield f"Young's modulus is {moduli} GPa and Poisson's ratio {ratios} in {plural(len(known), 'test')}."
 
 
-def _explicit_nuisances(fit: Identification) -> str:
-    explicit = [n for n in fit.settings.nuisances if n.is_simulated]
-    if not explicit:
-        return ""
-    priors = {(n.key, n.prior_mean, n.prior_sd) for n in fit.nuisances}
+def _range(values: Sequence[float]) -> str:
+    return " to ".join(dict.fromkeys(number(end, 4) for end in (min(values), max(values))))
+
+
+def laws_of(found: Sequence[GroupFindings]) -> dict[str, CreepLaw]:
+    """{name: law} of all that were fitted, in the order in which their equations are numbered."""
+    return {one.law.name: one.law for group in found for one in group.fits}
+
+
+def _laws(found: Sequence[GroupFindings], cite: Callable[..., str]) -> Iterator[str]:
+    """The laws by their titles and the numbers of their equations, with what they cite, and their T_ref."""
     named = [
-        f"{key} {number(mean)} ± {number(sd, 2)} {nuisance_unit(kind_and_start(key)[0])}".rstrip()
-        for key, mean, sd in sorted(priors)
+        f"the {title_in_sentence(law)}, Eq. ({k}){cite(*law.references)}"
+        for k, law in enumerate(laws_of(found).values(), start=1)
     ]
-    if not named or len(named) > MOST_NAMED:
-        named = list(dict.fromkeys(n.kind for n in explicit))
-    return f"Nuisance parameters with Gaussian priors (mean ± standard deviation) were {listed(named)}."
+    yield f"The law was {named[0]}." if len(named) == 1 else f"The laws tried were {'; '.join(named)}."
+    rates = [
+        rate for one in found for rate in (*one.fit.law.terms.values(), *(s.rate for s in one.fit.law.states.values()))
+    ]
+    exponents = (part for rate in rates for e in rate.atoms(sympy.exp) for part in sympy.Add.make_args(e.args[0]))
+    factors = {arrhenius.T_ref for arrhenius in map(arrhenius_exponent, exponents) if arrhenius is not None}
+    if factors:
+        shown = listed([f"{number(T, 6)} K" for T in sorted(factors)])
+        yield f"Rate coefficients of laws with an activation energy are those at T_ref = {shown}."
 
 
-def _penalty(found: GroupFindings) -> str:
-    """The penalty on terms of a sum, where one was used."""
-    sparse = next((one.sparsity for one in found.fits if one.sparsity is not None), None)
-    if sparse is None:
-        return ""
-    strength = "" if sparse.strength is None else f" of strength {number(sparse.strength, 3)}"
-    dropped = f"; left out were {listed([*sparse.dropped_terms])}" if sparse.dropped_terms else "; all terms stayed"
-    return (
-        f"The terms of the sum {printable(sparse.law, 120)} were selected by the penalty {sparse.penalty}{strength} "
-        f"and confirmed by BIC{dropped}."
+def _models(fit: Identification) -> Iterator[str]:
+    """By what the tests were predicted: the specimen's own words on it, the surrogate, and the reduced-order model."""
+    predictor, name = fit.predictor, printable(str(fit.provenance.get("specimen", "")), 80)
+    surrogate = predictor is not None and predictor.specimen is not predictor and not predictor.parts
+    yield f"The tests were predicted by {'a surrogate' if surrogate else 'the model'} of the specimen '{name}'."
+    if predictor is None:
+        return
+    tests: dict[str, list[History]] = {}
+    pieces = {}
+    for history in fit.histories:
+        own = predictor.specimen.for_history(history)
+        pieces[own.label] = own
+        tests.setdefault(own.label, []).append(history)
+    yield from (sentence(text) for label, piece in pieces.items() if (text := piece.model_text(tests[label])))
+    if predictor.reduced_order_model() is not None:
+        yield "The global search used the reduced-order model of these finite elements."
+
+
+# ---- estimation ------------------------------------------------------------------------------------------------------
+
+
+def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
+    """How the optimum was sought, what was weighted how, and what intervals are made of."""
+    settings, noise = fit.settings, fit.noise_model
+    search = str(fit.search_trace.search if fit.search_trace is not None else fit.provenance.get("search", "")).lower()
+    how = ""
+    if search.startswith("multi-start"):
+        points = f"at most {settings.sobol_points} points of a Sobol' sequence{cite('sobol')}"
+        how = f" from up to {plural(settings.starts, 'start')}, picked out of {points} (seed {settings.seed})"
+    elif "swarm" in search:
+        how = f" by a particle swarm{cite('swarm')} (seed {settings.seed})"
+    refined = f"and refined by least squares in a trust region{cite('trust region')}"
+    yield f"Parameters were sought within the bounds of the table of symbols{how}, {refined}."
+    minimised = "The sum of the relative squared errors of the outputs was minimised"
+    if isinstance(settings.weights, Mapping):
+        weights = ", ".join(f"{name.replace('_', ' ')} {number(value, 3)}" for name, value in settings.weights.items())
+        yield f"{minimised}, with the weights {weights}."
+    elif settings.weights == "noise":
+        yield "Values were found by least squares of readings of equal weight."
+    elif settings.weights == "equal":
+        yield f"{minimised}, each output with equal weight."
+    elif settings.weights == "paper":
+        yield f"{minimised}, with 0.99 of the weight on the amplitude{cite('chen')}."
+    components = "White and autocorrelated noise, offsets and the scatter of rates"
+    yield f"{components} were estimated by restricted maximum likelihood{cite('reml')}."
+    freedom = f"Satterthwaite's degrees of freedom{cite('satterthwaite')}"
+    if settings.weights == "likelihood":
+        yield (
+            f"95 % intervals follow from the whole covariance with {freedom}; parameters have weak Gaussian priors, "
+            "with the variance of a uniform distribution between their bounds."
+        )
+    else:
+        yield (
+            f"95 % intervals are those of the covariance of this weighted estimate under that noise, with {freedom}: "
+            "H⁻¹ (Jᵀ W C W J + P) H⁻¹ with H = Jᵀ W J + P, where J are the derivatives of the residuals, W the "
+            f"weights, C the covariance of the noise and P the precision of the priors{cite('weighted least squares')}."
+        )
+    nuisances = list(dict.fromkeys(one.kind for one in settings.nuisances))
+    if nuisances:
+        yield f"Nuisance parameters of the tests with Gaussian priors are {listed(nuisances)}."
+    yield rate_scatter_sentence(fit)
+    yield (
+        "Autocorrelated parts have the covariance s² exp(-d / l) at a distance d, in ln t of outputs that are compared "
+        "by their logarithm and else in time over the duration of a test; those were kept by which the likelihood "
+        f"gains more than by chance in {100 * AUTOCORRELATION_CONFIDENCE:g} % of cases."
     )
+    if any(one.stated > 0 for one in noise.outputs.values()):
+        yield (
+            "The noise of a reading has a log-normal prior about the noise that its test states, with a standard "
+            f"deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
+        )
+    if settings.loss != "linear":
+        yield f"Readings far off have less weight by the loss '{settings.loss}'."
+    if settings.test_loss == "student":
+        yield f"Tests far from the others have less weight by Student's distribution{cite('student')}."
+    if fit.numerical_error is not None:
+        yield "Numerical errors of predictions were corrected at the optimum; a tenth of them stays in the covariance."
+
+
+def _sparsity(found: GroupFindings) -> Iterator[str]:
+    """The penalty on terms of a sum, where one was used."""
+    for sparse in [one.sparsity for one in found.fits if one.sparsity is not None][:1]:
+        dropped = f"left out were {listed([*sparse.dropped_terms])}" if sparse.dropped_terms else "all terms stayed"
+        selected = f"were selected by the penalty {sparse.penalty} and confirmed by BIC"
+        yield f"The terms of the sum {printable(sparse.law, 120)} {selected}; {dropped}."
 
 
 # ---- comparison and adequacy -----------------------------------------------------------------------------------------
@@ -258,153 +277,88 @@ CRITERIA = {
 """{criterion: its name, and its penalty for K parameters and n readings}."""
 
 
-def ranking_sentences(found: GroupFindings, references: References, *, numbers: bool) -> list[str]:
-    """How the laws of a material were compared; numbers : whether n is stated, as of one material alone."""
-    ranking = found.ranking
-    if ranking is None:
-        return []
-    if ranking.criterion in CRITERIA:
-        name, penalty = CRITERIA[ranking.criterion]
-        n = f" (n = {number(ranking.independent_frames, 4)})" if numbers and _known(ranking.independent_frames) else ""
-        deviance = (
-            "chi-square, under the covariance of the law that fits the tests best, plus the logarithm of the "
-            "determinant that integrates nuisance parameters out"
-        )
-        criterion = (
-            f"{name}{references.cite(ranking.criterion)}: {deviance}, plus {penalty} for K parameters that the tests "
-            f"determine and n independent readings, as many as their autocorrelation leaves{n}"
+def _comparison(found: GroupFindings, cite: Callable[..., str]) -> Iterator[str]:
+    """How the laws of a material were compared."""
+    if found.ranking is None:
+        return
+    if found.ranking.criterion in CRITERIA:
+        name, penalty = CRITERIA[found.ranking.criterion]
+        yield (
+            f"The laws were compared by the {name}{cite(found.ranking.criterion)}: chi-square, under the covariance of "
+            "the law that fits the tests best, plus the logarithm of the determinant that integrates nuisance "
+            f"parameters out, plus {penalty} for K parameters that the tests determine and n independent readings, as "
+            "many as their autocorrelation leaves."
         )
     else:
-        criterion = "error of tests that were held out"
-    return [
-        f"The laws were compared by the {criterion}.",
+        yield "The laws were compared by the error of tests that were held out."
+    yield (
         "The weight of a law is exp(-difference / 2) over the sum of all laws tried, and a law is credible with a "
         f"weight above {CREDIBLE_WEIGHT:g}. A law is called decisive where its weight is above {DECISIVE_WEIGHT:g}, it "
         "was among the laws asked for, it is not contradicted by the tests, and neither a share of another law nor an "
-        "effect that was not modelled changes that.",
-    ]
+        "effect that was not modelled changes that."
+    )
 
 
-def _known(value: float) -> bool:
-    return math.isfinite(value) and value > 0
-
-
-def adequacy_sentences(found: Sequence[GroupFindings], references: References) -> list[str]:
+def _adequacy(fits: Sequence[Identification], cite: Callable[..., str]) -> Iterator[str]:
     """How it was judged whether the tests contradict a law; none where it was not."""
-    judged = [one.fit.adequacy for one in found if one.fit.adequacy is not None]
+    judged = [fit.adequacy for fit in fits if fit.adequacy is not None]
     if not judged:
-        return []
-    sources = {output.noise_source for one in judged for output in one.outputs}
-    estimated = (
-        " Noise that no test states is estimated from the third differences of neighbouring readings, with "
-        f"{FREEDOM_PER_FRAME:g} degrees of freedom for each of them; chi-square over its degrees of freedom then has "
-        "the F distribution for one test, and for several that of a scaled chi-square with the same mean and variance"
-        f"{references.cite('satterthwaite')}."
-        if "estimated" in sources
-        else ""
-    )
-    freedom = (
-        f" Here it has {number(judged[0].freedom, 4)} degrees of freedom."
-        if len(judged) == 1 and _known(judged[0].freedom)
-        else ""
-    )
+        return
     several = " (the least of those of all outputs and of each one, times their number)"
-    scatter = number(math.exp(LARGEST_SCATTER), 2)
-    return [
+    yield (
         "A law is not contradicted by the tests where its chi-square, against noise that was stated or estimated "
         f"without the law, has a probability of at least {100 * SIGNIFICANCE:g} %"
         f"{several if any(len(one.outputs) > 1 for one in judged) else ''}, the rates of tests scatter by less than a "
-        f"factor of {scatter}, and nothing else explains that scatter six times better: a stress exponent that "
-        "changes with stress, an activation energy that changes with temperature, one test, or two groups of tests. "
-        f"Degrees of freedom are the readings less the unknowns that they determine.{freedom}{estimated}"
-    ]
+        f"factor of {number(math.exp(LARGEST_SCATTER), 2)}, and nothing else explains that scatter six times better: a "
+        "stress exponent that changes with stress, an activation energy that changes with temperature, one test, or "
+        "two groups of tests. Degrees of freedom are the readings less the unknowns that they determine."
+    )
+    if any(output.noise_source == "estimated" for one in judged for output in one.outputs):
+        yield (
+            "Noise that no test states is estimated from the third differences of neighbouring readings, with "
+            f"{FREEDOM_PER_FRAME:g} degrees of freedom for each of them; chi-square over its degrees of freedom then "
+            "has the F distribution for one test, and for several that of a scaled chi-square with the same mean and "
+            f"variance{cite('satterthwaite')}."
+        )
 
 
 # ---- other stages ----------------------------------------------------------------------------------------------------
 
 
-def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
-    """Paragraphs on identification, ranking and the other stages, then the references."""
-    references = References()
-    paragraphs = [
-        _source_of_data(contents, references),
-        *identification_methods(contents, found, references),
-        *_stages(contents, references),
-        _software(contents, found, references),
-    ]
-    text, cited = references.numbered(typeset("\n\n".join(" ".join(p) for p in paragraphs if p)))
-    numbered = "\n".join(f"[{k}] {citation}" for k, citation in enumerate(cited, start=1))
-    return f"{text}\n\n{numbered}".strip() + "\n"
-
-
-def _source_of_data(contents: ReportContents, references: References) -> list[str]:
-    """Where the data were published, if the study says so."""
-    if not contents.data_citations:
-        return []
-    return [f"The measured data are those of{references.cite(*contents.data_citations)}."]
-
-
-def _stages(contents: ReportContents, references: References) -> list[list[str]]:
-    paragraphs: list[list[str]] = []
+def _stages(contents: ReportContents, cite: Callable[..., str]) -> Iterator[list[str]]:
+    """A paragraph on each of the other stages."""
     if contents.exclusions:
         tests = {one.test for one in contents.exclusions}
-        paragraphs.append(
-            [
-                f"Readings of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons that the "
-                "report lists."
-            ]
-        )
+        yield [
+            f"Readings of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons in the report."
+        ]
     if contents.temperature:
-        paragraphs.append(
-            [
-                "Forms of temperature of the parameters were chosen by regression on isothermal estimates with their "
-                f"covariances{references.cite('pysindy')}, over all combinations of forms."
-            ]
-        )
+        how = f"by regression on isothermal estimates with their covariances{cite('pysindy')}"
+        yield [f"Forms of temperature of the parameters were chosen {how}, over all combinations of forms."]
     for assessment in contents.rupture.values():
         methods = dict.fromkeys(one.fit.method for one in assessment.ranked)
-        cited = [f"{name}{references.cite(name) if name in CITATIONS else ''}" for name in methods]
-        ruptures = assessment.tests
-        run_outs = int(ruptures.censored.sum())
-        scattering = [label for label, names in ruptures.groups.items() if len(set(names)) > 1]
-        how = [f"{plural(run_outs, 'run-out')} as censored times"] if run_outs else []
-        how += [f"{listed([_plural_of(label) for label in scattering])} as random effects"] if scattering else []
-        with_them = f", {listed(how)}," if how else ""
-        were = "was" if len(ruptures) == 1 else "were"
-        paragraphs.append([f"{plural(len(ruptures), 'rupture test')}{with_them} {were} assessed by {listed(cited)}."])
-    if contents.forecasts:
-        forecasts = contents.forecasts.values()
-        level, draws = next(iter(forecasts)).level, max(one.draws for one in forecasts)
-        drawn = f"; they come from {draws} draws in each test" if draws else ""
-        paragraphs.append(
-            [
-                f"Forecasts have bands of {100 * level:g} % that contain the uncertainty of the parameters and of the "
-                f"choice of the law, the scatter between tests, dimensions, noise and numerical error{drawn}."
-            ]
-        )
-    if contents.design:
-        by = order_text(next(iter(contents.design.values())))
-        information = f"Expected information of further tests was computed{references.cite('lindley')}"
-        paragraphs.append([f"{information}; they are listed {by}."])
-    return paragraphs
+        cited = [f"{name}{cite(name) if name in CITATIONS else ''}" for name in methods]
+        yield [
+            f"{plural(len(assessment.tests), 'rupture test')}, run-outs as censored times and heats and laboratories "
+            f"as random effects, were assessed by {listed(cited)}."
+        ]
+    for forecast in [*contents.forecasts.values()][:1]:
+        drawn = f"; they come from {forecast.draws} draws in each test" if forecast.draws else ""
+        yield [
+            f"Forecasts have bands of {100 * forecast.level:g} % that contain the uncertainty of the parameters and of "
+            f"the choice of the law, the scatter between tests, dimensions, noise and numerical error{drawn}."
+        ]
+    for design in [*contents.design.values()][:1]:
+        information = f"Expected information of further tests was computed{cite('lindley')}"
+        yield [f"{information}; they are listed {order_text(design)}."]
 
 
-def _plural_of(label: str) -> str:
-    """Several of what a label names: heats, laboratories."""
-    label = printable(label, 60)
-    return f"{label[:-1]}ies" if label.endswith("y") else f"{label}s"
-
-
-def _software(contents: ReportContents, found: Sequence[GroupFindings], references: References) -> list[str]:
+def _software(contents: ReportContents, found: Sequence[GroupFindings], cite: Callable[..., str]) -> list[str]:
     versions = dict(contents.provenance.versions)
     if not versions and found:
         versions = {"creepkit": str(found[0].fit.provenance.get("creepkit", ""))}
-    named = listed(
-        [
-            f"{printable(name, 60)} {printable(version, 60)}{references.cite(name) if name == 'creepkit' else ''}"
-            for name, version in versions.items()
-            if version
-        ]
-    )
+    named = [
+        f"{name} {printable(text, 60)}{cite(*[name] * (name == 'creepkit'))}" for name, text in versions.items() if text
+    ]
     seed = "" if contents.provenance.seed is None else f", seed {contents.provenance.seed}"
-    return [sentence(f"The work was done with {named}{seed}")] if named else []
+    return [sentence(f"The work was done with {listed(named)}{seed}")] if named else []

@@ -83,9 +83,9 @@ def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str
         weights = ", ".join(f"{r.fit.law.name} {r.weight:.3f}" for r in ranking.laws)
         description = (
             f"{misfit_name(ranking)}: {plural(len(ranking.laws), 'law')} in {plural(len(ranking.best.tests), 'test')}, "
-            f"the weights of the laws, and the curves of the credible ones. {' '.join(separation)} Weights: {weights}."
+            f"and the curves of the credible ones. {' '.join(separation)} Weights: {weights}."
         )
-        caption = f"Where the laws differ: {misfit_name(ranking)}, and weights."
+        caption = f"Where the laws differ: {misfit_name(ranking)}."
         title = f"Misfit of each law in each test{of}"
         blocks.append(figures.picture(lambda: ranking_figure(ranking), title, description, caption))
     return blocks
@@ -239,28 +239,16 @@ def _fit_to_json(fit: Identification) -> dict[str, Any]:
 # ---- figure ----------------------------------------------------------------------------------------------------------
 
 
-MOST_TESTS_DRAWN = 6
-"""Tests whose curves are drawn: those in which the credible laws differ most."""
+MOST_TESTS_DRAWN, MOST_LAWS_DRAWN = 6, 5
+"""Tests whose curves are drawn, those in which the credible laws differ most, and laws, the best first."""
 
 
-MOST_LAWS_DRAWN = 5
-"""Credible laws whose curves are drawn, the best first."""
-
-
-MOST_TEST_NAMES = 24
-"""Columns of the misfits that are named."""
+MOST_TEST_NAMES, MOST_NUMBERS = 24, 14
+"""Columns of the misfits that are named, and up to which each misfit is written in its cell."""
 
 
 SHOWN_QUANTILE = 0.97
 """Of the misfits: where the colours end. A test of hardly any noise has a misfit of any size."""
-
-
-MOST_NUMBERS = 14
-"""Up to this many tests each misfit is written in its cell."""
-
-
-PANEL_WIDTH = 3.0
-"""Inches of the title of one test's panel, as wide as its axes."""
 
 
 NOT_JUDGED = "this noise is not known well enough to judge the laws by it: compare them, not with 1"
@@ -275,22 +263,25 @@ COMMON_RATE_MISFIT = "mean square misfit of each law in each test over noise², 
 
 
 def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
-    """Draw the misfit of each law in each test, the weights, and the curves of the laws that tests do not tell apart.
+    """Draw the misfit of each law in each test, and the curves of the laws that tests do not tell apart.
 
     The misfit is that of `misfits`; the title is the verdict.
     """
     credible = [r for r in ranking.laws if r.weight > CREDIBLE_WEIGHT][:MOST_LAWS_DRAWN]
     with_tests = len(credible) > 1 and all(r.fit.histories and r.fit.predictor is not None for r in credible)
     curves = [fitted_curves(r.fit) for r in credible] if with_tests else []
-    shown = _tests_to_draw([r.fit for r in credible], curves) if curves else []
+    shown = _tests_to_draw(ranking.best, curves) if curves else []
     heights, width = [2.0 + 0.42 * len(ranking.laws), *([3.0 * -(-len(shown) // 3)] if shown else [])], 12.5
     figure = empty_figure(width, sum(heights) + 0.7)
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     _draw_misfits(parts[0], ranking)
     if shown:
-        for axes, test in zip(panel_grid(len(shown), 3, 0.0, 0.0, part=parts[1])[1], shown, strict=True):
+        panels = panel_grid(len(shown), 3, 0.0, 0.0, part=parts[1])[1]
+        for axes, test in zip(panels, shown, strict=True):
             _draw_test(axes, credible, curves, test)
-        _name_laws(parts[1], credible, every_test=len(shown) == len(ranking.best.tests))
+        names = ["measured", *(f"{r.fit.law.name}, weight {r.weight:.3f}" for r in credible)]
+        title = "credible laws with their 95 % bands; of many tests those in which they differ most"
+        parts[1].legend(panels[0].lines, names, loc="outside lower center", ncols=3, fontsize=8, title=title)
     figure.suptitle(wrapped(ranking.verdict, width), fontsize=10)
     return save_figure(figure, path)
 
@@ -323,40 +314,30 @@ def _draw_misfits(part: Any, ranking: Ranking) -> None:
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import NullLocator
 
-    heat, bars = part.subplots(1, 2, width_ratios=(4.0, 1.0), sharey=True)
-    order = _columns(ranking.best)
+    axes, best = part.subplots(), ranking.best
+    order = _columns(best)
     values = misfits(ranking)[:, order]
     finite = values[np.isfinite(values) & (values > 0)]
     low, high = np.quantile(finite, (0.0, SHOWN_QUANTILE)) if finite.size else (1.0, 1.0)
     labels = logarithmic_labels(min(float(low), 0.8), max(float(high), 2.0), 6)
-    image = heat.imshow(
-        np.where(values > 0, values, np.nan), norm=LogNorm(labels[0], labels[-1]), cmap="YlOrRd", aspect="auto"
-    )
-    heat.set_yticks(range(len(ranking.laws)), [r.fit.law.name for r in ranking.laws], fontsize=8)
-    _label_tests(heat, ranking.best, order)
-    if len(order) <= MOST_NUMBERS:
-        middle = float(np.sqrt(labels[0] * labels[-1]))
-        for (row, column), value in np.ndenumerate(values):
-            colour = "white" if value > middle * (labels[-1] / middle) ** 0.4 else "black"
-            heat.text(column, row, _number(value), ha="center", va="center", fontsize=7.5, color=colour)
+    norm = LogNorm(labels[0], labels[-1])
+    image = axes.imshow(np.where(values > 0, values, np.nan), norm=norm, cmap="YlOrRd", aspect="auto")
+    names = [f"{r.fit.law.name}, weight {r.weight:.3f}" for r in ranking.laws]
+    axes.set_yticks(range(len(names)), names, fontsize=8)
+    step = -(-len(order) // MOST_TEST_NAMES)
+    tests = [shortened(best.tests[k].name) for k in order[::step]]
+    axes.set_xticks(range(0, len(order), step), tests, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
+    axes.set_xlabel(f"{len(order)} tests, from the coldest to the hottest" if step > 1 else "", fontsize=9)
+    for (row, column), value in np.ndenumerate(values) if len(order) <= MOST_NUMBERS else ():
+        colour = "white" if norm(value) > 0.7 else "black"
+        axes.text(column, row, _number(value), ha="center", va="center", fontsize=7.5, color=colour)
     extend = "max" if (finite > labels[-1]).any() else "neither"
-    bar = part.colorbar(image, ax=heat, label="misfit / noise²", pad=0.01, aspect=12, extend=extend)
+    bar = part.colorbar(image, ax=axes, label="misfit / noise²", pad=0.01, aspect=12, extend=extend)
     bar.set_ticks(list(labels), labels=[_number(v) for v in labels])
     bar.ax.yaxis.set_minor_locator(NullLocator())
-    adequacy = ranking.best.adequacy
-    judged = adequacy is None or adequacy.outputs
-    title = wrapped(misfit_name(ranking), 6.5, 9.0)
-    heat.set_title(title if judged else f"{title}\n{NOT_JUDGED}", fontsize=9)
-    weights = [r.weight for r in ranking.laws]
-    bars.barh(range(len(weights)), weights, color=_law_colours(ranking), height=0.6)
-    for row, weight in enumerate(weights):
-        inside = weight > 0.7
-        place = (weight - 0.03, "right", "white") if inside else (weight + 0.03, "left", "black")
-        bars.text(place[0], row, f"{weight:.3f}", va="center", ha=place[1], color=place[2], fontsize=8)
-    bars.set(xlim=(0.0, 1.0), xticks=(0.0, 0.5, 1.0), xlabel="weight among the laws tried")
-    bars.xaxis.label.set_fontsize(9)
-    bars.tick_params(axis="y", labelleft=False)
-    bars.grid(axis="x", alpha=0.25)
+    judged = best.adequacy is None or best.adequacy.outputs
+    title = wrapped(misfit_name(ranking), 9.0, 9.0)
+    axes.set_title(title if judged else f"{title}\n{NOT_JUDGED}", fontsize=9)
 
 
 def _number(value: float) -> str:
@@ -366,50 +347,28 @@ def _number(value: float) -> str:
     return f"{value:.2g}" if value < 100 else f"{value:.0f}" if value < 9999.5 else power_of_ten(float(f"{value:.0e}"))
 
 
-def _law_colours(ranking: Ranking) -> list[Any]:
-    """Those of the curves; grey for laws whose curves are not drawn."""
-    colours = distinct_colours(MOST_LAWS_DRAWN)
-    return [
-        colours[k] if r.weight > CREDIBLE_WEIGHT and k < MOST_LAWS_DRAWN else "0.6" for k, r in enumerate(ranking.laws)
-    ]
-
-
 def _columns(fit: Identification) -> list[int]:
     """The tests from the coldest to the hottest, of one temperature, or without histories, in their order."""
     celsius = np.round(temperatures_celsius(fit.histories)) if fit.histories else np.zeros(len(fit.tests))
     return [int(k) for k in np.argsort(celsius, kind="stable")]
 
 
-def _label_tests(axes: Axes, fit: Identification, order: Sequence[int]) -> None:
-    """Names of the tests, of many those of some."""
-    step = -(-len(order) // MOST_TEST_NAMES)
-    names = [shortened(fit.tests[k].name) for k in order[::step]]
-    axes.set_xticks(range(0, len(order), step), names, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
-    if step > 1:
-        axes.set_xlabel(f"{len(order)} tests, from the coldest to the hottest", fontsize=9)
-
-
 # ---- curves ----------------------------------------------------------------------------------------------------------
 
 
-def _tests_to_draw(fits: Sequence[Identification], curves: Sequence[FittedCurves]) -> list[int]:
-    """Positions of the tests in which the laws differ most, in noises; of one law, of its largest misfits."""
-    with_frames = [k for k, test in enumerate(fits[0].tests) if test.outputs]
+def _tests_to_draw(best: Identification, curves: Sequence[FittedCurves]) -> list[int]:
+    """Positions of the tests in which the curves of laws differ most, in noises of the best one."""
+
+    def separation(test: int) -> float:
+        output = best.tests[test].outputs[0]
+        values = np.stack([c.of(test, output.output)[0] for c in curves])
+        distance = float(np.sqrt(np.nanmean((values - values[0])[1:] ** 2)))
+        return float(np.nan_to_num(distance / output.noise if output.noise > 0 else distance))
+
+    with_frames = [k for k, test in enumerate(best.tests) if test.outputs]
     if len(with_frames) <= MOST_TESTS_DRAWN:
         return with_frames
-    scores = np.array([_separation(fits, curves, test) for test in with_frames])
-    chosen = np.argsort(-np.nan_to_num(scores), kind="stable")[:MOST_TESTS_DRAWN]
-    return [with_frames[k] for k in np.sort(chosen)]
-
-
-def _separation(fits: Sequence[Identification], curves: Sequence[FittedCurves], test: int) -> float:
-    """Root mean square distance of the laws' curves in a test, over the noise; of one law its own misfit."""
-    if len(fits) == 1:
-        return misfit_of(fits[0].tests[test])
-    output = fits[0].tests[test].outputs[0]
-    values = np.stack([c.of(test, output.output)[0] for c in curves])
-    distance = float(np.sqrt(np.nanmean((values - values[0])[1:] ** 2)))
-    return distance / output.noise if output.noise > 0 else distance
+    return sorted(sorted(with_frames, key=separation, reverse=True)[:MOST_TESTS_DRAWN])
 
 
 def _draw_test(axes: Axes, laws: Sequence[RankedLaw], curves: Sequence[FittedCurves], test: int) -> None:
@@ -419,17 +378,4 @@ def _draw_test(axes: Axes, laws: Sequence[RankedLaw], curves: Sequence[FittedCur
         draw_curve(axes, curve, colour, "-" if k == 0 else "--", dots="0.35" if k == 0 else None)
     set_curve_ranges(axes, drawn, output)
     axes.set(xlabel="time, h", ylabel=axis_label(output))
-    title = f"{shortened(history.name, 48)}: {shortened(program_text(history), 96)}"
-    axes.set_title(wrapped(title, PANEL_WIDTH), fontsize=8.5)
-
-
-def _name_laws(part: Any, laws: Sequence[RankedLaw], every_test: bool) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], color="0.35", marker=".", ls="none")]
-    labels = ["measured"]
-    for k, (ranked, colour) in enumerate(zip(laws, distinct_colours(len(laws)), strict=True)):
-        handles.append(Line2D([], [], color=colour, ls="-" if k == 0 else "--"))
-        labels.append(f"{ranked.fit.law.name}, weight {ranked.weight:.3f}")
-    title = "credible laws with their 95 % bands" + ("" if every_test else "; the tests in which they differ most")
-    part.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, title=title, title_fontsize=8)
+    axes.set_title(wrapped(f"{shortened(history.name, 48)}: {shortened(program_text(history), 96)}", 3.0), fontsize=8.5)

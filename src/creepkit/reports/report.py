@@ -24,11 +24,10 @@ from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import identification_to_json
 from creepkit.inverse.selection import Ranking, rank
-from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.quality import check_data_quality
 from creepkit.records import History
-from creepkit.registry import default_registry, resolve_law
+from creepkit.registry import default_registry
 from creepkit.reports.contents import (
     Exclusion,
     ExportedFile,
@@ -246,38 +245,7 @@ def _provenance(groups: Sequence[ReportGroup], histories: Sequence[History]) -> 
         seed=fit.settings.seed,
         settings={**{k: v for k, v in settings.items() if k != "seed"}, **stated},
         inputs=dict(_inputs(histories)),
-        commands=tuple(_commands(groups[0], histories)) if len(groups) == 1 else (),
     )
-
-
-MOST_NAMED_FILES = 12
-"""Of the command that reads tests; more are a folder."""
-
-
-def _commands(group: ReportGroup, histories: Sequence[History]) -> Iterator[str]:
-    """Lines of Python that repeat an identification, where names and settings alone determine it."""
-    found = findings_of(group)
-    files = list(dict.fromkeys(Path(h.source).name for h in histories if h.source and Path(h.source).is_file()))
-    if found is None or not files or found.fit.sparsity is not None:
-        return
-    fits = [one.fit for one in group.result.laws] if isinstance(group.result, Ranking) else [found.fit]
-    try:
-        known = all(resolve_law(fit.law.name).fingerprint == fit.law.fingerprint for fit in fits)
-    except CreepkitError:
-        known = False
-    defaults = IdentificationSettings()
-    changed = {
-        one.name: getattr(found.fit.settings, one.name)
-        for one in fields(defaults)
-        if getattr(found.fit.settings, one.name) != getattr(defaults, one.name)
-    }
-    if not known or "nuisances" in changed:
-        return
-    changes = "".join(f", {name}={value!r}" for name, value in changed.items())
-    verb, laws = ("select", [fit.law.name for fit in fits]) if len(fits) > 1 else ("identify", fits[0].law.name)
-    yield "import creepkit as ck"
-    yield f"tests = ck.read_histories({files if len(files) <= MOST_NAMED_FILES else 'FOLDER'})"
-    yield f"ck.report(ck.{verb}({laws!r}, tests{changes}), 'report.html')"
 
 
 def _inputs(histories: Sequence[History]) -> Iterator[tuple[str, str]]:

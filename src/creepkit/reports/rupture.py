@@ -38,9 +38,6 @@ LEAST_SCATTER_SHOWN = 1e-3
 SHOWN_EFFECTS = 6
 """Heats at each end of the list."""
 
-CRITERIA = {"bic": "BIC", "aicc": "AICc"}
-"""As they are written."""
-
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
 
@@ -67,7 +64,7 @@ def rupture_blocks(assessment: RuptureAssessment, figures: PageFigures | None = 
     """Methods with their weights and constants, checks and notes, and with `figures` the isotherms."""
     best, relation, groups = assessment.best, assessment.relation, assessment.tests.groups
     columns = (
-        *("method", "weight", f"{CRITERIA[assessment.settings.criterion]} - best", "scatter of a test"),
+        *("method", "weight", "BIC - best", "scatter of a test"),
         *(f"between {_plural(group)}" for group in groups),
     )
     rows = [
@@ -190,8 +187,7 @@ def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
         "tests": len(assessment.tests),
         "run_outs": int(assessment.tests.censored.sum()),
         "methods": [
-            {**_fit_to_json(one.fit), f"{assessment.settings.criterion}_excess": one.excess, "weight": one.weight}
-            for one in assessment.ranked
+            {**_fit_to_json(one.fit), "bic_excess": one.excess, "weight": one.weight} for one in assessment.ranked
         ],
         "rejected": dict(assessment.rejected),
         "relation": None

@@ -15,8 +15,14 @@ from creepkit.records import growing_output, output_named, specimen_of
 from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import draw_parity, make_folder, panel_grid, panels_of, save_figure
 from creepkit.reports.terminal import print_json, print_table, tell
-from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
-from creepkit.screening.results import AlloyResult, mean_chi_square, mean_relative_squared_error
+from creepkit.screening.results import (
+    COMPARISON_STRESS,
+    AlloyResult,
+    confirmation_text,
+    mean_chi_square,
+    mean_relative_squared_error,
+    result_columns,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -150,7 +156,7 @@ def _draw_by_class(
 def _plot_misfits(plate: ScreeningResult) -> Figure:
     """Misfit of the reduced law against that of the dense one (Fig. 7b): Eq. (4), and in units of noise."""
     figure, panels = panel_grid(2, 2, 4.3, 4.6)
-    fits = {one.alloy: (one.dense_fit, one.reduced_fit) for one in plate.identified if one.dense_fit is not None}
+    fits = {one.alloy: (one.dense_fit, one.best) for one in plate.identified if one.dense_fit is not None}
     for axes, (title, measure) in zip(panels, MISFIT_MEASURES, strict=True):
         values = np.array([[measure(one) for one in pair] for pair in fits.values()])
         finite = values[np.isfinite(values)]

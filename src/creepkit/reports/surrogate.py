@@ -116,11 +116,11 @@ def write_surrogate_figures(surrogate: Surrogate, data: Dataset, folder: Path, n
 def size_study_rows(results: Sequence[SizeStudyResult]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """The heads and rows of a table, the best first."""
     outputs = list(results[0].outputs) if results else []
-    sizes_and_losses = ("cell", "hidden", "layers", "samples", "weights", "loss (Eq. 4)", "training", "epochs", "best")
+    sizes_and_losses = ("hidden", "layers", "samples", "weights", "loss (Eq. 4)", "training", "epochs", "best")
     heads = (*sizes_and_losses, *(f"RSE {name}" for name in outputs))
     rows = [
         (
-            *map(str, (one.cell, one.hidden, one.layers, one.samples, one.weight_count)),
+            *map(str, (one.hidden, one.layers, one.samples, one.weight_count)),
             *(f"{one.loss:.4g}", f"{one.training:.4g}", str(one.epochs), str(one.best_epoch)),
             *(f"{one.outputs[name]:.3g}" for name in outputs),
         )

@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest
-from creepkit.inverse.information_criteria import aicc_penalty, bic_penalty, criterion_weights
+from creepkit.inverse.information_criteria import bic_penalty, criterion_weights
 from creepkit.records import History
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.assessment import (
@@ -25,14 +25,16 @@ from creepkit.rupture_assessment.assessment import (
     interpolated,
 )
 from creepkit.rupture_assessment.checks import AssessmentCheck, effectiveness, physical_realism, repeatability, turning
-from creepkit.rupture_assessment.fitting import conditions_of, fit_method, too_few_tests
-from creepkit.rupture_assessment.methods import METHODS, MINIMUM_RATE, MONKMAN_GRANT
-from creepkit.rupture_assessment.monkman_grant import (
+from creepkit.rupture_assessment.fitting import (
     LEAST_CURVATURE,
     MinimumRateRelation,
+    conditions_of,
     curvature_probability,
+    fit_method,
     fit_relation,
+    too_few_tests,
 )
+from creepkit.rupture_assessment.methods import METHODS, MINIMUM_RATE, MONKMAN_GRANT
 from creepkit.rupture_assessment.observed_tests import (
     NOT_STATED,
     RuptureTests,
@@ -191,8 +193,7 @@ def _ranked(
                 fits.append(fit)
     if not fits:
         return (), rejected
-    penalty = bic_penalty if settings.criterion == "bic" else aicc_penalty
-    scores = [-2.0 * fit.log_likelihood + penalty(fit.parameter_count, fit.observations) for fit in fits]
+    scores = [-2.0 * fit.log_likelihood + bic_penalty(fit.parameter_count, fit.observations) for fit in fits]
     excess, by_fit = criterion_weights(scores)
     degrees = Counter(fit.method for fit in fits)
     shares = by_fit / [degrees[fit.method] for fit in fits]  # every method has the same weight before the tests
@@ -209,7 +210,6 @@ def _fit(
         tests,
         conditions_of(tests, tensile),
         degree=degree,
-        distribution=settings.distribution,
         fixed=settings.fixed.get(name, {}),
         level=settings.level,
     )

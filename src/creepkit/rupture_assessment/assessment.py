@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,8 +25,8 @@ from creepkit.presentation import Presentable, present
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.checks import AssessmentCheck
-from creepkit.rupture_assessment.methods import METHODS, Conditions, Distribution
-from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
+from creepkit.rupture_assessment.fitting import MinimumRateRelation
+from creepkit.rupture_assessment.methods import METHODS, Conditions
 from creepkit.rupture_assessment.observed_tests import RuptureTests
 from creepkit.rupture_assessment.rupture_fit import RuptureFit, RuptureParameter, VarianceFreedom, power_of_ten
 from creepkit.rupture_assessment.strength import (
@@ -57,16 +57,13 @@ LARGEST_CONSTANT = 1e7
 class RuptureSettings(Options, title="settings of an assessment", error=FitError):
     """How rupture tests are assessed.
 
-    degrees : of polynomials of log10 of the stress that are tried. distribution : of rupture times, "lognormal" or
-    "weibull". criterion : "bic" or "aicc", with as many observations as tests that broke.
+    degrees : of polynomials of log10 of the stress that are tried.
     fixed : {method: {constant: value}} that are given in the place of fitted ones, {"larson-miller": {"C": 20.0}}.
     random_effects : whether heats and laboratories scatter. level : of intervals and bounds.
     seed : of the tests that a check of repeatability leaves out.
     """
 
     degrees: tuple[int, ...] = option((1, 2, 3), "Of polynomials of log stress that are tried.", Limits(1, 5))
-    distribution: Distribution = option("lognormal", "Of rupture times.")
-    criterion: Literal["bic", "aicc"] = option("bic", "Of the ranking.")
     fixed: Mapping[str, Mapping[str, float]] = option(
         dict, "A constant that is given.", flag="fix", example="larson-miller.C=20"
     )
@@ -114,7 +111,7 @@ class RuptureQuestion(Options, title="arguments of an assessment", error=FitErro
 
 @dataclass(frozen=True)
 class RankedRuptureFit:
-    """A fitted method in the ranking: its criterion less the lowest, and its weight.
+    """A fitted method in the ranking: its BIC (of the tests that broke) less the lowest, and its weight.
 
     The weight is exp(-excess / 2) over the number of degrees of the method that are ranked, normalised: before the
     tests are seen all methods have the same weight, however many degrees are tried.
@@ -205,9 +202,7 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
         """Fits with weights that add up to one: of the average (None), or of one method."""
         if method is not None and method != AVERAGE:
             is_relation = self.relation is not None and method == self.relation.times.method
-            model = self.relation if is_relation else self[method]
-            assert model is not None
-            return [(model, 1.0)]
+            return [((self.relation if is_relation else None) or self[method], 1.0)]
         kept = [(one.fit, one.weight) for one in self.ranked if one.weight >= LEAST_WEIGHT]
         total = sum(weight for _, weight in kept)
         return [(fit, weight / total) for fit, weight in kept]
@@ -255,9 +250,9 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
 
     def obstacle(self, models: WeightedModels, temperature: float) -> str:
         """Why models state no strength at a temperature, K, whatever the time; "" where they do."""
-        if any(_needs(model, "tensile_strength") for model, _ in models) and not np.isfinite(
-            self.tensile(np.array([temperature]))[0]
-        ):
+        methods = [METHODS[model.method] for model, _ in models if isinstance(model, RuptureFit)]
+        needs_tensile = any(method.needs == "tensile_strength" for method in methods)
+        if needs_tensile and not np.isfinite(self.tensile(np.array([temperature]))[0]):
             return f"no tensile strength is known at {celsius_text(temperature)}"
         if self.tests.isothermal and abs(temperature - self.tests.temperature.mean()) > ISOTHERMAL_TOLERANCE:
             return f"all tests are at {celsius_text(float(self.tests.temperature.mean()))}"
@@ -277,8 +272,7 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
         check_conditions([temperature])
         if not 0 < stress < 1e9:
             raise FitError(f"stress is {stress!r}; give MPa above zero")
-        T, s = np.array([float(temperature)]), np.array([float(stress)])
-        at = Conditions(s, T, self.tensile(T), np.full(1, np.nan))
+        at = Conditions.isotherm(np.array([float(stress)]), temperature, self.tensile)
         models = self.models(method)
         ends = [curve for (kind, _), curve in bound_curves(models, at, self.settings.level).items() if kind == of]
         curves = [mixed(models, at, of).quantile(0.5), *ends]
@@ -296,10 +290,6 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
 
 ISOTHERMAL_TOLERANCE = 5.0
 """K by which a strength may be asked for beside tests of one temperature."""
-
-
-def _needs(model: Any, what: str) -> bool:
-    return isinstance(model, RuptureFit) and METHODS[model.method].needs == what
 
 
 def interpolated(temperatures: Floats, strengths: Floats, at: Floats) -> Floats:
@@ -326,7 +316,7 @@ def check_conditions(temperatures: Sequence[float] | None, hours: Sequence[float
 
 ASSESSMENT = DocumentFormat(
     "creepkit-rupture-assessment",
-    1,
+    2,
     FileKind("a rupture assessment", FitError, "give a file that RuptureAssessment.save wrote"),
     remedy="assess the tests again",
 )

@@ -3,36 +3,40 @@
 The likelihood is marginal, with right-censored run-outs and random effects of heats and laboratories.
 
 log10 of the time of a test is m + b + s e, with m by the method, b the sum of the effects of its heat and laboratory,
-each normal with mean 0, and e standard normal ("lognormal" times) or of the smallest extreme value ("weibull" times). A
-test that broke contributes its density, a run-out the probability that it lasts longer (Tobin (1958), Econometrica 26,
-24).
+each normal with mean 0, and e standard normal. A test that broke contributes its density, a run-out the probability
+that it lasts longer (Tobin (1958), Econometrica 26, 24).
 
 Effects are integrated out. With one kind of effect by adaptive Gauss-Hermite quadrature about the mode of each effect
 (Liu, Pierce (1994), Biometrika 81, 624), with two by Laplace's approximation about their joint mode. Both are exact, to
-rounding, for lognormal times without run-outs: there the integrand is Gaussian.
+rounding, without run-outs: there the integrand is Gaussian.
 
 All functions take several candidates at once, so that derivatives by differences cost one call.
+
+Monkman-Grant's relation is two such fits: rupture times by minimum creep rates, and these by a rate law.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.sparse import csr_array
 from scipy.special import log_ndtr, logsumexp, stdtrit
 
-from creepkit.arrays import Bools, Floats, Ints
+from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import FitError
-from creepkit.rupture_assessment.methods import Basis, Centre, Conditions, Distribution, RuptureMethod
+from creepkit.records import SECONDS_PER_HOUR
+from creepkit.rupture_assessment.methods import MINIMUM_RATE, MONKMAN_GRANT, Basis, Centre, Conditions, RuptureMethod
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
 from creepkit.rupture_assessment.rupture_fit import (
     LEAST_SCALE,
     RuptureFit,
     RuptureParameter,
+    StudentLogTime,
     VarianceFreedom,
     variance_freedom,
 )
@@ -62,18 +66,15 @@ class GroupedTimes:
     log_time: Floats
     censored: Bools
     members: tuple[Floats, ...]
-    distribution: Distribution
 
     @classmethod
-    def of(
-        cls, log_time: Floats, censored: Bools, groups: Mapping[str, Sequence[str]], distribution: Distribution
-    ) -> GroupedTimes:
+    def of(cls, log_time: Floats, censored: Bools, groups: Mapping[str, Sequence[str]]) -> GroupedTimes:
         """With the groups by name, in their order."""
         members = []
         for values in groups.values():
             levels = sorted(set(values))
             members.append(np.array([[float(v == level) for level in levels] for v in values]))
-        return cls(log_time, censored, tuple(members), distribution)
+        return cls(log_time, censored, tuple(members))
 
     def log_likelihood(self, mean: Floats, scale: Floats, scatter: Floats) -> Floats:
         """(candidates,) marginal log-likelihoods.
@@ -93,11 +94,6 @@ class GroupedTimes:
     def _terms(self, mean: Floats, scale: Floats) -> tuple[Floats, Floats, Floats]:
         """Log-density, or log-probability to last, and its first two derivatives by the mean; (..., tests) each."""
         z = (self.log_time - mean) / scale
-        if self.distribution == "weibull":
-            growth = np.exp(np.minimum(z, 300.0))
-            broken = ~self.censored
-            value = np.where(broken, z - np.log(scale), 0.0) - growth
-            return value, (growth - broken) / scale, -growth / scale**2
         lasting = log_ndtr(-z)
         exponent = np.minimum(-0.5 * z**2 - HALF_LOG_TAU - lasting, 700.0)
         hazard = np.minimum(np.exp(exponent), np.maximum(z, 0.0) + 1.0)  # of which it never has more: rounding
@@ -114,11 +110,12 @@ class GroupedTimes:
         effects = np.zeros(scatter.shape)
         precision = scatter**-2.0
         limit = LARGEST_STEP * scale[:, None]
-        first_level, second_level, order, starts = _shared_tests(members)
+        one, other = np.nonzero(members.T @ members)  # pairs of levels that share tests, which are few of all pairs
+        shared = csr_array(members[:, one] * members[:, other])
         for _ in range(MODE_STEPS):
             _, first, second = self._terms(mean + effects @ members.T, scale[:, None])
             hessian = precision[:, :, None] * np.eye(scatter.shape[1])
-            hessian[:, first_level, second_level] -= np.add.reduceat(second[:, order], starts, axis=1)
+            hessian[:, one, other] -= second @ shared
             gradient = first @ members - precision * effects
             step = np.clip(np.linalg.solve(hessian, gradient[..., None])[..., 0], -limit, limit)
             effects = effects + step
@@ -166,19 +163,6 @@ class GroupedTimes:
         return np.split(modes[0], np.cumsum(sizes)[:-1])
 
 
-def _shared_tests(members: Floats) -> tuple[Ints, Ints, Ints, Ints]:
-    """Pairs of levels (pairs,) (pairs,) that share tests; those tests, pair after pair, and where each pair's begin.
-
-    members : (tests, levels) of zeros and ones. A product of matrices would take all pairs, of which few share a test.
-    """
-    levels = [np.flatnonzero(row) for row in members]
-    triples = np.array([(i, j, test) for test, own in enumerate(levels) for i in own for j in own])
-    triples = triples[np.lexsort(triples.T[::-1])]
-    new = np.any(np.diff(triples[:, :2], axis=0) != 0, axis=1)
-    starts = np.concatenate([[0], np.flatnonzero(new) + 1])
-    return triples[starts, 0], triples[starts, 1], triples[:, 2], starts
-
-
 GRADIENT_STEP, HESSIAN_STEP = 1e-5, 3e-4
 """Of central differences, in coordinates of order one."""
 
@@ -190,9 +174,6 @@ MOST_NUMBERS = 200_000
 
 NEWTON_STEPS = 6
 """After the quasi-Newton method: to the last digits."""
-
-EXTREME_VALUE_VARIANCE = np.pi**2 / 6.0
-"""Of the smallest extreme value of scale one."""
 
 LEAST_INDEPENDENCE = 1e-9
 """Smallest singular value of the scaled functions of a method at which its coefficients are determined."""
@@ -263,11 +244,11 @@ def _hessian(cost: Cost, point: Floats) -> Floats:
     return np.asarray(matrix + np.tril(matrix, -1).T)
 
 
-def conditions_of(tests: RuptureTests, tensile: TensileStrength) -> Conditions:
+def conditions_of(tests: RuptureTests, tensile: TensileStrength | None = None) -> Conditions:
     """The conditions of tests; tensile : of temperatures, where a test does not state its own."""
-    strength = np.where(
-        np.isfinite(tests.tensile_strength), tests.tensile_strength, tensile(np.asarray(tests.temperature))
-    )
+    strength = tests.tensile_strength
+    if tensile is not None:
+        strength = np.where(np.isfinite(strength), strength, tensile(np.asarray(tests.temperature)))
     return Conditions(tests.stress, tests.temperature, strength, tests.minimum_rate)
 
 
@@ -277,19 +258,12 @@ def centre_of(tests: RuptureTests) -> Centre:
 
 
 def fit_method(
-    method: RuptureMethod,
-    tests: RuptureTests,
-    at: Conditions,
-    *,
-    degree: int,
-    distribution: Distribution,
-    fixed: Mapping[str, float],
-    level: float,
+    method: RuptureMethod, tests: RuptureTests, at: Conditions, *, degree: int, fixed: Mapping[str, float], level: float
 ) -> RuptureFit:
     """The maximum of the likelihood; FitError where the tests do not determine the coefficients."""
     centre = centre_of(tests)
     basis = method.basis(at, degree, fixed, centre)
-    times = GroupedTimes.of(tests.log_time, tests.censored, tests.groups, distribution)
+    times = GroupedTimes.of(tests.log_time, tests.censored, tests.groups)
     problem = _scaled(method, basis, times, tests.ruptured)
     point = _minimum(problem, _start(problem, tests))
     location, count = problem.location_count, problem.linear.shape[1]
@@ -319,7 +293,6 @@ def fit_method(
     return RuptureFit(
         method.name,
         degree,
-        distribution,
         dict(fixed),
         centre,
         estimates[:count],
@@ -430,9 +403,8 @@ def _variance_freedom(problem: _Scaled, point: Floats, scale: float, scatter: Fl
     columns = problem.linear
     if problem.bilinear is not None:
         columns = np.column_stack([columns + point[count] * problem.bilinear, problem.bilinear @ point[:count]])
-    within = scale**2 * (EXTREME_VALUE_VARIANCE if problem.times.distribution == "weibull" else 1.0)
     members = [m[broken] for m in problem.times.members]
-    return variance_freedom(columns[broken], members, within, [float(v) for v in scatter**2])
+    return variance_freedom(columns[broken], members, scale**2, [float(v) for v in scatter**2])
 
 
 def _covariance(problem: _Scaled, point: Floats, corrected: Floats) -> Floats:
@@ -480,3 +452,71 @@ def _with_half_widths(
         variance = np.einsum("mi,ij,mj->m", jacobian, part, jacobian)
         half = stdtrit(freedom.of(jacobian), 0.5 + 0.5 * level) * np.sqrt(np.maximum(variance, 0.0))
     return {name: (value, float(h)) for (name, value), h in zip(at.items(), half, strict=True)}
+
+
+UNUSED_ENERGY = 300e3
+"""J/mol, of a rate law of tests at one temperature; it is used at that temperature alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class MinimumRateRelation:
+    """Rupture times by minimum rates.
+
+    times : log10 t = c - m log10 of the rate, of the tests with both. rates : the rate law, of all tests with a rate.
+    Its predictions by stress and temperature take the scatters of rates and of times for independent.
+    """
+
+    times: RuptureFit
+    rates: RuptureFit
+
+    def log_time(self, at: Conditions, of: str) -> StudentLogTime:
+        """Distribution of log10 of a time in hours; by the rate where it is known, else by the rate law."""
+        if np.isfinite(at.rate).all():
+            return self.times.log_time(at, of)
+        log_rate = self.rates.log_time(at, of)
+        predicted = replace(at, rate=10.0**log_rate.median / SECONDS_PER_HOUR)
+        by_rate = self.times.log_time(predicted, of)
+        m = self.times["m"].value
+        spread = np.hypot(by_rate.spread, m * log_rate.spread)
+        return StudentLogTime(by_rate.median, spread, np.minimum(by_rate.freedom, log_rate.freedom))
+
+    def test_scatter(self, at: Conditions) -> StudentLogTime:
+        """Distribution of log10 of the time of one test over the median time of its heat, by its rate."""
+        return self.times.test_scatter(at)
+
+
+def fit_relation(tests: RuptureTests, with_rate: RuptureTests, *, level: float) -> MinimumRateRelation:
+    """The relation and its rate law; FitError, in one sentence, where rates are missing or too few."""
+    known = np.isfinite(tests.minimum_rate)
+    if not known.any():
+        raise FitError("no test has a minimum creep rate, which monkman-grant needs; add minimum_rate to the tests")
+    both = tests[known]
+    times = fit_method(MONKMAN_GRANT, both, conditions_of(both), degree=1, fixed={}, level=level)
+    log_rates = replace(
+        with_rate,
+        log_time=frozen(np.log10(with_rate.minimum_rate * SECONDS_PER_HOUR)),
+        censored=frozen(np.zeros(len(with_rate)), dtype=bool),
+    )
+    fixed = {"Q": UNUSED_ENERGY} if with_rate.isothermal else {}
+    rates = fit_method(MINIMUM_RATE, log_rates, conditions_of(with_rate), degree=1, fixed=fixed, level=level)
+    return MinimumRateRelation(times, rates)
+
+
+LEAST_CURVATURE = 0.01
+"""Probability below which rates say that one stress exponent does not hold for all of them."""
+
+
+def curvature_probability(with_rate: RuptureTests) -> float:
+    """Probability of so much curvature of ln rate over ln stress if there were none, by the F test; 1 of few rates."""
+    from scipy.stats import f as f_distribution
+
+    x, y = np.log(with_rate.stress), np.log(with_rate.minimum_rate)
+    line = [np.ones_like(x), x - x.mean(), *([] if with_rate.isothermal else [1.0 / with_rate.temperature])]
+    left = []
+    for columns in (line, [*line, (x - x.mean()) ** 2]):
+        A = np.stack([column / np.abs(column).max() for column in columns], axis=1)
+        if np.linalg.matrix_rank(A) < A.shape[1] or len(y) < A.shape[1] + 2:
+            return 1.0
+        left.append(float(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2)))
+    freedom = len(y) - len(line) - 1
+    return float(f_distribution.sf((left[0] - left[1]) * freedom / max(left[1], 1e-300), 1, freedom))

@@ -26,16 +26,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import SECONDS_PER_HOUR
-
-Distribution = Literal["lognormal", "weibull"]
-"""Of rupture times at one condition."""
+from creepkit.rupture_assessment.observed_tests import TensileStrength
 
 LN10 = float(np.log(10.0))
 
@@ -54,6 +51,12 @@ class Conditions:
     temperature: Floats
     tensile_strength: Floats
     rate: Floats
+
+    @classmethod
+    def isotherm(cls, stress: Floats, temperature: float, tensile: TensileStrength) -> Conditions:
+        """At one temperature, K, without rates; stress : (points,) MPa."""
+        T = np.full(stress.shape, float(temperature))
+        return cls(stress, T, tensile(T), np.full(stress.shape, np.nan))
 
 
 @dataclass(frozen=True)

@@ -12,22 +12,20 @@ heats less one, however many tests there are.
 C, its derivatives and A (by the restricted likelihood) are those of the normal model of the tests that broke: with
 Z the members of the effects, V = theta_0 I + sum theta_g Z_g Z_g'.
 
-log10 of a time is Student's, with a Weibull test, or a mixture of such.
+log10 of a time is Student's, or a mixture of such.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Protocol
 
 import numpy as np
-from scipy.special import chdtri, stdtr, stdtrit
+from scipy.special import stdtr, stdtrit
 
 from creepkit.arrays import Floats, frozen
 from creepkit.errors import FitError
-from creepkit.rupture_assessment.methods import METHODS, Centre, Conditions, Distribution
+from creepkit.rupture_assessment.methods import METHODS, Centre, Conditions
 
 MOST_LEVELS = 400
 """Of one kind of effect: with more its variance is taken for known."""
@@ -118,32 +116,10 @@ def variance_freedom(
 BISECTIONS = 50
 """Of a bracket some units of log10 wide: to 1e-14."""
 
-NODES = 21
-"""Of the quadrature over the normal part of a Weibull test's time."""
-
-WEIBULL_MEDIAN = float(np.log(np.log(2.0)))
-"""Of the smallest extreme value."""
-
-_places, _lengths = np.polynomial.legendre.leggauss(15)
-CHI_PROBABILITIES, CHI_WEIGHTS = 0.5 * (1.0 + _places), 0.5 * _lengths
-"""Of the quadrature over chi^2."""
-
-
-class LogTimeDistribution(Protocol):
-    """Of log10 of a time in hours, at each point."""
-
-    def cumulative(self, log_time: Floats) -> Floats:
-        """(points,) probability of less than log_time (points,)."""
-        ...
-
-    def quantile(self, probability: float) -> Floats:
-        """(points,) the log time that is not reached with a probability."""
-        ...
-
 
 @dataclass(frozen=True, eq=False)
 class StudentLogTime:
-    """median, spread, freedom : (points,)."""
+    """Student's distribution of log10 of a time in hours; median, spread, freedom : (points,)."""
 
     median: Floats
     spread: Floats
@@ -159,43 +135,10 @@ class StudentLogTime:
 
 
 @dataclass(frozen=True, eq=False)
-class WeibullLogTime:
-    """A median that is normal plus a scale times the smallest extreme value about its median.
-
-    All deviations from the median are times sqrt(freedom / chi^2), as in Student's distribution, which this is where
-    the extreme value is normal.
-    median, spread, freedom : (points,). scale : of log10 of time.
-    """
-
-    median: Floats
-    spread: Floats
-    scale: float
-    freedom: Floats
-
-    def cumulative(self, log_time: Floats) -> Floats:
-        """(points,) probability of less than log_time (points,)."""
-        nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
-        deviation = np.asarray(log_time - self.median)[:, None, None] * self._contractions[:, :, None]
-        z = (deviation - self.spread[:, None, None] * nodes) / self.scale + WEIBULL_MEDIAN
-        by_chi = -np.expm1(-np.exp(np.clip(z, -700.0, 50.0))) @ (weights / weights.sum())
-        return np.asarray(by_chi @ CHI_WEIGHTS)
-
-    @cached_property
-    def _contractions(self) -> Floats:
-        """(points, nodes) of sqrt(chi^2 / freedom)."""
-        return np.asarray(np.sqrt(chdtri(self.freedom[:, None], CHI_PROBABILITIES) / self.freedom[:, None]))
-
-    def quantile(self, probability: float) -> Floats:
-        """(points,) the log time that is not reached with a probability."""
-        reach = (40.0 * self.scale + 10.0 * self.spread) / self._contractions.min(axis=1)
-        return _halved(self, probability, self.median - reach, self.median + reach)
-
-
-@dataclass(frozen=True, eq=False)
 class MixedLogTime:
     """Several distributions with weights that add up to one."""
 
-    parts: Sequence[LogTimeDistribution]
+    parts: Sequence[StudentLogTime]
     weights: Sequence[float]
 
     def cumulative(self, log_time: Floats) -> Floats:
@@ -206,22 +149,17 @@ class MixedLogTime:
     def quantile(self, probability: float) -> Floats:
         """(points,) the log time that is not reached with a probability."""
         quantiles = np.array([part.quantile(probability) for part in self.parts])
-        if len(self.parts) == 1:
-            return np.asarray(quantiles[0])
-        return _halved(self, probability, quantiles.min(axis=0), quantiles.max(axis=0))
+        low, high = quantiles.min(axis=0), quantiles.max(axis=0)
+        for _ in range(BISECTIONS if len(self.parts) > 1 else 0):
+            middle = 0.5 * (low + high)
+            below = self.cumulative(middle) < probability
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        return np.asarray(0.5 * (low + high))
 
 
 def power_of_ten(exponent: float) -> float:
     """10 to a power, infinite where that is beyond a double."""
     return 10.0 ** float(exponent) if exponent < 300.0 else float("inf")
-
-
-def _halved(distribution: LogTimeDistribution, probability: float, low: Floats, high: Floats) -> Floats:
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        below = distribution.cumulative(middle) < probability
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return np.asarray(0.5 * (low + high))
 
 
 LEAST_SCALE = 1e-6
@@ -244,8 +182,8 @@ class RuptureFit:
     """One method with its estimates.
 
     coefficients : (coefficients,), curvature : Manson-Haferd's k (0 elsewhere), of the basis of the method.
-    scale : of log10 of the times of one heat; a standard deviation for lognormal times. scatter : {group: standard
-    deviation of its effect}. levels : {group: how many}.
+    scale : standard deviation of log10 of the times of one heat. scatter : {group: standard deviation of its effect}.
+    levels : {group: how many}.
     covariance : (estimates, estimates) of coefficients, curvature where the method has one, scale and scatters, by
     observed information, with the corrections below.
     scale_corrected, scatter_corrected : with which predictions are made: scale^2 n / (n - p), scatter^2 h / (h - 1).
@@ -254,7 +192,6 @@ class RuptureFit:
 
     method: str
     degree: int
-    distribution: Distribution
     fixed: Mapping[str, float]
     centre: Centre
     coefficients: Floats
@@ -304,13 +241,9 @@ class RuptureFit:
         count = columns.shape[1]
         if basis.bilinear is not None:
             derivatives[:, count] = basis.bilinear @ self.coefficients
-            count += 1
-        if self.distribution == "weibull":
-            median = median + WEIBULL_MEDIAN * self.scale
-            derivatives[:, count] = WEIBULL_MEDIAN
         return median, derivatives
 
-    def log_time(self, at: Conditions, of: str) -> LogTimeDistribution:
+    def log_time(self, at: Conditions, of: str) -> StudentLogTime:
         """Distribution of log10 of a time in hours.
 
         of : "mean", the median time of the average heat, which only the estimates make uncertain; "heat", the median
@@ -323,16 +256,11 @@ class RuptureFit:
             total = total + sum(v**2 for v in self.scatter_corrected.values())
         location = derivatives[:, : self.parameter_count - 1 - len(self.scatter)]
         freedom = self.variance_freedom.of(location, between=of != "mean", within=of == "test")
-        if of == "test" and self.distribution == "weibull":
-            return WeibullLogTime(median, np.sqrt(total), self.scale_corrected, freedom)
         if of == "test":
             total = total + self.scale_corrected**2
         return StudentLogTime(median, np.sqrt(total), freedom)
 
-    def test_scatter(self, at: Conditions) -> LogTimeDistribution:
+    def test_scatter(self, at: Conditions) -> StudentLogTime:
         """Distribution of log10 of the time of one test over the median time of its heat."""
         none: Floats = np.zeros(at.stress.size)
-        spread, freedom = none + self.scale_corrected, none + self.variance_freedom.most
-        if self.distribution == "weibull":
-            return WeibullLogTime(none, none + LEAST_SCALE * self.scale_corrected, self.scale_corrected, freedom)
-        return StudentLogTime(none, spread, freedom)
+        return StudentLogTime(none, none + self.scale_corrected, none + self.variance_freedom.most)

@@ -10,16 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from creepkit.arrays import Floats
 from creepkit.records.units import celsius_text
+from creepkit.rupture_assessment.fitting import MinimumRateRelation
 from creepkit.rupture_assessment.methods import Conditions
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
-from creepkit.rupture_assessment.rupture_fit import LogTimeDistribution, MixedLogTime, power_of_ten
+from creepkit.rupture_assessment.rupture_fit import MixedLogTime, RuptureFit, power_of_ten
 
 BOUND_KINDS = ("mean", "heat", "test")
 """Of the median time of the average heat; of the median time of a new heat; of one test of a new heat."""
@@ -36,19 +36,8 @@ LONGEST_EXTRAPOLATION = 3.0
 """Times the longest test: estimates beyond it are flagged."""
 
 
-class LogTimeModel(Protocol):
-    """What predicts the distribution of rupture times."""
-
-    def log_time(self, at: Conditions, of: str) -> LogTimeDistribution:
-        """Distribution of log10 of a time in hours; of : one of BOUND_KINDS."""
-        ...
-
-    def test_scatter(self, at: Conditions) -> LogTimeDistribution:
-        """Distribution of log10 of the time of one test over the median time of its heat."""
-        ...
-
-
-WeightedModels = Sequence[tuple[LogTimeModel, float]]
+WeightedModels = Sequence[tuple[RuptureFit | MinimumRateRelation, float]]
+"""What predicts the distribution of rupture times, with weights that add up to one."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +110,7 @@ def strength_estimates(
     if np.isfinite(limit):
         highest = min(highest, TENSILE_LIMIT * limit)
     stress = np.geomspace(lowest, highest, GRID_POINTS)
-    shape = stress.shape
-    at = Conditions(stress, np.full(shape, temperature), np.full(shape, limit), np.full(shape, np.nan))
+    at = Conditions.isotherm(stress, temperature, tensile)
     median = mixed(models, at, "mean").quantile(0.5)
     tested = (stress >= 0.99 * tests.stress.min()) & (stress <= 1.01 * tests.stress.max())
     start = int(np.argmin(np.where(tested, np.abs(median - np.median(tests.log_time)), np.inf)))

@@ -13,7 +13,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import StudyError, nearest
 from creepkit.files.reading import read_bytes, sha256_of
 from creepkit.files.writing import check_target, write_bytes, write_text
-from creepkit.reports.attachments import problem_of_name, read_attachments, same_name
+from creepkit.reports.attachments import problem_of_names, read_attachments
 from creepkit.studies import arguments
 from creepkit.studies.arguments import check_forecast
 from creepkit.studies.cameras import StudyCamera, cameras_of, flagged_frames
@@ -95,22 +95,17 @@ class Study:
         data = [*self.paths, *(path for camera in self.cameras for path in camera.all_files)]
         places: list[tuple[KeyPath, str]] = [(("export", k, "file"), name) for k, name in enumerate(exports)]
         places += [] if model.report is None else [(("report", "file"), model.report.file)]
-        own = [same_name(one) for one in (file.path.name, f"{file.path.stem}.lock", f"{file.path.stem}.results")]
-        names: list[str] = []
+        taken = {one.casefold() for one in (file.path.name, f"{file.path.stem}.lock", f"{file.path.stem}.results")}
         for key, name in places:
-            read = any(fnmatchcase(name, pattern.removeprefix("./")) for pattern in model.data.files)
-            problems = {
-                "must be a plain name of a file, such as report.html": problem_of_name(name) or {"/", ":"} & {*name},
-                "is a file of the study itself; choose another name": same_name(name) in own,
-                "is written by another table already; give file = another name": same_name(name) in names,
-                "would be among the data files; give file = another name, or name those more exactly": (
-                    read or file.path.parent / name in data
-                ),
-            }
-            for problem, found in problems.items():
-                if found:
-                    raise file.error(key, f"'{name}' {problem}")
-            names.append(same_name(name))
+            among_data = any(fnmatchcase(name, pattern.removeprefix("./")) for pattern in model.data.files)
+            if problem_of_names([name]) or "/" in name:
+                raise file.error(key, f"'{name}' must be a plain name of a file, such as report.html")
+            if name.casefold() in taken:
+                what = "is a file of the study itself, or written by another table already; give file = another name"
+                raise file.error(key, f"'{name}' {what}")
+            if among_data or file.path.parent / name in data:
+                raise file.error(key, f"'{name}' would be among the data files; give file = another name")
+            taken.add(name.casefold())
 
     @cached_property
     def cameras(self) -> list[StudyCamera]:

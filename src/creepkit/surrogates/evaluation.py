@@ -9,7 +9,6 @@ R2.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -79,9 +78,6 @@ PAPER_EVALUATION_TIMES = (7_500.0, 22_500.0, 37_500.0)
 PAPER_TEST_DURATION = 43_200.0
 
 
-WORST_COUNT = 10
-
-
 @dataclass(frozen=True, eq=False)
 class PredictionComparison:
     """What a network predicts of samples, and what is true.
@@ -146,8 +142,8 @@ def error_metrics(true: Floats, predicted: Floats, mask: Bools) -> dict[str, flo
     }
 
 
-def comparison_metrics(comparison: PredictionComparison, times: Sequence[float]) -> dict[str, Any]:
-    """Everything that is stated of a network: {"loss", "outputs", "times", "worst", "samples"}; NaN becomes None."""
+def comparison_metrics(comparison: PredictionComparison) -> dict[str, Any]:
+    """Everything that is stated of a network: {"loss", "outputs", "samples"}; NaN becomes None."""
     largest = comparison.largest_errors()
     outputs = {}
     for k, name in enumerate(comparison.outputs):
@@ -158,38 +154,9 @@ def comparison_metrics(comparison: PredictionComparison, times: Sequence[float])
         "loss": relative_squared_error(comparison.true, comparison.predicted, comparison.mask, comparison.scale),
         "samples": len(comparison.true),
         "outputs": outputs,
-        "times": {f"{time:g}": _metrics_at_time(comparison, time) for time in times},
-        "worst": worst_histories(comparison, largest),
     }
     result: dict[str, Any] = record_to_json(metrics)
     return result
-
-
-def _metrics_at_time(comparison: PredictionComparison, time: float) -> dict[str, dict[str, float]]:
-    true, predicted = comparison.at_time(time)
-    mask = np.ones((len(true), 1), bool)
-    return {
-        name: error_metrics(true[:, k : k + 1], predicted[:, k : k + 1], mask)
-        for k, name in enumerate(comparison.outputs)
-    }
-
-
-def worst_histories(comparison: PredictionComparison, largest: Floats) -> list[dict[str, float]]:
-    """The samples with the largest errors of the first output: number in the design, row, error and when.
-
-    largest : (n, outputs) largest absolute errors.
-    """
-    rows = np.argsort(-largest[:, 0])[:WORST_COUNT]
-    absolute_errors = np.where(comparison.mask, np.abs(comparison.predicted - comparison.true)[..., 0], -1.0)
-    return [
-        {
-            "index": int(comparison.index[k]),
-            "row": int(k),
-            "error": float(largest[k, 0]),
-            "time": float(comparison.times[k, int(absolute_errors[k].argmax())]),
-        }
-        for k in rows
-    ]
 
 
 def evaluation_times(grid: TimeGrid, end: float) -> tuple[float, ...]:
@@ -251,4 +218,4 @@ def evaluate_rows(surrogate: Surrogate, samples: SampleArrays, data: Dataset, ro
         index=data.index[rows],
     )
     times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
-    return Evaluation(comparison, comparison_metrics(comparison, times), times)
+    return Evaluation(comparison, comparison_metrics(comparison), times)

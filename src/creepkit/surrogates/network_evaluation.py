@@ -5,18 +5,19 @@ so that forward mode costs one pass for each direction, and reverse mode one for
 share the matrix products of a frame. Arrays of a layer are (frames, 1 + directions, rows, ...): index 0 of the second
 axis holds the values, the others their derivatives.
 
-Equations of the cells, of Cho et al. (2014) and Hochreiter and Schmidhuber (1997), in the form of torch.nn:
-GRU    r, z = sigmoid(i + h), n = tanh(i_n + r h_n), h' = n + z (h - n)
-LSTM   i, f, o = sigmoid(i + h), g = tanh(i_g + h_g), c' = f c + i g, h' = o tanh c'
-with i = W_in x + b_in and h = W_hidden h + b_hidden. As sigmoid(x) = (1 + tanh(x/2)) / 2, weights of sigmoid gates are
-stored halved, and one tanh serves all gates.
+Equations of the gated recurrent unit of Cho et al. (2014) in the form of torch.nn.GRU,
+
+    r, z = sigmoid(i + h), n = tanh(i_n + r h_n), h' = n + z (h - n)
+
+with i = W_in x + b_in and h = W_hidden h + b_hidden. As sigmoid(x) = (1 + tanh(x/2)) / 2, weights of the gates r and z
+are stored halved, and tanh serves all three.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,15 +34,8 @@ Weights: TypeAlias = Mapping[str, NDArray[Any]]
 """{name: (...,)} weights and scales of a network, as they stand in its file."""
 
 
-RecurrentCell = Literal["gru", "lstm"]
-
-
-GATES = {"gru": 3, "lstm": 4}
-"""Gates of a cell: r, z, n; and i, f, g, o, in the order of the rows of their weights."""
-
-
-HALVED_GATES = {"gru": (0, 1), "lstm": (0, 1, 3)}
-"""Those with a sigmoid."""
+HALVED = np.array([0.5, 0.5, 1.0])
+"""Factors on the weights of the gates r, z and n, in the order of their rows."""
 
 
 SCALES = ("constants", "series", "targets")
@@ -90,10 +84,6 @@ class RecurrentLayer:
         return len(self.hidden_weights)
 
 
-LayerState = list[Floats]
-"""What a layer hands from frame to frame, (1 + directions, rows, hidden) each: h, and c of an LSTM."""
-
-
 @dataclass(frozen=True, eq=False)
 class ParameterNetwork:
     """The trained network: constants and series of tests to outputs in physical units.
@@ -101,10 +91,8 @@ class ParameterNetwork:
     head_weights, head_bias : (hidden, outputs) and (outputs,) of the linear layer behind the recurrent ones.
     constants, series, targets : scales of its inputs and of what it gives. floor, most : of the logarithm of the first
     output (see parameter_network.ParameterModule). logarithm : whether the first output is learnt by its logarithm.
-    corrects_base : whether that is the logarithm of its ratio to a base.
     """
 
-    cell: RecurrentCell
     layers: tuple[RecurrentLayer, ...]
     head_weights: Floats
     head_bias: Floats
@@ -114,25 +102,18 @@ class ParameterNetwork:
     floor: float
     most: float
     logarithm: bool
-    corrects_base: bool
 
     @classmethod
     def from_weights(
-        cls,
-        weights: Mapping[str, NDArray[Any]],
-        sizes: tuple[int, int, int],
-        shape: tuple[RecurrentCell, int, int],
-        *,
-        logarithm: bool,
-        corrects_base: bool,
+        cls, weights: Weights, sizes: tuple[int, int, int], shape: tuple[int, int], *, logarithm: bool
     ) -> ParameterNetwork:
         """The network of the weights in a file; SurrogateError where their names or shapes are others.
 
         weights : {name: (...,)} by the names of torch.nn. sizes : numbers of constants, series and outputs. shape : the
-        cell, the width and the number of layers.
+        width and the number of layers.
         """
-        (constants, series, outputs), (cell, hidden, depth) = sizes, shape
-        series, gates = series + int(corrects_base), GATES[cell] * hidden
+        (constants, series, outputs), (hidden, depth) = sizes, shape
+        gates = HALVED.size * hidden
         shapes: dict[str, tuple[int, ...]] = {"head.weight": (outputs, hidden), "head.bias": (outputs,)}
         for layer in range(depth):
             shapes[f"network.weight_ih_l{layer}"] = (gates, hidden if layer else constants + series)
@@ -145,15 +126,13 @@ class ParameterNetwork:
             raise SurrogateError("its header and its weights do not belong together; train it again")
         arrays = {name: np.asarray(array, float) for name, array in weights.items()}
         return cls(
-            cell,
-            tuple(_layer(arrays, layer, cell) for layer in range(depth)),
+            tuple(_layer(arrays, layer) for layer in range(depth)),
             np.ascontiguousarray(arrays["head.weight"].T),
             arrays["head.bias"],
             **{name: ColumnScale(arrays[f"{name}.mean"], arrays[f"{name}.deviation"]) for name in SCALES},
             floor=float(arrays["floor"]),
             most=float(arrays["most"]),
-            logarithm=logarithm or corrects_base,
-            corrects_base=corrects_base,
+            logarithm=logarithm,
         )
 
     @property
@@ -162,56 +141,38 @@ class ParameterNetwork:
         layers = (a for w in self.layers for a in (w.input_weights, w.hidden_weights, w.input_bias, w.hidden_bias))
         return sum(array.size for array in (*layers, self.head_weights, self.head_bias))
 
-    def outputs(self, constants: Floats, series: Floats, base: Floats | None = None) -> Floats:
+    def outputs(self, constants: Floats, series: Floats) -> Floats:
         """(rows, frames, outputs) in physical units.
 
         constants : (rows, constants), NaN where a coefficient is off. series : (tests, frames, series), those of each
-        row in turn: rows are candidates x tests. base : (rows, frames) what is corrected.
+        row in turn: rows are candidates x tests.
         """
-        return self.outputs_with_derivatives(constants, series, base)[0]
+        return self.outputs_with_derivatives(constants, series)[0]
 
     def outputs_with_derivatives(
-        self, constants: Floats, series: Floats, base: Floats | None = None, directions: Floats | None = None
+        self, constants: Floats, series: Floats, directions: Floats | None = None
     ) -> tuple[Floats, Floats]:
         """Outputs (rows, frames, outputs) in physical units, and derivatives (rows, frames, outputs, directions).
 
-        constants : (rows, constants). series : (tests, frames, series). base : (rows, frames); all as for outputs().
-        directions : (rows, directions, constants), how constants move; with a base there are none, as that moves too.
+        constants : (rows, constants). series : (tests, frames, series); as for outputs().
+        directions : (rows, directions, constants), how constants move.
         """
         if directions is None:
             directions = np.zeros((len(constants), 0, constants.shape[1]))
-        elif self.corrects_base:
-            raise SurrogateError("the derivatives of a network that corrects another model are left to differences")
-        tests = len(series)
+        tests, frames = len(series), self.series.standardised(series).swapaxes(0, 1)
         step = max(1, ROWS_IN_BATCH // ((1 + directions.shape[1]) * tests)) * tests
         values, derivatives = [], []
         for part in (slice(first, first + step) for first in range(0, len(constants), step)):
-            base_part = None if base is None else base[part]
-            raw = self._standardised_outputs(
-                self._constant_inputs(constants[part], directions[part]), self._series_inputs(series, base_part)
-            )
-            values.append(self._decoded(raw[:, 0], base_part).swapaxes(0, 1))
+            raw = self._standardised_outputs(self._constant_inputs(constants[part], directions[part]), frames)
+            values.append(self._decoded(raw[:, 0]).swapaxes(0, 1))
             slope = self._decoded_derivatives(raw[:, :1])
             derivatives.append(np.moveaxis(raw[:, 1:] * slope, (2, 0, 3, 1), (0, 1, 2, 3)))
         return np.concatenate(values), np.concatenate(derivatives)
-
-    # ---- inputs ------------------------------------------------------------------------------------------------------
 
     def _constant_inputs(self, constants: Floats, directions: Floats) -> Floats:
         """(1 + directions, rows, constants) standardised; a coefficient that is off stands at zero."""
         standardised = np.nan_to_num(self.constants.standardised(constants), nan=0.0)
         return np.concatenate([standardised[None], np.moveaxis(directions, 1, 0) / self.constants.deviation])
-
-    def _series_inputs(self, series: Floats, base: Floats | None) -> Floats:
-        """(frames, tests or rows, series) standardised, with ln of the base where there is one."""
-        if self.corrects_base:
-            assert base is not None
-            candidates = len(base) // len(series)
-            log_base = np.log(base + self.floor)[..., None]
-            series = np.concatenate([np.tile(series, (candidates, 1, 1)), log_base], axis=-1)
-        return self.series.standardised(series).swapaxes(0, 1)
-
-    # ---- layers ------------------------------------------------------------------------------------------------------
 
     def _standardised_outputs(self, constants: Floats, series: Floats) -> Floats:
         """(frames, 1 + directions, rows, outputs) standardised.
@@ -223,33 +184,27 @@ class ParameterNetwork:
         constant_part[0] += first.input_bias
         series_part = _product(series, first.input_weights[columns:])
         repetitions = rows // series.shape[1]
-        frames_of_cell: Callable[[RecurrentLayer, Floats, LayerState], Floats]
-        frames_of_cell = _gru_frames if self.cell == "gru" else _lstm_frames
-        state_count = 1 if self.cell == "gru" else 2
-        states = [[np.zeros((variants, rows, w.hidden)) for _ in range(state_count)] for w in self.layers]
+        states = [np.zeros((variants, rows, w.hidden)) for w in self.layers]
         blocks = []
         for start in range(0, len(series), FRAMES_IN_BLOCK):
             block = series_part[start : start + FRAMES_IN_BLOCK]
             inputs = np.tile(constant_part, (len(block), 1, 1, 1))
             inputs[:, 0] += np.tile(block, (1, repetitions, 1))
-            values = frames_of_cell(first, inputs, states[0])
+            values = _frames(first, inputs, states[0])
             for layer, state in zip(self.layers[1:], states[1:], strict=True):
                 inputs = _product(values, layer.input_weights)
                 inputs[:, 0] += layer.input_bias
-                values = frames_of_cell(layer, inputs, state)
+                values = _frames(layer, inputs, state)
             blocks.append(_product(values, self.head_weights))
         outputs = np.concatenate(blocks)
         outputs[:, 0] += self.head_bias
         return outputs
 
-    # ---- outputs -----------------------------------------------------------------------------------------------------
-
-    def _decoded(self, raw: Floats, base: Floats | None) -> Floats:
-        """Physical outputs (frames, rows, outputs) of standardised ones; base : (rows, frames)."""
+    def _decoded(self, raw: Floats) -> Floats:
+        """Physical outputs (frames, rows, outputs) of standardised ones."""
         outputs = raw * self.targets.deviation + self.targets.mean
         if self.logarithm:
-            scale = 1.0 if base is None or not self.corrects_base else base.T + self.floor
-            outputs[..., 0] = scale * np.exp(np.minimum(outputs[..., 0], self.most)) - self.floor
+            outputs[..., 0] = np.exp(np.minimum(outputs[..., 0], self.most)) - self.floor
         return outputs
 
     def _decoded_derivatives(self, raw: Floats) -> Floats:
@@ -261,14 +216,12 @@ class ParameterNetwork:
         return derivatives
 
 
-def _layer(arrays: Mapping[str, Floats], layer: int, cell: RecurrentCell) -> RecurrentLayer:
+def _layer(arrays: Mapping[str, Floats], layer: int) -> RecurrentLayer:
     """One layer of the weights of a file."""
-    hidden = arrays[f"network.weight_hh_l{layer}"].shape[1]
-    factor = np.ones((GATES[cell], hidden))
-    factor[list(HALVED_GATES[cell])] = 0.5
+    factor = np.repeat(HALVED, arrays[f"network.weight_hh_l{layer}"].shape[1])
 
     def scaled(name: str) -> Floats:
-        return np.ascontiguousarray(arrays[f"network.{name}_l{layer}"].T * factor.ravel())
+        return np.ascontiguousarray(arrays[f"network.{name}_l{layer}"].T * factor)
 
     return RecurrentLayer(scaled("weight_ih"), scaled("weight_hh"), scaled("bias_ih"), scaled("bias_hh"))
 
@@ -278,14 +231,15 @@ def _product(values: Floats, weights: Floats) -> Floats:
     return np.asarray(values.reshape(-1, len(weights)) @ weights).reshape(*values.shape[:-1], weights.shape[1])
 
 
-def _gru_frames(layer: RecurrentLayer, inputs: Floats, state: LayerState) -> Floats:
+def _frames(layer: RecurrentLayer, inputs: Floats, state: Floats) -> Floats:
     """(frames, 1 + directions, rows, hidden); `state` is brought to the last frame.
 
-    inputs : (frames, 1 + directions, rows, gates), W_in x + b_in; it is overwritten.
+    inputs : (frames, 1 + directions, rows, gates), W_in x + b_in; it is overwritten. state : (1 + directions, rows,
+    hidden) h.
     """
     hidden, result = layer.hidden, np.empty((*inputs.shape[:3], layer.hidden))
     gates = slice(None, 2 * hidden)  # r and z
-    h, back = state[0], np.empty(inputs.shape[1:])
+    h, back = state, np.empty(inputs.shape[1:])
     back_rows = back.reshape(-1, inputs.shape[3])
     for k, pre in enumerate(inputs):
         np.matmul(h.reshape(-1, hidden), layer.hidden_weights, out=back_rows)
@@ -309,34 +263,5 @@ def _gru_frames(layer: RecurrentLayer, inputs: Floats, state: LayerState) -> Flo
             dz += dn
             result[k, 1:] = dz + z * (h[1:] - dn)
         h = result[k]
-    state[0] = h.copy()
-    return result
-
-
-def _lstm_frames(layer: RecurrentLayer, inputs: Floats, state: LayerState) -> Floats:
-    """As _gru_frames, of an LSTM."""
-    hidden, result = layer.hidden, np.empty((*inputs.shape[:3], layer.hidden))
-    (h, c), back = state, np.empty(inputs.shape[1:])
-    back_rows = back.reshape(-1, inputs.shape[3])
-    sigmoid = np.ones((4, hidden))
-    sigmoid[list(HALVED_GATES["lstm"])] = 0.5
-    scale = sigmoid.ravel()
-    offset = np.where(scale < 1.0, 0.5, 0.0)
-    for k, pre in enumerate(inputs):
-        np.matmul(h.reshape(-1, hidden), layer.hidden_weights, out=back_rows)
-        pre += back
-        pre[0] += layer.hidden_bias
-        t = np.tanh(pre[0])
-        i, f, g, o = np.split(offset + scale * t, 4, axis=-1)
-        memory = np.empty_like(c)
-        memory[0] = f * c[0] + i * g
-        tanh_memory = np.tanh(memory[0])
-        result[k, 0] = o * tanh_memory
-        if len(pre) > 1:
-            pre[1:] *= scale * (1.0 - t * t)
-            di, df, dg, do = np.split(pre[1:], 4, axis=-1)
-            memory[1:] = f * c[1:] + df * c[0] + di * g + i * dg
-            result[k, 1:] = do * tanh_memory + (o * (1.0 - tanh_memory * tanh_memory)) * memory[1:]
-        h, c = result[k], memory
-    state[:] = [h.copy(), c]
+    state[:] = h
     return result

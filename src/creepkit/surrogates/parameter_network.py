@@ -10,7 +10,7 @@ from typing import TypeAlias
 import torch
 from torch import Tensor, nn
 
-from creepkit.surrogates.network_evaluation import RecurrentCell, SampleArrays, Weights
+from creepkit.surrogates.network_evaluation import SampleArrays, Weights
 
 SampleTensors: TypeAlias = dict[str, Tensor]
 """recipe.SampleArrays as tensors."""
@@ -81,8 +81,7 @@ LARGEST_LOG_EXCESS = 2.0
 class ParameterModule(nn.Module):
     """Standardised constants and series into recurrent layers, and a linear layer to standardised outputs.
 
-    Its samples are "constants" (n, C), NaN where a coefficient is off; "series" (n, frames, S); and "base" (n, frames)
-    where the first output is predicted as a correction, ln of the ratio, of that base.
+    Its samples are "constants" (n, C), NaN where a coefficient is off, and "series" (n, frames, S).
 
     deviation : (outputs,) of the training rows, in physical units. spread, floor, most : (...) scalars, the mean square
     of the training rows, the floor of the logarithm, and its greatest value.
@@ -97,24 +96,13 @@ class ParameterModule(nn.Module):
     floor: Tensor
     most: Tensor
 
-    def __init__(
-        self,
-        sizes: tuple[int, int, int],
-        hidden: int,
-        layers: int,
-        cell: RecurrentCell,
-        *,
-        logarithm: bool,
-        corrects_base: bool,
-    ) -> None:
+    def __init__(self, sizes: tuple[int, int, int], hidden: int, layers: int, *, logarithm: bool) -> None:
         super().__init__()
         constants, series, outputs = sizes
-        self.logarithm, self.corrects_base = logarithm or corrects_base, corrects_base
-        kind = nn.GRU if cell == "gru" else nn.LSTM
-        self.network = kind(constants + series + int(corrects_base), hidden, layers, batch_first=True)
+        self.logarithm = logarithm
+        self.network = nn.GRU(constants + series, hidden, layers, batch_first=True)
         self.head = nn.Linear(hidden, outputs)
-        self.constants, self.series = Standardisation(constants), Standardisation(series + int(corrects_base))
-        self.targets = Standardisation(outputs)
+        self.constants, self.series, self.targets = map(Standardisation, sizes)
         self.register_buffer("deviation", torch.ones(outputs, dtype=torch.float64))
         for name in ("spread", "floor", "most"):
             self.register_buffer(name, torch.ones((), dtype=torch.float64))
@@ -132,7 +120,7 @@ class ParameterModule(nn.Module):
         first = data[:, 0].abs()
         self.floor = (LOG_FLOOR * first[first > 0].median()) if (first > 0).any() else torch.ones(()).double()
         self.constants = Standardisation.from_rows(rows["constants"])
-        self.series = Standardisation.from_rows(self._series(rows))
+        self.series = Standardisation.from_rows(rows["series"])
         encoded = self._encoded(rows)
         self.targets = Standardisation.from_rows(encoded, mask)
         self.most = encoded[mask][:, 0].max().double() + LARGEST_LOG_EXCESS
@@ -140,30 +128,25 @@ class ParameterModule(nn.Module):
 
     def forward(self, batch: SampleTensors) -> Tensor:
         """(rows, frames, outputs) in physical units."""
-        return self.decoded(self.standardised_outputs(self.standardised_inputs(batch)), batch.get("base"))
+        return self.decoded(self.standardised_outputs(self.standardised_inputs(batch)))
 
     def standardised_inputs(self, batch: SampleTensors) -> Tensor:
         """(rows, frames, inputs) standardised; a coefficient that is off stands at zero."""
         constants = torch.nan_to_num(self.constants(batch["constants"]), nan=0.0)
-        series = self.series(self._series(batch))
+        series = self.series(batch["series"])
         return torch.cat([constants[:, None].expand(-1, series.shape[1], -1), series], dim=-1)
 
     def standardised_outputs(self, inputs: Tensor) -> Tensor:
         """(rows, frames, outputs) standardised, of inputs (rows, frames, inputs)."""
         return self.head(self.network(inputs)[0])  # type: ignore[no-any-return]
 
-    def decoded(self, raw: Tensor, base: Tensor | None) -> Tensor:
-        """Physical outputs (rows, frames, outputs) of standardised ones.
-
-        raw : (rows, frames, outputs). base : (rows, frames) what is corrected, or None.
-        """
+    def decoded(self, raw: Tensor) -> Tensor:
+        """Physical outputs (rows, frames, outputs) of standardised ones, raw (rows, frames, outputs)."""
         outputs = self.targets.inverse(raw)
         if not self.logarithm:
             return outputs
         first = torch.exp(torch.minimum(outputs[..., 0], self.most.to(raw.dtype)))
-        floor = self.floor.to(raw.dtype)
-        scale = 1.0 if base is None or not self.corrects_base else base + floor
-        return torch.cat([(scale * first - floor)[..., None], outputs[..., 1:]], dim=-1)
+        return torch.cat([(first - self.floor.to(raw.dtype))[..., None], outputs[..., 1:]], dim=-1)
 
     def loss(self, batch: SampleTensors) -> Tensor:
         """A number: see the class."""
@@ -172,7 +155,7 @@ class ParameterModule(nn.Module):
     def loss_and_outputs(self, batch: SampleTensors) -> tuple[Tensor, Tensor]:
         """The loss, a number, and the outputs (rows, frames, outputs)."""
         raw, mask = self.standardised_outputs(self.standardised_inputs(batch)), batch["mask"]
-        outputs, count = self.decoded(raw, batch.get("base")), mask.sum()
+        outputs, count = self.decoded(raw), mask.sum()
         errors = (outputs - batch["targets"]) / self.deviation.to(outputs.dtype)
         loss = _masked_squares(errors, mask) / (count * self.spread.to(outputs.dtype))
         if self.logarithm:
@@ -187,15 +170,7 @@ class ParameterModule(nn.Module):
             return targets
         floor = self.floor.to(targets.dtype)
         first = torch.log((targets[..., 0] + floor).clamp(min=1e-3 * float(floor)))
-        if self.corrects_base:
-            first = first - torch.log(batch["base"] + floor)
         return torch.cat([first[..., None], targets[..., 1:]], dim=-1)
-
-    def _series(self, batch: SampleTensors) -> Tensor:
-        if not self.corrects_base:
-            return batch["series"]
-        base = torch.log(batch["base"] + self.floor.to(batch["base"].dtype))
-        return torch.cat([batch["series"], base[..., None]], dim=-1)
 
 
 def _masked_squares(values: Tensor, mask: Tensor) -> Tensor:

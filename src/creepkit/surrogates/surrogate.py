@@ -37,13 +37,13 @@ from creepkit.records import (
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid, specimen_conditions
 from creepkit.surrogates.network_evaluation import SampleArrays, Weights
-from creepkit.surrogates.parameter_gru import ApplicabilityDomain, ParameterGru, SurrogateMetadata
-from creepkit.surrogates.parameter_inputs import (
+from creepkit.surrogates.parameter_gru import (
+    ApplicabilityDomain,
     LawInputs,
     LoadHistoryInputs,
-    base_model,
+    ParameterGru,
+    SurrogateMetadata,
     complete_parameters,
-    hold_last_value,
     zero_coefficients,
 )
 
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 SURROGATE = DocumentFormat(
     "creepkit-surrogate",
-    2,
+    3,
     FileKind("a surrogate", SurrogateError, "train again or take a copy", maximum_bytes=2**30),
     remedy="train again",
 )
@@ -295,16 +295,15 @@ class Surrogate(Predictor, Presentable, text="reports.surrogate:surrogate_text")
             return unpredicted(histories, self.outputs, len(theta), Status.OUTSIDE_CLASS, f"{reason}; {remedy}")
         theta = complete_parameters(self.metadata.law, law, theta)
         frames = prediction_frames(self.metadata.grid, histories)
-        inputs, law_inputs, based = self._history_inputs, self._law_inputs, self.recipe.base != "none"
+        inputs, law_inputs = self._history_inputs, self._law_inputs
         tests = [*zip(histories, frames, strict=True)]
         query = NetworkQuery.of_tests(inputs, law_inputs.input_rows(theta), tests, nuisances)
         directions = None
-        if sensitivities and not based:
+        if sensitivities:
             positions = [self.metadata.law.names.index(name) for name in law.names]
             directions = query.directions(law_inputs.derivatives(theta)[:, :, positions])
-        base = self._base(theta, tests, nuisances) if based else None
         series = np.stack([inputs.series_values(*test) for test in tests])
-        rows, row_derivatives = self.network.outputs_with_derivatives(query.rows, series, base, directions)
+        rows, row_derivatives = self.network.outputs_with_derivatives(query.rows, series, directions)
         shape = query.constants.shape[:2]
         outputs, derivatives = (v.reshape(*shape, *v.shape[1:]) for v in (rows, row_derivatives))
         outside = self.metadata.domain.outside(query.domain)
@@ -319,8 +318,7 @@ class Surrogate(Predictor, Presentable, text="reports.surrogate:surrogate_text")
 
     def predict_samples(self, samples: SampleArrays) -> Floats:
         """(rows, frames, outputs) of the network for samples of its recipe, in physical units."""
-        arrays = {name: np.asarray(samples[name], float) for name in ("constants", "series", "base") if name in samples}
-        return self.network.outputs(arrays["constants"], arrays["series"], arrays.get("base"))
+        return self.network.outputs(*(np.asarray(samples[name], float) for name in ("constants", "series")))
 
     @property
     def weight_count(self) -> int:
@@ -357,8 +355,6 @@ class Surrogate(Predictor, Presentable, text="reports.surrogate:surrogate_text")
     def __repr__(self) -> str:
         return f"<Surrogate: {self.title}>"
 
-    # ---- inputs of the network ----------------------------------------------------------------------------------
-
     @cached_property
     def _history_inputs(self) -> LoadHistoryInputs:
         return self.recipe.history_inputs(self.specimen, self.metadata.conditions, self.metadata.grid.relative)
@@ -366,16 +362,6 @@ class Surrogate(Predictor, Presentable, text="reports.surrogate:surrogate_text")
     @cached_property
     def _law_inputs(self) -> LawInputs:
         return LawInputs(self.metadata.law)
-
-    def _base(self, theta: Floats, tests: Sequence[tuple[History, Floats]], nuisances: NuisanceValues) -> Floats:
-        """(candidates x tests, frames) what the model that is corrected predicts of the first output."""
-        planned = [history.replace(times=times, outputs={}, standard_deviation={}) for history, times in tests]
-        model = base_model(self.specimen, self.recipe.base)
-        prediction = model.predict(self.metadata.law, theta, planned, nuisances=nuisances)
-        values = prediction.values[..., prediction.outputs.index(self.outputs[0])]
-        return hold_last_value(values).reshape(-1, values.shape[-1])
-
-    # ---- outputs ---------------------------------------------------------------------------------------------------
 
     def _history_prediction(
         self, history: History, frames: Floats, outputs: Floats, derivatives: Floats | None, nuisances: tuple[str, ...]

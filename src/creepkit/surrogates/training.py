@@ -27,6 +27,7 @@ from creepkit.dataset.storage import read_dataset
 from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import as_read_back
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
+from creepkit.jobs.progress import ProgressCallback
 from creepkit.surrogates.evaluation import (
     dataset_fingerprint,
     evaluate_rows,
@@ -34,8 +35,8 @@ from creepkit.surrogates.evaluation import (
     trainable_samples,
     training_split,
 )
-from creepkit.surrogates.network_evaluation import RecurrentCell, SampleArrays, Weights
-from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru, ProgressCallback, Training
+from creepkit.surrogates.network_evaluation import SampleArrays, Weights
+from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru, Training
 from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors, sample_tensors, weights_of
 from creepkit.surrogates.surrogate import CHECKPOINT, Surrogate, load_surrogate
 
@@ -331,12 +332,11 @@ def _device(name: str) -> torch.device:
 class SizeStudyResult:
     """One training of a sweep.
 
-    cell, hidden, layers, samples : what was varied; samples are those learnt from.
+    hidden, layers, samples : what was varied; samples are those learnt from.
     weight_count : numbers that were fitted. loss : Eq. (4) of the validation rows at the best epoch.
     training : the loss of the training rows in that epoch. outputs : {output: its RSE}. losses : Eq. (4) of each epoch.
     """
 
-    cell: RecurrentCell
     hidden: int
     layers: int
     samples: int
@@ -348,11 +348,6 @@ class SizeStudyResult:
     outputs: dict[str, float]
     losses: tuple[float, ...]
     file: str
-
-    @property
-    def label(self) -> str:
-        """In words."""
-        return f"{self.cell} {self.hidden} x {self.layers}, {self.samples} samples"
 
 
 def size_study(
@@ -376,12 +371,12 @@ def size_study(
     training_split(len(data), replace(recipe.training, samples=max(counts)), seed)
     folder.mkdir(parents=True, exist_ok=True)
     widths = sizes.layers or (recipe.layers,), sizes.hidden or (recipe.hidden,)
-    combinations = list(product(sizes.cells or (recipe.cell,), *widths, counts))
+    combinations = list(product(*widths, counts))
     results = []
-    for k, (cell, layers, hidden, count) in enumerate(combinations):
+    for k, (layers, hidden, count) in enumerate(combinations):
         training = replace(recipe.training, samples=count)
-        variant = replace(recipe, cell=cell, layers=layers, hidden=hidden, training=training)
-        path = folder / f"{cell}-{hidden}x{layers}-{count}.safetensors"
+        variant = replace(recipe, layers=layers, hidden=hidden, training=training)
+        path = folder / f"gru-{hidden}x{layers}-{count}.safetensors"
         named_progress = _with_task_name(progress, f"{k + 1} of {len(combinations)}, {path.stem}")
         model = train(data, variant, to=path, seed=seed, device=device, progress=named_progress)
         results.append(_study_result(model, variant, count, path))
@@ -398,7 +393,6 @@ def _study_result(model: Surrogate, recipe: ParameterGru, count: int, path: Path
     metadata, provenance = model.metadata, model.metadata.provenance
     best = int(provenance["best_epoch"])
     return SizeStudyResult(
-        cell=recipe.cell,
         hidden=recipe.hidden,
         layers=recipe.layers,
         samples=count,

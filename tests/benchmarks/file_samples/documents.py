@@ -14,7 +14,7 @@ from file_samples.samples import ReaderSample
 import creepkit as ck
 from creepkit.cli.shared import read_law_file
 from creepkit.errors import SurrogateError
-from creepkit.fem.mesh_files import read_input_deck, read_mesh
+from creepkit.fem.mesh_files import read_mesh
 from creepkit.files.json_documents import DocumentFormat
 from creepkit.files.reading import FileKind
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
@@ -45,12 +45,6 @@ target = "latex"
 NODES = "id,r_mm,z_mm\n1,0.0,0.0\n2,1.5,0.0\n3,1.5,1.25\n4,0.0,1.25\n5,3.0,0.0\n6,3.0,1.25\n"
 ELEMENTS = "id,n1,n2,n3,n4\n1,1,2,3,4\n2,2,5,6,3\n"
 SETS = '{"encastre": [5, 6],\n "top": [3, 4, 6],\n "pressure_face_S1": [1, 2]}\n'
-DECK = (
-    "*HEADING\nplate\n*NODE, NSET=ALL\n"
-    "1, 0.0, 0.0\n2, 1.5, 0.0\n3, 1.5, 1.25\n4, 0.0, 1.25\n5, 3.0, 0.0\n6, 3.0, 1.25\n"
-    "*ELEMENT, TYPE=CAX4, ELSET=BODY\n1, 1, 2, 3, 4\n2, 2, 5, 6, 3\n*NSET, NSET=TOP\n3, 4, 6\n"
-    "*SURFACE, NAME=FACE\nBODY, S1\n*BOUNDARY\n5, 1, 2\n6, 1, 2\n*DSLOAD\nFACE, P, 1.0\n"
-)
 WEIGHTS = DocumentFormat("creepkit-sample", 1, FileKind("a sample", SurrogateError, "make it again"), "make it again")
 
 
@@ -107,5 +101,3 @@ def samples() -> Iterator[ReaderSample]:
         others = {name: content for name, content in mesh.items() if name != file}
         sample = document(f"mesh {file}", file, mesh[file], read_sets, keys_of, others)
         yield ReaderSample(**{**sample.__dict__, "reader": "mesh"})
-    deck = document("deck", "x.inp", DECK.encode(), read_input_deck, "NODE ELEMENT BOUNDARY")
-    yield ReaderSample(**{**deck.__dict__, "repeated": (), "misspelt": ()})

@@ -47,7 +47,6 @@ def make(folder: Path) -> None:
     identified(groups, folder)
     planned(folder)
     ck.rupture(rupture_tests(), "larson-miller").save(folder / "rupture_assessment.json")
-    screened(groups[1073.15], folder)
     locked(folder)
 
 
@@ -100,13 +99,6 @@ def rupture_tests() -> list[ck.History]:
             load = ck.constant_stress(stress)
             tests.append(ck.History(name, np.zeros(1), {}, load, T, rupture_time=3600.0 * life))
     return tests
-
-
-def screened(tests: list[ck.History], folder: Path) -> None:
-    """A plate of one alloy."""
-    options = ck.ScreeningOptions(dense=None, confirm=False)
-    alloy = [replace(test, alloy="A") for test in tests]
-    ck.screen(alloy, ["norton"], options=options, workers=1).to_hdf5(folder / "plate.h5")
 
 
 def locked(folder: Path) -> None:

@@ -41,22 +41,21 @@ def test_train_writes_a_surrogate_and_its_pictures(file: Path, tmp_path: Path) -
 
 
 def test_a_sweep_is_a_table_and_is_not_redone(file: Path, tmp_path: Path) -> None:
-    sizes = "--layers 1 --hidden 4,6 --cells gru,lstm --samples 20,48"
+    sizes = "--layers 1 --hidden 4,6 --samples 20,48"
     words = f"surrogate sweep {file} --to {tmp_path} {sizes} --epochs 2 --json"
     first = creepkit(words)
     assert first.exit_code == 0, first.output
     found = json.loads(first.stdout)["trainings"]
-    trained = {(e["cell"], e["hidden"], e["layers"], e["samples"]) for e in found}
-    assert trained == {(c, h, 1, n) for c in ("gru", "lstm") for h in (4, 6) for n in (20, 48)}
-    gru = next(e for e in found if (e["cell"], e["hidden"]) == ("gru", 4))
+    assert {(e["hidden"], e["layers"], e["samples"]) for e in found} == {(h, 1, n) for h in (4, 6) for n in (20, 48)}
+    gru = next(e for e in found if e["hidden"] == 4)
     # 3 gates of (4 + 4 + 2) x 4 numbers for log10 A, n, off and the load, and a head of 4 + 1
     assert gru["weight_count"] == 3 * 4 * (4 + 4 + 2) + 5
     stamps = {p: p.stat().st_mtime_ns for p in tmp_path.glob("*.safetensors")}
-    assert len(stamps) == 8
+    assert len(stamps) == 4
     (tmp_path / "gru-4x1-20.safetensors").unlink()
     again = creepkit(words)
     assert json.loads(again.stdout)["trainings"] == found
-    assert sum(p.stat().st_mtime_ns == stamp for p, stamp in stamps.items()) == 7
+    assert sum(p.stat().st_mtime_ns == stamp for p, stamp in stamps.items()) == 3
 
 
 def test_a_sweep_judges_every_number_of_samples_by_the_same_rows(tmp_path: Path) -> None:
@@ -75,7 +74,7 @@ def test_what_cannot_be_is_one_line(file: Path, tmp_path: Path) -> None:
     train, sweep, to = "surrogate train", "surrogate sweep", tmp_path / "m.safetensors"
     missing = "there are not 900 samples to learn from: the data set has 60 accepted ones, of which 12"
     table = [
-        (f"{train} {file} --to {to} --cell rnn", "--cell rnn is not known; write gru|lstm"),
+        (f"{train} {file} --to {to} --target sqrt", "--target sqrt is not known; write value|log"),
         (f"{train} {to} --to {to}", "no such"),
         (f"{sweep} {file} --to {to} --hidden '64;128'", "--hidden 64;128 is not known; write INTEGER,..."),
         (f"{sweep} {file} --to {to} --samples 900", missing),

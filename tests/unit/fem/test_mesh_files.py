@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from creepkit.errors import SolveError
-from creepkit.fem.mesh import Mesh, discretize, half_bandwidth
-from creepkit.fem.mesh_builder import renumbered
-from creepkit.fem.mesh_files import read_input_deck, read_mesh
+from creepkit.fem.finite_element_model import finite_element_model
+from creepkit.fem.mesh import Mesh, discretize, half_bandwidth, renumbered
+from creepkit.fem.mesh_files import read_mesh
 from creepkit.specimens.bulge.geometry import DimpleGeometry
+from helpers.decks import mesh_of_deck
 from helpers.fem_cases import mesh_quality
 from helpers.paths import SHARED, needs_shared_data
 
@@ -30,56 +31,12 @@ QUADS = "id,n1,n2,n3,n4\n1,1,2,5,4\n2,2,5,6,3\n"
 
 SETS = {"top": [4, 5, 6], "encastre": [3, 6], "pressure_face_S1": [1], "pressure_face_S4": [2]}
 
-DECK = """** two squares, one of them in capitals
-*Node, nset=ALL
- 1, 0., 0.
- 2, 1., 0., 0.
- 3, 2., 0.
-*NODE
- 4, 0., 1.0d0
- 5, 1., 1.
- 6, 2., 1.
-*Element, type=CAX4R, elset=Squares
- 1, 1, 2, 5, 4
- 2, 2, 5,
- 6, 3
-*Nset, nset=TOP, generate
- 4, 6, 1
-*Nset, nset=Wall
- 3, 6
-*Elset, elset=_Low_S1, internal
- 1
-*Elset, elset=_Low_S4, internal
- 2
-*Surface, type=ELEMENT,
-  name=Low
- _Low_S1, S1
- _Low_S4, S4
-*Boundary
- Part-1.Wall, ENCASTRE
- 1, 1
-*Material, name=M
-*Elastic
- 150000., 0.3
-*Step, nlgeom
-*Visco, cetol=1e-4
- 1., 100.
-*Dsload
- Low, P, 8.
-*End step
-"""
-
 
 def write(folder: Path, nodes: str = NODES, quads: str = QUADS, **sets: list) -> Mesh:
     (folder / "nodes.csv").write_text(nodes)
     (folder / "quads.csv").write_text(quads)
     (folder / "sets.json").write_text(json.dumps(SETS | sets))
     return read_mesh(folder / "nodes.csv", folder / "quads.csv", folder / "sets.json")
-
-
-def deck(folder: Path, text: str, **options) -> Mesh:
-    (folder / "mesh.inp").write_text(text)
-    return read_input_deck(folder / "mesh.inp", **options)
 
 
 def push(mesh: Mesh) -> np.ndarray:
@@ -113,8 +70,8 @@ def test_the_mesh_of_the_paper():
 
 @needs_shared_data
 @pytest.mark.parametrize("name", ["dabi_timehardening.inp", "dabi_norton_in625_800C_steady.inp"])
-def test_decks_of_calculix(name):
-    mesh = read_input_deck(DATA / "benchmarks" / "dabi_ccx" / name)
+def test_decks_of_calculix(name, tmp_path):
+    mesh = mesh_of_deck(DATA / "benchmarks" / "dabi_ccx" / name, tmp_path)
     assert (len(mesh.elements), len(mesh.nodes), len(mesh.pressed), len(mesh.top)) == (174, 613, 35, 61)
     area = (discretize(mesh).weights / discretize(mesh).points[..., 0]).sum()
     assert area == pytest.approx(10 * 4 - 7.5 * 2 - np.pi / 4 * 7.5 * 1.5, rel=1e-5)
@@ -125,20 +82,8 @@ def test_decks_of_calculix(name):
 
 
 def test_tables_become_a_mesh_of_eight_node_elements(tmp_path):
-    check(write(tmp_path))
-
-
-@pytest.mark.parametrize("pressed", [None, "low"])
-def test_a_deck_becomes_the_same_mesh(tmp_path, pressed):
-    check(deck(tmp_path, DECK, pressed=pressed))
-
-
-def test_a_deck_may_press_elements_one_by_one(tmp_path):
-    check(deck(tmp_path, DECK.replace("*Dsload\n Low, P, 8.", "*DLOAD\n1, P1, 1.\n_Low_S4, P4, 1.")))
-
-
-def check(mesh: Mesh) -> None:
     """Two squares, pressed from below, held at r = 2."""
+    mesh = write(tmp_path)
     assert (len(mesh.elements), len(mesh.nodes)) == (2, 13)
     np.testing.assert_allclose(mesh_quality(mesh).sine, 1.0)
     np.testing.assert_allclose(push(mesh), [0.0, 2.0], atol=1e-15)
@@ -171,30 +116,23 @@ def test_renumbering_keeps_the_mesh_and_never_widens_its_bandwidth():
 
 
 WRONG = [
-    ("CAX4R", "CPE4", "10: element type CPE4 is not supported; allowed are CAX4, CAX4R, CAX8, CAX8R"),
-    (" 2, 2, 5,\n 6, 3", " 2, 2, 5, 6", "12: an element CAX4R has a number and 4 nodes, found 4 cells"),
-    (" 1, 1, 2, 5, 4", " 1, 1, 2, 5, 9", "11: element 1 names node 9, which is not among the nodes"),
-    (" 1, 1, 2,", " 2, 1, 2,", "13: element 2 was already given in mesh.inp:11; keep one of them"),
-    ("nset=TOP", "nset=TIP", " there is no node set 'top'; did you mean 'TIP'? (known: ALL, TIP, WALL)"),
-    ("_Low_S1, S1", "_Low_S1, S5", "24: 'S5' is no side of a quadrilateral; allowed are S1 to S4"),
-    ("l, ENCASTRE", "l, 1, 2, 0.5", "27: a motion of 0.5 mm is prescribed; only nodes at rest are read, with 0"),
-    (" 3, 6\n", " 3, 60\n", "17: there is no node 60; name one of the 6 nodes given before"),
-    (" Low, P", " Lower, P", "36: there is no surface 'Lower'; did you mean 'LOW'? (known: LOW)"),
-    ("*Dsload", "*Load", " the mesh has no pressed side; say which sides of which elements are pressed"),
-    (
-        "*Node, nset",
-        "*Include, input=a.inp\n*Node, nset",
-        "2: *INCLUDE is not followed; put the included lines into mesh.inp",
-    ),
-    ("** two", "1, 2\n** two", "1: data before any keyword; an input deck begins with a line such as *NODE"),
-    ("*Nset, nset=Wall", "*Nset", "16: *NSET has no NSET; write *NSET, NSET=..."),
+    ("nodes.csv", "6,2,1", "5,2,1", "7: '5, 2, 1' is no row; write a whole number from 1 on that no other row has"),
+    ("nodes.csv", "6,2,1", "6,2", "7: '6, 2' is no row; write a whole number"),
+    ("nodes.csv", "r_mm", "r", "1: missing column 'r_mm'; found: id, r, z_mm"),
+    ("quads.csv", "2,5,4", "2,5,9", " element 1 names node 9, which is not among the nodes"),
+    ("quads.csv", "2,2,5,6,3", "2,2,6,5,3", "element 1 of the mesh, near r = 1.5 mm, z = 0.5 mm, is inverted"),
+    ("sets.json", "[4, 5, 6]", "[4, 6]", " the nodes of the top are not one line of element sides from the axis"),
+    ("sets.json", "[4, 5, 6]", "4", " set 'top' is not a list of node numbers; write one such as [1, 6, 147]"),
+    ("sets.json", "encastre", "encaster", " there is no set 'encastre'; did you mean 'encaster'?"),
+    ("sets.json", "[3, 6]", "[3, 60]", " set 'encastre' names node 60, which is not among the nodes"),
+    ("sets.json", "_face_", "_side_", " the mesh has no pressed side; say by a set which are"),
 ]
 
 
-def test_what_is_wrong_in_decks(tmp_path, monkeypatch):
+def test_what_is_wrong_in_tables(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for old, new, message in WRONG:
-        assert old in DECK
-        Path("mesh.inp").write_text(DECK.replace(old, new))
-        with pytest.raises(SolveError, match=f"^{re.escape('mesh.inp:' + message)}$"):
-            read_input_deck("mesh.inp")
+    for file, old, new, message in WRONG:
+        write(tmp_path)
+        Path(file).write_text(Path(file).read_text().replace(old, new))
+        with pytest.raises(SolveError, match=re.escape(message)):
+            finite_element_model(read_mesh("nodes.csv", "quads.csv", "sets.json"))

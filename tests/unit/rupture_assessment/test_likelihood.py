@@ -3,25 +3,23 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.stats import gumbel_l, multivariate_normal, norm, t
+from scipy.stats import multivariate_normal, norm
 
 from creepkit.rupture_assessment.fitting import GroupedTimes, conditions_of, fit_method
 from creepkit.rupture_assessment.methods import METHODS, RuptureMethod
 from creepkit.rupture_assessment.observed_tests import rupture_tests
-from creepkit.rupture_assessment.rupture_fit import WeibullLogTime, variance_freedom
+from creepkit.rupture_assessment.rupture_fit import variance_freedom
 from helpers.planted_rupture import MOTORETTES, larson_miller, planted, rupture_test
-
-LN10 = np.log(10.0)
 
 
 def unknown(temperature):
     return np.full(np.shape(temperature), np.nan)
 
 
-def fitted(method, histories, degree=2, distribution="lognormal", **fixed):
+def fitted(method, histories, degree=2, **fixed):
     tests, _, _ = rupture_tests(histories)
     at = conditions_of(tests, unknown)
-    return fit_method(method, tests, at, degree=degree, distribution=distribution, fixed=fixed, level=0.95), tests
+    return fit_method(method, tests, at, degree=degree, fixed=fixed, level=0.95), tests
 
 
 def test_without_heats_and_run_outs_it_is_least_squares():
@@ -68,7 +66,7 @@ def test_effects_of_complete_data_integrate_to_a_normal_distribution(kinds):
     groups = {"heat": [f"H{k}" for k in rng.integers(0, 5, n)], "laboratory": [f"L{k}" for k in rng.integers(0, 3, n)]}
     chosen = dict(list(groups.items())[:kinds])
     y, mean, scatter = rng.normal(2.0, 0.5, n), rng.normal(2.0, 0.1, n), np.array([0.3, 0.15])[:kinds]
-    times = GroupedTimes.of(y, np.zeros(n, bool), chosen, "lognormal")
+    times = GroupedTimes.of(y, np.zeros(n, bool), chosen)
     covariance = 0.2**2 * np.eye(n) + sum(
         s**2 * members @ members.T for s, members in zip(scatter, times.members, strict=True)
     )
@@ -76,16 +74,13 @@ def test_effects_of_complete_data_integrate_to_a_normal_distribution(kinds):
     assert value == pytest.approx(multivariate_normal(mean, covariance).logpdf(y), abs=1e-9)
 
 
-@pytest.mark.parametrize("distribution", ["lognormal", "weibull"])
-def test_effects_of_run_outs_are_integrated(distribution):
+def test_effects_of_run_outs_are_integrated():
     y, censored = np.array([2.0, 2.2, 2.4, 2.4, 2.1, 2.5]), np.array([0, 0, 1, 1, 1, 1], bool)
     heats, mean, s, tau = ["a", "a", "a", "a", "b", "b"], np.linspace(1.9, 2.5, 6), 0.12, 0.25
-    times = GroupedTimes.of(y, censored, {"heat": heats}, distribution)
+    times = GroupedTimes.of(y, censored, {"heat": heats})
 
     def density(b, k):
         z = (y[k] - mean[k] - b) / s
-        if distribution == "weibull":
-            return np.exp(-np.exp(z)) * (1.0 if censored[k] else np.exp(z) / s)
         return norm.sf(z) if censored[k] else norm.pdf(z) / s
 
     expected = 0.0
@@ -120,19 +115,9 @@ def test_motorettes_with_a_normal_distribution():
     assert fit.scale == pytest.approx(0.2592, abs=5e-5)
 
 
-def test_motorettes_with_a_weibull_distribution():
-    """ln h = 16.3185 - 0.0453 T, scale 0.334, log-likelihood -147.4 (Venables, Ripley (2002), MASS, 13.2)."""
-    fit, tests = fitted(*motorettes(lambda T: T - 273.2), distribution="weibull")
-    assert LN10 * fit["b_0"].value == pytest.approx(16.3185, abs=5e-5)
-    assert LN10 * fit["b_1"].value == pytest.approx(-0.0453, abs=5e-5)
-    assert LN10 * fit.scale == pytest.approx(0.334, abs=5e-4)
-    in_hours = fit.log_likelihood - np.log(10.0 ** tests.log_time[~tests.censored] * LN10).sum()
-    assert in_hours == pytest.approx(-147.4, abs=0.05)
-
-
 # ---- degrees of freedom ----------------------------------------------------------------------------------------------
 
-# Degrees of freedom of balanced tests are those of an analysis of variance; Weibull bounds tend to closed forms.
+# Degrees of freedom of balanced tests are those of an analysis of variance.
 
 
 HEATS, EACH = 6, 8
@@ -153,13 +138,3 @@ def test_without_heats_it_is_tests_less_constants():
     columns = np.random.default_rng(0).standard_normal((20, 3))
     freedom = variance_freedom(columns, [], 0.04, [])
     np.testing.assert_allclose(freedom.of(np.eye(3), within=True), 17.0)
-
-
-def test_weibull_bounds_between_the_extreme_value_and_student():
-    one = np.ones(1)
-    certain = WeibullLogTime(2.0 * one, 1e-6 * one, 0.1, 1e6 * one)
-    for p in (0.025, 0.975):
-        expected = 2.0 + 0.1 * (gumbel_l.ppf(p) - gumbel_l.ppf(0.5))
-        assert certain.quantile(p)[0] == pytest.approx(expected, abs=1e-3)
-    uncertain = WeibullLogTime(2.0 * one, 0.2 * one, 0.01, 5.0 * one)
-    assert uncertain.quantile(0.975)[0] == pytest.approx(2.0 + 0.2 * t.ppf(0.975, 5), abs=5e-3)

@@ -10,7 +10,6 @@ from scipy.stats import t as student
 import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.rupture_assessment.checks import physical_realism
-from creepkit.rupture_assessment.fitting import GroupedTimes, _shared_tests
 from creepkit.rupture_assessment.observed_tests import rupture_tests
 from creepkit.rupture_assessment.strength import _bound
 from helpers.mistakes import said_otherwise
@@ -273,18 +272,6 @@ def test_times_beyond_a_double_are_infinite() -> None:
     assert found.rupture_time(1e-3, 20.0) == (np.inf, np.inf, np.inf)
     with pytest.raises(FitError, match="give MPa above zero"):
         found.rupture_time(0.0, 900.0)
-
-
-def test_pairs_of_levels_that_share_tests() -> None:
-    """The Hessian of effects of heats and laboratories against the product of matrices."""
-    rng = np.random.default_rng(0)
-    groups = {"heat": rng.integers(0, 7, 40).astype(str), "laboratory": rng.integers(0, 3, 40).astype(str)}
-    members = np.column_stack(GroupedTimes.of(np.zeros(40), np.zeros(40, bool), groups, "lognormal").members)
-    weights = rng.uniform(size=(5, 40))
-    first, second, order, starts = _shared_tests(members)
-    found = np.zeros((5, members.shape[1], members.shape[1]))
-    found[:, first, second] = np.add.reduceat(weights[:, order], starts, axis=1)
-    np.testing.assert_allclose(found, np.einsum("ml,cm,mk->clk", members, weights, members), atol=1e-12)
 
 
 # ---- strength bounds -------------------------------------------------------------------------------------------------

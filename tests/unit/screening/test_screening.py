@@ -3,7 +3,6 @@
 import csv
 import dataclasses
 
-import h5py
 import numpy as np
 import pytest
 
@@ -15,8 +14,8 @@ from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.readers.history_csv import write_history
 from creepkit.records import PressureJump
-from creepkit.screening import files
 from creepkit.screening.alloys import Alloy, Compositions, atomic_percent, check_tests, limitations, read_compositions
+from creepkit.screening.results import read_result, write_result
 from creepkit.screening.screen import ScreeningOptions, screen
 from creepkit.specimens.bulge.outputs import profile_displacement
 from helpers.narrow_predictor import Narrow
@@ -53,17 +52,6 @@ def test_shares_of_laws_go_by_class_and_add_up_to_one(plate):
     assert list(plate.by_class()) == ["Fe-rich", "near-equimolar"]
     assert [sum(share.values()) for share in plate.law_fractions().values()] == pytest.approx([1.0, 1.0])
     assert plate.law_fractions()["Fe-rich"]["norton"] == pytest.approx(plate["X"].laws[0].weight)
-
-
-def test_the_numbers_file_holds_tests_and_covariances(plate, tmp_path):
-    with h5py.File(plate.to_hdf5(tmp_path / "plate.h5")) as file:
-        first = file["alloys/0000"]
-        assert dict(file.attrs) == {"format": "creepkit-plate", "layout": 1, "units": "MPa, mm, s, K"}
-        assert (first.attrs["alloy"], first.attrs["law"]) == ("X", "norton")
-        np.testing.assert_array_equal(first["laws/0/covariance"], plate["X"].best.covariance)
-        measured, predicted = (first[f"tests/0/{kind}/strain"][:] for kind in ("measured", "predicted"))
-        np.testing.assert_array_equal(measured, TWO[0].outputs["strain"])
-        np.testing.assert_allclose(predicted, measured, rtol=0.2)
 
 
 def test_a_confirmation_that_fails_is_a_note_and_no_failure(monkeypatch):
@@ -109,7 +97,7 @@ def test_laws_outside_the_class_of_a_surrogate_are_the_specimens_own():
 
 def test_an_answer_is_read_back_as_it_was(plate, tmp_path):
     answer = plate["X"]
-    found = files.read_result(files.write_result(answer, tmp_path / "X.json"))
+    found = read_result(write_result(answer, tmp_path / "X.json"))
     for field in ("alloy", "verdict", "notes", "failed_laws", "equivalents", "cpu_seconds", "confirmation"):
         assert getattr(found, field) == getattr(answer, field)
     assert found.best.values == answer.best.values

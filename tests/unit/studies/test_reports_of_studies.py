@@ -156,7 +156,7 @@ def test_a_forged_report_writes_nothing_outside_its_folder_or_inside(
     assert not Path("/stolen.csv").exists()
 
 
-@pytest.mark.parametrize("name", ["data", "one.csv", "study.lock", "STUDY.toml", "-rf", "con.py", ".law.py", "~law.py"])
+@pytest.mark.parametrize("name", ["data", "one.csv", "study.lock", "STUDY.toml", "-rf", ".law.py", "~law.py"])
 def test_exports_replace_neither_data_nor_the_study(small_study: Path, name: str) -> None:
     if name == "one.csv":
         (small_study.parent / "data" / "one.csv").rename(small_study.parent / "one.csv")

@@ -21,19 +21,19 @@ FRAMES = 2 * FRAMES_IN_BLOCK + 3
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
-def module_of(cell: str, *, logarithm: bool = False, corrects_base: bool = False) -> ParameterModule:
+def module_of(*, logarithm: bool = False) -> ParameterModule:
     """A network of torch in float64 with scales that are not trivial."""
     torch.manual_seed(0)
-    module = ParameterModule(SIZES, HIDDEN, LAYERS, cell, logarithm=logarithm, corrects_base=corrects_base).double()
+    module = ParameterModule(SIZES, HIDDEN, LAYERS, logarithm=logarithm).double()
     for scale in (module.constants, module.series, module.targets):
         scale.mean, scale.deviation = torch.randn_like(scale.mean), 0.5 + torch.rand_like(scale.mean)
     module.floor, module.most = torch.tensor(0.02).double(), torch.tensor(9.0).double()
     return module
 
 
-def network_of(module: ParameterModule, cell: str, **how: bool) -> ParameterNetwork:
-    how = {"logarithm": False, "corrects_base": False, **how}
-    return ParameterNetwork.from_weights(weights_of(module.state_dict()), SIZES, (cell, HIDDEN, LAYERS), **how)
+def network_of(module: ParameterModule) -> ParameterNetwork:
+    weights = weights_of(module.state_dict())
+    return ParameterNetwork.from_weights(weights, SIZES, (HIDDEN, LAYERS), logarithm=module.logarithm)
 
 
 def inputs(rows: int, tests: int) -> tuple[np.ndarray, np.ndarray]:
@@ -41,21 +41,20 @@ def inputs(rows: int, tests: int) -> tuple[np.ndarray, np.ndarray]:
     return rng.normal(size=(rows, CONSTANTS)), rng.normal(size=(tests, FRAMES, SERIES))
 
 
-def by_torch(module: ParameterModule, constants: torch.Tensor, series: np.ndarray, **base: torch.Tensor):
+def by_torch(module: ParameterModule, constants: torch.Tensor, series: np.ndarray):
     repeated = torch.from_numpy(np.tile(series, (len(constants) // len(series), 1, 1)))
-    return module({"constants": constants, "series": repeated, **base})
+    return module({"constants": constants, "series": repeated})
 
 
-@pytest.mark.parametrize("cell", ["gru", "lstm"])
 @pytest.mark.parametrize("logarithm", [False, True])
-def test_values_and_derivatives_are_those_of_torch(cell: str, logarithm: bool) -> None:
-    module = module_of(cell, logarithm=logarithm)
+def test_values_and_derivatives_are_those_of_torch(logarithm: bool) -> None:
+    module = module_of(logarithm=logarithm)
     constants, series = inputs(6, 2)
     directions = np.random.default_rng(2).normal(size=(6, 7, CONSTANTS))
     if logarithm:  # a bound that half of the outputs exceed
-        median = np.median(network_of(module, cell, logarithm=True).outputs(constants, series)[..., 0])
+        median = np.median(network_of(module).outputs(constants, series)[..., 0])
         module.most = torch.tensor(np.log(median + 0.02))
-    network = network_of(module, cell, logarithm=logarithm)
+    network = network_of(module)
     values, slopes = network.outputs_with_derivatives(constants, series, directions=directions)
 
     def along(moved: torch.Tensor) -> torch.Tensor:
@@ -73,38 +72,26 @@ def test_values_and_derivatives_are_those_of_torch(cell: str, logarithm: bool) -
 
 @pytest.mark.parametrize("rows", [1, 600])
 def test_batches_of_rows_are_one(rows: int) -> None:
-    module = module_of("gru")
+    module = module_of()
     constants, series = inputs(2 * rows, 2)
-    values = network_of(module, "gru").outputs(constants, series)
+    values = network_of(module).outputs(constants, series)
     with torch.no_grad():
         assert values == pytest.approx(by_torch(module, torch.from_numpy(constants), series).numpy(), rel=1e-10)
 
 
 def test_a_coefficient_that_is_off_stands_at_zero_and_does_not_move() -> None:
-    module, (constants, series) = module_of("gru"), inputs(2, 1)
+    module, (constants, series) = module_of(), inputs(2, 1)
     constants[1, 0] = np.nan
     with torch.no_grad():
         exact = by_torch(module, torch.from_numpy(constants), series).numpy()
-    assert network_of(module, "gru").outputs(constants, series) == pytest.approx(exact, rel=1e-11)
-
-
-def test_a_base_is_corrected_and_has_no_derivatives() -> None:
-    module, (constants, series) = module_of("lstm", corrects_base=True), inputs(4, 2)
-    network, base = network_of(module, "lstm", corrects_base=True), np.random.default_rng(3).random((4, FRAMES))
-    with torch.no_grad():
-        exact = by_torch(module, torch.from_numpy(constants), series, base=torch.from_numpy(base)).numpy()
-    assert network.outputs(constants, series, base) == pytest.approx(exact, rel=1e-11)
-    with pytest.raises(SurrogateError, match="left to differences"):
-        network.outputs_with_derivatives(constants, series, base, np.zeros((4, 1, CONSTANTS)))
+    assert network_of(module).outputs(constants, series) == pytest.approx(exact, rel=1e-11)
 
 
 def test_weights_of_another_network_are_refused() -> None:
-    weights = dict(weights_of(module_of("gru").state_dict()))
+    weights = dict(weights_of(module_of().state_dict()))
     for other in ({**weights, "head.bias": np.zeros(2)}, {**weights, "more": np.zeros(1)}):
         with pytest.raises(SurrogateError, match="do not belong together"):
-            ParameterNetwork.from_weights(other, SIZES, ("gru", HIDDEN, LAYERS), logarithm=False, corrects_base=False)
-    with pytest.raises(SurrogateError, match="do not belong together"):
-        ParameterNetwork.from_weights(weights, SIZES, ("lstm", HIDDEN, LAYERS), logarithm=False, corrects_base=False)
+            ParameterNetwork.from_weights(other, SIZES, (HIDDEN, LAYERS), logarithm=False)
 
 
 TRAINING = {"surrogates.parameter_network", "surrogates.training"}

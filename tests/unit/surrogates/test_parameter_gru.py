@@ -9,15 +9,12 @@ import torch
 import creepkit as ck
 from creepkit.dataset.dataset import Dataset
 from creepkit.errors import SolveError, SurrogateError
-from creepkit.records import History, RecordedLoading, Status
+from creepkit.records import RecordedLoading, Status
 from creepkit.sampling.conditions import TimeGrid
-from creepkit.surrogates.parameter_gru import ParameterGru, Training
-from creepkit.surrogates.parameter_inputs import LawInputs, LoadHistoryInputs
+from creepkit.surrogates.parameter_gru import LawInputs, LoadHistoryInputs, ParameterGru, Training
 from creepkit.surrogates.parameter_network import sample_tensors
-from creepkit.surrogates.reference_stress_model import ReferenceStressModel
 from creepkit.surrogates.surrogate import Surrogate, load_surrogate
 from creepkit.surrogates.training import train
-from helpers.cantilever import Cantilever
 from helpers.planted_datasets import HOURS, bars, data_set, dimples, measured
 
 BRIEF = Training(epochs=2, batch=32, rate=1e-2)
@@ -45,7 +42,7 @@ def plates() -> Dataset:
 @pytest.fixture(scope="module")
 def bulging(plates: Dataset) -> Surrogate:
     how = Training(epochs=30, batch=8, rate=1e-2)
-    return train(plates, ParameterGru(12, 2, cell="lstm", target="log", training=how))
+    return train(plates, ParameterGru(12, 2, target="log", training=how))
 
 
 # ---- derivatives -----------------------------------------------------------------------------------------------------
@@ -66,10 +63,9 @@ def differences(model: Surrogate, data: Dataset, row: int, step: float = 1e-5) -
     return np.stack(out, axis=-1)
 
 
-@pytest.mark.parametrize("cell", ["gru", "lstm"])
 @pytest.mark.parametrize("target", ["value", "log"])
-def test_jacobians_are_central_differences(tension: Dataset, cell: str, target: str) -> None:
-    model = train(tension, ParameterGru(6, 2, cell=cell, target=target, training=BRIEF))
+def test_jacobians_are_central_differences(tension: Dataset, target: str) -> None:
+    model = train(tension, ParameterGru(6, 2, target=target, training=BRIEF))
     found = model.predict(tension.law, tension.theta_of(4), [tension.planned_test(4)], sensitivities=True)
     numeric = differences(model, tension, 4)
     assert found.jacobian == pytest.approx(numeric, rel=1e-6, abs=1e-8 * np.abs(numeric).max())
@@ -279,33 +275,3 @@ def test_mean_loads_hold_the_time_of_the_jump() -> None:
     found = made.series_values(history, np.array([0.0, 20.0, 40.0]))
     expected = [[100, 100, 0, 0], [100, 100, np.log10(21), np.log10(21)], [140, 130, np.log10(41), np.log10(21)]]
     assert found == pytest.approx(np.array(expected))
-
-
-# ---- reference stress model ------------------------------------------------------------------------------------------
-
-# The model at the reference stress, in closed form.
-
-
-NORTON, HOUR = ck.law("norton"), 3600.0
-VALUES = {"A": 1e-16, "n": 4.0}
-TIMES = np.array([0.0, HOUR, 4 * HOUR, 10 * HOUR])
-
-
-def held(**geometry: float) -> History:
-    return History("beam", TIMES, {}, ck.load_steps("force", [(0, 10.0), (4 * HOUR, 12.0)]), 293.15,
-                   specimen="cantilever", geometry=geometry)  # fmt: skip
-
-
-def deflection(span: float = 50.0, height: float = 2.0) -> np.ndarray:
-    """By hand: Norton's strain at 0.7 of the stress at the root, times L^2/(3 h)."""
-    stresses = [0.7 * 6.0 * force * span / (10.0 * height**2) for force in (10.0, 12.0)]
-    rates = [VALUES["A"] * stress ** VALUES["n"] for stress in stresses]
-    strain = rates[0] * np.minimum(TIMES, 4 * HOUR) + rates[1] * np.maximum(TIMES - 4 * HOUR, 0.0)
-    return span**2 / (3.0 * height) * strain
-
-
-def test_the_deflection_is_that_of_a_bar_under_the_reference_stress() -> None:
-    found = ReferenceStressModel(Cantilever()).predict(NORTON, NORTON.to_internal(VALUES), [held(), held(span=60.0)])
-    assert found.outputs == ("deflection",)
-    np.testing.assert_allclose(found.values[0, 0, :, 0], deflection(), rtol=1e-5, atol=1e-12)
-    np.testing.assert_allclose(found.values[0, 1, :, 0], deflection(span=60.0), rtol=1e-5, atol=1e-12)

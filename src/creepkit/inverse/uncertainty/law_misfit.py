@@ -28,7 +28,7 @@ from creepkit.arrays import Bools, Floats
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.rate_explanations import ENERGY_CHANGE, EXPONENT_CHANGE, FACTOR_SD
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
-from creepkit.inverse.uncertainty.rate_scatter import FLAT_BELOW, SMALLEST_EFFECT, USUAL_SD, RateScatter, Solution
+from creepkit.inverse.uncertainty.rate_scatter import SMALLEST_EFFECT, RateScatter
 from creepkit.language.symbols import GAS_CONSTANT
 
 USUAL_LOG_STRESS, USUAL_KELVIN = 0.9, 50.0
@@ -38,10 +38,6 @@ USUAL_LOG_STRESS, USUAL_KELVIN = 0.9, 50.0
 
 CHANGES = np.geomspace(0.1, 1.0, 5)
 """Sizes of the misfit, over these changes."""
-
-
-SCATTERS = np.geomspace(5e-3, 1.0, 10)
-"""Of ln rate between tests."""
 
 
 FEWEST_CONDITIONS = 3
@@ -183,28 +179,19 @@ class LawMisfits:
         """
         axes = [a for a, seen in zip(self._axes, self._seen, strict=True) if seen]
         columns = [a.effects(a.values) for a in axes]
-        known, usual = self.scatter.known, USUAL_SD["test"]
-        scatters = SCATTERS if known is None else np.array([max(known, SMALLEST_EFFECT)])
-        logs, sizes, without, moments = [], [(0.0, AS_IT_IS)], list[Floats](), list[Floats]()
+        logs, sizes = list[Floats](), [(0.0, AS_IT_IS)]
+        without, moments = list[Floats](), list[Floats]()
         sizes += [(float(size), (1.0 - AS_IT_IS) / CHANGES.size) for size in CHANGES]
-        for s in scatters:
-            before = float(np.log(s / (s + FLAT_BELOW * usual)) - 0.5 * (s / usual) ** 2)
-            for tried in product(sizes, repeat=len(axes)):
-                prior = np.repeat([max(size, SMALLEST_EFFECT) for size, _ in tried], 2 * KNOTS.size)
-                log, mean, covariance = self._solved(float(s), np.concatenate(columns, axis=1), prior)
-                logs.append(log + before + float(np.log([likely for _, likely in tried]).sum()))
-                moments.append(covariance + np.outer(mean, mean))
-                without.append(moments[-1] if not any(size for size, _ in tried) else without[-1])
+        for tried in product(sizes, repeat=len(axes)):
+            prior = np.repeat([max(size, SMALLEST_EFFECT) for size, _ in tried], 2 * KNOTS.size)
+            log, mean, covariance = self.scatter.over_scatter(np.concatenate(columns, axis=1), prior)
+            logs.append(log + float(np.log([likely for _, likely in tried]).sum()))
+            moments.append(covariance + mean[:, :, None] * mean[:, None, :])
+            without.append(moments[0])
         share = np.exp(np.array(logs) - logsumexp(logs))
-        with_misfit, right = (np.einsum("k,kij->ij", share, np.array(one)) for one in (moments, without))
+        with_misfit, right = (np.einsum("ks,ksij->ij", share, np.array(one)) for one in (moments, without))
         return with_misfit, right
-
-    def _solved(self, sd: float, columns: Floats, prior_sd: Floats) -> Solution:
-        """As RateScatter.solved(); sd : of ln rate between tests, beside what is likely of groups."""
-        groups = [self.scatter.posterior.mean_square(level) ** 0.5 for level in self.scatter.levels[:-1]]
-        return self.scatter.solved(np.array([*groups, sd]), columns, prior_sd)
 
     def _beside_the_others(self, tests: Bools) -> float:
         """ln of the rate of some tests (tests,) over what the others say of it, by the law."""
-        sd = max(self.scatter.posterior.median("test"), SMALLEST_EFFECT)
-        return float(self._solved(sd, tests.astype(float)[:, None], np.array([FACTOR_SD]))[1][-1])
+        return float(self.scatter.evidence(tests.astype(float)[:, None], np.array([FACTOR_SD])).mean[0])

@@ -27,6 +27,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import logsumexp
 
 from creepkit.arrays import Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor
@@ -34,7 +35,7 @@ from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel, Residuals
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_condition
-from creepkit.inverse.variance_components import LinearisedProblem, scaled_inverse
+from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
 from creepkit.records import History, Nuisance
 
 USUAL_SD = {"test": ASSUMED_RATE_SD, "heat": 0.5, "laboratory": 0.3}
@@ -45,7 +46,8 @@ FLAT_BELOW = 1.0 / 3.0
 """Of what is usual: standard deviations that the prior hardly tells apart, since rates are not known that well."""
 
 
-Solution = tuple[float, Floats, Floats]
+SMALLEST_FACTOR = 0.1
+"""Of ln rate: a smaller deviation of a test is no finding, however exact the tests are."""
 
 
 LEVELS = ("laboratory", "heat", "test")
@@ -58,6 +60,10 @@ LABELS = {"laboratory": ("laboratory", "lab"), "heat": ("heat", "cast", "batch")
 
 NODES = {1: 60, 2: 24, 3: 12}
 """Standard deviations of a level at which its posterior distribution is taken, by the number of levels."""
+
+
+EVIDENCE_NODES = 25
+"""Those between single tests over which evidence is averaged."""
 
 
 REFINEMENTS, GRID_HALF_WIDTH = 2, 4.0
@@ -75,6 +81,19 @@ SMALLEST_SD, LARGEST_IN_PRIORS = 1e-3, 4.0
 def level_of(history: History, level: str) -> str:
     """The laboratory or the heat of a history, by its labels; "" where it states none, and of the level "test"."""
     return next((history.labels[key] for key in LABELS.get(level, ()) if history.labels.get(key)), "")
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What tests say of further effects on their rates, averaged over the scatter between single tests.
+
+    log : ln of the marginal likelihood, but for a constant of the tests. mean, sd : (effects,). step : (unknowns,) dx.
+    """
+
+    log: float
+    mean: Floats
+    sd: Floats
+    step: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,40 +167,62 @@ class RateScatter:
 
     def _on_grid(self, low: Floats, high: Floats) -> ScatterPosterior:
         """The posterior on a grid, even in ln of standard deviations between low and high, (levels,) each."""
-        count, scale = NODES[low.size], np.array([USUAL_SD[level] for level in self.levels])
-        axes = [np.linspace(first, last, count) for first, last in zip(low, high, strict=True)]
+        axes = [np.linspace(first, last, NODES[low.size]) for first, last in zip(low, high, strict=True)]
         sd = np.exp(np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=-1))
-        log_weight = np.log(sd / (sd + FLAT_BELOW * scale)).sum(axis=1)  # d sd = sd d ln sd
-        log_weight -= 0.5 * ((sd / scale) ** 2).sum(axis=1)
-        log_weight += np.array([self.restricted_log_likelihood(one) for one in sd])
+        log_weight = log_prior(sd, self.levels) + self.solved(sd)[0]
         weight = np.exp(log_weight - log_weight.max())
         return ScatterPosterior(self.levels, sd, weight / weight.sum())
 
-    def restricted_log_likelihood(self, sd: Floats) -> float:
-        """ln of the restricted likelihood of standard deviations sd (levels,), but for a constant."""
-        return self.solved(sd)[0]
-
-    def solved(self, sd: Floats, columns: Floats | None = None, prior_sd: Floats | None = None) -> Solution:
+    def solved(
+        self, sd: Floats, columns: Floats | None = None, prior_sd: Floats | None = None
+    ) -> tuple[Floats, Floats, Floats]:
         """ln of the restricted likelihood, mean and covariance of (dx, c) and of further effects on rates, given sd.
 
-        sd : (levels,). columns : (tests, effects) on ln rates. prior_sd : (effects,) their prior standard deviations.
+        sd : (..., levels). columns : (tests, effects) on ln rates. prior_sd : (effects,) their prior standard
+        deviations. Returns (...,), (..., n) and (..., n, n).
         """
-        own = (np.maximum(sd[-1], SMALLEST_EFFECT) ** 2 + self.variance) / self.weight
-        further = np.zeros((own.size, 0)) if columns is None else columns
+        own = (np.maximum(sd[..., -1:], SMALLEST_EFFECT) ** 2 + self.variance) / self.weight
+        further = np.zeros((self.weight.size, 0)) if columns is None else columns
         Q, size = np.concatenate([self.joint_design, further], axis=1), self.design.shape[1]
-        of_group = np.array([sd[self.levels.index(level)] for level, _ in self.groups])
-        prior = np.append(np.maximum(of_group, SMALLEST_EFFECT), [] if prior_sd is None else prior_sd)
-        precision = Q.T @ (Q / own[:, None])
-        precision[:size, :size] += self.precision
-        precision[size:, size:] += np.diag(prior**-2.0)
-        right = Q.T @ (self.log_factor / own)
-        right[:size] -= self.gradient
-        scale = np.sqrt(np.maximum(np.diag(precision), 1e-300))
-        scaled = precision / np.outer(scale, scale)
-        mean = np.linalg.solve(scaled, right / scale) / scale
-        chi_square = float(self.log_factor**2 @ (1.0 / own) - right @ mean)
-        determinant = float(np.linalg.slogdet(scaled)[1] + 2.0 * (np.log(scale).sum() + np.log(prior).sum()))
-        return -0.5 * (chi_square + determinant + float(np.log(own).sum())), mean, scaled_inverse(precision)
+        of_group = sd[..., [self.levels.index(level) for level, _ in self.groups]]
+        of_further = np.zeros(0) if prior_sd is None else np.asarray(prior_sd, float)
+        prior = np.concatenate(
+            [np.maximum(of_group, SMALLEST_EFFECT), np.broadcast_to(of_further, (*sd.shape[:-1], of_further.size))], -1
+        )
+        precision = Q.T @ (Q / own[..., None])
+        precision[..., :size, :size] += self.precision
+        effects = np.arange(size, Q.shape[1])
+        precision[..., effects, effects] += prior**-2.0
+        right = (self.log_factor / own) @ Q
+        right[..., :size] -= self.gradient
+        scale = np.sqrt(np.maximum(np.diagonal(precision, axis1=-2, axis2=-1), 1e-300))
+        squares = scale[..., :, None] * scale[..., None, :]
+        covariance = np.linalg.inv(precision / squares) / squares
+        mean = (covariance @ right[..., None])[..., 0]
+        chi_square = (self.log_factor**2 / own).sum(-1) - (right * mean).sum(-1)
+        determinant = np.linalg.slogdet(precision / squares)[1] + 2.0 * (np.log(scale).sum(-1) + np.log(prior).sum(-1))
+        return -0.5 * (chi_square + determinant + np.log(own).sum(-1)), mean, covariance
+
+    def over_scatter(self, columns: Floats, prior_sd: Floats) -> tuple[Floats, Floats, Floats]:
+        """The same at standard deviations between single tests, (nodes, ...), with ln of their prior in the first.
+
+        columns : (tests, effects) on ln rates. prior_sd : (effects,) standard deviations. Those between heats and
+        laboratories are as is likely; a known one between tests is the one node.
+        """
+        known = self.known is not None
+        nodes = np.array([self.known]) if known else np.geomspace(SMALLEST_SD, LARGEST_RATE_SCATTER, EVIDENCE_NODES)
+        prior = np.zeros(1) if known else log_prior(nodes[:, None], ("test",))
+        groups = [np.full(nodes.size, self.posterior.mean_square(level) ** 0.5) for level in self.levels[:-1]]
+        log, mean, covariance = self.solved(np.stack([*groups, nodes], axis=-1), columns, prior_sd)
+        return log + prior - logsumexp(prior), mean, covariance
+
+    def evidence(self, columns: Floats, prior_sd: Floats) -> Evidence:
+        """Of further effects on ln rates. columns : (tests, effects). prior_sd : (effects,) standard deviations."""
+        logs, means, covariances = self.over_scatter(columns, prior_sd)
+        share, unknowns = np.exp(logs - logsumexp(logs)), self.joint_design.shape[1]
+        mean = share @ means
+        sd = np.sqrt(share @ (np.diagonal(covariances, axis1=1, axis2=2) + (means - mean) ** 2))
+        return Evidence(float(logsumexp(logs)), mean[unknowns:], sd[unknowns:], mean[: self.design.shape[1]])
 
     def joint(self, sd: Floats) -> tuple[Floats, Floats]:
         """Mean (unknowns + effects,) and covariance of (dx, c) about the estimate, given sd (levels,) of the effects.
@@ -272,6 +313,24 @@ class ScatterPosterior:
         order = np.argsort(values)
         cumulative = np.cumsum(self.weight[order])
         return float(values[order][min(int(np.searchsorted(cumulative, 0.5)), values.size - 1)])
+
+
+def log_prior(sd: Floats, levels: Sequence[str]) -> Floats:
+    """(...,) ln of the prior density of ln of standard deviations sd (..., levels), but for a constant."""
+    usual = np.array([USUAL_SD[level] for level in levels])
+    return np.asarray((np.log(sd / (sd + FLAT_BELOW * usual)) - 0.5 * (sd / usual) ** 2).sum(axis=-1))
+
+
+def redundant_rates(linear: LinearisedProblem, noise_model: NoiseModel) -> int:
+    """How many combinations of the rates of tests no unknown moves, within its prior, by more than SMALLEST_FACTOR."""
+    residuals = linear.residuals
+    assert residuals.jacobian is not None
+    factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
+    weighted = factor.inverse_times(residuals.log_rate_sensitivity)
+    information = np.maximum((weighted * residuals.log_rate_sensitivity).sum(axis=1), 1e-300)
+    moved = np.einsum("te,tep->tp", weighted, residuals.jacobian) / information[:, None]
+    moved /= np.sqrt(np.maximum(linear.precision, 1e-300))
+    return len(moved) - int((np.linalg.svd(moved, compute_uv=False) > SMALLEST_FACTOR).sum())
 
 
 def rate_scatter(

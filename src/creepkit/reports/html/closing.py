@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.files.writing import file_stem
 from creepkit.quality.flags import frame_ranges_text
-from creepkit.reports.attachments import problem_of_name
+from creepkit.reports.attachments import problem_of_names
 from creepkit.reports.blocks import (
     Block,
     Downloads,
@@ -23,13 +23,12 @@ from creepkit.reports.blocks import (
     printable_lines,
     sentence,
 )
-from creepkit.reports.compared_values import frame_counts, selection_sentence
+from creepkit.reports.compared_values import reading_counts, selection_sentence
 from creepkit.reports.findings import findings_of
 from creepkit.reports.histories import history_blocks, quality_blocks
 from creepkit.reports.identified_files import covariance_file
 from creepkit.reports.law_names import definition_blocks
-from creepkit.reports.methods import methods_text
-from creepkit.reports.methods_tests import laws_of
+from creepkit.reports.methods import laws_of, methods_text
 
 if TYPE_CHECKING:
     from creepkit.reports.contents import ExportedFile, ReportContents
@@ -144,7 +143,7 @@ def _provenance_blocks(contents: ReportContents) -> list[Block]:
     if provenance.inputs:
         rows = [(name, digest) for name, digest in provenance.inputs.items()]
         blocks.append(Table("Input files", ("file", "sha256 of its content"), rows))
-    carried = [one.name for one in contents.attachments if not problem_of_name(one.name)]
+    carried = [one.name for one in contents.attachments if not problem_of_names([one.name])]
     if carried:
         blocks.append(Paragraph("Files that the page carries:"))
         blocks.append(Items(carried))
@@ -237,5 +236,5 @@ def _selections(contents: ReportContents) -> Iterator[str]:
         if found is None or not any(h.outputs for h in found.fit.histories):
             continue
         most = found.fit.settings.frames
-        text = selection_sentence(frame_counts(found.fit.histories, most), most)
+        text = selection_sentence(reading_counts(found.fit.histories, most), most)
         yield f"{group.name}: {text}" if len(contents.groups) > 1 else text

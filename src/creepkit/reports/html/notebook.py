@@ -39,7 +39,7 @@ def notebook_html(record: object) -> str:
     block = template("blocks.html").module.block  # type: ignore[attr-defined]
     fits = [record] if isinstance(record, Identification) else []
     fits = [one.fit for one in record.laws] if isinstance(record, Ranking) else fits
-    blocks = [block(block_shown(one, LawNames.of(fits))) for one in _blocks(record)]
+    blocks = [block(block_shown(one, LawNames(fits))) for one in _blocks(record)]
     return f'<div class="creepkit"><style>{STYLE}</style>{"".join(blocks)}</div>'
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -84,7 +83,7 @@ def report_html(contents: ReportContents) -> str:
     contents = dataclasses.replace(contents, groups=tuple(map(with_histories, contents.groups)))
     figures = PageFigures()
     found = [one for one in map(findings_of, contents.groups) if one is not None]
-    names = LawNames.of(fit for one in found for fit in one.fits)
+    names = LawNames(fit for one in found for fit in one.fits)
     sections = [
         _findings_section(contents, found, figures),
         *_group_sections(found, figures),
@@ -115,10 +114,6 @@ def _summary(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
 
 
 # ---- blocks as they are shown ----------------------------------------------------------------------------------------
-
-
-_DEPENDENCE = re.compile(r" with [\w-]+ temperature dependence")
-"""Of titles in a headline, which the equation shows."""
 
 
 def section_shown(section: PageSection, names: LawNames) -> PageSection:
@@ -155,7 +150,7 @@ def block_shown(block: Block, names: LawNames) -> Block:
     if isinstance(block, Answer):
         return dataclasses.replace(
             block,
-            headline=_DEPENDENCE.sub("", said(block.headline)),
+            headline=said(block.headline),
             picture=None if block.picture is None else block_shown(block.picture, names),
             values=[cells((one[0], one[1], one[3])) for one in block.values],
             figures=[cells(one) for one in block.figures],

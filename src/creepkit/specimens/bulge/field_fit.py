@@ -1,34 +1,19 @@
 """Eq. (7), D exp(-|(x - x_c)/S|^p - |(y - y_c)/S|^p), by least squares to measured points of one or many frames.
 
 `fit_frames` fits D, S, p of every frame about one given centre, all frames at once; `joint_center` finds the centre
-that serves all frames best; `fit_field`, for a single field, is both with one frame. `paper_parameters` maps the form
-with eight parameters, by which such fields are described elsewhere, to D, S, p.
+that serves all frames best.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Bools, Floats
-from creepkit.checked_arguments import checked
-from creepkit.errors import FitError
+from creepkit.arrays import Bools, Floats
 
 SHAPES = (0.25, 40.0)
 """Least and greatest p of a result, as in the fit of profiles."""
-
-
-_FEWEST_POINTS = 12
-
-
-_LEAST_SIGNAL_TO_ERROR = 5.0
-"""Least ratio of D to its standard error in a result; the best fit to noise alone reached 3 in forty trials."""
-
-
-_START_QUANTILES = (1.0, 0.98)
-"""Searches start from the greatest height, right for a small bulge, and from one that a few wild points leave alone."""
 
 
 _MOST_STEPS, _MOST_CENTERS = 60, 40
@@ -55,34 +40,6 @@ class Bells(NamedTuple):
     to_center: Floats
 
 
-@dataclass(frozen=True)
-class FieldFit:
-    """A bulge D exp(-|(x - x_c)/S|^p - |(y - y_c)/S|^p) fitted to points.
-
-    amplitude, width : D and S, mm. shape : p. x_center, y_center : mm.
-    standard_errors : of these five, in this order, if the points err independently. Pixels with overlapping subsets do
-        not: true errors are greater by the root of the number of pixels that share one error.
-    residual_sd : mm, root mean square of the residuals. points : how many were fitted.
-    """
-
-    amplitude: float
-    width: float
-    shape: float
-    x_center: float
-    y_center: float
-    standard_errors: tuple[float, ...]
-    residual_sd: float
-    points: int
-
-
-class PaperParameters(NamedTuple):
-    """D and S of Eq. (7), mm, and p."""
-
-    amplitude: float
-    width: float
-    shape: float
-
-
 class FrameFits(NamedTuple):
     """Fits of frames about one centre.
 
@@ -92,56 +49,6 @@ class FrameFits(NamedTuple):
     values: Floats
     converged: Bools
     cost: Floats
-
-
-@checked
-def paper_parameters(
-    amplitude: float, sigma_x: float, sigma_y: float, shape: float, theta: float = 0.0, offset: float = 0.0
-) -> PaperParameters:
-    """D, S, p of Eq. (7) from offset + A exp(-(|x'/s_x|^p + |y'/s_y|^p) / 2) with axes turned by theta.
-
-    amplitude, sigma_x, sigma_y, offset : A, s_x, s_y and the offset, mm. theta : rad.
-
-    D = A + offset, S = sqrt(s_x s_y) 2^(1/p), p. That is exact for s_x = s_y, no offset, and theta = 0 or p = 2.
-    Otherwise: an ellipse becomes the square bulge of its area; an offset is taken as part of the bulge, for it was
-    fitted beside it and Eq. (7) has none, so that D is the height of the fitted apex and S is left as it is; and theta
-    has no counterpart, for Eq. (7) keeps its axes and for p other than 2 is not round: at 45 degrees and p = 2.2 it is
-    3.2 % wider along x than the same form unturned. A field is better fitted anew than mapped.
-    """
-    numbers = np.array([amplitude, sigma_x, sigma_y, shape, theta, offset], dtype=float)
-    if not np.isfinite(numbers).all() or min(sigma_x, sigma_y) <= 0.0 or not SHAPES[0] <= shape <= SHAPES[1]:
-        raise FitError(
-            f"no bulge has sigma_x = {sigma_x!r}, sigma_y = {sigma_y!r}, p = {shape!r} and finite other numbers; both "
-            f"sigma must be above zero and p within {SHAPES[0]:g} to {SHAPES[1]:g}"
-        )
-    return PaperParameters(amplitude + offset, float(np.sqrt(sigma_x * sigma_y) * 2.0 ** (1.0 / shape)), shape)
-
-
-@checked
-def fit_field(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> FieldFit:
-    """Fit Eq. (7) by unweighted least squares to points; x, y, heights : (points,) mm, in any order or shape.
-
-    Points that are not finite (a camera lost them) are left out. The fit has no offset: take off first what the surface
-    showed without pressure.
-    """
-    X, Y, H = _points(x, y, heights)
-    scale, weights = float(np.abs(H).max()), np.ones((1, H.size))
-    places, field = np.stack([X, Y], axis=1), H[None] / scale
-    results = [joint_center(places, field, weights, *_start(X, Y, H / scale, share)) for share in _START_QUANTILES]
-    center, fits, _ = min(results, key=lambda result: float(result[1].cost[0]))
-    jacobian = model(places - center, fits.values)[1][0]
-    D, S, p = scale * fits.values[0, 0], *np.exp(fits.values[0, 1:])
-    left = 2.0 * float(fits.cost[0])
-    errors = _standard_errors(jacobian.T, left) * np.array([scale, S, p, 1.0, 1.0])
-    if not (abs(D) > _LEAST_SIGNAL_TO_ERROR * errors[0] and SHAPES[0] < p < SHAPES[1]):
-        raise FitError(
-            f"the field of {H.size} points shows no bulge of Eq. (7): the best fit has D = {D:.3g} +- "
-            f"{errors[0]:.2g} mm, S = {S:.3g} mm, p = {p:.3g}; take off what the surface showed "
-            "without pressure and give the points of one bulge"
-        )
-    residual_sd = scale * float(np.sqrt(left / H.size))
-    x_center, y_center = center.tolist()
-    return FieldFit(float(D), float(S), float(p), x_center, y_center, tuple(errors.tolist()), residual_sd, int(H.size))
 
 
 def model(places: Floats, values: Floats, subset: float = 0.0) -> tuple[Floats, Floats]:
@@ -316,45 +223,3 @@ def joint_center(
         if np.hypot(*step) < 10.0 * tolerance * reach:
             break
     return center, fits, matrix
-
-
-def _points(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """The points that were seen, as three arrays (points,)."""
-    arrays = [np.asarray(values, dtype=float) for values in (x, y, heights)]
-    if len({array.shape for array in arrays}) > 1:
-        shapes = ", ".join(str(array.shape) for array in arrays)
-        raise FitError(f"a field needs as many x as y as heights; found the shapes {shapes}")
-    seen = np.isfinite(arrays).all(axis=0)
-    X, Y, H = (array[seen] for array in arrays)
-    if H.size < _FEWEST_POINTS or not np.abs(H).max() > 0.0 or not min(np.ptp(X), np.ptp(Y)) > 0.0:
-        raise FitError(
-            f"a field of {H.size} finite points cannot be fitted; it needs at least {_FEWEST_POINTS}, over x and y, "
-            "and heights that are not all zero"
-        )
-    return X, Y, H
-
-
-def _start(X: Floats, Y: Floats, H: Floats, share: float) -> tuple[Floats, Floats]:
-    """Centre (2,) and (1, 3) of D, ln S, ln p from the moments of the points above half of the height of the bulge.
-
-    share : of the points that stay below that height: noise moves it little.
-
-    A Gaussian stands above its half within r = S sqrt(ln 2), where the mean of x^2 about its centre is S^2 ln(2) / 4.
-    """
-    size = np.abs(H)
-    top = float(np.quantile(size, share))
-    turned = H * np.sign(H[np.argmin(np.abs(size - top))])
-    high = turned >= 0.5 * top
-    spread = 0.5 * (X[high].var() + Y[high].var())
-    width = np.sqrt(4.0 * spread / np.log(2.0)) if spread > 0.0 else 0.25 * min(np.ptp(X), np.ptp(Y))
-    amplitude = top * np.sign(np.sum(H[high]))
-    return np.array([X[high].mean(), Y[high].mean()]), np.array([[amplitude, np.log(width), np.log(2.0)]])
-
-
-def _standard_errors(jacobian: Floats, left: float) -> Floats:
-    """Roots of the diagonal of s^2 (J^T J)^-1, s^2 being what each degree of freedom leaves; infinite if singular."""
-    points, unknowns = jacobian.shape
-    if np.linalg.matrix_rank(jacobian) < unknowns:
-        return np.full(unknowns, np.inf)
-    variance = left / (points - unknowns)
-    return np.asarray(np.sqrt(variance * np.diag(np.linalg.inv(jacobian.T @ jacobian))))

@@ -108,13 +108,6 @@ class DimpleGeometry:
         ahead, behind = (_nodes(size, layout) for layout in (up, down))
         return np.asarray((ahead - behind) / (2 * step))
 
-    def section(self, points: int = 100) -> Floats:
-        """The outline of the half section, (points, 2), from the middle of the roof and closed; for drawing."""
-        H, Ro = self.plate_thickness, self.outer_radius
-        size = self._dimensions()
-        cavity = size.cavity(np.linspace(*size.span, max(points - 4, 2)))
-        return np.vstack([cavity, [[Ro, 0.0], [Ro, H], [0.0, H]], cavity[:1]])
-
     def _dimensions(self) -> DimpleDimensions:
         return DimpleDimensions(*(getattr(self, name) for name in self.lengths))
 

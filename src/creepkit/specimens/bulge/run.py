@@ -4,32 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.errors import SolveError
 from creepkit.fem.surface_interpolation import surface_interpolation
 from creepkit.presentation import present
 from creepkit.specimens.finite_element_run import STRESS_FIELD, FiniteElementRun
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-class TopProfile(NamedTuple):
-    """The top of the dimple: radii (nodes,) at rest, mm; displacement : (times, nodes) mm, how far each has risen."""
-
-    radii: Floats
-    displacement: Floats
-
-
-class StressRange(NamedTuple):
-    """Least and greatest von Mises stress; low, high : (times,) MPa."""
-
-    low: Floats
-    high: Floats
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -46,24 +31,6 @@ class BulgeRun(FiniteElementRun):
         """
         rows = self._at(self._profiles, times) @ surface_interpolation(self.test.piece.top_radii, radius).T
         return rows if np.ndim(radius) else np.asarray(rows[..., 0])
-
-    def profile(self, times: ArrayLike | None = None) -> TopProfile:
-        """The whole top, at the nodes of the mesh; times : number or (times,) s, by default those of the frames."""
-        return TopProfile(self.test.piece.top_radii, self._at(self._profiles, times))
-
-    def mises_range(self, times: ArrayLike | None = None, within: float | None = None) -> StressRange:
-        """Least and greatest von Mises stress of the integration points at radii up to `within` mm.
-
-        times : number or (times,) s, by default those of the frames.
-        By default the whole roof, up to the radius of the cavity. The least of these depends on the mesh: it is that of
-        the point nearest to where bending changes its sign.
-        """
-        reach = self.test.piece.geometry.cavity_radius if within is None else float(within)
-        chosen = self.point_coordinates[:, 0] <= reach
-        if not chosen.any():
-            raise SolveError(f"run '{self.name}': no integration point lies within a radius of {reach:g} mm")
-        values = np.maximum(self._at(self.simulation.mises[:, chosen], times), 0.0)
-        return StressRange(values.min(axis=-1), values.max(axis=-1))
 
     def section(self, time: float | None = None, name: str = STRESS_FIELD, path: str | Path | None = None) -> Figure:
         """A picture of the deformed section, coloured by a field (see `field`), at a time; by default the last."""

@@ -9,9 +9,6 @@ import sympy
 
 import creepkit as ck
 from creepkit.inverse.identify import identify
-from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise
-from creepkit.inverse.perturbations import with_random_effects, with_unknown_effects
 from creepkit.inverse.selection.challenges import (
     NOT_EXCLUDED,
     SHARE,
@@ -78,14 +75,14 @@ def test_a_share_of_another_law_is_excluded_by_many_stresses_and_little_noise(si
     assert [one.kind for one in altered_laws([sinh, norton])] in ([], ["threshold"])
 
 
-def test_a_share_of_another_law_is_not_excluded_by_a_narrow_range(power_law_narrow):
-    """Over 55 to 65 MPa a power law is a sinh too."""
-    found = challenges_of(power_law_narrow)[0]
-    assert found.kind == "sum"
-    assert found.subject == "norton+hyperbolic-sine"
-    assert found.sentence.startswith(
-        "its sum with hyperbolic-sine, tried with 30 % of the rate carried by it, explains them as well (its "
-    )
+def test_a_sum_that_fits_no_better_is_charged_for_its_parameters_as_laws_are(power_law_narrow):
+    """Over 55 to 65 MPa a power law is a sinh too: three parameters more, 3 ln n, fit as well and say nothing."""
+    norton, _ = power_law_narrow
+    one = next(one for one in altered_laws(power_law_narrow, 40.0) if one.kind == "sum")
+    assert one.problem.law.name == "norton+hyperbolic-sine"
+    assert abs(one.excess) < 1.0
+    assert one.penalty == pytest.approx(3 * np.log(norton.effective_frames))
+    assert [one.kind for one in challenges_of(power_law_narrow)[:1]] != ["sum"]
 
 
 def test_a_planted_sum_of_two_fifths_is_not_decided_against():
@@ -110,8 +107,8 @@ def test_the_share_is_held_in_the_fit(power_law_narrow):
     assert _chi_square(single, best.x) == pytest.approx(
         float((single.whiten(single.residuals(best.x).values) ** 2).sum())
     )
-    assert _least_excess(FittedLaw.of(best), single, best.x + 0.05)[0] == pytest.approx(0.0, abs=0.02)
-    assert NOT_EXCLUDED == pytest.approx(1.96**2, abs=1e-3)
+    assert _least_excess(FittedLaw.of(best), single, best.x + 0.05, 0.0)[0] == pytest.approx(0.0, abs=0.02)
+    assert np.exp(-0.5 * NOT_EXCLUDED) == pytest.approx(0.05 / 0.95)
 
 
 # ---- thresholds --------------------------------------------------------------------------------------------------
@@ -181,7 +178,7 @@ def test_the_planted_example_is_decisive():
 
 
 def test_what_fits_better_is_said_to_fit_better():
-    """3.84 is 95 % of chi-square with one degree of freedom: beyond it, two laws do not explain tests equally well."""
+    """By more than what leaves a law a twentieth of the weight."""
     assert _comparison_text(-48.6) == "fits better (its chi-square is 48.6 lower)"
     assert _comparison_text(-1.2) == "explains them as well (its chi-square is 1.2 lower)"
     assert _comparison_text(2.0) == "explains them as well (its chi-square is 2.0 higher)"
@@ -253,19 +250,6 @@ def steady_fits():
     tests = [h.replace(standard_deviation={"strain": np.full(h.times.size, 2e-4)}) for h in tests]
     settings = replace(TRIAL_SETTINGS, nuisances=())
     return [identify(law, tests, Steady(), settings=settings) for law in (NORTON, HYPERBOLIC_SINE)]
-
-
-def test_an_error_of_every_test_as_unknowns_is_what_it_is_as_a_random_effect(steady_fits):
-    """Integrating a Gaussian unknown out adds its column times itself to the covariance (Woodbury)."""
-    linear, noise = steady_fits[0].linearised, NoiseModel({"strain": OutputNoise(2e-4)})
-    effect = next(e for e in steady_fits[0].unmodelled if e.residual_change.size)
-    columns = effect.residual_change[..., None] * np.eye(3)[:, None, :]
-    unknown = with_unknown_effects(linear, columns)
-    as_unknowns = unknown.solve(CovarianceFactor.of_residuals(unknown.residuals, noise))
-    random = with_random_effects(linear, [effect])
-    as_random = random.solve(CovarianceFactor.of_residuals(random.residuals, noise))
-    assert as_unknowns.chi_square == pytest.approx(as_random.chi_square, rel=1e-6)
-    np.testing.assert_allclose(as_unknowns.step[:-3], as_random.step, rtol=1e-5)
 
 
 def test_sizes_of_errors_are_those_that_were_put_into_the_tests(steady_fits):

@@ -35,7 +35,7 @@ def scatter_of(log_factor, variance=0.0, heats=(), known=None):
 def test_without_heats_the_restricted_likelihood_is_largest_at_the_sample_variance():
     z = np.random.default_rng(1).normal(0.0, 0.2, 9)
     scatter = scatter_of(z, variance=0.01**2)
-    best = minimize(lambda s: -scatter.restricted_log_likelihood(np.exp(s)), [np.log(0.1)]).x
+    best = minimize(lambda s: -scatter.solved(np.exp(s))[0], [np.log(0.1)]).x
     assert np.exp(2 * best[0]) == pytest.approx(z.var(ddof=1) - 0.01**2, rel=1e-3)
 
 
@@ -44,7 +44,7 @@ def test_with_heats_it_is_the_analysis_of_variance():
     heats, tests = 6, 4
     z = rng.normal(0.0, 0.3, heats)[:, None] + rng.normal(0.0, 0.1, (heats, tests))
     scatter = scatter_of(z.ravel(), 1e-8, [f"heat {k}" for k in range(heats) for _ in range(tests)])
-    best = minimize(lambda s: -scatter.restricted_log_likelihood(np.exp(s)), np.log([0.3, 0.1]), tol=1e-10).x
+    best = minimize(lambda s: -scatter.solved(np.exp(s))[0], np.log([0.3, 0.1]), tol=1e-10).x
     within = ((z - z.mean(axis=1, keepdims=True)) ** 2).sum() / (heats * (tests - 1))
     between = tests * z.mean(axis=1).var(ddof=1)
     assert np.exp(2 * best) == pytest.approx([(between - within) / tests, within], rel=1e-3)
@@ -167,7 +167,7 @@ def test_it_is_the_smoothing_spline_of_the_factors_of_tests_amid_them_and_its_li
     misfits, values = power_law(y)
     axis = misfits._axes[0]
     columns = axis.effects(axis.values)
-    _, mean, _ = misfits._solved(scatter, columns, np.full(columns.shape[1], change))
+    _, mean, _ = misfits.scatter.solved(np.array([scatter]), columns, np.full(columns.shape[1], change))
     points = np.log(np.array([40.0, 52.0, 66.0, 88.0, 120.0, 170.0]))
     about = points - np.log(REFERENCE.stress)
     found = values[0] + mean[0] + (values[1] + mean[1]) * about + axis.effects(points) @ mean[2:]
