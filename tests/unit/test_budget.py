@@ -21,15 +21,15 @@ BUDGET = {
     "core": 67,
     "dataset": 735,
     "discovery": 1373,
-    "experiments": 1321,
+    "experiments": 1322,
     "exporters": 2658,
     "extraction": 1291,
     "fem": 1427,
     "files": 1380,
-    "forecasts": 1287,
+    "forecasts": 1290,
     "instruments": 1222,
     "integration": 762,
-    "inverse": 10689,
+    "inverse": 10693,
     "jobs": 251,
     "kernels": 1703,
     "language": 1483,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29550
+TESTS = 29585
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
