@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1290,
     "instruments": 1222,
     "integration": 762,
-    "inverse": 10693,
+    "inverse": 10393,
     "jobs": 251,
     "kernels": 1703,
     "language": 1483,
