@@ -155,8 +155,7 @@ class BulgeReducedOrderModel(Predictor):
 
     def refined(self) -> Predictor | None:
         """What it stands for: the specimen itself on its finer discretisation."""
-        refined: Predictor | None = self.specimen.refined()
-        return refined
+        return self.specimen.refined()  # type: ignore[no-any-return]
 
 
 @lru_cache(maxsize=16)
