@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -162,8 +162,6 @@ def law_blocks(law: TemperatureLaw, figures: PageFigures | None = None, of: str 
     forms = [(name, ", ".join(map(_form_text, weights))) for name, weights in law.plausible_forms.items()]
     caption = f"forms that remain, weighed by {CRITERION[data]} ({EQUIVALENCE_NOTE[data]})"
     blocks += [Table(caption, ("parameter", "forms with their weights"), forms), _combinations(law)]
-    odds = [(name, _odds_text(by_form)) for name, by_form in law.prior_odds.items() if len(by_form) > 1]
-    blocks += [Table("prior odds, the likeliest as 1", ("parameter", "odds"), odds)] if odds else []
     return [*blocks, Items(law.notes)] if law.notes else blocks
 
 
@@ -187,11 +185,6 @@ def _combinations(law: TemperatureLaw) -> Table:
     more = len(law.candidates) - MAX_COMBINATIONS_LISTED
     caption = f"combinations, the best first{f'; {more} more are not listed' if more > 0 else ''}"
     return Table(caption, ("forms", "numbers", "criterion - best", "weight"), rows, numeric=(1, 2, 3))
-
-
-def _odds_text(odds_by_form: Mapping[str, float]) -> str:
-    largest = max(odds_by_form.values())
-    return ", ".join(f"{form} {odds / largest:.2g}" for form, odds in odds_by_form.items())
 
 
 def temperature_study_text(study: TemperatureStudy) -> str:

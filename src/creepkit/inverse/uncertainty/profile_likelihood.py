@@ -17,7 +17,6 @@ left of second order would count as misfit: with d half way between the optimum 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,10 +30,10 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, TESTS_ALONE
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
-from creepkit.presentation import Presentable, present
+from creepkit.presentation import Presentable
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 CONSTRAINT_WIDTH = 0.02
@@ -78,10 +77,6 @@ class ProfileLikelihood(Presentable, text="reports.inference:profile_text"):
     level: float
     laplace: tuple[float, float]
     notes: tuple[str, ...] = field(default=())
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """The rise of chi-square over the quantity, with that of Laplace's approximation; written to `path`."""
-        return present("reports.inference:profile_figure", self, path)
 
 
 @dataclass(frozen=True)
