@@ -46,7 +46,7 @@ def whole_identification() -> ck.Identification:
     )  # fmt: skip
     effects = (
         Perturbation("thickness", 0.01, "mm", 0.08),
-        Perturbation("temperature drift", 5.0, "K over a test", 0.05, -3.1, 0.93),
+        Perturbation("temperature drift", 5.0, "K over a test", 0.05),
         Perturbation("temperature", 3.0, "K", -0.14, common=True, tests=2, per_kelvin=0.05, assumed=True),
     )
     return replace(
@@ -141,7 +141,7 @@ def test_a_damaged_file_is_an_answer_or_one_sentence(kind: str, documents: dict[
         (("adequacy", "verdict"), "splendid", "adequacy.verdict"),
         (("adequacy", "outputs", 0, "noise"), 0.0, "adequacy.outputs.0.noise"),
         (("numerical_error", "noises"), -1.0, "numerical_error.noises"),
-        (("unmodelled", 1, "hardening_correlation"), -0.5, "unmodelled.1.hardening_correlation"),
+        (("unmodelled", 1, "size"), -0.5, "unmodelled.1.size"),
         (("noise_model", "discrepancy_length"), 0.0, "noise_model.discrepancy_length"),
         (("samples",), [[1.0]], "samples"),
         (("covariance",), [[1.0]], "covariance"),

@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1403,
     "instruments": 1282,
     "integration": 774,
-    "inverse": 10812,
+    "inverse": 10726,
     "jobs": 251,
     "kernels": 1703,
     "language": 1494,

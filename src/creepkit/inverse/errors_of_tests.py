@@ -15,13 +15,11 @@ C0. Values that are not found by likelihood stay as they are, and their covarian
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, Residuals, components_fixed_by_priors
+from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.perturbations import (
@@ -41,50 +39,38 @@ SCATTER_NODES = 60
 """Standard deviations over which the scatter by errors of single tests is averaged."""
 
 
-@dataclass(frozen=True, eq=False)
-class TestErrors:
-    """The errors that an identification includes.
-
-    perturbations : of lengths and instruments, of which those count that are included. scatter : (tests,) standard
-    deviation of ln rate, by temperatures and loads that are off in each test by itself, beyond what was estimated.
-    lives : (tests, observations) -, what one standard deviation of the scatter of lives, as estimated of rupture times,
-    does to the curves of tests that are followed to rupture.
-    """
-
-    __test__ = False  # not a test case, whatever its name says to pytest
-
-    perturbations: tuple[Perturbation, ...]
-    scatter: Floats
-    lives: Floats
-
-    def common(self) -> Floats:
-        """(tests, observations, errors) effects on the residuals of what all tests have alike."""
-        return self._stacked([e.residual_change for e in self.perturbations if e.included and e.common])
-
-    def own(self, residuals: Residuals) -> Floats:
-        """(tests, observations, errors) of what each test has by itself."""
-        of_rates = [self.scatter[:, None] * residuals.log_rate_sensitivity] if self.scatter.any() else []
-        own = [e.residual_change for e in self.perturbations if e.included and not e.common]
-        return self._stacked([*own, *of_rates, *([self.lives] if self.lives.any() else [])])
-
-    def within(self, residuals: Residuals) -> Residuals:
-        """The residuals with the errors in their covariance."""
-        return residuals.with_effects(self.own(residuals), self.common())
-
-    def _stacked(self, effects: Sequence[Floats]) -> Floats:
-        return np.stack(effects, axis=-1) if effects else np.zeros((self.scatter.size, 0, 0))
+RATE, LIFE = "rate of a test", "life of a test"
+"""Kinds of what is included beside lengths and instruments, each test by itself: ln rate by temperatures and loads,
+beyond the scatter that was estimated; the scatter of lives, as estimated of rupture times, in curves that are followed
+to rupture."""
 
 
 def errors_of_tests(
     problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
-) -> TestErrors | None:
-    """The errors that the settings include, at x (unknowns,); None where they include none."""
+) -> tuple[Perturbation, ...]:
+    """Errors at x (unknowns,), of which those count that the settings include; none where they include none.
+
+    Those of lengths and instruments, then RATE and LIFE.
+    """
     if not problem.settings.included_errors:
-        return None
-    found = of_lengths_and_instruments(problem, x, linear)
-    scatter = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
-    lives = scatter * life_sensitivity(linear.residuals, problem.observations)
-    return TestErrors(found, _usual_scatter(problem, x, linear, noise_model), lives)
+        return ()
+    rates = _usual_scatter(problem, x, linear, noise_model)
+    lives = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
+    changes = {
+        RATE: rates[:, None] * linear.residuals.log_rate_sensitivity,
+        LIFE: lives * life_sensitivity(linear.residuals, problem.observations),
+    }
+    own = [
+        Perturbation(kind, 1.0, "", residual_change=change, tests=len(rates), included=True)
+        for kind, change in changes.items()
+        if change.any()
+    ]
+    return (*of_lengths_and_instruments(problem, x, linear), *own)
+
+
+def with_errors(linear: LinearisedProblem, errors: Sequence[Perturbation]) -> LinearisedProblem:
+    """The linear problem with the errors in its covariance that are included."""
+    return linear.with_effects(one for one in errors if one.included)
 
 
 def _usual_scatter(
@@ -124,43 +110,18 @@ def _mean_square(usual: float, estimate: float, redundant: int) -> float:
 
 
 def error_covariances(
-    linear: LinearisedProblem, noise_model: NoiseModel, errors: TestErrors | None, working_noise: NoiseModel | None
+    linear: LinearisedProblem, noise_model: NoiseModel, errors: Sequence[Perturbation], working_noise: NoiseModel | None
 ) -> tuple[Floats, Floats]:
     """(unknowns, unknowns) what errors of tests add to the covariance of x: all of them, and those common to all tests.
 
     working_noise : under which values were found that are not by likelihood.
     """
-    size = linear.precision.size
-    if errors is None:
-        return np.zeros((size, size)), np.zeros((size, size))
-    own, common = errors.own(linear.residuals), errors.common()
-    if working_noise is not None:
-        return _moved_by(linear, working_noise, own, common)
+    of_instruments = [one for one in errors if one.common]
     without, with_common, with_all = (
-        covariance_of_values(replace(linear, residuals=residuals), noise_model)
-        for residuals in (
-            linear.residuals,
-            linear.residuals.with_effects(own[..., :0], common),
-            linear.residuals.with_effects(own, common),
-        )
+        covariance_of_values(with_errors(linear, some), noise_model, working_noise)
+        for some in ((), of_instruments, errors)
     )
     return _excess(with_all, without), _excess(with_common, without)
-
-
-def _moved_by(
-    linear: LinearisedProblem, working_noise: NoiseModel, own: Floats, common: Floats
-) -> tuple[Floats, Floats]:
-    """As error_covariances(), of values that are not by likelihood: what errors of one standard deviation move x by."""
-    plain = replace(linear.residuals, random_effect_sensitivities=None, common_effects=None)
-    free = replace(linear, residuals=plain, free=np.ones_like(linear.free))
-    solution = free.solve(CovarianceFactor.of_residuals(plain, working_noise))
-    size = linear.precision.size
-    found = []
-    for effects, sums in ((own, "tfp,tfk->ptk"), (common, "tfp,tfk->pk")):
-        pull = np.einsum(sums, solution.weighted_jacobian, effects) if effects.shape[-1] else np.zeros((size, 0))
-        moved = solution.covariance @ pull.reshape(size, -1)
-        found.append(moved @ moved.T)
-    return found[0] + found[1], found[1]
 
 
 def _excess(covariance: Floats, least: Floats) -> Floats:

@@ -79,11 +79,7 @@ CODEC = RecordCodec(
         ImplausibleNuisance: {"standard_deviations": NOT_NEGATIVE, "size": POSITIVE, "share": NOT_NEGATIVE_OR_NAN},
         LargestDeviation: {"rms": NOT_NEGATIVE},
         NumericalError: {"*": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},
-        Perturbation: {
-            "*": NAN_ALLOWED,
-            **dict.fromkeys(("size", "tests"), NOT_NEGATIVE),
-            "hardening_correlation": NOT_NEGATIVE_OR_NAN,
-        },
+        Perturbation: {"*": NAN_ALLOWED, **dict.fromkeys(("size", "tests"), NOT_NEGATIVE)},
         OutputErrors: {"*": NOT_NEGATIVE_OR_NAN},
         OutputFit: {"noise": NOT_NEGATIVE},
         SingleValue: {"*": NOT_NEGATIVE_OR_NAN, "measured": POSITIVE},

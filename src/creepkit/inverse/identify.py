@@ -21,7 +21,7 @@ from creepkit.inverse.defect_correction import (
     shift_of_values,
     with_correction_at_frames,
 )
-from creepkit.inverse.errors_of_tests import error_covariances, errors_of_tests
+from creepkit.inverse.errors_of_tests import LIFE, RATE, error_covariances, errors_of_tests
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
@@ -324,7 +324,7 @@ def _result(
     found_at = judged if by_likelihood else linear
     errors = best.errors if by_likelihood else errors_of_tests(problem, linear.x, linear, noise_model)
     unmodelled = perturbations(
-        problem, linear, noise_model, histories, None if errors is None else errors.perturbations, working_noise
+        problem, linear, noise_model, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
     )
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     rates = RateExplanations(problem, linear.x, judged, noise_model)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.errors_of_tests import TestErrors, errors_of_tests
+from creepkit.inverse.errors_of_tests import errors_of_tests, with_errors
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
 from creepkit.inverse.variance_components import (
@@ -62,7 +63,7 @@ class EstimationResult:
 
     problem : with the priors of nuisance parameters as they were estimated; minimum : its optimum; residuals : there,
     with the weights of tests; linearised : the problem made linear there. x : (unknowns,) the values: the optimum, from
-    where errors of tests move those by likelihood; errors : that were in the covariance, None for none.
+    where errors of tests move those by likelihood; errors : that were in the covariance.
     """
 
     problem: LeastSquaresProblem
@@ -72,7 +73,7 @@ class EstimationResult:
     log_likelihood: float
     linearised: LinearisedProblem
     x: Floats
-    errors: TestErrors | None = None
+    errors: tuple[Perturbation, ...] = ()
 
 
 def estimate_iteratively(
@@ -131,9 +132,8 @@ def under_errors_of_tests(result: EstimationResult) -> EstimationResult:
     for step in range(MOST_ERROR_STEPS):
         about = at_own_rates(problem, linear, noise)
         errors = errors_of_tests(problem, linear.x, about, noise)
-        assert errors is not None
         result = replace(result, errors=errors) if step == 0 else result
-        solution = about.solve(CovarianceFactor.of_residuals(errors.within(about.residuals), noise))
+        solution = about.solve(CovarianceFactor.of_residuals(with_errors(about, errors).residuals, noise))
         x = linear.x.copy()
         x[linear.free] += solution.step
         x = problem.bounds.clip(x)

@@ -35,7 +35,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NEGLIGIBLE_DISCREPANCY, NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH, RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
-from creepkit.inverse.perturbations import sizes_of_effect, with_random_effects
+from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import life_sensitivity
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
@@ -172,7 +172,7 @@ class Judge:
             return adequacy.with_explanations(explanations)
         remedies = []
         for effect in effects:
-            if not effect.common and self.adequacy(with_random_effects(linear, [effect])).explains:
+            if not effect.common and self.adequacy(linear.with_effects([effect])).explains:
                 largest = float(np.abs(sizes_of_effect(linear, effect, self.noise_model)).max())
                 remedies.append(replace(effect, size=effect.size * largest).description)
         return replace(adequacy, remedies=tuple(remedies)).with_explanations(explanations)
@@ -195,7 +195,7 @@ class Judge:
         effect = scatter * life_sensitivity(linear.residuals, self.problem.observations)
         if not effect.any():
             return linear
-        return replace(linear, residuals=linear.residuals.with_effects(effect[..., None]))
+        return replace(linear, residuals=linear.residuals.with_effects([effect]))
 
     def _largest_deviation(self, judged: JudgedResiduals) -> LargestDeviation | None:
         """Where the deviation is largest over the known noise."""

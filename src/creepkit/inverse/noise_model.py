@@ -60,16 +60,16 @@ class Residuals:
         """The same with other weights of tests."""
         return replace(self, test_weights=test_weights)
 
-    def with_effects(self, own: Floats, common: Floats | None = None) -> Residuals:
+    def with_effects(self, own: Sequence[Floats], common: Sequence[Floats] = ()) -> Residuals:
         """The same with further random effects.
 
-        own, common : (tests, observations, effects) -, one standard deviation of those of each test, and of those that
-        all tests have alike.
+        own, common : (tests, observations) -, one standard deviation of each of those that tests have independently,
+        and of those that all tests have alike.
         """
 
-        def joined(present: Floats | None, more: Floats | None) -> Floats | None:
-            added = [one for one in (present, more) if one is not None and one.shape[-1]]
-            return np.concatenate(added, axis=-1) if added else present
+        def joined(present: Floats | None, more: Sequence[Floats]) -> Floats | None:
+            columns = [*([] if present is None else [present]), *(one[..., None] for one in more)]
+            return np.concatenate(columns, axis=-1) if columns else None
 
         return replace(
             self,

@@ -24,14 +24,6 @@ NOT_INCLUDED = "the intervals do not include"
 """How the note on perturbations that are not modelled begins."""
 
 
-LARGEST_DRIFT = 30.0
-"""K, of a furnace over a test: a larger drift explains nothing that anybody measures."""
-
-
-LIKE_HARDENING = 0.8
-"""Correlation from which on a drift looks like hardening."""
-
-
 @dataclass(frozen=True, eq=False)
 class Perturbation:
     """Something that tests may hide, with the prior standard deviation that is usual for it.
@@ -40,8 +32,6 @@ class Perturbation:
         the tests have independently of one another, or of one error common to all tests.
     rate_change : of ln of the rate at the reference point: one standard deviation of it where the errors are
         independent; where one is common, what the rate changes by if its size is added to what the tests state.
-    like_hardening : the size, in the same unit, that looks most like the hardening of the law itself, NaN where it has
-        none, and hardening_correlation : how much like it, in the residuals, 1 for the same.
     residual_change : (tests, observations) -, of the residuals, by one standard deviation; saved in kept fits alone.
     common : whether it is one error of all tests, as of an instrument that measures them all. tests : how many have it.
     included : whether the intervals include it.
@@ -53,8 +43,6 @@ class Perturbation:
     size: float
     unit: str
     rate_change: float = float("nan")
-    like_hardening: float = float("nan")
-    hardening_correlation: float = float("nan")
     residual_change: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     common: bool = False
     tests: int = 1
@@ -121,11 +109,4 @@ def combined_change_text(perturbations: Sequence[Perturbation]) -> str:
 def unmodelled_note(perturbations: Sequence[Perturbation]) -> tuple[str, ...]:
     """One sentence on what intervals do not include, with what it would do to the rate; none where that is little."""
     parts = [p.sentence for p in perturbations if abs(p.rate_change) > NOTEWORTHY_CHANGE and not p.included]
-    sentences = [f"{NOT_INCLUDED} what would move the rate amid the tests: {'; '.join(parts)}"] if parts else []
-    sentences += [
-        f"no temperature was recorded: a drift of {p.like_hardening:+.2g} K over a test would look like the hardening "
-        f"of this law (correlation {p.hardening_correlation:.2f})"
-        for p in perturbations
-        if abs(p.like_hardening) < LARGEST_DRIFT and p.hardening_correlation > LIKE_HARDENING
-    ]
-    return tuple(sentences)
+    return (f"{NOT_INCLUDED} what would move the rate amid the tests: {'; '.join(parts)}",) if parts else ()

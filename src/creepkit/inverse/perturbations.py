@@ -10,7 +10,7 @@ A temperature or load that is off changes the creep rate of each test by its own
 strain or displacement the stress is E (strain - creep strain): a modulus or a strain that is off moves it from the
 first reading on, and is found as offsets of the tests.
 
-The same perturbations, as random effects in the covariance or as unknowns with priors, show what a law would explain
+The same perturbations, as random effects in the covariance, show what a law would explain
 with them (inverse.judging), and whether the choice of a law rests on their absence
 (selection.perturbation_trials).
 """
@@ -22,7 +22,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import sympy
 
 from creepkit.arrays import Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor
@@ -34,7 +33,7 @@ from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
-from creepkit.language import CreepLaw, strain, temperature, time
+from creepkit.language import temperature, time
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import (
     Dimension,
@@ -76,7 +75,7 @@ def perturbations(
     linear: LinearisedProblem,
     noise_model: NoiseModel,
     full_histories: Sequence[History],
-    known: Sequence[Perturbation] | None = None,
+    known: Sequence[Perturbation] = (),
     working_noise: NoiseModel | None = None,
 ) -> tuple[Perturbation, ...]:
     """Those that no nuisance parameter of the problem stands for, with what they do to the rate, about the optimum.
@@ -85,7 +84,6 @@ def perturbations(
     working_noise : under which values were found that are not by likelihood.
     """
     x = linear.x
-    factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
     reference = problem.coordinates.reference
     slope = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature)
     found, without_energy = [], not problem.law.uses(temperature)
@@ -101,51 +99,23 @@ def perturbations(
         moved = moved.sum(axis=0, keepdims=True) if one.common else moved
         by_error = moved[:, : problem.parameter_count] @ _log_rate_gradient(problem, x)
         one = replace(one, rate_change=float(by_error[0] if one.common else np.sqrt((by_error**2).sum())))
-        if one.kind == DRIFT:
-            ratio, correlation = _likeness_of_hardening(problem, x, linear, factor, change)
-            one = replace(one, like_hardening=one.size * ratio, hardening_correlation=correlation)
         if one.kind in (DRIFT, "temperature"):
             one = replace(one, per_kelvin=slope, assumed=without_energy)
         found.append(replace(one, residual_change=np.zeros((0, 0))) if one.common else one)
     return tuple(found)
 
 
-def with_random_effects(linear: LinearisedProblem, effects: Sequence[Perturbation]) -> LinearisedProblem:
-    """The linear problem with these perturbations as random effects of each test in its covariance."""
-    stacked = np.stack([effect.residual_change for effect in effects], axis=-1)
-    return replace(linear, residuals=linear.residuals.with_effects(stacked))
-
-
-def with_unknown_effects(linear: LinearisedProblem, changes: Floats) -> LinearisedProblem:
-    """The linear problem with further unknowns of prior mean zero and standard deviation one, after all others.
-
-    changes : (tests, observations, unknowns) -, of the residuals by each.
-    """
-    jacobian, more = linear.residuals.jacobian, changes.shape[-1]
-    assert jacobian is not None
-    return LinearisedProblem(
-        replace(linear.residuals, jacobian=np.concatenate([jacobian, changes], axis=-1)),
-        np.append(linear.precision, np.ones(more)),
-        np.append(linear.prior_residual, np.zeros(more)),
-        np.append(linear.free, np.ones(more, bool)),
-        np.concatenate([linear.step_bounds, np.outer([-np.inf, np.inf], np.ones(more))], axis=1),
-    )
-
-
-def effect_columns(effect: Perturbation, *, common: bool) -> Floats:
-    """(tests, observations, unknowns) change of the residuals by a perturbation of all tests alike, or of each test."""
-    column = effect.residual_change[..., None]
-    return np.asarray(column if common else column * np.eye(len(column))[:, None, :])
-
-
 def sizes_of_effect(
     linear: LinearisedProblem, effect: Perturbation, noise_model: NoiseModel, *, common: bool = False
 ) -> Floats:
-    """(1,) of all tests or (tests,) sizes that a perturbation takes in a linear problem, in standard deviations."""
-    columns = effect_columns(effect, common=common)
-    perturbed = with_unknown_effects(linear, columns)
-    factor = CovarianceFactor.of_residuals(perturbed.residuals, noise_model)
-    return perturbed.solve(factor).step[-columns.shape[-1] :]
+    """(1,) of all tests or (tests,) sizes that a perturbation takes in a linear problem, in standard deviations.
+
+    Best linear predictions of it as a random effect.
+    """
+    perturbed = linear.with_effects([replace(effect, common=common)])
+    solution = perturbed.solve(CovarianceFactor.of_residuals(perturbed.residuals, noise_model))
+    sizes = -(effect.residual_change * solution.weighted_residuals).sum(axis=1)
+    return np.asarray(sizes.sum(keepdims=True) if common else sizes)
 
 
 # ---- what each does to the residuals ---------------------------------------------------------------------------------
@@ -156,11 +126,11 @@ def _all(
     x: Floats,
     linear: LinearisedProblem,
     full_histories: Sequence[History],
-    known: Sequence[Perturbation] | None,
+    known: Sequence[Perturbation],
 ) -> Iterator[Perturbation]:
     """Errors that the tests have independently of one another: lengths, offsets, drifts; then those common to all."""
     kinds = {n.kind for n in problem.settings.nuisances}
-    known = of_lengths_and_instruments(problem, x, linear) if known is None else known
+    known = known or of_lengths_and_instruments(problem, x, linear)
     yield from (one for one in known if not one.common)
     if "offset" not in kinds:
         yield from _offsets(problem, linear)
@@ -444,45 +414,3 @@ def _with_offset_of(
         offset = float(np.sqrt(np.mean(means[weights > 0] ** 2))) if (weights > 0).any() else 0.0
         noise_model = noise_model.with_output(name, offset=float(np.hypot(noise_model[name].offset, offset)))
     return noise_model
-
-
-def _likeness_of_hardening(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, factor: CovarianceFactor, change: Floats
-) -> tuple[float, float]:
-    """(ratio, correlation) of an effect to what the law's hardening does, beside all other unknowns.
-
-    Hardening is what disappears where an exponent of strain, of time or of an internal variable is zero.
-    """
-    law, jacobian = problem.law, linear.residuals.jacobian
-    assert jacobian is not None
-    theta = problem.coordinates.theta(x[: problem.parameter_count])
-    positions = [k for k in _hardening_exponents(law) if abs(theta[k]) > 0]
-    if not positions:
-        return float("nan"), float("nan")
-    hardening = np.einsum("tep,p->te", jacobian[..., positions], theta[positions])
-    others = [k for k in range(jacobian.shape[-1]) if k not in positions]
-    columns = np.concatenate([hardening[..., None], change[..., None], jacobian[..., others]], axis=-1)
-    whitened = factor.whiten(columns)[linear.residuals.present]
-    basis, _ = np.linalg.qr(whitened[:, 2:] / np.maximum(np.linalg.norm(whitened[:, 2:], axis=0), 1e-300))
-    own, effect = (whitened[:, k] - basis @ (basis.T @ whitened[:, k]) for k in (0, 1))
-    sizes = float(np.linalg.norm(own)), float(np.linalg.norm(effect))
-    if min(sizes) == 0.0:
-        return float("nan"), float("nan")
-    product = float(own @ effect)
-    return product / sizes[1] ** 2, abs(product) / (sizes[0] * sizes[1])
-
-
-def _hardening_exponents(law: CreepLaw) -> list[int]:
-    """Positions of the parameters without which a term no longer depends on strain, time or an internal variable."""
-    memory = {strain, time, *law.states}
-
-    def hardens(parameter: sympy.Symbol) -> bool:
-        return any(
-            memory & term.free_symbols - term.subs(parameter, 0).free_symbols
-            for term in law.terms.values()
-            if parameter in term.free_symbols
-        )
-
-    return [
-        k for k, (symbol, p) in enumerate(law.params.items()) if p.off == 0.0 and p.scale != "log" and hardens(symbol)
-    ]

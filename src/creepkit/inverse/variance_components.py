@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from scipy.optimize import OptimizeResult, minimize
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor, NoiseLikelihood
 from creepkit.inverse.noise_model import OUTPUT_COMPONENTS, NoiseModel, Residuals, components_fixed_by_priors
+from creepkit.inverse.perturbation import Perturbation
 from creepkit.records import Nuisance
 
 BOUND_TOLERANCE = 1e-6
@@ -38,6 +39,13 @@ class LinearisedProblem:
         """(tests, observations, free unknowns) derivatives of the residuals."""
         assert self.residuals.jacobian is not None
         return self.residuals.jacobian[..., self.free]
+
+    def with_effects(self, effects: Iterable[Perturbation]) -> LinearisedProblem:
+        """The same with perturbations in the covariance: of each test by itself, or of all tests alike."""
+        own, common = list[Floats](), list[Floats]()
+        for effect in effects:
+            (common if effect.common else own).append(effect.residual_change)
+        return replace(self, residuals=self.residuals.with_effects(own, common))
 
     def solve(self, factor: CovarianceFactor) -> LinearSolution:
         """The optimum under a covariance."""

@@ -10,16 +10,14 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
-from creepkit.inverse.perturbation import DRIFT, unmodelled_note
+from creepkit.inverse.perturbation import DRIFT
 from creepkit.inverse.perturbations import (
     OFFSET_IN_NOISES,
     USUAL_DRIFT,
-    _likeness_of_hardening,
     _log_rate_gradient,
     _with_scatter_of,
     perturbations,
     value_changes,
-    with_random_effects,
 )
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import USUAL_ERRORS, IdentificationSettings
@@ -210,35 +208,6 @@ def test_the_effect_of_thickness_is_that_of_other_simulations():
     np.testing.assert_allclose(found, expected, atol=0.03 * np.abs(expected).max())
 
 
-# ---- likeness of hardening ----------------------------------------------------------------------------------------
-
-
-def test_a_change_that_is_the_hardening_itself_has_correlation_one():
-    """What disappears with m = 0, times minus a half: it takes minus two of it, and the correlation is one."""
-    loadings = [constant_stress(80.0, "stress"), STEP]
-    problem, x, linear = at_the_truth(HARDENING_AT, bars(HARDENING_AT, loadings))
-    position = HARDENING_AT.names.index("m")
-    hardening = VALUES[HARDENING_AT.name]["m"] * linear.residuals.jacobian[..., position]
-    factor = CovarianceFactor.of_residuals(linear.residuals, NoiseModel({"strain": OutputNoise(NOISE)}))
-    ratio, correlation = _likeness_of_hardening(problem, x, linear, factor, -0.5 * hardening)
-    assert ratio == pytest.approx(-2.0, rel=1e-6)
-    assert correlation == pytest.approx(1.0, rel=1e-9)
-    other = linear.residuals.jacobian[..., HARDENING_AT.names.index("A")]
-    assert _likeness_of_hardening(problem, x, linear, factor, -0.5 * hardening + 7.0 * other)[1] == pytest.approx(1.0)
-
-
-def test_cooling_looks_like_strain_hardening_and_is_said_with_its_sign():
-    """One test at one stress, the exponents and energy fixed: a furnace that cools slows creep as hardening does."""
-    law = HARDENING_AT.fix(n=4.0, Q=420e3)
-    VALUES[law.name] = {"A": 1e-15, "m": -0.1}
-    effects, _, _ = effects_of(law, bars(law))
-    drift = effects[DRIFT]
-    assert drift.like_hardening < 0
-    assert drift.hardening_correlation > 0.8
-    (sentence,) = (one for one in unmodelled_note([drift]) if "no temperature was recorded" in one)
-    assert f"a drift of {drift.like_hardening:+.2g} K over a test would look like the hardening of this law" in sentence
-
-
 # ---- random effects and sentences ---------------------------------------------------------------------------------
 
 
@@ -246,12 +215,12 @@ def test_an_effect_in_the_covariance_is_a_rank_of_one_in_each_test():
     tests = bars(NORTON_AT, [constant_stress(s, "stress") for s in (70.0, 90.0)])
     effects, _, linear = effects_of(NORTON_AT, tests)
     noise = NoiseModel({"strain": OutputNoise(NOISE)})
-    with_both = with_random_effects(linear, [*effects.values()])
+    with_both = linear.with_effects(effects.values())
     columns = np.stack([e.residual_change for e in effects.values()], axis=-1)
     expected = covariance(linear.residuals, noise) + columns @ np.swapaxes(columns, 1, 2)
     found = CovarianceFactor.of_residuals(with_both.residuals, noise).inverse_times(expected)
     np.testing.assert_allclose(found, np.broadcast_to(np.eye(len(expected[0])), found.shape), atol=1e-5)
-    again = with_random_effects(with_both, [effects[DRIFT]])
+    again = with_both.with_effects([effects[DRIFT]])
     assert again.residuals.random_effect_sensitivities.shape[-1] == 3
 
 

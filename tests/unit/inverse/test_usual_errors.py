@@ -157,7 +157,7 @@ def test_errors_common_to_tests_are_the_covariance_of_all_of_them_as_one_matrix(
     common = rng.normal(size=(*plain.values.shape, 2)) * plain.present[..., None]
     rows, v = common.reshape(-1, 2), rng.normal(size=(*plain.values.shape, 3))
     whole = blocks + rows @ rows.T
-    factor = CovarianceFactor.of_residuals(plain.with_effects(np.zeros((*plain.values.shape, 0)), common), noise)
+    factor = CovarianceFactor.of_residuals(plain.with_effects([], np.moveaxis(common, -1, 0)), noise)
     expected = np.linalg.solve(whole, v.reshape(-1, 3))
     np.testing.assert_allclose(factor.inverse_times(v).reshape(-1, 3), expected, rtol=1e-6, atol=1e-6 * expected.max())
     white = factor.whiten(v).reshape(-1, 3)

@@ -3,7 +3,7 @@
 Each unmodelled effect of the laws (see inverse.perturbations: a length known to its tolerance, an offset, a
 furnace that drifts) is put into the linear problems of all of them, with its usual size as prior standard deviation,
 and they are ranked again under one common covariance. In several tests it is tried twice: independently in each test,
-as a random effect of the covariance, and as one error of all tests, an unknown with a prior. No simulation is needed.
+and as one error of all tests. No simulation is needed.
 
 An answer that singles a law out rests on the absence of an effect with which it no longer has nearly all the weight.
 Where no law is singled out, the law of most evidence with an effect is named if it then explains the tests, and without
@@ -25,7 +25,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
-from creepkit.inverse.perturbations import effect_columns, sizes_of_effect, with_random_effects, with_unknown_effects
+from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.selection.discrimination import (
     DISTINGUISHABLE_CHI_SQUARE,
     linearised_problem,
@@ -77,7 +77,7 @@ class Trial:
     def of(cls, fits: Sequence[Identification], effects: tuple[Perturbation, ...], scope: Scope) -> Trial:
         """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
         perturbed = [
-            with_random_effects(p, [e]) if scope == "test" else with_unknown_effects(p, effect_columns(e, common=True))
+            p.with_effects([replace(e, common=scope == "all")])
             for p, e in zip([linearised_problem(fit) for fit in fits], effects, strict=True)
         ]
         scores, noise_model = _scores(fits, perturbed)

@@ -208,6 +208,9 @@ def covariance_of_values(
     solution = free.solve(CovarianceFactor.of_residuals(plain, working_noise))
     weighted = solution.weighted_jacobian
     meat = np.einsum("tfp,tfg,tgq->pq", weighted, covariance(residuals, noise_model), weighted, optimize=True)
+    if residuals.common_effects is not None:
+        pull = np.einsum("tfp,tfk->pk", weighted, residuals.common_effects)
+        meat += pull @ pull.T
     return np.asarray(solution.covariance @ (meat + np.diag(linearised.precision)) @ solution.covariance)
 
 

@@ -9,9 +9,6 @@ import sympy
 
 import creepkit as ck
 from creepkit.inverse.identify import identify
-from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise
-from creepkit.inverse.perturbations import with_random_effects, with_unknown_effects
 from creepkit.inverse.selection.challenges import (
     NOT_EXCLUDED,
     SHARE,
@@ -253,19 +250,6 @@ def steady_fits():
     tests = [h.replace(standard_deviation={"strain": np.full(h.times.size, 2e-4)}) for h in tests]
     settings = replace(TRIAL_SETTINGS, nuisances=())
     return [identify(law, tests, Steady(), settings=settings) for law in (NORTON, HYPERBOLIC_SINE)]
-
-
-def test_an_error_of_every_test_as_unknowns_is_what_it_is_as_a_random_effect(steady_fits):
-    """Integrating a Gaussian unknown out adds its column times itself to the covariance (Woodbury)."""
-    linear, noise = steady_fits[0].linearised, NoiseModel({"strain": OutputNoise(2e-4)})
-    effect = next(e for e in steady_fits[0].unmodelled if e.residual_change.size)
-    columns = effect.residual_change[..., None] * np.eye(3)[:, None, :]
-    unknown = with_unknown_effects(linear, columns)
-    as_unknowns = unknown.solve(CovarianceFactor.of_residuals(unknown.residuals, noise))
-    random = with_random_effects(linear, [effect])
-    as_random = random.solve(CovarianceFactor.of_residuals(random.residuals, noise))
-    assert as_unknowns.chi_square == pytest.approx(as_random.chi_square, rel=1e-6)
-    np.testing.assert_allclose(as_unknowns.step[:-3], as_random.step, rtol=1e-5)
 
 
 def test_sizes_of_errors_are_those_that_were_put_into_the_tests(steady_fits):
