@@ -17,7 +17,6 @@ left of second order would count as misfit: with d half way between the optimum 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -31,10 +30,6 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, TESTS_ALONE
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
 from creepkit.presentation import Presentable
-
-if TYPE_CHECKING:
-    pass
-
 
 CONSTRAINT_WIDTH = 0.02
 """w over the standard deviation of the quantity."""
