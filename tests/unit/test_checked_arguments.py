@@ -17,9 +17,8 @@ import numpy as np
 import sympy
 
 import creepkit as ck
-from creepkit.argument_types import KnownByName, annotations_of
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.checked_arguments import checked, checked_with_own_words
+from creepkit.checked_arguments import KnownByName, annotations_of, checked, checked_with_own_words
 from creepkit.errors import ArgumentError, CreepkitError
 from helpers.mistakes import said_otherwise
 from helpers.source_tree import public_classes

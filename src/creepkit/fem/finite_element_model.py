@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
-from creepkit.fem.mesh import SIDES, Mesh, discretize
+from creepkit.fem.mesh import SIDES, GeometryDerivative, Mesh, discretize
 
 TILE = 8
 """Side of the tiles in which the core keeps banded matrices."""
@@ -164,6 +164,16 @@ class FiniteElementModel:
         if directions.forces is not None and self.dead.size:
             forces = np.array([self.on_equations(each) for each in directions.forces]).reshape(forces.shape)
         return gradients, hoops, directions.velocities, forces
+
+    def geometry_derivative(self, velocity: Floats) -> GeometryDerivative:
+        """What exact shape derivatives need when the nodes move.
+
+        velocity : (nodes, 2) mm for each unit of the number of the geometry.
+        """
+        moves = velocity[self.elements]
+        slopes = (self.by_radius, self.by_height)
+        gradient = np.stack([np.einsum("epa,eai->epi", each, moves) for each in slopes], axis=3)
+        return GeometryDerivative(gradient, np.einsum("epa,ea->ep", self.over_radius, moves[:, :, 0]))
 
     def on_equations(self, forces: Floats) -> Floats:
         """Forces (size,) on the equations, N/rad; forces : (nodes, 2) N/rad on the nodes."""

@@ -143,17 +143,6 @@ def discretize(mesh: Mesh) -> Discretization:
     )
 
 
-def geometry_derivative(mesh: Mesh, velocity: Floats) -> GeometryDerivative:
-    """What exact shape derivatives need when the nodes move.
-
-    velocity : (nodes, 2) mm for each unit of the number of the geometry.
-    """
-    at = discretize(mesh)
-    moves = velocity[mesh.elements]
-    gradient = np.stack([np.einsum("epa,eai->epi", slopes, moves) for slopes in (at.by_radius, at.by_height)], axis=3)
-    return GeometryDerivative(gradient, np.einsum("epa,ea->ep", at.over_radius, moves[:, :, 0]))
-
-
 def local_tangents(nodes: Floats, places: Floats) -> Floats:
     """Derivatives (elements, places, 2 local, 2) of r and z to the local coordinates, mm.
 

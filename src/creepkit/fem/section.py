@@ -14,21 +14,7 @@ from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import AxialConstraints, FiniteElementModel, RigidContact, finite_element_model
-from creepkit.fem.mesh import (
-    SIDE_SLOPES,
-    SIDE_VALUES,
-    SIDE_WEIGHTS,
-    SIDES,
-    Mesh,
-    check_elements,
-    half_bandwidth,
-    order_by_neighbours,
-    outline,
-    strip_mesh,
-)
-
-SAME_PLACE = 1e-9
-"""mm; nodes that are nearer to one another are one node where two sections are joined."""
+from creepkit.fem.mesh import SIDE_SLOPES, SIDE_VALUES, SIDE_WEIGHTS, SIDES, Mesh, check_elements, outline, strip_mesh
 
 
 @checked
@@ -132,49 +118,6 @@ class Section:
         points = {"top_first": int(mesh.top[0]), "top_last": int(mesh.top[-1])} if mesh.top.size else {}
         sides = {"pressed": mesh.pressed} if mesh.pressed.size else {}
         return cls(mesh.nodes, mesh.elements, sides, points, held=mesh.held)
-
-    def joined(self, other: Section) -> Self:
-        """Both sections with the nodes at the same places made one, numbered for a small bandwidth.
-
-        Sides of one name become one side, without the element sides where the two meet. Name sides and points before;
-        hold and load the section after.
-        """
-        if self.is_loaded or other.is_loaded:
-            raise SolveError("a section is joined with another before either is held or loaded")
-        both = np.vstack([self.nodes, other.nodes])
-        distance = np.linalg.norm(other.nodes[:, None] - self.nodes, axis=2)
-        twin = distance.argmin(axis=1)
-        found = distance[np.arange(len(twin)), twin] < SAME_PLACE
-        if not found.any():
-            raise SolveError("two sections to be joined share no node; let a side of one be a side of the other")
-        number = np.arange(len(both))
-        number[len(self.nodes) :][found] = twin[found]
-        elements = number[np.vstack([self.elements, other.elements + len(self.nodes)])]
-        kept, elements = np.unique(elements, return_inverse=True)
-        elements = elements.reshape(-1, 8)
-        new = np.full(len(both), -1)
-        new[kept] = np.arange(kept.size)
-        order = np.arange(kept.size)
-        better = order_by_neighbours(elements, kept.size)
-        place = np.argsort(better)
-        if half_bandwidth(place[elements]) < half_bandwidth(elements):
-            order, elements, new = better, place[elements], np.where(new >= 0, place[new], -1)
-        number = new[number]
-        edges_left = _outline(elements)
-        shared = np.isin(edges_left, number[len(self.nodes) :][found])
-        if (shared[:, 0] & shared[:, 2] & ~shared[:, 1]).any():
-            raise SolveError("two sections to be joined have other element sides where they meet; give them the same")
-        outer = {tuple(edge) for edge in edges_left.tolist()}
-        sides = {}
-        for name in {**self.sides, **other.sides}:
-            given = [number[one.sides[name] + first] for one, first in ((self, 0), (other, len(self.nodes)))
-                     if name in one.sides]  # fmt: skip
-            edges = [edge for edge in np.vstack(given).tolist() if tuple(edge) in outer]
-            if edges:
-                sides[name] = np.array(edges, dtype=np.int64)
-        points = {name: number[node] for name, node in self.points.items()}
-        points |= {name: number[node + len(self.nodes)] for name, node in other.points.items()}
-        return type(self)(both[kept][order], elements, sides, points)
 
     # ---- names ----------------------------------------------------------------------------------------------------
 
@@ -285,11 +228,6 @@ class Section:
         )
 
     # ---- what it is for -------------------------------------------------------------------------------------------
-
-    @property
-    def is_loaded(self) -> bool:
-        """Whether anything holds it or acts on it."""
-        return bool(self.held.any() or self.pressed.size or self.forces.any() or self.planes or self.contacts)
 
     def model(self, observed: Ints) -> FiniteElementModel:
         """The finite element model; observed : (observed,) displacements, 2 node + 0 for u_r or + 1 for u_z."""

@@ -38,6 +38,8 @@ class Elastic:
     @checked
     def at(self, T: float) -> Elastic:
         """The same record with numbers, at temperature `T` in K."""
+        if isinstance(self.E, float) and isinstance(self.nu, float):
+            return self
         E, nu = (float(v.subs(temperature, T)) if isinstance(v, sympy.Expr) else float(v) for v in (self.E, self.nu))
         return Elastic(E, nu)
 

@@ -33,9 +33,9 @@ from .loading import load_steps as load_steps
 from .loading import loading_of as loading_of
 from .nuisance_programs import SCALABLE_LOADS as SCALABLE_LOADS
 from .nuisance_programs import STEP_DURATION as STEP_DURATION
+from .nuisance_programs import changed_fields as changed_fields
 from .nuisance_programs import drift_duration as drift_duration
-from .nuisance_programs import warmer_and_stiffer as warmer_and_stiffer
-from .nuisance_programs import with_program_nuisances as with_program_nuisances
+from .nuisance_programs import with_changed_history as with_changed_history
 from .plugin_calls import accepts_path as accepts_path
 from .plugin_calls import call_of_plugin as call_of_plugin
 from .plugin_calls import histories_in as histories_in

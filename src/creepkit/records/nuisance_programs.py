@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
@@ -22,50 +22,46 @@ SCALABLE_LOADS = ("stress", "pressure", "force", "displacement")
 """Quantities of a loading that a load step can change."""
 
 
-def warmer_and_stiffer(history: History, temperature_change: float, modulus_change: float) -> History:
-    """A history that is so many K warmer, its modulus larger by that share."""
-    if temperature_change == 0.0 and modulus_change == 0.0:
-        return history
-    program, elastic = history.temperature_program(), history.elastic
-    if elastic is not None:
-        elastic = replace(elastic, E=elastic.E * (1.0 + modulus_change))
-    return history.replace(temperature=Program(program.times, program.values + temperature_change), elastic=elastic)
+def changed_fields(history: History, values: Mapping[str, float]) -> dict[str, Any]:
+    """{field of the history: what it is with nuisances {key: value}} of those that any of them changes.
 
-
-def with_changed_history(history: History, values: Mapping[str, float]) -> History:
-    """The history that nuisances {key: value} of programs, temperature and modulus stand for."""
-    changed = with_program_nuisances(history, values)
-    return warmer_and_stiffer(changed, values.get("temperature", 0.0), values.get("modulus", 0.0))
-
-
-def with_program_nuisances(history: History, values: Mapping[str, float]) -> History:
-    """The history as the rig made it; values : {key: value} of explicit nuisances, of which others do not count.
-
-    A rate step changes no program; its breakpoints enter the temperature's, so that steps of an integration end there.
+    Nuisances that change no history do not count. A rate step changes no program; its breakpoints enter the
+    temperature's, so that steps of an integration end there.
     """
-    temperature, load = history.temperature, None
+    changed: dict[str, Any] = {}
+    warmer, stiffer = values.get("temperature", 0.0), values.get("modulus", 0.0)
+    if warmer:
+        program = history.temperature_program()
+        changed["temperature"] = Program(program.times, program.values + warmer)
+    if stiffer and history.elastic is not None:
+        changed["elastic"] = replace(history.elastic, E=history.elastic.E * (1.0 + stiffer))
     for key, value in values.items():
         kind, start = kind_and_start(key)
         if kind == "load step":
-            if history.loading.quantity not in SCALABLE_LOADS:
+            loading = changed.get("loading", history.loading)
+            if loading.quantity not in SCALABLE_LOADS:
                 raise SolveError(
                     f"{history.origin}: a load step changes a stress or a pressure, and {history.loading.quantity} is "
                     "prescribed here; leave it out for this test"
                 )
-            program = load or history.loading.program()
-            merged = _with_breakpoints(program, step_program(start))
+            merged = _with_breakpoints(loading.program(), step_program(start))
             load = Program(merged.times, merged.values * (1.0 + value * step_program(start).at(merged.times)))
+            changed["loading"] = RecordedLoading(load, loading.quantity, getattr(loading, "control", "load"))
         elif kind in PROGRAM_NUISANCES or kind == "rate step":
             shape = step_program(start) if start else drift_program(history)
+            temperature = changed.get("temperature", history.temperature)
             merged = _with_breakpoints(
                 temperature if isinstance(temperature, Program) else Program.constant(temperature), shape
             )
             change = 0.0 if kind in RATE_NUISANCES else value
-            temperature = Program(merged.times, merged.values + change * shape.at(merged.times))
-    if load is None:
-        return history if temperature is history.temperature else history.replace(temperature=temperature)
-    control: Literal["load", "stress"] = getattr(history.loading, "control", "load")
-    return history.replace(temperature=temperature, loading=RecordedLoading(load, history.loading.quantity, control))
+            changed["temperature"] = Program(merged.times, merged.values + change * shape.at(merged.times))
+    return changed
+
+
+def with_changed_history(history: History, values: Mapping[str, float]) -> History:
+    """The history as the rig made it, so many K warmer, its modulus larger by a share, by nuisances {key: value}."""
+    changed = changed_fields(history, values)
+    return history.replace(**changed) if changed else history
 
 
 def step_program(start: float) -> Program:

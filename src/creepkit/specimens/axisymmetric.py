@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,10 +13,11 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import FiniteElementModel
-from creepkit.fem.mesh import GeometryDerivative, Mesh, geometry_derivative
+from creepkit.fem.mesh import GeometryDerivative
 from creepkit.fem.section import Section
 from creepkit.records import dimension_named
 from creepkit.specimens.finite_element_specimen import FiniteElementSpecimen
+from creepkit.specimens.test_piece import kept
 
 if TYPE_CHECKING:
     from creepkit.fem.simulation import Simulation
@@ -150,23 +150,6 @@ class Axisymmetric(FiniteElementSpecimen, ABC):
         return _movement(self, load, key)
 
 
-_Made = TypeVar("_Made")
-
-
-def _kept(make: Callable[..., _Made]) -> Callable[..., _Made]:
-    """What is made of a test piece, kept, for a fit needs it a thousand times; made anew for one without a hash."""
-    cached = lru_cache(maxsize=256)(make)
-
-    def made(piece: Axisymmetric, *names: str) -> _Made:
-        try:
-            hash(piece)
-        except TypeError:
-            return make(piece, *names)
-        return cached(piece, *names)
-
-    return made
-
-
 @dataclass(frozen=True, eq=False)
 class PreparedSection:
     """A section ready to be simulated; order : the displacements that are observed, 2 node + component."""
@@ -176,7 +159,7 @@ class PreparedSection:
     order: tuple[int, ...]
 
 
-@_kept
+@kept
 def prepared_section(piece: Axisymmetric, load: str) -> PreparedSection:
     """The section of a test piece; SolveError, beginning with the specimen's name, where it cannot be made."""
     try:
@@ -211,18 +194,17 @@ def _neighbours(piece: Axisymmetric, key: str) -> tuple[Axisymmetric, Axisymmetr
     return longer, shorter, step
 
 
-@_kept
+@kept
 def _movement(piece: Axisymmetric, load: str, key: str) -> tuple[GeometryDerivative, Floats, Floats]:
     """By central differences of the section."""
-    section = prepared_section(piece, load).section
+    body = prepared_section(piece, load)
     longer, shorter, step = _neighbours(piece, key)
     up, down = longer.section(load), shorter.section(load)
-    if not (up.has_topology_of(section) and down.has_topology_of(section)):
+    if not (up.has_topology_of(body.section) and down.has_topology_of(body.section)):
         raise SolveError(
             f"specimen '{piece.name}': another '{key}' makes another mesh, not the same one with its nodes moved; let "
             "numbers of elements, and what is held, not depend on lengths"
         )
     velocity = (up.nodes - down.nodes) / (2.0 * step)
     force = (up.forces - down.forces) / (2.0 * step)
-    mesh = Mesh(section.nodes, section.elements, section.held, section.pressed, np.zeros(0, dtype=np.int64))
-    return geometry_derivative(mesh, velocity), velocity, force
+    return body.model.geometry_derivative(velocity), velocity, force

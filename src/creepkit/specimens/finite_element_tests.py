@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,16 +20,18 @@ from creepkit.records import (
     NuisanceValues,
     Prediction,
     Program,
+    changed_fields,
     dimension_named,
     kind_and_start,
     outputs_of_tests,
-    with_program_nuisances,
 )
 from creepkit.specimens.separate_tests import TestResponse, predict_separately
+from creepkit.specimens.test_piece import kept
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
-    from creepkit.language import CreepLaw
+    from creepkit.language import CreepLaw, Elastic
+    from creepkit.records import Loading
 
 
 STEPS = {"temperature step": 1.0, "temperature drift": 1.0, "load step": 1e-3, "modulus": 1e-3, "temperature": 1.0}
@@ -59,30 +60,7 @@ class FiniteElementTest:
         cls, specimen: Any, history: History, nuisances: Mapping[str, float], sensitivities: bool = False
     ) -> FiniteElementTest:
         """Set one test up; nuisances : {key: value}. sensitivities : for a simulation with its derivatives."""
-        piece, tested = specimen.of_test(history, nuisances)
-        known = {key: dimension_named(specimen, key) for key in nuisances}
-        loads = tuple(key for key, length in known.items() if length is None)
-        lengths = tuple(key for key, length in known.items() if length is not None and length.of_piece)
-        views = tuple(key for key in known if key not in (*loads, *lengths))
-        load_history = _load_history_of(piece, with_program_nuisances(tested, nuisances))
-        test = cls(piece, history, load_history, loads, lengths, views)
-        if not sensitivities:
-            return test
-
-        def segments(key: str, step: float) -> Floats:
-            return cls.of(specimen, history, {**nuisances, key: nuisances[key] + step}).load_history.segments
-
-        steps = {key: STEPS[kind_and_start(key)[0]] for key in loads}
-        along = [(segments(key, step) - segments(key, -step)) / (2.0 * step) for key, step in steps.items()]
-        moves = [piece.movement(test.load, key) for key in lengths]
-        directions = sensitivity_directions(
-            test.model,
-            load_history,
-            np.array(along).reshape(-1, *load_history.segments.shape),
-            [(gradient, velocity) for gradient, velocity, _ in moves],
-            np.array([force for *_, force in moves]) if moves else None,
-        )
-        return replace(test, directions=directions)
+        return _prepared(specimen, history, tuple(nuisances.items()), sensitivities)
 
     @property
     def load(self) -> str:
@@ -145,33 +123,65 @@ class FiniteElementTest:
         return TestResponse(values, status, end, "", at[..., :count], nuisances, names)
 
 
-def _load_history_of(piece: Any, tested: History) -> LoadHistory:
-    """What the body goes through in a test; SolveError for one that cannot be made.
+@kept
+def _prepared(
+    specimen: Any, history: History, nuisances: tuple[tuple[str, float], ...], sensitivities: bool
+) -> FiniteElementTest:
+    """As FiniteElementTest.of; nuisances : (key, value)."""
+    piece, tested = specimen.of_test(history, dict(nuisances))
+    known = {key: dimension_named(specimen, key) for key, _ in nuisances}
+    loads = tuple(key for key, length in known.items() if length is None)
+    lengths = tuple(key for key, length in known.items() if length is not None and length.of_piece)
+    views = tuple(key for key in known if key not in (*loads, *lengths))
+    load_history = _load_history_of(piece, history, tested.loading, tested.temperature, tested.elastic)
+    test = FiniteElementTest(piece, history, load_history, loads, lengths, views)
+    if not sensitivities:
+        return test
 
-    tested : with its nuisances.
-    """
-    where, quantity = tested.origin, tested.loading.quantity
-    if tested.times[-1] <= 0.0:
+    def segments(key: str, step: float) -> Floats:
+        values = dict(nuisances)
+        changed = changed_fields(history, {**values, key: values[key] + step})
+        fields = (changed.get(name, getattr(history, name)) for name in ("loading", "temperature", "elastic"))
+        return _load_history_of(piece, history, *fields).segments
+
+    steps = {key: STEPS[kind_and_start(key)[0]] for key in loads}
+    along = [(segments(key, step) - segments(key, -step)) / (2.0 * step) for key, step in steps.items()]
+    moves = [piece.movement(test.load, key) for key in lengths]
+    directions = sensitivity_directions(
+        test.model,
+        load_history,
+        np.array(along).reshape(-1, *load_history.segments.shape),
+        [(gradient, velocity) for gradient, velocity, _ in moves],
+        np.array([force for *_, force in moves]) if moves else None,
+    )
+    return replace(test, directions=directions)
+
+
+def _load_history_of(
+    piece: Any, history: History, loading: Loading, temperature: float | Program, elastic: Elastic | None
+) -> LoadHistory:
+    """What the body goes through in a test as its nuisances say; SolveError for one that cannot be made."""
+    where, quantity, end = history.origin, loading.quantity, float(history.times[-1])
+    if end <= 0.0:
         raise SolveError(f"{where}: the last time is 0 s, where the load only begins; ask for a time after it")
-    if tested.elastic is None:
+    if elastic is None:
         raise SolveError(f"{where}: specimen '{piece.name}' needs elastic data; set elastic=Elastic(E=...), E in MPa")
-    load = tested.loading.program()
+    load = loading.program()
     if {each.name: each.quantity for each in piece.loads}[quantity] == "pressure" and load.values.min() < 0.0:
         raise SolveError(f"{where}: the pressure falls to {load.values.min():g} MPa; it must not be negative")
     if not load.values.any():
         raise SolveError(f"{where}: the {quantity} is zero throughout; a test needs a load")
-    temperature, elastic = tested.temperature_program(), tested.elastic
-    moduli = {float(T): float(elastic.at(float(T)).E) for T in np.unique(temperature.values)}
-    values = np.array([moduli[float(T)] for T in temperature.values])
+    kelvin = temperature if isinstance(temperature, Program) else Program.constant(temperature)
+    moduli = {float(T): float(elastic.at(float(T)).E) for T in np.unique(kelvin.values)}
+    values = np.array([moduli[float(T)] for T in kelvin.values])
     if not (values > 0).all():
         raise SolveError(f"{where}: the modulus is {values.min():g} MPa; it must be above zero")
-    modulus, poisson = Program(temperature.times, values), float(elastic.at(float(temperature.values[0])).nu)
-    end = float(tested.times[-1])
+    modulus, poisson = Program(kelvin.times, values), float(elastic.at(float(kelvin.values[0])).nu)
     motion = piece.motion(quantity)
     if motion is None:
-        return LoadHistory(load, temperature, modulus, end, poisson)
+        return LoadHistory(load, kelvin, modulus, end, poisson)
     moved = Program(load.times, motion * load.values)
-    return LoadHistory(Program.constant(0.0), temperature, modulus, end, poisson, moved)
+    return LoadHistory(Program.constant(0.0), kelvin, modulus, end, poisson, moved)
 
 
 class Reduction(NamedTuple):
@@ -198,16 +208,15 @@ def predict_tests(
     kernel = kernels.lower(law, "compiled")
     settings = solver_settings(specimen, exact=sensitivities) if reduction is None else reduction.settings
 
-    @cache
-    def prepared(k: int, *values: float) -> tuple[FiniteElementTest, SolvableModel]:
-        test = FiniteElementTest.of(specimen, histories[k], dict(zip(nuisances, values, strict=True)), sensitivities)
+    def prepared(k: int, of_test: Mapping[str, float]) -> tuple[FiniteElementTest, SolvableModel]:
+        test = FiniteElementTest.of(specimen, histories[k], of_test, sensitivities)
         return test, test.model if reduction is None else reduction.model_of(test.piece)
 
     for k in range(len(histories)) if len(theta) else ():  # before threads begin: a model may have to be trained
-        prepared(k, *(float(values[0, k]) for values in nuisances.values()))
+        prepared(k, {key: float(values[0, k]) for key, values in nuisances.items()})
 
     def respond(row: Floats, k: int, of_test: Mapping[str, float]) -> TestResponse:
-        test, model = prepared(k, *of_test.values())
+        test, model = prepared(k, of_test)
         return test.response(test.simulate(kernel, row, settings, model))
 
     outputs = outputs_of_tests(specimen, histories)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import difflib
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import Field, field, replace
-from typing import Any, Self
+from functools import lru_cache, wraps
+from typing import Any, Self, TypeVar
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
@@ -17,11 +18,29 @@ from creepkit.records import (
     check_geometry,
     check_load,
     dimension_named,
-    warmer_and_stiffer,
+    with_changed_history,
 )
 
 BASIC_NUISANCES = ("temperature", "modulus")
 """Kinds that every test piece follows: they change the history itself."""
+
+
+Made = TypeVar("Made")
+
+
+def kept(make: Callable[..., Made]) -> Callable[..., Made]:
+    """What is made of a test piece, kept, for a fit needs it a thousand times; made anew for one without a hash."""
+    cached = lru_cache(maxsize=256)(make)
+
+    @wraps(make)
+    def made(piece: Any, *further: Any) -> Made:
+        try:
+            hash(piece)
+        except TypeError:
+            return make(piece, *further)
+        return cached(piece, *further)
+
+    return made
 
 
 @checked
@@ -100,7 +119,7 @@ class TestPiece(Specimen):
             if known is not None:  # what an estimate tries beyond the bounds is drawn back by its penalty
                 lengths[known.name] = float(min(max(value, known.bounds[0]), known.bounds[1]))
         piece = self.replace(**lengths) if lengths and self.dimensions else self
-        return piece, warmer_and_stiffer(history, nuisances.get("temperature", 0.0), nuisances.get("modulus", 0.0))
+        return piece, with_changed_history(history, nuisances)
 
     def _length(self, name: str, value: float, history: History) -> float:
         known = dimension_named(self, name)

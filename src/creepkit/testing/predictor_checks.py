@@ -208,16 +208,6 @@ def check_ends(case: PredictorCase) -> str:
     return f"{int((found.status != int(Status.COMPLETE)).sum())} of {found.status.size} rows ended early"
 
 
-@finding("finite at time zero")
-def check_rest(case: PredictorCase) -> str:
-    """What is seen at rest is a number."""
-    found, starts = case.predict(), [(k, h) for k, h in enumerate(case.histories) if h.times[0] == 0.0]
-    for k, history in starts:
-        bad = [str(o) for o, v in zip(found.outputs, found.of(k)[0], strict=True) if not np.isfinite(v)]
-        assert not bad, f"test '{history.name}': {bad[0]} is not finite at time zero; state what is seen at rest"
-    return f"{len(starts)} tests"
-
-
 @finding("a batch equals one by one")
 def check_batches(case: PredictorCase) -> str:
     """Candidates and tests together are what each is alone."""
@@ -227,16 +217,8 @@ def check_batches(case: PredictorCase) -> str:
         alone = case.predict(thetas[c : c + 1], [case.histories[k]])
         where = f" at test '{case.histories[k].name}', candidate {c}"
         worst = max(worst, (largest_difference(alone.of(0), together.of(k, c)), where))
-    assert worst[0] <= SAME, f"{worst[0]:.1e}{worst[1]}; one row must not depend on the others"
+    assert worst[0] <= SAME, f"{worst[0]:.1e}{worst[1]}; one row must not depend on the others, nor on chance"
     return f"{worst[0]:.1e}{worst[1] if worst[0] else ''}"
-
-
-@finding("deterministic")
-def check_determinism(case: PredictorCase) -> str:
-    """The same call gives the same numbers."""
-    first, second = (case.predict(case.candidates[:2]).values for _ in range(2))
-    assert np.array_equal(first, second, equal_nan=True), "two calls differ; take no random numbers and keep no state"
-    return "equal to the last bit"
 
 
 @finding("pickles")

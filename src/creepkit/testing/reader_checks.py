@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit.errors import HistoryError, nearest
 from creepkit.readers.history_csv import HISTORY_CSV, write_history
-from creepkit.records import History, Reader, accepts_path, constant_stress, histories_in, known_specimens, outputs_of
+from creepkit.records import History, Reader, accepts_path, histories_in, known_specimens, outputs_of
 from creepkit.testing.reports import finding
 
 FOREIGN_FILES: dict[str, bytes] = {
@@ -67,22 +67,6 @@ def foreign_places() -> Iterator[Path]:
         (folder / "folder.csv").mkdir()
         (folder / "folder.csv" / "index.csv").write_bytes(b"")
         yield from (*sorted(folder.iterdir()), folder, folder / "missing.csv")
-
-
-@finding("files of write_history()")
-def check_own_files(reader: Reader, _: Path | None) -> str:
-    """What write_history() writes is read back equal by a reader that accepts it."""
-    times = np.array([0.0, 3600.0, 7200.0])
-    example = History("example", times, {"strain": np.array([0.0, 1e-3, 1.5e-3])}, constant_stress(120.0), 1033.15)
-    with tempfile.TemporaryDirectory() as folder:
-        file = write_history(example, Path(folder) / "example.csv")
-        if not accepts_path(reader, file):
-            return "not accepted; they are left to the reader csv"
-        found = histories_in(reader, file)
-    assert found, "it finds none"
-    difference = history_difference(example, found[0])
-    assert not difference, difference
-    return "read back equal"
 
 
 @finding("example file")

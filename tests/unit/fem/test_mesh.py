@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from creepkit.errors import SolveError
-from creepkit.fem.mesh import (
-    CORNERS,
-    Mesh,
-    discretize,
-    geometry_derivative,
-    shape_functions,
-    shape_gradients,
-    strip_mesh,
-)
+from creepkit.fem.finite_element_model import finite_element_model
+from creepkit.fem.mesh import CORNERS, Mesh, discretize, shape_functions, shape_gradients, strip_mesh
 from creepkit.fem.section import Section
 from creepkit.fem.simulation import LoadHistory, Simulation, simulate
 from creepkit.fem.solver import SolverSettings
@@ -73,7 +67,8 @@ def test_a_linear_field_has_its_gradient_at_every_point_of_a_curved_mesh():
 def test_geometry_change_is_the_derivative_of_what_the_mesh_becomes():
     mesh = ring(3, 2)
     velocity = np.random.default_rng(2).normal(size=mesh.nodes.shape)
-    change, step = geometry_derivative(mesh, velocity), 1e-6
+    held = replace(mesh, held=np.ones(mesh.nodes.shape, dtype=bool))
+    change, step = finite_element_model(held).geometry_derivative(velocity), 1e-6
     ahead, behind = (discretize(mesh.moved(mesh.nodes + s * velocity)) for s in (step, -step))
     at = discretize(mesh)
     growth = np.log(ahead.weights / behind.weights) / (2 * step)
@@ -129,7 +124,7 @@ def test_a_middle_node_beyond_a_quarter_of_its_side_is_refused():
 
 # ---- section ---------------------------------------------------------------------------------------------------------
 
-# Sections: meshes with named sides and points, joined, held and loaded; forces, planes and moved sides in the core.
+# Sections: meshes with named sides and points, held and loaded; forces, planes and moved sides in the core.
 
 
 E, NU = 1e5, 0.3
@@ -202,17 +197,3 @@ def test_observed_displacements_do_not_change_a_simulation() -> None:
     ]
     for end in ends[1:]:
         np.testing.assert_allclose(end, ends[0], rtol=1e-4, atol=1e-9)
-
-
-def test_joined_sections_are_one_body() -> None:
-    """A bar of two blocks strains as one of one block, and the inner side is no side any more."""
-    lower = Section.rectangle((0.0, 0.0), (2.0, 1.0), 3, 1)
-    upper = Section.rectangle((0.0, 1.0), (2.0, 3.0), 3, 2)
-    both = lower.joined(upper)
-    assert len(both.nodes) == len(lower.nodes) + len(upper.nodes) - 7
-    assert set(both.sides) == {"bottom", "left", "right", "top"}
-    assert len(both.sides["right"]) == 3
-    for each in (both, BAR):
-        bar = each.hold("bottom", z=True).pull("top", 1e3)
-        strain = np.log1p(top_of(bar, simulated(bar, [], load=1.0)) / 3.0)
-        np.testing.assert_allclose(strain * np.exp(-strain), 1e3 / (E * 4.0 * np.pi), rtol=1e-7)

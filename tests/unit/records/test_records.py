@@ -25,7 +25,7 @@ from creepkit.records import (
     constant_strain,
     constant_stress,
     kind_and_start,
-    with_program_nuisances,
+    with_changed_history,
 )
 from creepkit.records.camera_format import LENGTH_UNITS
 from creepkit.records.quantities import LENGTH, STRESS, TEMPERATURE, TIME
@@ -100,7 +100,7 @@ def test_what_makes_no_sense_is_refused():
         (lambda: Nuisance("rate step"), "start is 0 s; say when it begins, such as start=3600"),
         (lambda: Nuisance("thickness", start=5.0), "'thickness' has no start; only temperature step, rate step, load"),
         (lambda: Nuisance("rate step", "tests", start=5.0), "scope 'tests' is not known; did you mean 'test'"),
-        (lambda: with_program_nuisances(history(loading=constant_strain(0.002)), {"load step@400": 0.1}),
+        (lambda: with_changed_history(history(loading=constant_strain(0.002)), {"load step@400": 0.1}),
          "a load step changes a stress or a pressure, and strain is prescribed here"),
     )  # fmt: skip
     assert said_otherwise(cases) == []
@@ -292,10 +292,10 @@ def rig_history(loading=None, temperature=1000.0, **fields):
 
 
 def test_a_step_is_a_ramp_of_five_seconds_and_a_drift_reaches_its_value_at_the_last_used_frame():
-    program = with_program_nuisances(rig_history(), {"temperature step@400": -12.0}).temperature_program()
+    program = with_changed_history(rig_history(), {"temperature step@400": -12.0}).temperature_program()
     np.testing.assert_allclose(program.at([0, 400, 402.5, 405, 900]), [1000, 1000, 994, 988, 988])
     cut = rig_history(used=np.array([True, True, False]))
-    program = with_program_nuisances(cut, {"temperature drift": 5.0}).temperature_program()
+    program = with_changed_history(cut, {"temperature drift": 5.0}).temperature_program()
     np.testing.assert_allclose(program.at([0, 250, 500, 1000]), [1000, 1002.5, 1005, 1005])
 
 
@@ -303,12 +303,12 @@ def test_steps_add_to_one_another_and_to_what_was_recorded():
     """A recorded jump at 300 s stays one: 1000 K before it, 1010 K at it."""
     recorded = rig_history(temperature=Program(np.array([0.0, 300.0, 300.0]), np.array([1000.0, 1000.0, 1010.0])))
     values = {"temperature step@200": 2.0, "temperature step@600": -3.0}
-    program = with_program_nuisances(recorded, values).temperature_program()
+    program = with_changed_history(recorded, values).temperature_program()
     np.testing.assert_allclose(program.at([100, 250, 299.999, 300, 700]), [1000, 1002, 1002, 1012, 1009])
 
 
 def test_a_load_step_scales_a_stress_and_keeps_its_control():
-    loaded = with_program_nuisances(
+    loaded = with_changed_history(
         rig_history(StressSteps(((0.0, 40.0), (700.0, 60.0)), "stress")), {"load step@400": 0.1}
     ).loading
     assert isinstance(loaded, RecordedLoading)

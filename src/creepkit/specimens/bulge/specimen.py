@@ -18,7 +18,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
-from creepkit.fem.mesh import GeometryDerivative, Mesh, geometry_derivative
+from creepkit.fem.mesh import GeometryDerivative, Mesh
 from creepkit.hookspecs import hookimpl
 from creepkit.records import (
     Dimension,
@@ -359,7 +359,8 @@ def _model_of_mesh(piece: Bulge) -> FiniteElementModel:
 @lru_cache(maxsize=256)
 def _movement(geometry: DimpleGeometry, refinement: float, name: str) -> tuple[GeometryDerivative, Floats, Floats]:
     velocity = geometry.mesh_velocity(name, refinement)
-    return geometry_derivative(geometry.mesh(refinement), velocity), velocity, np.zeros_like(velocity)
+    model = model_of_geometry(geometry, refinement)
+    return model.geometry_derivative(velocity), velocity, np.zeros_like(velocity)
 
 
 @hookimpl

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from creepkit.fem.finite_element_model import finite_element_model
-from creepkit.fem.mesh import geometry_derivative
 from creepkit.fem.reduced_order_model import ReducedOrderModel
 from creepkit.fem.simulation import sensitivity_directions, simulate
 from creepkit.language import Elastic, parameters, principal_stress, strain, stress
@@ -88,9 +87,8 @@ def test_thickness() -> None:
     setup = FiniteElementTest.of(SPECIMEN, history(), {})
     settings = solver_settings(SPECIMEN, exact=True)._replace(newton=1e-12)
     mesh, velocity = setup.piece.geometry.mesh(1.0), setup.piece.geometry.mesh_velocity("apex_thickness", 1.0)
-    along = sensitivity_directions(
-        setup.model, setup.load_history, velocities=[(geometry_derivative(mesh, velocity), velocity)]
-    )
+    moves = [(setup.model.geometry_derivative(velocity), velocity)]
+    along = sensitivity_directions(setup.model, setup.load_history, velocities=moves)
     model = REDUCED.reduced_model_of(SPECIMEN)
     base = simulate(lowered(creep), theta, model, setup.load_history, settings=settings, directions=along)
 
