@@ -15,7 +15,7 @@ from creepkit.reports.answer import (
     KeyFigure,
     answer,
     asked_figures,
-    interval_digits,
+    interval_text,
     rate_and_exponent,
     tests_text,
     titled_law,
@@ -271,7 +271,7 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
     rows = []
     for one in found:
         fit = one.fit
-        rate, exponent = (_with_interval(values) for values in rate_and_exponent(fit))
+        rate, exponent = map(interval_text, rate_and_exponent(fit))
         properties = (rate, combined_change_text(fit.unmodelled) or "–", exponent)
         rows.append(
             (
@@ -296,12 +296,6 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
         "law or effect that was tried does as well; the verdict of each material says what is missing"
     )
     return Table(caption, columns, rows, numeric=(2, 5, 6, 7, 8))
-
-
-def _with_interval(values: tuple[float, ...]) -> str:
-    value, low, high = values
-    digits = interval_digits(value, low, high)
-    return f"{number(value, digits)} ({number(low, digits)} to {number(high, digits)})"
 
 
 # ---- other stages ----------------------------------------------------------------------------------------------------
