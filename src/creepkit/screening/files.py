@@ -32,11 +32,7 @@ ALLOY_RESULT = DocumentFormat(
 
 
 CODEC = RecordCodec(
-    ranges={
-        AlloyResult: {"predicted": ANY_NUMBER},
-        ConfirmedOutput: {"rms_difference": ANY_NUMBER},
-        **FIT_CODEC.ranges,
-    },
+    ranges={ConfirmedOutput: {"rms_difference": ANY_NUMBER}, **FIT_CODEC.ranges},
     values={Identification: ValueCodec(identification_to_json, identification_from_json)},
 )
 """Of the result of an alloy; its identifications are documents of their own inside it."""

@@ -6,11 +6,9 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
 
-from creepkit.arrays import Floats
 from creepkit.errors import FitError, nearest
 from creepkit.inverse.confirmation import Confirmation
 from creepkit.inverse.identification import Identification
@@ -19,7 +17,6 @@ from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor
 from creepkit.screening.alloys import UNKNOWN_CLASS, Alloy, Compositions
 
-PredictedOutputs: TypeAlias = Mapping[str, Floats]
 """{output: (frames,) mm or strain} of one test."""
 
 
@@ -41,8 +38,7 @@ class AlloyResult:
     verdict : one sentence on which law it is; equivalents : on each pair of laws that the tests cannot separate.
     failure : why there is no law; empty otherwise.
     dense_fit, sparse_fit : the law without sparsity and what a penalty made of it, where they were requested.
-    predicted : {test: {output: (frames,) mm or strain}} of the best law with the test's own nuisances and offsets, by
-        the specimen where it was confirmed. cpu_seconds : CPU time of the identification.
+    cpu_seconds : CPU time of the identification.
     decisive : whether the ranking of its laws is (see inverse.selection.ranking).
     """
 
@@ -56,7 +52,6 @@ class AlloyResult:
     dense_fit: Identification | None = None
     sparse_fit: Identification | None = None
     confirmation: Confirmation | None = None
-    predicted: Mapping[str, PredictedOutputs] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     cpu_seconds: float = 0.0
     decisive: bool = False
@@ -177,5 +172,5 @@ class ScreeningResult(Presentable, text="reports.screening:screening_text"):
         return present("screening.files:write_csv", self, Path(path))
 
     def plot(self, folder: str | Path) -> list[Path]:
-        """Draw measured against identified displacement, misfit with and without sparsity, and shares of laws."""
+        """Draw the share of each law by class, and the rate of each alloy by its law; the paths of the pictures."""
         return present("reports.screening:plot_screening", self, Path(folder))
