@@ -29,7 +29,11 @@ BUDGET = {
     "forecasts": 1403,
     "instruments": 1282,
     "integration": 774,
+<<<<<<< HEAD
     "inverse": 10720,
+=======
+    "inverse": 10689,
+>>>>>>> main
     "jobs": 251,
     "kernels": 1703,
     "language": 1494,

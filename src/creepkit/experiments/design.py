@@ -342,7 +342,7 @@ def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> La
     for k, one in task.altered:
         if one.other and one.other not in known:
             known[one.other] = KnownLaw.from_identification(tried[one.other], task.laws[0].noise_model)
-        altered.append(Alteration(k, one.excess, known[one.other] if one.other else None))
+        altered.append(Alteration(k, one.excess, one.penalty, known[one.other] if one.other else None))
     return LawCriterion(
         outcomes, task.remaining.weights, excess, chi_squares, ranking.independent_frames, altered, seed
     )

@@ -67,7 +67,7 @@ class RemainingLaws:
             for k, fit in enumerate(self.fits[:CHALLENGED_LAWS])
             for altered in altered_laws([fit, *(other for other in tried if other is not fit)], NEARLY_EXCLUDED)
         ]
-        is_settled = len(self.fits) == 1 and not any(altered.excess <= NOT_EXCLUDED for _, altered in found)
+        is_settled = len(self.fits) == 1 and not any(one.excess + one.penalty <= NOT_EXCLUDED for _, one in found)
         return [] if is_settled else found
 
     def unmodelled_effects(self) -> tuple[str, ...]:

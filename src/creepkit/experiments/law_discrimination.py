@@ -94,7 +94,7 @@ class LawCriterion:
     def expectation(self, histories: Sequence[History], *, at_draws: bool = False) -> Expectation:
         """Information, probability of a right verdict and chi-squares of every direction, with these tests.
 
-        An altered law counts, for the information, as another law of as many parameters.
+        An altered law counts, for the information, as another law.
         """
         weight, count = self.weights / self.weights.sum(), len(self.weights)
         penalty = self._penalties(histories)
@@ -102,9 +102,9 @@ class LawCriterion:
         for a, name in enumerate(self.names):
             Q = self._increments(a, histories, at_draws)
             score = (self.excess + penalty + Q[:count].T).T
-            own = [k for k, alteration in enumerate(self.altered) if alteration.law == a]
-            more = np.array([self.altered[k].excess + Q[count + k] - Q[a] for k in own]).reshape(-1, Q.shape[1])
-            before = _shares(np.append(self.excess, [self.excess[a] + self.altered[k].excess for k in own])[:, None])
+            own = [(k, one.excess + one.penalty) for k, one in enumerate(self.altered) if one.law == a]
+            more = np.array([beyond + Q[count + k] - Q[a] for k, beyond in own]).reshape(-1, Q.shape[1])
+            before = _shares(np.append(self.excess, [self.excess[a] + beyond for _, beyond in own])[:, None])
             after = _shares(np.concatenate([score, score[a] + more]))
             information += weight[a] * float(np.mean(np.log(np.maximum(after[a], 1e-300)) - np.log(before[a])))
             decided = _shares(score) > DECISIVE_WEIGHT
@@ -232,8 +232,7 @@ class LawCriterion:
                 altered = self.altered[b - len(self.names)]
                 own, _ = _refit_in_full(truth, self._noise_model, made, [truth.fit.u + deviation[: truth.size]])
                 found = altered.refitted(own, self._noise_model, made)
-                excess = 0.0 if found is None else found.excess
-                refitted = excess - altered.excess + float(self._least(a, a, histories, y[[chosen]], True)[0])
+                refitted = found.excess - altered.excess + float(self._least(a, a, histories, y[[chosen]], True)[0])
         except CreepkitError:  # no start can be predicted: the linear value stands
             return False
         self.ratios[_key(histories), a, b] = float(np.clip(refitted / linear[chosen], *RATIO_LIMITS))
@@ -253,15 +252,16 @@ class LawCriterion:
 class Alteration:
     """What a verdict for one law has to exclude.
 
-    law : position of that law. excess : chi-square of the altered law above that law's. other : of a sum, what is known
-    of the law that has a share; None for a threshold.
+    law : position of that law. excess : chi-square of the altered law above that law's; penalty : of its further
+    parameters, by BIC. other : of a sum, what is known of the law that has a share; None for a threshold.
     """
 
     law: int
     excess: float
+    penalty: float = 0.0
     other: KnownLaw | None = None
 
-    def refitted(self, own: FittedLaw, noise_model: NoiseModel, further: Sequence[History]) -> AlteredLaw | None:
+    def refitted(self, own: FittedLaw, noise_model: NoiseModel, further: Sequence[History]) -> AlteredLaw:
         """The altered law fitted to further tests too, as a challenge does; own : the law itself, fitted to these."""
         if self.other is None:
             return above_threshold(own)

@@ -49,8 +49,8 @@ or displacement, a share, of an extensometer of class 1 by ISO 9513.
 class IdentificationSettings(Options, title="settings of an identification", error=FitError):
     """What a run can be repeated from.
 
-    starts : of the multi-start search; sobol_points : that are screened for them, a power of two is best; half of them
-    where two parameters beside rates are sought, a quarter for one.
+    starts : of the multi-start search, half of them where two parameters beside rates are sought, two for one;
+    sobol_points : that are screened for them, a power of two is best; a quarter of them for two, an eighth for one.
     frames : that are compared in each history, with all their outputs. seed : of random draws.
     loss : of frames, for values only; intervals and noise model are Gaussian, in which outliers are noise. An
         identification by likelihood takes none.

@@ -6,8 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import sympy
-
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.language import algebra
 from creepkit.language.algebra import times
@@ -88,8 +86,8 @@ class CreepLaw(LawRecord):
         """The law at one temperature, in K; parameters that no longer matter there are dropped."""
         return algebra.at(self, temperature)
 
-    def expression(self, values: Mapping[Any, float] | None = None) -> sympy.Expr:
-        """The rate with these values in it, by name or symbol; R and T_ref of Arrhenius factors stay symbols."""
+    def expression(self, values: Mapping[Any, float] | None = None) -> Any:
+        """The rate for sympy with values in it, by name or symbol; R and T_ref of Arrhenius factors stay symbols."""
         return present("reports.law_names:law_expression", self, values or {})
 
     def latex(self) -> str:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy
 from sympy.printing.latex import LatexPrinter
@@ -15,8 +14,7 @@ from creepkit.language.symbols import GAS_CONSTANT, LATEX_SYMBOLS, temperature
 # ---- LaTeX ---------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class ArrheniusExponent:
+class ArrheniusExponent(NamedTuple):
     """exp[-(Q/R)(1/T - 1/T_ref)] recognised in an expression: Q in J/mol, T_ref in K; -Q is `energy` after `sign`."""
 
     Q: sympy.Expr

@@ -208,7 +208,7 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
     how = ""
     if search.startswith("multi-start"):
         points = f"at most {settings.sobol_points} points of a Sobol' sequence{cite('sobol')}"
-        how = f" from {plural(settings.starts, 'start')}, picked out of {points} (seed {settings.seed})"
+        how = f" from up to {plural(settings.starts, 'start')}, picked out of {points} (seed {settings.seed})"
     elif "swarm" in search:
         how = f" by a particle swarm{cite('swarm')} (seed {settings.seed})"
     refined = f"and refined by least squares in a trust region{cite('trust region')}"

@@ -64,8 +64,16 @@ SAME_BASIN = 0.1
 """Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
 
 
-FIRST_STEPS, CONTINUED = Tolerances(max_steps=3), 3
-"""Of every start of least squares, and how many of the best ends of these steps are refined to the end."""
+FIRST_STEPS, LAST_STEPS = Tolerances(max_steps=3), Tolerances(tolerance=1e-4)
+"""Of every start of least squares, and then of the best of them one after the other."""
+
+
+CONTINUED, CONFIRMED = 3, 2
+"""How many of the best are refined to the end at most, and how many of them that end at the best are enough."""
+
+
+SAME_POINT = 0.02
+"""Of the width of the bounds: starts that come closer than that in every coordinate lead to the same minimum."""
 
 
 def refined(
@@ -79,9 +87,22 @@ def refined(
             progress("start", k + 1, len(starts))
     ends.sort(key=lambda end: end.cost)
     for k, end in enumerate(ends[:CONTINUED]):
-        if not end.converged:
-            ends[k] = problem.minimise(end.x)
+        ends[k] = _continued(problem, end, ends[:k])
+        if k and sum(other is min(ends, key=lambda one: one.cost) for other in ends[: k + 1]) >= CONFIRMED:
+            break
     return sorted(ends, key=lambda end: end.cost)
+
+
+def _continued(problem: LeastSquaresProblem, end: Minimum, others: Sequence[Minimum]) -> Minimum:
+    """The minimum that a search leads to, a few steps at a time; that of another one where it comes to lie there."""
+    for _ in range(LAST_STEPS.max_steps // FIRST_STEPS.max_steps):
+        near = [o for o in others if (np.abs(end.x - o.x) <= SAME_POINT * problem.bounds.width).all()]
+        if near:
+            return near[0]
+        if end.converged:
+            break
+        end = problem.minimise(end.x, tolerances=replace(LAST_STEPS, max_steps=FIRST_STEPS.max_steps + 1))
+    return end
 
 
 def refine_candidates(

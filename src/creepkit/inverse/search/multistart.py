@@ -40,19 +40,13 @@ class MultiStart(Options, title="multi-start", error=FitError, prefix="multi-sta
 
     def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
         """The minima of all starts, best first; a sum's best single term stands behind the best."""
-        starts, draws = self.starts or problem.settings.starts, self.draws or default_draws(problem)
+        settings, shapes = problem.settings, problem.bounds.lower.size - len(problem.coordinates.term_rates)
+        share = {0: 8, 1: 8, 2: 4}.get(shapes, 1)  # rates are not drawn: they are shifted to those of the data
+        starts = self.starts or min(settings.starts, max(2 * settings.starts // share, 2))
+        draws = self.draws or max(settings.sobol_points // share, 1)
         screened = screened_starts(problem, starts=starts, draws=draws)
         initial_points = [*single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2), *screened]
         return SearchResult(tuple(refined(problem, initial_points, progress)))
-
-
-def default_draws(problem: LeastSquaresProblem) -> int:
-    """Those of the settings for three parameters beside rates, half of them for two, a quarter for one or none.
-
-    Rates are not drawn: they are shifted to those of the data.
-    """
-    shapes = problem.bounds.lower.size - len(problem.coordinates.term_rates)
-    return max(problem.settings.sobol_points // {0: 4, 1: 4, 2: 2}.get(shapes, 1), 1)
 
 
 def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
@@ -83,41 +77,39 @@ def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int)
 
 
 def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
-    """The centre, and the best draws after a shift of all rates to that of the data: (parameters,) each."""
+    """The centre, and the best draws after a shift of all rates to that of the data: (parameters,) each.
+
+    Once shifted they can be compared: the worse half of them is left out from shift to shift. The last shift is not
+    simulated, as the first step of a refinement does that.
+    """
     observations, bounds, seed = problem.observations, problem.bounds, problem.settings.seed
     sobol = qmc.Sobol(bounds.lower.size, seed=seed).random(draws)
-    points = bounds.lower + sobol * bounds.width
-    rates = list(problem.coordinates.term_rates)
-    points = np.concatenate([bounds.centre[None], points])
+    points = np.concatenate([bounds.centre[None], bounds.lower + sobol * bounds.width])
     points = _with_sampled_exponents(problem, points, np.concatenate([np.full((1, bounds.lower.size), 0.5), sobol]))
+    rates, internal_rates = list(problem.coordinates.term_rates), list(problem.coordinates.state_rates)
     if rates:
-        log_rate = bounds.centre[rates[0]] - 0.5 * sum(LOG_RATE_BOUNDS)
-        rng = np.random.default_rng(seed)
-        fractions = rng.dirichlet(np.full(len(rates), 0.7), size=len(points))
+        middle = bounds.centre - 0.5 * sum(LOG_RATE_BOUNDS)
+        fractions = np.random.default_rng(seed).dirichlet(np.full(len(rates), 0.7), size=len(points))
         fractions[0] = unequal_fractions(len(rates))
-        points[:, rates] = log_rate + np.log(np.maximum(fractions, 1e-4))
-        internal_rates = list(problem.coordinates.state_rates)
-        log_internal_rate = (bounds.centre - 0.5 * sum(LOG_RATE_BOUNDS))[internal_rates]
-        points[1:, internal_rates] = (
-            log_internal_rate
-            + INTERNAL_RATE_RANGE[0]
-            + sobol[:, internal_rates] * (INTERNAL_RATE_RANGE[1] - INTERNAL_RATE_RANGE[0])
-        )
-        points[0, internal_rates] = log_internal_rate + 0.5 * sum(INTERNAL_RATE_RANGE)
-        for _ in range(2 + 3 * min(len(internal_rates), 1)):
-            residuals = problem.candidate_residuals(bounds.clip(points))
+        points[:, rates] = middle[rates[0]] + np.log(np.maximum(fractions, 1e-4))
+        positions = np.concatenate([np.full((1, len(internal_rates)), 0.5), sobol[:, internal_rates]])
+        points[:, internal_rates] = middle[internal_rates] + np.interp(positions, (0, 1), INTERNAL_RATE_RANGE)
+    points, shifts = bounds.clip(points), (1 + 3 * min(len(internal_rates), 1)) if rates else 0
+    for shift in range(shifts + 1):
+        residuals = problem.candidate_residuals(points)
+        score = (np.arcsinh(residuals[:, observations.present]) ** 2).mean(axis=1)
+        if shift or not shifts:
+            best = 1 + np.argsort(score[1:], kind="stable")
+            kept = [0, *best[: max(starts - 1, 0 if shift == shifts else len(points) // 2)]]
+            points, residuals, score = points[kept], residuals[kept], score[kept]
+        if rates:
             points[:, rates] -= np.clip(median_log_rate_excess(observations, residuals), -6, 6)[:, None]
             points[:, internal_rates] -= np.clip(median_log_rupture_excess(observations, residuals), -6, 6)[:, None]
-    points = bounds.clip(points)
-    residuals = problem.candidate_residuals(points)
-    score = np.array(
-        [np.mean(np.arcsinh(candidate_residuals[observations.present]) ** 2) for candidate_residuals in residuals]
-    )
-    chosen = [0, *[int(k) for k in np.argsort(score) if k != 0][: max(starts - 1, 0)]]
-    if not np.isfinite(score[chosen]).any():  # from where nothing is predicted, no direction leads away
-        problem.check_predicted(points[chosen])
+            points = bounds.clip(points)
+    if not np.isfinite(score).any():  # from where nothing is predicted, no direction leads away
+        problem.check_predicted(points)
         raise FitError(f"law '{problem.law.name}': no point within its bounds can be simulated; widen the bounds")
-    return [points[k] for k in chosen]
+    return [*points]
 
 
 def _with_sampled_exponents(problem: LeastSquaresProblem, points: Floats, sobol: Floats) -> Floats:

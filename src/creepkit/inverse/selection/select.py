@@ -18,8 +18,7 @@ from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import describing, identify, identify_values
-from creepkit.inverse.initial_search import StartingEstimate
+from creepkit.inverse.identify import describing, identify
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
@@ -40,11 +39,6 @@ def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
     for law in laws:
         by_fingerprint.setdefault(law.fingerprint, law)
     return list(by_fingerprint.values())
-
-
-RULED_OUT_EXCESS = 40.0
-"""Criterion over the best from which a law is ruled out by a surrogate already: e^-20 of the weight, which the errors
-of a surrogate, some noise in chi-square, do not make up for."""
 
 
 def select(
@@ -147,54 +141,19 @@ def _identify_all(
     failed: dict[str, str],
     kind: str = "law",
 ) -> list[Identification]:
-    """The laws that can be identified; the others go to `failed`.
+    """The laws that can be identified; of the others `failed` says why.
 
     kind : what they are, for the progress: "law 3 of 8: Garofalo's hyperbolic sine".
-    through : all laws that it knows are identified with it first, and those far behind keep their values from it.
     """
     fits = []
     for k, law in enumerate(laws):
         task = f"{kind} {k + 1} of {len(laws)}: {law.title or law.name}"
         if progress is not None:
             progress(task, k, len(laws))
-        first = through_for_law(through, law)
-        fit = _try_to_identify(law, histories, first or using, settings, failed, sampled=first is None)
-        fits += [fit] if fit is not None else []
+        try:
+            fits.append(identify(law, histories, using, settings=settings, through=through_for_law(through, law)))
+        except CreepkitError as error:
+            failed[law.name] = str(error)
         if progress is not None:
             progress(task, k + 1, len(laws))
-    if through is None or not fits:
-        return fits
-    competitive = {id(r.fit) for r in rank(fits, challenge=False).laws if r.excess < RULED_OUT_EXCESS}
-    refined = {
-        id(fit): _try_to_identify(fit.law, histories, using, settings, failed, fit)
-        for fit in fits
-        if id(fit) in competitive
-    }
-    return [refined.get(id(fit)) or _ruled_out(fit) for fit in fits if fit.law.name not in failed]
-
-
-def _try_to_identify(
-    law: CreepLaw,
-    histories: Sequence[History],
-    using: Predictor | Mapping[str, Predictor],
-    settings: IdentificationSettings,
-    failed: dict[str, str],
-    previous_fit: Identification | None = None,
-    sampled: bool = True,
-) -> Identification | None:
-    """Identify one law, from where a cheaper predictor ended if it did; errors are recorded in `failed`.
-
-    sampled : whether its posterior is sampled where that is needed; not of what is identified again.
-    """
-    start = None if previous_fit is None else StartingEstimate.from_identification(previous_fit)
-    try:
-        run = identify if sampled else identify_values
-        return run(law, histories, using, settings=settings, start=start)
-    except CreepkitError as error:
-        failed[law.name] = str(error)
-        return None
-
-
-def _ruled_out(fit: Identification) -> Identification:
-    note = f"ruled out with the {fit.provenance['specimen']}, and not refined any further"
-    return replace(fit, notes=(*fit.notes, note))
+    return fits
