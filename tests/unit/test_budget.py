@@ -29,14 +29,10 @@ BUDGET = {
     "forecasts": 1403,
     "instruments": 1282,
     "integration": 774,
-<<<<<<< HEAD
-    "inverse": 10720,
-=======
-    "inverse": 10689,
->>>>>>> main
+    "inverse": 10683,
     "jobs": 251,
     "kernels": 1703,
-    "language": 1494,
+    "language": 1493,
     "laws": 136,
     "modules": 770,
     "quality": 1295,
