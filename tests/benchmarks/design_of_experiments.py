@@ -33,8 +33,7 @@ from measured import Page, arguments, progress
 
 import creepkit as ck
 from creepkit.errors import CreepkitError, FitWarning
-from creepkit.experiments.candidate_tests import frame_times
-from creepkit.experiments.rig import rigs_of
+from creepkit.experiments.rig import frame_times, rigs_of
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 
 SERVICE = {"bars": 40.0, "scatter": 40.0, "dimples": 60.0}

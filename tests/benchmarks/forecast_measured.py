@@ -28,8 +28,7 @@ from measured_creep import STRAIN_LIMIT
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit.forecasts.drawn_law import SimulatedTest, crossing_times
-from creepkit.forecasts.draws import law_draws, uncertain_quantities
+from creepkit.forecasts.draws import SimulatedTest, crossing_times, law_draws, uncertain_quantities
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
@@ -130,7 +129,6 @@ def forecast_of(case: Case, fit: Identification, history: History) -> Result:
     result: Result = {"test": history.name, "output": output, "times": times, "law only": law_only}
     if score is not None:
         result |= {"whole": score.whole_inside, "share": score.inside, "p": score.p_value}
-        result |= {"explained": score.explained}
     return result
 
 

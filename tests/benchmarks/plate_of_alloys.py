@@ -102,7 +102,7 @@ def confirmation_table(page, plate):
     """How far finite elements are from the identified laws, and what a single law loses against Eq. (2)."""
     confirmations = [r.confirmation for r in plate.identified if r.confirmation is not None]
     losses = [
-        mean_relative_squared_error(r.reduced_fit) / mean_relative_squared_error(r.dense_fit)
+        mean_relative_squared_error(r.best) / mean_relative_squared_error(r.dense_fit)
         for r in plate.identified
         if r.dense_fit is not None
     ]

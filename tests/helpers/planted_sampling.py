@@ -10,8 +10,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.sampling.conditions import TimeGrid, planned_test
-from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion
-from creepkit.sampling.domains import SamplingDomain
+from creepkit.sampling.domains import DrawCriterion, OutcomeCriterion, SamplingDomain
 from creepkit.sampling.rates import Draws, additive_recurrence_step
 
 NORTON = ck.law("norton")

@@ -17,28 +17,46 @@ BUDGET = {
     "api": 316,
     "app": 603,
     "cameras": 931,
+<<<<<<< HEAD
     "cli": 2267,
     "core": 67,
     "dataset": 765,
     "discovery": 1405,
     "experiments": 1562,
     "exporters": 2613,
+=======
+    "cli": 2340,
+    "core": 67,
+    "dataset": 735,
+    "discovery": 1373,
+    "experiments": 1321,
+    "exporters": 2658,
+>>>>>>> main
     "extraction": 1302,
     "fem": 1427,
     "files": 1380,
-    "forecasts": 1403,
+    "forecasts": 1287,
     "instruments": 1282,
+<<<<<<< HEAD
     "integration": 774,
     "inverse": 10683,
     "jobs": 251,
     "kernels": 1703,
     "language": 1493,
+=======
+    "integration": 762,
+    "inverse": 10689,
+    "jobs": 251,
+    "kernels": 1703,
+    "language": 1483,
+>>>>>>> main
     "laws": 136,
     "modules": 770,
     "quality": 1295,
     "readers": 5840,
     "records": 2232,
     "registry": 615,
+<<<<<<< HEAD
     "reports": 5456,
     "rupture_assessment": 1697,
     "sampling": 1026,
@@ -46,11 +64,20 @@ BUDGET = {
     "specimens": 3228,
     "studies": 3038,
     "surrogates": 1391,
+=======
+    "reports": 5642,
+    "rupture_assessment": 1688,
+    "sampling": 1001,
+    "screening": 597,
+    "specimens": 3184,
+    "studies": 3055,
+    "surrogates": 1381,
+>>>>>>> main
     "testing": 1797,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29672
+TESTS = 29550
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -10,18 +10,13 @@ import numpy as np
 import pytest
 
 from creepkit.integration import IntegrationSettings
-from creepkit.integration.tensor_integration import (
-    PointTrajectory,
-    integrate_tensor_point,
-    prescribed_strain,
-    prescribed_stress,
-)
+from creepkit.integration.tensor_integration import PointTrajectory, integrate_tensor_point
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Program, Status
+from creepkit.records import PointLoading, Program, Status
 
 ENDLESS = IntegrationSettings(strain_limit=np.inf)
 NAFEMS = {"A": 3.125e-14, "n": 5}
@@ -31,10 +26,16 @@ E, NU = STEEL
 G, K = E / (2 * (1 + NU)), E / (3 * (1 - 2 * NU))
 
 
+def imposed(controls) -> PointLoading:
+    """From {component: (quantity, value)}."""
+    kinds = ("stress", "strain")
+    return PointLoading(*({k: value for k, (kind, value) in controls.items() if kind == one} for one in kinds))
+
+
 def driven(law: CreepLaw, values, controls, times, elastic=STEEL, temperature=300.0) -> PointTrajectory:
     kernel = lower(law, "compiled")
     run = integrate_tensor_point(
-        kernel, law.to_internal(values)[0], elastic, controls, temperature, times, settings=ENDLESS
+        kernel, law.to_internal(values)[0], elastic, imposed(controls), temperature, times, settings=ENDLESS
     )
     assert run.status == Status.COMPLETE
     assert run.reason == ""
@@ -42,7 +43,7 @@ def driven(law: CreepLaw, values, controls, times, elastic=STEEL, temperature=30
 
 
 def constants(**components: float):
-    return {name[1:]: prescribed_stress(value) for name, value in components.items()}
+    return {name[1:]: ("stress", value) for name, value in components.items()}
 
 
 CASES = {
@@ -85,7 +86,7 @@ class TestNafemsWithASteppedLoad:
     """NAFEMS R0027 10C, (200, -200), then (250, -250) at 100 h, eps = A sigma^5 t^0.5, by time and by strain."""
 
     step = Program.steps([(0.0, 200.0), (100.0, 250.0)])
-    controls = {"11": prescribed_stress(step), "22": prescribed_stress(Program(step.times, -step.values))}  # noqa: RUF012
+    controls = {"11": ("stress", step), "22": ("stress", Program(step.times, -step.values))}  # noqa: RUF012
     times = (100.0, 110.0, 150.0, 200.0)
 
     def test_time_hardening(self) -> None:
@@ -103,7 +104,7 @@ class TestNafemsWithASteppedLoad:
 def test_nafems_primary_and_secondary_creep_with_a_stepped_load() -> None:
     """NAFEMS R0027 12A, 12C: A1 = 1e-16, A2 = 1e-14, sigma^5 (A1 t + A2 t^0.5), 100 MPa then 110 MPa at 10 000 h."""
     values = {"A_1": 1e-16, "n_1": 5, "A_2": 0.5e-14, "n_2": 5, "m": -0.5}
-    step = prescribed_stress(Program.steps([(0.0, 100.0), (1e4, 110.0)]))
+    step = ("stress", Program.steps([(0.0, 100.0), (1e4, 110.0)]))
     run = driven(NORTON + TIME_HARDENING, values, {"11": step}, [1, 100, 1000, 1e4, 11000, 15000, 20000])
     expected = [0.000101, 0.0011, 0.004162277660168379, 0.02, 0.02239658138066511, 0.03167208862824868]
     np.testing.assert_allclose(run.creep_strain[:, 0], [*expected, 0.042776050843374935], rtol=1e-4)
@@ -119,7 +120,7 @@ class TestRelaxation:
 
     def test_uniaxial(self) -> None:
         """NAFEMS R0027 1B, strain 1e-3."""
-        run = driven(NORTON, NAFEMS, {"11": prescribed_strain(1e-3)}, self.times)
+        run = driven(NORTON, NAFEMS, {"11": ("strain", 1e-3)}, self.times)
         expected = [200, 198.04854714851308, 183.8645430449837, 133.74806099528442, 79.03765226488096]
         expected += [44.69345229175846, 25.147097047418033, 14.142047236764345]
         np.testing.assert_allclose(run.stress[:, 0], expected, rtol=1e-4)
@@ -128,7 +129,7 @@ class TestRelaxation:
     def test_uniaxial_with_time_hardening(self) -> None:
         """NAFEMS R0027 8B, strain 1e-3, eps = A sigma^5 t^0.5."""
         run = driven(
-            TIME_HARDENING, {"A": 0.5 * NAFEMS["A"], "n": 5, "m": -0.5}, {"11": prescribed_strain(1e-3)}, self.times[1:]
+            TIME_HARDENING, {"A": 0.5 * NAFEMS["A"], "n": 5, "m": -0.5}, {"11": ("strain", 1e-3)}, self.times[1:]
         )
         expected = [163.0298794203759, 133.74806099528442, 104.05283253589862, 79.03765226488096]
         expected += [59.519602639852714, 44.69345229175846, 33.52966364209675]
@@ -136,14 +137,14 @@ class TestRelaxation:
 
     def test_equal_strains_in_a_plane(self) -> None:
         """k = E/(2(1-nu)): half of the creep lies in each direction of the plane."""
-        run = driven(NORTON, NAFEMS, {"11": prescribed_strain(7e-4), "22": prescribed_strain(7e-4)}, self.times)
+        run = driven(NORTON, NAFEMS, {"11": ("strain", 7e-4), "22": ("strain", 7e-4)}, self.times)
         expected = self.relaxed(E / (1 - NU) * 7e-4, E / (2 * (1 - NU)))
         np.testing.assert_allclose(run.stress[:, :2], np.stack([expected, expected], axis=-1), rtol=1e-4)
 
     @pytest.mark.parametrize("component", ["12", "23", "13"])
     def test_shear(self, component: str) -> None:
         """k = 3G, q = sqrt(3) tau, tau0 = 2G eps."""
-        run = driven(NORTON, NAFEMS, {component: prescribed_strain(6e-4)}, self.times)
+        run = driven(NORTON, NAFEMS, {component: ("strain", 6e-4)}, self.times)
         expected = self.relaxed(np.sqrt(3) * 2 * G * 6e-4, 3 * G) / np.sqrt(3)
         np.testing.assert_allclose(run.stress[:, ["11", "22", "33", "12", "23", "13"].index(component)], expected, 1e-4)
 
@@ -151,7 +152,7 @@ class TestRelaxation:
         """k = 3G; the mean stress stays what it was."""
         held = np.array([1e-3, -2e-4, 1e-4, 3e-4, -2e-4, 4e-4])
         names = ("11", "22", "33", "12", "23", "13")
-        run = driven(NORTON, NAFEMS, {n: prescribed_strain(e) for n, e in zip(names, held, strict=True)}, self.times)
+        run = driven(NORTON, NAFEMS, {n: ("strain", e) for n, e in zip(names, held, strict=True)}, self.times)
         mean = 3 * K * held[:3].mean()
         s = 2 * G * (held - held[:3].mean() * np.array([1, 1, 1, 0, 0, 0]))
         start = np.sqrt(1.5 * s**2 @ [1, 1, 1, 2, 2, 2])
@@ -160,13 +161,13 @@ class TestRelaxation:
 
     def test_a_law_of_the_largest_principal_stress_in_shear(self) -> None:
         """sigma_1 = tau = q/sqrt(3), so A is divided by sqrt(3)^5."""
-        run = driven(PRINCIPAL, NAFEMS, {"12": prescribed_strain(6e-4)}, self.times)
+        run = driven(PRINCIPAL, NAFEMS, {"12": ("strain", 6e-4)}, self.times)
         expected = self.relaxed(np.sqrt(3) * 2 * G * 6e-4, 3 * G, 3**-2.5) / np.sqrt(3)
         np.testing.assert_allclose(run.stress[:, 3], expected, rtol=1e-4)
 
     def test_a_law_of_the_mean_stress_under_held_strains(self) -> None:
         """The mean stress, 3 K e, does not relax: dq/dt = -3G A sigma_m q^5."""
-        held = {"11": prescribed_strain(1e-3), "22": prescribed_strain(1e-4), "33": prescribed_strain(1e-4)}
+        held = {"11": ("strain", 1e-3), "22": ("strain", 1e-4), "33": ("strain", 1e-4)}
         run = driven(MEAN, {"A": NAFEMS["A"] / 100, "n": 5}, held, self.times)
         expected = self.relaxed(2 * G * 9e-4, 3 * G, 3 * K * 4e-4 / 100)
         np.testing.assert_allclose(run.stress[:, 0] - run.stress[:, 1], expected, rtol=1e-4)
@@ -183,7 +184,7 @@ def test_principal_and_mean_stress_of_a_general_state() -> None:
     c, s = np.cos(0.4), np.sin(0.4)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
     tensor = turn @ np.diag([60.0, 140.0, 10.0]) @ turn.T
-    controls = {f"{i + 1}{j + 1}": prescribed_stress(tensor[i, j]) for i in range(3) for j in range(i, 3)}
+    controls = {f"{i + 1}{j + 1}": ("stress", tensor[i, j]) for i in range(3) for j in range(i, 3)}
     q = np.sqrt(0.5 * (80.0**2 + 130.0**2 + 50.0**2))
     run = driven(PRINCIPAL, {"A": 1e-12, "n": 3}, controls, [1e3])
     assert run.equivalent[0] == pytest.approx(1e-9 * 140.0**3, rel=1e-9)
@@ -200,7 +201,7 @@ def test_a_maxwell_tube_in_plane_strain(radius: float) -> None:
     """
     radial, hoop = (1e-3 / 3 * (1 - sign * 4 / radius**2) for sign in (1, -1))
     times = np.array([1e-6, 0.1, 0.5, 0.9])
-    controls = {"11": prescribed_stress(radial), "22": prescribed_stress(hoop), "33": prescribed_strain(0.0)}
+    controls = {"11": ("stress", radial), "22": ("stress", hoop), "33": ("strain", 0.0)}
     run = driven(NORTON, {"A": 1.0, "n": 1.0}, controls, times, elastic=(1.0, 0.3))
     decay = np.exp(-times)
     shift = (1.3 * 4 / radius + 0.6 * radius) - 0.08 * radius * decay + 6.0 * times / radius
@@ -213,7 +214,7 @@ def test_a_maxwell_tube_in_plane_strain(radius: float) -> None:
 
 def test_plane_strain_ends_with_the_axial_stress_in_the_middle() -> None:
     """NAFEMS 5A (200, 100) in plane strain: the steady axial stress is 150, and the rate that of q = 86.60."""
-    held = {"11": prescribed_stress(200.0), "22": prescribed_stress(100.0), "33": prescribed_strain(0.0)}
+    held = {"11": ("stress", 200.0), "22": ("stress", 100.0), "33": ("strain", 0.0)}
     run = driven(NORTON, NAFEMS, held, [0.0, 900.0, 1000.0])
     q = np.sqrt(0.75) * 100
     assert run.stress[0, 2] == pytest.approx(NU * 300)
@@ -232,7 +233,7 @@ def test_two_bars_share_a_load() -> None:
     stresses = []
     for length, expected in ((1.0, 160.38058841422904), (2.0, 139.61941158577096)):
         ramp = Program(np.array([0.0, end]), np.array([0.0, pace * end / length]))
-        run = driven(NORTON, {"A": 1e-14, "n": 5}, {"11": prescribed_strain(ramp)}, [end])
+        run = driven(NORTON, {"A": 1e-14, "n": 5}, {"11": ("strain", ramp)}, [end])
         assert run.stress[0, 0] == pytest.approx(expected, rel=1e-5)
         stresses.append(run.stress[0, 0])
     assert sum(stresses) == pytest.approx(300.0, rel=1e-5)

@@ -54,7 +54,7 @@ def command(
         if all(name.endswith(".json") for name in files):
             if only or changes or surrogate or settings:
                 raise FitError("settings, --only, --fix, --bound and --surrogate are for tests, not for saved fits")
-            own = {name: value for name, value in forms.items() if name in ("forms", "prior", "parameters")}
+            own = {name: value for name, value in forms.items() if name in ("forms", "parameters")}
             found: TemperatureLaw = ck.discover([ck.load(n) for n in files], progress=progress.tick, **own)
         else:
             (changed,) = LawChanges(temperature="none").changed(changes).applied([ck.law(law)], [])

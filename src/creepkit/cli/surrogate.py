@@ -43,9 +43,6 @@ def generate(
         dict[str, tuple[float, float]] | None,
         Option(help="Range of a condition, in MPa, s, mm, K, N.", flag="range", example="P1=5:20"),
     ] = None,
-    screened: Annotated[
-        bool, Option(help="Of the paper's domain: leave out what bursts far too early by the reduced-order model.")
-    ] = True,
     execution: Annotated[dict[str, Any], ParallelExecution],
     dry_run: Annotated[bool, Option(help="Say what would be drawn; simulate nothing.")] = False,
     as_json: Json = False,
@@ -62,10 +59,6 @@ def generate(
     changes: dict[str, Any] = {"domain": domain, **(conditions or {})}
     if interval is not None:
         changes["every"] = interval
-    if not screened:
-        if domain != "paper":
-            raise DatasetError("--no-screened belongs to --domain paper; nothing else leaves samples out")
-        changes["screened"] = False
     piece = ck.specimen(specimen)
     design = resolve_design(law, piece, **changes)
     if dry_run:

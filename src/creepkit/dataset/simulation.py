@@ -1,8 +1,4 @@
-"""Simulation of the rows of a sampling design, with screening by the reduced-order model and the acceptance criteria.
-
-Where the specimen has a reduced-order model, a sample that bursts far too early in it is rejected without a simulation.
-Samples are simulated one at a time on one thread.
-"""
+"""Simulation of the rows of a sampling design, one at a time on one thread, and the acceptance criteria."""
 
 from __future__ import annotations
 
@@ -10,15 +6,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from creepkit.arrays import Ints
 from creepkit.dataset.dataset import FAILED, NOT_SIMULATED, Dataset, empty_columns
 from creepkit.errors import DatasetError
 from creepkit.jobs.worker_process import error_text
-from creepkit.records import Predictor, Status
+from creepkit.records import Status
 from creepkit.sampling.conditions import creep_output, hold_times
-from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion, SimulationOutcome
+from creepkit.sampling.domains import DrawCriterion, OutcomeCriterion, SimulationOutcome
 
 if TYPE_CHECKING:
     from creepkit.records import Specimen
@@ -26,52 +21,23 @@ if TYPE_CHECKING:
     from creepkit.sampling.rates import Draws
 
 
-def rejected_by_screening(design: SamplingDomain, samples: Dataset) -> Ints:
-    """(rows,) the number of the criterion that a sample cannot meet, 0 where it must be simulated to know."""
-    reasons = np.zeros(len(samples), dtype=np.int64)
-    reduced_model, criteria = samples.specimen.reduced_order_model(), _outcome_criteria(design)
-    if not design.screened or reduced_model is None:
-        return reasons
-    for row in np.flatnonzero(samples.reasons == 0).tolist():
-        try:
-            outcome = _outcome(samples, row, reduced_model, frames=False)
-            reasons[row] = next((k for k, one in criteria if one.rejects_early(outcome)), 0)
-        except (MemoryError, OSError):
-            raise
-        except Exception:
-            continue  # whatever a law of a plugin raises: its simulation comes next, and says it
-    return reasons
-
-
-def _outcome_criteria(design: SamplingDomain) -> list[tuple[int, OutcomeCriterion]]:
-    """The criteria of simulated samples, each with its number among all."""
-    return [(k, one) for k, one in enumerate(design.criteria, start=1) if isinstance(one, OutcomeCriterion)]
-
-
-def _outcome(samples: Dataset, row: int, model: Predictor, *, frames: bool) -> SimulationOutcome:
-    """The outcome of one sample by a model, at the frames of its test, or only when its holds begin and end."""
+def _outcome(samples: Dataset, row: int) -> SimulationOutcome:
+    """The outcome of one sample, at the frames of its test and when its holds begin and end."""
     test = samples.planned_test(row)
     hold_instants = hold_times(test)
-    shown_times = test.times if frames else np.unique(hold_instants)
-    times = np.union1d(shown_times, hold_instants)
-    prediction = model.predict(samples.law, samples.theta_of(row), [test.replace(times=times)])
+    times = np.union1d(test.times, hold_instants)
+    prediction = samples.specimen.predict(samples.law, samples.theta_of(row), [test.replace(times=times)])
     observed, shown = prediction.of(0), creep_output(samples.specimen)
-    outputs, hold_outputs = (observed[np.searchsorted(times, t)] for t in (shown_times, hold_instants))
+    outputs, hold_outputs = (observed[np.searchsorted(times, t)] for t in (test.times, hold_instants))
     status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
     if status == Status.NOT_CONVERGED and not np.isfinite(observed[times > 0, shown.column]).any():
         raise DatasetError(f"not converged from {end_time:g} s on, with nothing to show before")
     conditions = samples.conditions_of(row)
-    return SimulationOutcome(
-        shown_times, outputs, hold_outputs, status, end_time, conditions, shown.column, shown.falls
-    )
+    return SimulationOutcome(test.times, outputs, hold_outputs, status, end_time, conditions, shown.column, shown.falls)
 
 
 TOO_MANY_FAILURES = 8
 """First samples of a shard after whose failure, all of them, the shard is given up."""
-
-
-REJECTED_DIGITS = 12
-"""Binary digits of the histories of rejected samples, 1 part in 4000: these serve inspection, not training."""
 
 
 def empty_dataset(design: SamplingDomain, specimen: Specimen, provenance: dict[str, object]) -> Dataset:
@@ -91,12 +57,11 @@ def simulate_rows(design: SamplingDomain, header: Dataset, seed: int, first: int
     """Rows first to first + count of a design, simulated."""
     draws = design.draw(first, count, seed)
     samples = _unsimulated(header, draws, _reasons_before(design, draws), first)
-    samples.reasons[:] += rejected_by_screening(design, samples)
     failures: dict[int, str] = {}
-    criteria = _outcome_criteria(design)
+    criteria = [(k, one) for k, one in enumerate(design.criteria, start=1) if isinstance(one, OutcomeCriterion)]
     for attempt, row in enumerate(np.flatnonzero(samples.reasons == 0).tolist(), start=1):
         try:
-            outcome = _outcome(samples, row, samples.specimen, frames=True)
+            outcome = _outcome(samples, row)
             samples.values[row, : outcome.times.size], samples.hold_outputs[row] = outcome.outputs, outcome.hold_outputs
             samples.status[row], samples.end_times[row] = outcome.status, outcome.end_time
             samples.reasons[row] = next((k for k, one in criteria if not one.passes(outcome)), 0)
@@ -107,17 +72,7 @@ def simulate_rows(design: SamplingDomain, header: Dataset, seed: int, first: int
             failures[row] = error_text(error)
             if len(failures) == attempt == TOO_MANY_FAILURES:
                 raise DatasetError(f"the first {attempt} simulations all failed: {failures[row]}") from error
-    rejected = samples.reasons != 0
-    samples.values[rejected] = rounded_outputs(samples.values[rejected])
     return replace(samples, failures=failures)
-
-
-def rounded_outputs(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The values (...,) rounded to REJECTED_DIGITS binary digits, which take a third of the space when compressed."""
-    fractions, exponents = np.frexp(values)
-    return np.asarray(
-        np.ldexp(np.round(fractions * 2**REJECTED_DIGITS) / 2**REJECTED_DIGITS, exponents), dtype=np.float32
-    )
 
 
 def _reasons_before(design: SamplingDomain, draws: Draws) -> Ints:

@@ -10,8 +10,7 @@ Arrays, the first axis being the sample, in the order of the Sobol sequence, rej
 
     parameters   (n, P)                float64  the law's parameters in the author's values; 0 = switched off
     conditions   (n, C)                float64  what the test was: modulus (MPa), levels of the load, end_time (s) ...
-    values       (n, frames, outputs)  float32  NaN after the end, and where nothing was simulated; 12 binary digits
-                                                of rejected samples
+    values       (n, frames, outputs)  float32  NaN after the end, and where nothing was simulated
     hold_outputs (n, 4, outputs)       float32  at the ends of first ramp, first hold, second ramp and test
     status       (n,)                  int8     0 complete, 1 burst, 2 not converged, 3 outside the domain, -1 not run
     end_times    (n,)                  float64  s, where the simulation ended

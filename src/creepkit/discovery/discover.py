@@ -132,17 +132,12 @@ Forms = Any
 """One or more temperature forms, or {parameter: one or more}; see discover()."""
 
 
-PriorOdds = Mapping[str, Mapping[str, float]]
-"""{parameter: {form: odds}}."""
-
-
 @checked
 def discover(
     fits: Sequence[Identification],
     *,
     forms: Forms | None = None,
     optimizer: Any = None,
-    prior: PriorOdds | None = None,
     parameters: Sequence[str] | None = None,
     histories: Sequence[History] | None = None,
     joint_fit: Identification | None = None,
@@ -157,20 +152,18 @@ def discover(
         pysindy, whose features of T/1000 K are forms each and all together.
     optimizer : of pysindy, such as pysindy.STLSQ(threshold=2.0); it drops terms of a combination, whose coefficients it
         sees in standard deviations of their whitened columns. By default every term stays and the forms are weighed.
-    prior : {parameter: {form: odds}} in the place of the default, which counts 1/T four times for the coefficient of a
-        rate and shares equal odds among forms of equally many numbers; printed with the result.
     parameters : those that may depend on temperature; by default all.
     histories : all tests; the forms are then put back into the law and refitted to them (see refit), with the settings
         and the predictor of the first identification.
     joint_fit : an identification of the law times Arrhenius' factor from all tests, where the refits begin.
 
-    A combination of forms that fails is recorded in the notes with its reason, and the others go on.
+    Before the estimates are seen 1/T counts four times for the coefficient of a rate, and forms of equally many numbers
+    share equal odds. A combination of forms that fails is recorded in the notes with its reason, and the others go on.
     """
     estimates = IsothermalEstimates.from_identifications(fits)
-    candidates = candidate_forms_of(estimates, forms, prior or {}, parameters)
+    candidates = candidate_forms_of(estimates, forms, parameters)
     combinations = rank_combinations(estimates, candidates, progress, optimizer)
-    odds = {name: {form.name: form.prior_odds for form in own} for name, own in candidates.items()}
-    temperature_law = temperature_law_from_combinations(estimates, combinations, odds)
+    temperature_law = temperature_law_from_combinations(estimates, combinations)
     if histories is None:
         return temperature_law
     predictor = fits[0].predictor
@@ -184,11 +177,11 @@ def discover(
 
 
 def candidate_forms_of(
-    estimates: IsothermalEstimates, forms: Forms | None, prior: PriorOdds, parameters: Sequence[str] | None
+    estimates: IsothermalEstimates, forms: Forms | None, parameters: Sequence[str] | None
 ) -> dict[str, list[CandidateForm]]:
     """{parameter: its candidate forms}, in the law's order."""
     law = estimates.law
-    check_form_options(law, forms, prior, parameters)
+    check_form_options(law, forms, parameters)
     coordinates = Coordinates(law, estimates.reference)
     rate_coefficients = {law.names[k] for k in coordinates.coefficients}
     T_ref, forms_by_parameter = estimates.reference.temperature, {}
@@ -196,23 +189,19 @@ def candidate_forms_of(
         own = _listed(forms.get(name) if isinstance(forms, Mapping) else forms)
         own = (CONSTANT,) if parameters is not None and name not in parameters else own
         forms_by_parameter[name] = candidate_forms(
-            law, name, name in rate_coefficients, T_ref, estimates.temperatures, own, prior.get(name)
+            law, name, name in rate_coefficients, T_ref, estimates.temperatures, own
         )
     return forms_by_parameter
 
 
 @checked
-def check_form_options(
-    law: CreepLaw, forms: Forms | None = None, prior: PriorOdds | None = None, parameters: Sequence[str] | None = None
-) -> None:
+def check_form_options(law: CreepLaw, forms: Forms | None = None, parameters: Sequence[str] | None = None) -> None:
     """Raise an error, before any work, for names of parameters or temperature forms that there are not."""
     by_parameter = {n: _listed(own) or () for n, own in forms.items()} if isinstance(forms, Mapping) else {}
-    for name in (*(parameters or ()), *(prior or ()), *by_parameter):
+    for name in (*(parameters or ()), *by_parameter):
         law.symbol(name)
     listed = [*(chain.from_iterable(by_parameter.values()) if by_parameter else _listed(forms) or ())]
-    names = [one for one in listed if isinstance(one, str)]
-    registered_prior = () if len(names) < len(listed) else chain.from_iterable((prior or {}).values())
-    check_form_names(chain(names, registered_prior))
+    check_form_names(one for one in listed if isinstance(one, str))
 
 
 def _listed(forms: Any) -> Sequence[Any] | None:
@@ -226,16 +215,13 @@ class DiscoveryOptions(Options, title="options of a temperature study", error=Fi
     """What temperature_study() is asked beside the settings of its identifications.
 
     forms : names of registered temperature forms, or {parameter: names}; by default all that suit a parameter.
-    prior : {parameter: {form: odds}}. parameters : those that may depend on temperature; by default all.
+    parameters : those that may depend on temperature; by default all.
     moduli : whether to find each test's modulus from its first 15 frames before; every test states one to begin from.
     within : K, tests so near to the coldest of a group are at one temperature.
     """
 
     forms: Mapping[str, Sequence[str]] | Sequence[str] | None = option(
         None, "Forms that a parameter may take.", flag="form", example="n=constant,linear"
-    )
-    prior: Mapping[str, Mapping[str, float]] | None = option(
-        None, "Prior odds of a form.", key="prior_odds", flag="prior", example="A.arrhenius=10"
     )
     parameters: tuple[str, ...] | None = option(None, "Those that may depend on temperature; by default all.")
     moduli: bool = option(False, "First find each test's modulus from its first 15 frames.")
@@ -281,9 +267,7 @@ def temperature_study(
     is left out of the forms; both are noted.
     """
     options = DiscoveryOptions().changed(changes)
-    form_options: dict[str, Any] = {
-        "forms": options.forms, "prior": options.prior, "parameters": options.parameters
-    }  # fmt: skip
+    form_options: dict[str, Any] = {"forms": options.forms, "parameters": options.parameters}
     law, resolved = resolve_law(law), resolve_predictors(using, tests)
     predictor = CompositePredictor.of(resolved)
     if law.uses(temperature):

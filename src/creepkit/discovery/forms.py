@@ -260,16 +260,15 @@ def candidate_forms(
     T_ref: float,
     temperatures: Floats,
     forms: Sequence[Any] | None = None,
-    prior: Mapping[str, float] | None = None,
 ) -> list[CandidateForm]:
     """The forms that a parameter may take, the constant first, each with its prior odds.
+
+    Forms of equally many numbers share equal odds, and for the coefficient of a rate 1/T counts ARRHENIUS_ODDS times.
 
     is_rate_coefficient : whether the parameter is the coefficient of a rate, which Arrhenius' factor is for.
     temperatures : (temperatures,) K of the estimates; T_ref : K.
     forms : those wanted, by name or as given_forms() takes them; by default all that are registered. Two that span the
         same functions are one. Where none of those given by a user suits, the parameter is constant.
-    prior : {form: odds}; the others have the default: forms of equally many numbers share equal odds, and for rates 1/T
-        counts ARRHENIUS_ODDS times.
     """
     param, wanted = law.table[parameter], _forms_by_name(law, parameter, T_ref, forms)
     forms_found = [CandidateForm(CONSTANT, parameter, None, {parameter: sympy.S.One}, {parameter: param})]
@@ -286,13 +285,11 @@ def candidate_forms(
         retained = forms_found[:1]
     if not retained:
         raise FitError(f"none of the forms {', '.join(wanted)} suits parameter '{parameter}' of law '{law.name}'")
-    for name in prior or {}:
-        if name not in {one.name for one in retained}:
-            suggestion = nearest(name, [one.name for one in retained])
-            raise FitError(
-                f"prior odds are given for '{name}', no form that parameter '{parameter}' may take: {suggestion}"
-            )
-    return _with_prior_odds(retained, is_rate_coefficient, prior or {})
+    sizes = [one.parameter_count for one in retained]
+    odds = [ARRHENIUS_ODDS if is_rate_coefficient and one.name == ARRHENIUS else 1.0 for one in retained]
+    return [
+        replace(one, prior_odds=o / sizes.count(one.parameter_count)) for one, o in zip(retained, odds, strict=True)
+    ]
 
 
 def _forms_by_name(law: CreepLaw, parameter: str, T_ref: float, forms: Sequence[Any] | None) -> dict[str, Any]:
@@ -374,18 +371,3 @@ def check_form_names(names: Iterable[str]) -> None:
     for name in names:
         if name not in known:
             raise FitError(f"there is no temperature form '{name}': {nearest(name, known)}")
-
-
-def _with_prior_odds(
-    candidates: Sequence[CandidateForm], is_rate_coefficient: bool, prior: Mapping[str, float]
-) -> list[CandidateForm]:
-    sizes = [candidate.parameter_count for candidate in candidates]
-    default_odds = [ARRHENIUS_ODDS if is_rate_coefficient and one.name == ARRHENIUS else 1.0 for one in candidates]
-    odds = [
-        prior.get(one.name, o / sizes.count(one.parameter_count))
-        for one, o in zip(candidates, default_odds, strict=True)
-    ]
-    if min(odds) <= 0:
-        bad = candidates[int(np.argmin(odds))].name
-        raise FitError(f"the prior odds of '{bad}' are {min(odds):g}; they must be above zero, or leave the form out")
-    return [replace(one, prior_odds=o) for one, o in zip(candidates, odds, strict=True)]

@@ -82,7 +82,7 @@ MAX_COMBINATIONS_WRITTEN = 20
 def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
     """The result as JSON-able data."""
     estimates = temperature_law.isothermal_estimates
-    content = {
+    content: dict[str, Any] = {
         "creepkit": version("creepkit"),
         "law": temperature_law.law,
         "isothermal_law": temperature_law.isothermal_law,
@@ -91,7 +91,8 @@ def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
         "criterion_data": temperature_law.criterion_data,
         "estimates": temperature_law.estimates,
         "plausible_forms": temperature_law.plausible_forms,
-        "prior_odds": temperature_law.prior_odds,
+        "fit": temperature_law.fit,
+        "notes": temperature_law.notes,
         "candidates": [
             {
                 "forms": candidate.forms,
@@ -109,8 +110,6 @@ def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
             "overdispersion": temperature_law.combinations.overdispersion,
         },
         "reference": estimates.reference,
-        "fit": temperature_law.fit,
-        "notes": temperature_law.notes,
     }
     return {**TEMPERATURE_LAW.heading, **CODEC.to_json(content)}
 
@@ -134,7 +133,7 @@ class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_
     temperature_range : K, the temperatures it was found from. criterion_data : "points" when regression on isothermal
         estimates chose the forms, "histories" when the tests themselves did.
     plausible_forms : {parameter: forms that remain, best first}. candidates : combinations of forms, best first.
-    prior_odds : {parameter: {form: odds}}. fit : the identification of `law` from all tests, once refitted.
+    fit : the identification of `law` from all tests, once refitted.
     """
 
     law: CreepLaw
@@ -145,7 +144,6 @@ class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_
     criterion_data: Literal["points", "histories"]
     plausible_forms: Mapping[str, tuple[FormWeight, ...]]
     candidates: tuple[FormCombination, ...]
-    prior_odds: Mapping[str, Mapping[str, float]]
     isothermal_estimates: IsothermalEstimates
     combinations: RankedCombinations
     fit: Identification | None = None
@@ -206,7 +204,7 @@ class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_
 
 
 def temperature_law_from_combinations(
-    estimates: IsothermalEstimates, combinations: RankedCombinations, prior_odds: Mapping[str, Mapping[str, float]]
+    estimates: IsothermalEstimates, combinations: RankedCombinations
 ) -> TemperatureLaw:
     """The temperature law that the isothermal estimates alone give."""
     c = combinations.overdispersion
@@ -230,7 +228,6 @@ def temperature_law_from_combinations(
         criterion_data="points",
         plausible_forms=combinations.plausible_forms,
         candidates=candidates,
-        prior_odds=prior_odds,
         isothermal_estimates=estimates,
         combinations=combinations,
         notes=tuple(notes),

@@ -1,15 +1,14 @@
 """design: the next tests, by what they are expected to tell for each hour of machine time.
 
 Candidates are what a rig can make. Each is predicted with every law that remains, with exact sensitivities, and what it
-tells follows from Gaussian algebra about the estimates; the best ones are evaluated again at draws of the posteriors,
-and for the law with refits in full. Goals are the parameters (D-optimal), a quantity such as the rate at the stress of
-service (c-optimal), and the law.
+tells follows from Gaussian algebra about the estimates; the best ones are evaluated again at draws of the posteriors.
+Goals are the parameters (D-optimal), a quantity such as the rate at the stress of service (c-optimal), and the law.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,14 +17,11 @@ from creepkit import limits
 from creepkit.arrays import single_threaded_blas
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
-from creepkit.experiments.candidate_tests import CandidateTest, candidates_given, grid_of_rig
-from creepkit.experiments.design_task import DesignTask, Goal, RemainingLaws, task_of
-from creepkit.experiments.expectations import Expectation, PrecisionCriterion
-from creepkit.experiments.known_laws import KnownLaw
-from creepkit.experiments.law_discrimination import Alteration, LawCriterion
+from creepkit.experiments.design_task import DesignTask, Goal
+from creepkit.experiments.expectations import Expectation, LawCriterion, PrecisionCriterion
 from creepkit.experiments.planned_design import ALIKE, Design, PlannedTest
-from creepkit.experiments.planned_outcomes import PlannedOutcomes
-from creepkit.experiments.rig import Rig, rigs_for
+from creepkit.experiments.planned_outcomes import KnownLaw, PlannedOutcomes
+from creepkit.experiments.rig import CandidateTest, Rig, candidates_given, grid_of_rig, rigs_for
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import MINIMUM_TESTS
@@ -34,7 +30,6 @@ from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
 from creepkit.records import History
-from creepkit.records.units import time_text
 
 Progress = Callable[[str, int, int], None]
 
@@ -45,10 +40,6 @@ EVALUATED_AT_DRAWS = 8
 
 MOST_ALIKE = 2
 """Of these, those of one load and duration."""
-
-
-MOST_REFITS = 10
-"""Refits in full, each of one candidate in one direction."""
 
 
 LARGEST_RUPTURE_PROBABILITY = 0.1
@@ -70,7 +61,7 @@ def design(
     rig: Rig | Sequence[Rig] | None = None,
     goal: Goal | None = None,
     budget: float | None = None,
-    candidates: Sequence[History | CandidateTest] | None = None,
+    candidates: Sequence[History] | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Design:
@@ -79,19 +70,19 @@ def design(
     rig : what the equipment can do; by default a little more than what it did. goal : "law", "parameters" or a
         quantity; by default the law where more than one remains. budget : h of machine time for one run or several.
     candidates : planned histories (without outputs) in the place of what the rig can make.
-    Stopped by Ctrl-C it gives the best so far.
     """
     if budget is not None and budget <= 0:
         raise FitError(f"the budget is {budget:g} h; it must be above zero")
     limits.check_number("seed", seed, limits.SEED, FitError)
-    remaining = RemainingLaws.of(source)
-    rigs = rigs_for(remaining.fits[0], rig)
+    task = DesignTask.of(source, goal, budget)
+    rigs = rigs_for(task.laws[0], rig)
     if candidates is not None and not len(candidates):
         raise FitError("candidates= takes a list of planned histories, found none")
-    search = _Search(task_of(remaining, goal, budget), rigs, seed, progress)
-    if search.nothing_to_do is not None:
-        return search.nothing_to_do
-    planned = _grids(remaining.fits, rigs, budget) if candidates is None else candidates_given(candidates, rigs)
+    if task.obstacle:
+        names, weights = tuple(fit.law.name for fit in task.laws), tuple(task.weights.tolist())
+        return Design(task.goal_name, names, weights, (), budget=budget, obstacle=task.obstacle)
+    search = _Search(task, rigs, seed, progress)
+    planned = _grids(task.laws, rigs, budget) if candidates is None else candidates_given(candidates, rigs)
     if budget is not None:
         planned = [c for c in planned if c.hours <= 1.0001 * budget]
         if not planned:
@@ -110,7 +101,7 @@ def _grids(laws: Sequence[Identification], rigs: Sequence[Rig], budget: float | 
 
 
 class _Search:
-    """The evaluation of candidates: all to first order, the best at draws, and for the law with refits in full."""
+    """The evaluation of candidates: all to first order, the best at draws."""
 
     def __init__(self, task: DesignTask, rigs: Sequence[Rig], seed: int, progress: Progress | None) -> None:
         self.task, self.rigs = task, {rig.specimen: rig for rig in rigs}
@@ -125,62 +116,37 @@ class _Search:
             self.criterion = _law_criterion(task, self.outcomes, seed)
         else:
             quantity = task.goal if isinstance(task.goal, DerivedQuantity) else None
-            self.criterion = PrecisionCriterion(self.outcomes, task.remaining.weights, quantity, seed)
+            self.criterion = PrecisionCriterion(self.outcomes, task.weights, quantity, seed)
         self.tests: list[PlannedTest] = []
         self.left_out: dict[str, str] = {}
 
-    @property
-    def nothing_to_do(self) -> Design | None:
-        """The answer where no test can help."""
-        task = self.task
-        if not task.obstacle:
-            return None
-        names = tuple(fit.law.name for fit in task.laws)
-        return Design(task.goal_name, names, task.weights, (), budget=task.budget, obstacle=task.obstacle)
-
     def run(self, planned: Sequence[CandidateTest], *, refuse: bool = False) -> Design:
         """The design; refuse : whether it is an error that no test can be made, as where a user names them."""
-        interrupted = False
-        plan: tuple[PlannedTest, ...] = ()
-        expected: Expectation | None = None
         with single_threaded_blas():
-            try:
-                self._evaluate_all(planned, refuse)
-                if self.criterion.differs_at_draws:
-                    self._evaluate_best()
-                plan, expected = self._plan()
-            except KeyboardInterrupt:
-                if not self.tests:
-                    raise
-                interrupted = True
-                self.tests.sort(key=self._order)
+            self._evaluate_all(planned, refuse)
+            if self.criterion.differs_at_draws:
+                self._evaluate_best()
+            plan, expected = self._plan()
         if not plan and self.tests:
             plan, expected = (self.tests[0],), self.tests[0].expectation
         task = self.task
         return Design(
             goal=task.goal_name,
             laws=tuple(fit.law.name for fit in task.laws),
-            weights=task.weights,
+            weights=tuple(task.weights.tolist()),
             tests=tuple(self.tests),
             left_out=tuple(self.left_out.items()),
             plan=plan,
             expected=expected,
             budget=task.budget,
-            interrupted=interrupted,
             unit=task.goal.unit if isinstance(task.goal, DerivedQuantity) and task.goal.scale == "linear" else None,
             altered=tuple(altered.problem.law.name for _, altered in task.altered),
-            notes=(*task.extrapolation, *notes_of(task.laws, tuple(self.rigs.values())), *self._notes_of_plan(plan)),
+            notes=(*task.extrapolation, *notes_of(task.laws, tuple(self.rigs.values()))),
         )
 
     def _evaluate_all(self, planned: Sequence[CandidateTest], refuse: bool) -> None:
-        try:
-            self.outcomes.add([h for candidate in planned for h in candidate.histories])
-            stopped = False
-        except KeyboardInterrupt:
-            stopped = True
+        self.outcomes.add([h for candidate in planned for h in candidate.histories])
         for candidate in planned:
-            if not all(self.outcomes.is_known(h) for h in candidate.histories):
-                continue
             refusal = self._refusal(candidate)
             if refusal:
                 self.left_out[candidate.description] = refusal
@@ -192,8 +158,6 @@ class _Search:
             name, refusal = next(iter(self.left_out.items()))
             raise FitError(f"the planned test '{name}' is of no use: {refusal}")
         self.tests.sort(key=self._order)
-        if stopped:
-            raise KeyboardInterrupt
 
     def _refusal(self, candidate: CandidateTest) -> str:
         """Why a planned test is left out, in a sentence; "" where it is not."""
@@ -213,7 +177,7 @@ class _Search:
         return ""
 
     def _evaluate_best(self) -> None:
-        """The best candidates at draws of the posteriors, and then the very best with refits in full."""
+        """The best candidates at draws of the posteriors."""
         promising = self._promising()
         for done, test in enumerate(promising):
             if self._ruptures(test):
@@ -221,8 +185,6 @@ class _Search:
             else:
                 self._evaluate_at_draws(test)
             self.progress("best tests at draws of the posteriors", done + 1, len(promising))
-        if isinstance(self.criterion, LawCriterion):
-            self._refit(self.criterion)
 
     def _promising(self) -> list[PlannedTest]:
         """The first candidates, no more than two of one load and duration."""
@@ -246,18 +208,6 @@ class _Search:
         position = next(k for k, t in enumerate(self.tests) if t.histories is test.histories)
         self.tests[position] = replace(test, expectation=expectation, at_draws=True)
         self.tests.sort(key=self._order)
-
-    def _refit(self, criterion: LawCriterion) -> None:
-        """Refits of the first candidate in every direction, until it stays the first or there were enough of them."""
-        refits, refitted = 0, set()
-        while refits < MOST_REFITS and self.tests and id(self.tests[0].histories) not in refitted:
-            first = self.tests[0]
-            refitted.add(id(first.histories))
-            for a, b in criterion.directions():
-                refits += int(refits < MOST_REFITS and criterion.refit(first.histories, a, b))
-                self.progress("refits in full", min(refits, MOST_REFITS), MOST_REFITS)
-            self._evaluate_at_draws(first)
-        self.progress("refits in full", MOST_REFITS, MOST_REFITS)
 
     def _order(self, test: PlannedTest) -> tuple[float, ...]:
         """Least for the best: the cheapest that decides between laws, else the likeliest to; for values by the hour.
@@ -301,16 +251,6 @@ class _Search:
             self.progress("runs for the budget", len(chosen), MOST_RUNS)
         return tuple(chosen)
 
-    def _notes_of_plan(self, plan: Sequence[PlannedTest]) -> list[str]:
-        """Where the plan is at an edge of what was considered, or was cut short."""
-        notes = []
-        if len(plan) >= MOST_RUNS and self.task.budget is not None:
-            left = self.task.budget - sum(test.hours for test in plan)
-            notes.append(f"a plan has at most {MOST_RUNS} runs; {left:.3g} h of the budget are left")
-        if plan and self.rigs:
-            notes += edges_of(plan[0], self.tests, self.rigs)
-        return notes
-
     def _together(self, plan: Sequence[PlannedTest]) -> Expectation:
         if len(plan) == 1 and (plan[0].at_draws or not self.criterion.differs_at_draws):
             return plan[0].expectation
@@ -329,42 +269,15 @@ def _histories(plan: Sequence[PlannedTest]) -> list[History]:
 
 
 def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> LawCriterion:
-    ranking = task.remaining.ranking
+    ranking = task.ranking
     assert ranking is not None
     ranked = [next(r for r in ranking.laws if r.fit is fit) for fit in task.laws]
     chi_squares = np.array([r.chi_square for r in ranked])
     if not np.isfinite(chi_squares).all():
         chi_squares = np.array([law.chi_square for law in outcomes.laws[: len(task.laws)]])
     excess = np.array([r.excess for r in ranked])
-    known = {fit.law.name: law for fit, law in zip(task.laws, outcomes.laws, strict=False)}
-    tried = {r.fit.law.name: r.fit for r in ranking.laws}
-    altered = []
-    for k, one in task.altered:
-        if one.other and one.other not in known:
-            known[one.other] = KnownLaw.from_identification(tried[one.other], task.laws[0].noise_model)
-        altered.append(Alteration(k, one.excess, one.penalty, known[one.other] if one.other else None))
-    return LawCriterion(
-        outcomes, task.remaining.weights, excess, chi_squares, ranking.independent_frames, altered, seed
-    )
-
-
-def edges_of(chosen: CandidateTest, considered: Sequence[CandidateTest], rigs: Mapping[str, Rig]) -> list[str]:
-    """Where the first run of a plan lies at an edge of what was considered, one sentence each."""
-    rig = rigs.get(chosen.histories[0].specimen)
-    durations = [c.duration for c in considered]
-    if rig is None or len(durations) < 3:
-        return []
-    notes = []
-    if chosen.duration <= 1.001 * min(durations) and min(durations) < 0.999 * max(durations):
-        notes.append(
-            f"it is as short as any test that was considered ({time_text(min(durations))}, for frames each "
-            f"{time_text(rig.frame_interval)}): more frequent frames may make a shorter one better"
-        )
-    levels = chosen.histories[0].loading.program().values
-    levels = levels[levels > 0]
-    if levels.max() >= 0.999 * rig.levels[1] > rig.levels[0]:
-        notes.append(f"it takes the rig to the greatest load that it was said to reach ({rig.levels[1]:.3g})")
-    return notes
+    altered = [(k, one.excess, one.penalty) for k, one in task.altered]
+    return LawCriterion(outcomes, task.weights, excess, chi_squares, ranking.independent_frames, altered, seed)
 
 
 def notes_of(laws: Sequence[Identification], rigs: Sequence[Rig]) -> tuple[str, ...]:

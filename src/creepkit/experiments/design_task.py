@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -27,100 +28,54 @@ NEARLY_EXCLUDED = 3.0 * NOT_EXCLUDED
 """Chi-square above the law's own, up to which the noise of a further test may make an alteration allowed."""
 
 
-@dataclass(frozen=True, eq=False)
-class RemainingLaws:
-    """Identifications of the laws that the tests cannot rule out, best first.
-
-    weights : (laws,) -. ranking : of all laws that were tried, None for a single identification.
-    """
-
-    fits: tuple[Identification, ...]
-    weights: Floats
-    ranking: Ranking | None
-
-    @classmethod
-    def of(cls, source: Ranking | ModelAverage | Identification | Sequence[Identification]) -> RemainingLaws:
-        """Those of an identification, of several or of a ranking; FitError for what no design can be made from."""
-        if isinstance(source, Identification):
-            return cls((_usable(source),), np.ones(1), None)
-        if isinstance(source, Ranking):
-            ranking = source
-        else:
-            fits = source.fits if isinstance(source, ModelAverage) else source
-            if not fits:
-                raise FitError("a design is made from identifications or a ranking, found none")
-            _refuse_repeated(fits)
-            ranking = _with_weights(source) if isinstance(source, ModelAverage) else rank(list(fits), challenge=False)
-        remaining = ranking.credible or ranking.laws[:1]
-        return cls(tuple(_usable(r.fit) for r in remaining), np.array([r.weight for r in remaining]), ranking)
-
-    def altered(self) -> list[tuple[int, AlteredLaw]]:
-        """What the tests allow, or nearly exclude, beside the first laws: position of the law, and the law altered.
-
-        Nothing where one law remains and all that was tried beside it is excluded.
-        """
-        if self.ranking is None or len(self.ranking.laws) < 2:
-            return []
-        tried = [ranked.fit for ranked in self.ranking.laws]
-        found = [
-            (k, altered)
-            for k, fit in enumerate(self.fits[:CHALLENGED_LAWS])
-            for altered in altered_laws([fit, *(other for other in tried if other is not fit)], NEARLY_EXCLUDED)
-        ]
-        is_settled = len(self.fits) == 1 and not any(one.excess + one.penalty <= NOT_EXCLUDED for _, one in found)
-        return [] if is_settled else found
-
-    def unmodelled_effects(self) -> tuple[str, ...]:
-        """Challenges of the ranking that no test piece can answer, as sentences."""
-        challenges = (self.ranking.challenges or ()) if self.ranking is not None else ()
-        return tuple(str(c) for c in challenges if c.kind == "unmodelled effect")
-
-
-def _with_weights(laws: ModelAverage) -> Ranking:
-    """The ranking of laws whose weights are known, such as those of a file."""
-    scores = -2.0 * np.log(np.maximum(laws.weights, SMALLEST_WEIGHT))
-    frames = max(fit.effective_frames for fit in laws.fits)
-    return ranking_from_scores(laws.fits, scores, "bic", independent_frames=frames)
-
-
-SMALLEST_WEIGHT = 1e-300
-
-
-def _usable(fit: Identification) -> Identification:
-    if fit.predictor is None or not fit.histories:
-        raise FitError(
-            f"the identification of {fit.law.name} was loaded from a file: attach its histories and specimen with "
-            "fit.with_histories()"
-        )
-    if fit.covariance.shape != (fit.u.size, fit.u.size) or not np.isfinite(fit.covariance).all():
-        raise FitError(f"the identification of {fit.law.name} has no intervals; identify it again from its tests")
-    return fit
-
-
-def _refuse_repeated(fits: Sequence[Identification]) -> None:
-    seen: set[str] = set()
-    for fit in fits:
-        if fit.law.fingerprint in seen:
-            raise FitError(f"the law {fit.law.name} is given twice; give each law once")
-        seen.add(fit.law.fingerprint)
-
-
 Goal = Literal["parameters", "law"] | DerivedQuantity
 
 
 @dataclass(frozen=True, eq=False)
 class DesignTask:
-    """What is asked: the laws that remain, the goal, the budget, and altered laws that a verdict has to exclude."""
+    """What is asked: laws that the tests cannot rule out, the goal, the budget, and what a verdict has to exclude.
 
-    remaining: RemainingLaws
+    laws : their identifications, the best first. weights : (laws,) -. ranking : of all laws that were tried, None for a
+    single identification. altered : what the tests allow, or nearly exclude, beside the first laws: position of the
+    law, and the law altered.
+    """
+
+    laws: tuple[Identification, ...]
+    weights: Floats
+    ranking: Ranking | None
     goal: Goal
     budget: float | None
     altered: Sequence[tuple[int, AlteredLaw]]
 
-    @property
-    def laws(self) -> tuple[Identification, ...]:
-        """Identifications, best first."""
-        return self.remaining.fits
+    @classmethod
+    def of(
+        cls,
+        source: Ranking | ModelAverage | Identification | Sequence[Identification],
+        goal: Goal | None,
+        budget: float | None,
+    ) -> DesignTask:
+        """By default the law is asked for where more than one remains, or where the tests allow more than the one.
+
+        FitError for what no design can be made from.
+        """
+        ranking = None if isinstance(source, Identification) else _ranking_of(source)
+        ranked = [] if ranking is None else ranking.credible or ranking.laws[:1]
+        laws = (source,) if isinstance(source, Identification) else tuple(one.fit for one in ranked)
+        for fit in laws:
+            _check_usable(fit)
+        if isinstance(goal, str) and goal not in ("law", "parameters"):
+            raise FitError(f"goal '{goal}' is not known: 'law', 'parameters', or a quantity such as ck.rate_at(60.0)")
+        if goal == "law" and ranking is None:
+            raise FitError(
+                f"there is one law, {laws[0].law.name}, and nothing to tell it apart from: give the ranking of "
+                "several laws, or take the goal 'parameters'"
+            )
+        if isinstance(goal, DerivedQuantity):
+            check_kelvin(laws[0].ranges, goal.point.get("temperature"))
+        altered = [] if ranking is None or goal not in (None, "law") else _altered(laws, ranking)
+        chosen: Goal = goal if goal is not None else "law" if len(laws) > 1 or altered else "parameters"
+        weights = np.array([one.weight for one in ranked]) if ranked else np.ones(1)
+        return cls(laws, weights / weights.sum(), ranking, chosen, budget, altered)
 
     @property
     def goal_name(self) -> str:
@@ -147,33 +102,58 @@ class DesignTask:
             )
         if len(self.laws) > 1 or self.altered:
             return ""
-        doubt = "".join(f"; but {effect}" for effect in self.remaining.unmodelled_effects())
+        challenges = (self.ranking.challenges or ()) if self.ranking is not None else ()
+        doubt = "".join(f"; but {one}" for one in challenges if one.kind == "unmodelled effect")
         return (
             f"one law remains, {best.law.name}, and nothing is to be told apart from it{doubt}; tests are proposed for "
             "the goal 'parameters', or for a quantity such as the rate at a stress"
         )
 
-    @property
-    def weights(self) -> tuple[float, ...]:
-        """Of the laws, one together."""
-        return tuple(float(w) for w in self.remaining.weights / self.remaining.weights.sum())
+
+def _ranking_of(source: Ranking | ModelAverage | Sequence[Identification]) -> Ranking:
+    """The ranking of several laws; of a model average that of its weights, as a file has them."""
+    if isinstance(source, Ranking):
+        return source
+    fits = source.fits if isinstance(source, ModelAverage) else source
+    if not fits:
+        raise FitError("a design is made from identifications or a ranking, found none")
+    (fingerprint, count), *_ = Counter(fit.law.fingerprint for fit in fits).most_common(1)
+    if count > 1:
+        name = next(fit.law.name for fit in fits if fit.law.fingerprint == fingerprint)
+        raise FitError(f"the law {name} is given twice; give each law once")
+    if not isinstance(source, ModelAverage):
+        return rank(list(fits), challenge=False)
+    scores = -2.0 * np.log(np.maximum(source.weights, SMALLEST_WEIGHT))
+    return ranking_from_scores(fits, scores, "bic", independent_frames=max(fit.effective_frames for fit in fits))
 
 
-def task_of(remaining: RemainingLaws, goal: Goal | None, budget: float | None) -> DesignTask:
-    """What is asked: by default the law where more than one remains, or where the tests allow more than the one."""
-    several = len(remaining.fits) > 1
-    if isinstance(goal, str) and goal not in ("law", "parameters"):
-        raise FitError(f"goal '{goal}' is not known: 'law', 'parameters', or a quantity such as ck.rate_at(60.0)")
-    if goal == "law" and remaining.ranking is None:
+SMALLEST_WEIGHT = 1e-300
+
+
+def _altered(laws: Sequence[Identification], ranking: Ranking) -> list[tuple[int, AlteredLaw]]:
+    """What the tests allow, or nearly exclude, beside the first laws.
+
+    Nothing where one law remains and all that was tried beside it is excluded.
+    """
+    if len(ranking.laws) < 2:
+        return []
+    found = [
+        (k, altered)
+        for k, fit in enumerate(laws[:CHALLENGED_LAWS])
+        for altered in altered_laws([fit, *(r.fit for r in ranking.laws if r.fit is not fit)], NEARLY_EXCLUDED)
+    ]
+    is_settled = len(laws) == 1 and not any(one.excess + one.penalty <= NOT_EXCLUDED for _, one in found)
+    return [] if is_settled else found
+
+
+def _check_usable(fit: Identification) -> None:
+    if fit.predictor is None or not fit.histories:
         raise FitError(
-            f"there is one law, {remaining.fits[0].law.name}, and nothing to tell it apart from: give the ranking of "
-            "several laws, or take the goal 'parameters'"
+            f"the identification of {fit.law.name} was loaded from a file: attach its histories and specimen with "
+            "fit.with_histories()"
         )
-    altered = remaining.altered() if goal == "law" or (goal is None and remaining.ranking is not None) else []
-    if isinstance(goal, DerivedQuantity):
-        check_kelvin(remaining.fits[0].ranges, goal.point.get("temperature"))
-    chosen: Goal = goal if goal is not None else "law" if several or altered else "parameters"
-    return DesignTask(remaining, chosen, budget, altered if chosen == "law" else [])
+    if fit.covariance.shape != (fit.u.size, fit.u.size) or not np.isfinite(fit.covariance).all():
+        raise FitError(f"the identification of {fit.law.name} has no intervals; identify it again from its tests")
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.errors import FitError
-from creepkit.experiments.candidate_tests import CandidateTest
 from creepkit.experiments.expectations import Expectation
+from creepkit.experiments.rig import CandidateTest
 from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Design(Presentable, text="reports.design:design_text"):
     altered : names of what the tests allow beside them, which a decisive verdict has to exclude (goal "law").
     tests : all that were considered; without those that were left out, {description: why}.
     plan : the run to make, or the runs that fit the budget (h of machine time) together, and expected : what they tell.
-    interrupted : whether the work was stopped before its end. notes : what the expectation does not include.
+    notes : what the expectation does not include.
     unit : of a quantity whose standard deviation is its own, None where it is that of its logarithm.
     obstacle : why no test is proposed, in a sentence.
     """
@@ -75,7 +75,6 @@ class Design(Presentable, text="reports.design:design_text"):
     plan: tuple[PlannedTest, ...] = ()
     expected: Expectation | None = None
     budget: float | None = None
-    interrupted: bool = False
     notes: tuple[str, ...] = ()
     obstacle: str = ""
     altered: tuple[str, ...] = ()

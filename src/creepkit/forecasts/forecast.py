@@ -15,8 +15,7 @@ from creepkit.arrays import single_threaded_blas
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest
 from creepkit.forecasts.draws import check_tolerances, law_draws
-from creepkit.forecasts.forecast_of_test import forecast_test
-from creepkit.forecasts.results import TestForecast
+from creepkit.forecasts.forecast_of_test import TestForecast, forecast_test
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens

@@ -5,27 +5,24 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
-from creepkit.forecasts.banded_output import BandedOutput
-from creepkit.forecasts.drawn_law import DrawnLaw, crossing_times, drawn_law, first_crossing
-from creepkit.forecasts.draws import LawDraws, has_sampled_draws
-from creepkit.forecasts.measured_test import TestScore, score_test
-from creepkit.forecasts.results import (
+from creepkit.forecasts.banded_output import (
     CHOICE_OF_LAW,
     LAW,
     MISFIT,
     NOISE,
     NUMERICAL,
     OFFSET,
+    BandedOutput,
     OutputForecast,
-    TestForecast,
-    TimeForecast,
 )
+from creepkit.forecasts.draws import DrawnLaw, LawDraws, crossing_times, drawn_law, first_crossing, has_sampled_draws
+from creepkit.forecasts.measured_test import TestScore, score_test
 from creepkit.inverse.extrapolation import HOUR, extrapolation_text
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
@@ -33,8 +30,66 @@ from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.tested_region import outside_combinations
 from creepkit.inverse.uncertainty.laplace_approximation import is_open
+from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, output_unit
+
+
+@dataclass(frozen=True)
+class TimeForecast:
+    """When an output reaches a value, or the specimen breaks.
+
+    event : in words. output, target : what is reached; "" for rupture. value : s, at the identified values.
+    median, low, high : s, of a single test. All may be infinite.
+    measured : s, NaN where it is not known; censored : whether the test was stopped then, unbroken.
+    chance : probability that it comes before the last time of the test.
+    """
+
+    event: str
+    value: float
+    median: float
+    low: float
+    high: float
+    chance: float
+    measured: float = float("nan")
+    censored: bool = False
+    output: str = ""
+    target: float = float("nan")
+
+    @property
+    def inside(self) -> bool | None:
+        """Whether the measured time lies within the interval; None where nothing was measured."""
+        if not np.isfinite(self.measured):
+            return None
+        return self.measured <= self.high if self.censored else self.low <= self.measured <= self.high
+
+
+@dataclass(frozen=True, eq=False)
+class TestForecast:
+    """The forecast of one test.
+
+    outputs : {name: its curve and band}. times : to targets and to rupture. score : of a measured test, else None.
+    includes : what the bands are made of, with sizes. caution : why bands are not those of the tests, or "".
+    extrapolation : beyond the fitted ranges, in one sentence, or "". misfit : what the law of most weight misses there,
+    where bands and times hold that.
+    """
+
+    __test__ = False  # not a test case, whatever its name says to pytest
+
+    history: History
+    outputs: Mapping[str, OutputForecast]
+    times: tuple[TimeForecast, ...]
+    includes: Mapping[str, str]
+    extrapolation: str = ""
+    score: TestScore | None = None
+    notes: tuple[str, ...] = ()
+    caution: str = ""
+    misfit: LawMisfit | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the test."""
+        return self.history.name
 
 
 def forecast_test(

@@ -1,4 +1,4 @@
-"""A measured test beside its forecast: how likely it was, and how much of what is left its own nuisances explain.
+"""A measured test beside its forecast: how likely it was.
 
 With r the residuals of the test at the identified values, A and m derivatives to, and posterior mean of, what the
 fitted tests say (the law, and the effects of a heat or laboratory that was fitted), C its covariance, s^2 the variance
@@ -8,8 +8,7 @@ their tolerances, and N noise, offsets and misfit, the forecast is
     r + A m is normal with covariance V = A C A' + s^2 d d' + E E' + N,
 
 a mixture over the posterior distribution of the scatter, and over the laws of a ranking. p-values are prior predictive
-ones (Box (1980), J. R. Stat. Soc. A 143, 383). With the law frozen, the nuisances of the test are estimated from r
-under their priors: what whitened residuals are then smaller by, they explain.
+ones (Box (1980), J. R. Stat. Soc. A 143, 383).
 """
 
 from __future__ import annotations
@@ -21,9 +20,8 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import chi2
 
-from creepkit.arrays import Floats, Ints
-from creepkit.forecasts.drawn_law import DrawnLaw
-from creepkit.forecasts.draws import UncertainQuantity, systematic
+from creepkit.arrays import Floats
+from creepkit.forecasts.draws import DrawnLaw, UncertainQuantity, systematic
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
@@ -43,28 +41,6 @@ EXACTLY_KNOWN = 1e-9
 
 
 @dataclass(frozen=True)
-class ExplainedNuisance:
-    """One nuisance parameter of a measured test, estimated with the law frozen.
-
-    kind : "rate" (value is ln of a factor), "offset of amplitude", or the kind of a Nuisance, in its unit.
-    value, sd : estimate and its standard deviation. prior_mean, prior_sd : before the test.
-    spread : standard deviation that the forecast gives to such an estimate, that of the law included.
-    """
-
-    kind: str
-    value: float
-    sd: float
-    prior_mean: float
-    prior_sd: float
-    spread: float
-
-    @property
-    def deviation(self) -> float:
-        """Distance from the prior mean, in what the forecast allows it."""
-        return (self.value - self.prior_mean) / self.spread if self.spread > 0 else 0.0
-
-
-@dataclass(frozen=True)
 class TestScore:
     """How a measured test compares with its forecast.
 
@@ -73,9 +49,6 @@ class TestScore:
     departure_p_value : of the residuals in those directions alone in which the forecast is more uncertain than its
         noise: of a whole curve that lies so far off.
     log_score : ln of the predictive density of the outputs in their units, per frame; larger is better.
-    rms, rms_explained : {output: root mean square residual over its noise} at prior means, and with the test's own
-        nuisances estimated. explained : share of the squared whitened residuals that these explain.
-    nuisances : their estimates.
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
@@ -86,10 +59,6 @@ class TestScore:
     p_value: float
     departure_p_value: float
     log_score: float
-    rms: Mapping[str, float]
-    rms_explained: Mapping[str, float]
-    explained: float
-    nuisances: tuple[ExplainedNuisance, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,22 +66,18 @@ class LinearForecast:
     """What one law forecasts of a test's residuals, linear in what is uncertain.
 
     fit : the identification. problem, residuals : of the test. values : (data,) r at the prior means. by_joint : (data,
-    unknowns + effects) A. rate : (data,) d. tolerance : (data, dimensions) E. noise : (data, data) N. white : (data,)
-    standard deviation of what is independent from frame to frame. outputs : (data,) positions; names : of outputs.
-    misfit : standard deviation of ln rate by what the law misses there.
+    unknowns + effects) A. rate : (data,) d. tolerance : (data, dimensions) E. noise : (data, data) N. names : of
+    outputs. misfit : standard deviation of ln rate by what the law misses there.
     """
 
     fit: Identification
     problem: LeastSquaresProblem
     residuals: Residuals
-    noise_model: NoiseModel
     values: Floats
     by_joint: Floats
     rate: Floats
     tolerance: Floats
     noise: Floats
-    white: Floats
-    outputs: Ints
     names: tuple[str, ...]
     own: tuple[UncertainQuantity, ...]
     dimensions: tuple[UncertainQuantity, ...]
@@ -147,14 +112,11 @@ class LinearForecast:
             fit,
             problem,
             residuals,
-            noise_model,
             residuals.values[0][present],
             by_joint,
             rate,
             jacobian[:, [count + k for k in own]] * np.array([dimensions[k].sd for k in own]),
             covariance(residuals, noise_model)[0][np.ix_(present, present)],
-            _white_noise(residuals, noise_model)[present],
-            residuals.output_index[0][present],
             problem.observations.outputs,
             tuple(dimensions[k] for k in own),
             tuple(dimensions),
@@ -221,48 +183,6 @@ class LinearForecast:
             x[count + self.dimensions.index(dimension)] += dimension.sd * moved
         return np.asarray(self.problem.residuals(self.problem.bounds.clip(x)).values[0][self.residuals.present[0]])
 
-    def rms(self, values: Floats) -> dict[str, float]:
-        """{output: root mean square of residuals (data,) over their noise}."""
-        return {
-            name: float(np.sqrt(np.mean((values / self.white)[self.outputs == k] ** 2)))
-            for k, name in enumerate(self.names)
-            if name != RUPTURE_OUTPUT and (self.outputs == k).any()
-        }
-
-    def explained(self, history: History) -> tuple[tuple[ExplainedNuisance, ...], Floats, Floats]:
-        """Estimates of the test's own nuisances with the law frozen; residuals (data,) before and after."""
-        scatter = self.fit.scatter_of_rates
-        mean, joint = scatter.mean_joint
-        test = scatter.new_test(history, self.misfit)
-        variance = float(scatter.posterior.weight @ scatter.own_variance(test, scatter.posterior.sd))
-        known = np.zeros(mean.size)
-        known[[*test.known.values()]] = mean[[*test.known.values()]]
-        values = self.values + self.by_joint @ known
-        sd = float(np.sqrt(variance))
-        columns = [sd * self.rate[:, None], self.tolerance]
-        kinds = [("rate", 0.0, sd), *((d.kind, d.mean, d.sd) for d in self.own)]
-        present = self.residuals.present[0]
-        for k, (name, components) in enumerate(self.noise_model.outputs.items()):
-            if components.offset > 0 and (self.outputs == k).any():
-                effect = np.where(self.outputs == k, self.residuals.offset_sensitivity[0][present], 0.0)
-                columns.append(components.offset * effect[:, None])
-                kinds.append((f"offset of {name}", 0.0, components.offset))
-        design = np.concatenate(columns, axis=1)
-        without_offset = {n: replace(o, offset=0.0) for n, o in self.noise_model.outputs.items()}
-        noise = covariance(self.residuals, replace(self.noise_model, outputs=without_offset))[0]
-        weighted = np.linalg.solve(noise[np.ix_(present, present)], design)
-        posterior = np.linalg.inv(design.T @ weighted + np.eye(design.shape[1]))
-        to_estimate = -posterior @ weighted.T
-        estimate = to_estimate @ values
-        forecast = design @ design.T + noise[np.ix_(present, present)] + self.by_joint @ joint @ self.by_joint.T
-        spread = np.sqrt(np.einsum("kd,de,ke->k", to_estimate, forecast, to_estimate))
-        estimates = tuple(
-            ExplainedNuisance(kind, centre + one * float(e), one * float(np.sqrt(v)), centre, one, one * float(w))
-            for (kind, centre, one), e, v, w in zip(kinds, estimate, np.diag(posterior), spread, strict=True)
-            if one > 0
-        )
-        return estimates, values, values + design @ estimate
-
 
 def score_test(
     laws: Sequence[DrawnLaw],
@@ -276,20 +196,14 @@ def score_test(
     weight = np.array([one.weight for one in laws]) / sum(one.weight for one in laws)
     p_values, departures, densities = zip(*(one.evaluated(history) for one in forecasts), strict=True)
     log_density = logsumexp([logsumexp(one) - np.log(SCORED_NODES) for one in densities], b=weight)
-    best = forecasts[int(weight.argmax())]
-    estimates, before, after = best.explained(history)
-    squares, left = (float(((residuals / best.white) ** 2).sum()) for residuals in (before, after))
+    count = forecasts[int(weight.argmax())].values.size
     return TestScore(
         inside,
         whole_inside,
-        before.size,
+        count,
         float(weight @ p_values),
         float(weight @ departures),
-        float(log_density) / max(before.size, 1),
-        best.rms(before),
-        best.rms(after),
-        1.0 - left / squares if squares > 0 else 0.0,
-        estimates,
+        float(log_density) / max(count, 1),
     )
 
 
@@ -321,11 +235,3 @@ def noise_model_of(fit: Identification, observations: ObservationVector) -> Nois
         noise = float(observations.noise[position]) if stated else known.noise
         outputs[name] = replace(known, noise=max(noise, 1e-12), misfit=known.misfit * ratio, drift=known.drift * ratio)
     return replace(fit.noise_model, outputs=outputs, rate=0.0)
-
-
-def _white_noise(residuals: Residuals, noise_model: NoiseModel) -> Floats:
-    """(observations,) standard deviation of what is independent from frame to frame, in the transformed output."""
-    index = residuals.output_index
-    noise = noise_model.per_observation(index, "noise") * residuals.relative_noise * residuals.offset_sensitivity
-    misfit = noise_model.per_observation(index, "misfit")
-    return np.asarray(np.maximum(np.hypot(noise, misfit)[0], 1e-12))

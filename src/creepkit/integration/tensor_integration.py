@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from typing import Literal
 
 import numpy as np
 
@@ -28,25 +26,7 @@ from creepkit.integration.core_structures import (
 from creepkit.integration.tensor_point import EQUIVALENT_STRAIN
 from creepkit.integration.time_discretisation import SDIRK2, Tableau, merge_programs
 from creepkit.kernels.interface import CompiledLaw
-from creepkit.records import TENSOR_COMPONENTS, Program, Status
-
-
-@dataclass(frozen=True)
-class ComponentControl:
-    """What is prescribed in one component: stress in MPa, or total strain (of the tensor), over time."""
-
-    quantity: Literal["stress", "strain"]
-    program: Program
-
-
-def prescribed_stress(value: float | Program) -> ComponentControl:
-    """A component whose stress is prescribed, MPa."""
-    return ComponentControl("stress", value if isinstance(value, Program) else Program.constant(value))
-
-
-def prescribed_strain(value: float | Program) -> ComponentControl:
-    """A component whose total strain is prescribed."""
-    return ComponentControl("strain", value if isinstance(value, Program) else Program.constant(value))
+from creepkit.records import TENSOR_COMPONENTS, PointLoading, Program, Status
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +54,7 @@ def integrate_tensor_point(
     law: CompiledLaw,
     theta: ArrayLike,
     elastic: tuple[float, float],
-    controls: Mapping[str, ComponentControl],
+    loading: PointLoading,
     temperature: float | Program,
     times: ArrayLike,
     *,
@@ -84,25 +64,23 @@ def integrate_tensor_point(
     """Drive a virgin point from time zero.
 
     theta : (P,) internal parameters, see CompiledLaw. elastic : E in MPa, and nu.
-    controls : by component; those not named are free of stress. temperature : K. times : (times,) s, non-decreasing.
+    temperature : K. times : (times,) s, non-decreasing.
     """
     outputs, theta = checked_times(times), np.array(theta, dtype=float).reshape(-1)
     if sentence := refusal(law, theta):
         raise SolveError(sentence)
     if not (0 < elastic[0] < inf and -1 < elastic[1] < 0.5):
         raise SolveError(f"E is {elastic[0]:g} MPa and nu {elastic[1]:g}; allowed are E above 0 and nu in (-1, 0.5)")
-    for name in controls:
-        if name not in TENSOR_COMPONENTS:
-            raise SolveError(f"there is no component '{name}' to drive; allowed are {', '.join(TENSOR_COMPONENTS)}")
-    component_controls = [controls.get(name, prescribed_stress(0.0)) for name in TENSOR_COMPONENTS]
-    held = np.array([control.quantity == "strain" for control in component_controls])
-    programs = [*(c.program for c in component_controls), prescribed_stress(temperature).program]
+    imposed = {**loading.stress, **loading.strain}
+    programs = [imposed.get(name, Program.constant(0.0)) for name in TENSOR_COMPONENTS]
+    kelvin = temperature if isinstance(temperature, Program) else Program.constant(temperature)
+    held = np.array([name in loading.strain for name in TENSOR_COMPONENTS])
     arrays = {
         "theta": theta,
         "initial": np.array(law.initial, dtype=float),
         "limits": np.array(law.limits, dtype=float),
         "held": held.astype(np.int64),
-        "segments": merge_programs(*programs, end=float(outputs.max(initial=0.0))),
+        "segments": merge_programs(*programs, kelvin, end=float(outputs.max(initial=0.0))),
         "outputs": outputs,
         "history": np.zeros((outputs.size, EQUIVALENT_STRAIN + 1 + law.states)),
     }
@@ -120,8 +98,8 @@ def integrate_tensor_point(
     write_addresses(call, arrays)
     check_call(function("creepkit_integrate_tensor_point")(ctypes.byref(call)))
     code, rows, reached = call.ending, arrays["history"][: call.reached], outputs[: call.reached]
-    imposed = np.stack([c.program.at(reached) for c in component_controls], axis=-1)
-    stress, strain = _elastic_response(elastic, held, imposed, rows[:, :6])
+    values = np.stack([program.at(reached) for program in programs], axis=-1)
+    stress, strain = _elastic_response(elastic, held, values, rows[:, :6])
     return PointTrajectory(
         times=frozen(reached),
         stress=frozen(stress),

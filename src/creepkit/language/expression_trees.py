@@ -1,8 +1,8 @@
 """Expressions as JSON trees and back, and their values in multiple precision; nothing is evaluated from text.
 
 A tree is a symbol ("stress"), an integer (2) or a list whose first entry is a head: ["mul", "A", ["pow", "stress",
-"n"]]. Other numbers are ["rational", 1, 3] and ["float", 0.1]; a Float of other than double precision is ["float",
-mantissa, exponent, bits]. Rebuilt expressions equal the original exactly, since sympy does not rearrange them.
+"n"]]. Other numbers are ["rational", 1, 3] and ["float", 0.1], in double precision. Rebuilt expressions equal the
+original exactly, since sympy does not rearrange them.
 Evaluation works at mpmath's current precision; a number whose exponent would be astronomical raises OverflowError.
 """
 
@@ -108,7 +108,7 @@ EXPONENT_LIMIT = 1000
 """Largest numeric exponent."""
 
 
-_INTEGER_DIGIT_LIMIT, _PRECISION_LIMIT = 300, 1024
+_INTEGER_DIGIT_LIMIT = 300
 
 
 _ANY_NUMBER = SIZE_LIMIT
@@ -206,11 +206,9 @@ def _name_of(symbol: sympy.Symbol) -> str:
 
 
 def _float_tree(number: sympy.Float) -> list[Any]:
-    bits = int(number._prec)
-    if bits == 53 and sympy.Float(float(number))._mpf_ == number._mpf_:
-        return ["float", float(number)]
-    sign, mantissa, exponent, _ = number._mpf_
-    return ["float", int(-mantissa if sign else mantissa), int(exponent), bits]
+    if sympy.Float(float(number))._mpf_ != number._mpf_ or number._prec != 53:
+        raise LawError(f"the number {number} is not of double precision, as files hold it; write a float of Python")
+    return ["float", float(number)]
 
 
 # ---- reading -------------------------------------------------------------------------------------------------------
@@ -291,21 +289,7 @@ def _float_from(arguments: list[Any]) -> sympy.Float:
     match arguments:
         case [float() | int() as number] if type(number) is not bool and abs(number) < 1.8e308:
             return sympy.Float(float(number))
-        case [int() as mantissa, int() as exponent, int() as bits] if _is_normal(mantissa, exponent, bits):
-            sign, size = int(mantissa < 0), abs(mantissa)
-            return sympy.Float((sign, size, exponent, size.bit_length()) if size else 0, precision=bits)
     raise LawError(f'{_short_text(["float", *arguments])} is not a finite number in the form ["float", 0.1]')
-
-
-def _is_normal(mantissa: int, exponent: int, bits: int) -> bool:
-    """Whether mantissa 2^exponent is written as sympy writes it: an odd mantissa of at most `bits` bits, or 0 2^0."""
-    if mantissa == 0:
-        return exponent == 0 and 1 < bits <= _PRECISION_LIMIT
-    return (
-        mantissa % 2 == 1
-        and mantissa.bit_length() <= bits <= _PRECISION_LIMIT
-        and abs(exponent) <= 2 * _PRECISION_LIMIT
-    )
 
 
 def _rational_from(arguments: list[Any]) -> sympy.Rational:

@@ -28,7 +28,7 @@ from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rate
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
-    from creepkit.forecasts.results import TestForecast
+    from creepkit.forecasts.forecast_of_test import TestForecast
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.laplace_approximation import Estimate

@@ -11,8 +11,7 @@ from creepkit.arrays import Bools
 from creepkit.dataset.dataset import summary
 from creepkit.reports.blocks import aligned
 from creepkit.reports.terminal import print_json, tell, tell_written
-from creepkit.sampling.criteria import OutcomeCriterion
-from creepkit.sampling.domains import Acceptance, SamplingDomain
+from creepkit.sampling.domains import Acceptance, OutcomeCriterion, SamplingDomain
 from creepkit.sampling.domains import acceptance as evaluate_acceptance
 
 if TYPE_CHECKING:
@@ -77,11 +76,9 @@ def acceptance_text(acceptance: Acceptance) -> str:
             numbers = f"{_percent(is_met):>8} {_percent(remaining & ~is_met):>9}"
             remaining = remaining & is_met
         lines.append(f"{criterion.name:<14} {numbers}  {criterion.text}")
-    screened = getattr(domain, "screened", 0)
-    exception = " but for those that burst far too early by the reduced-order model" if screened else ""
     return "\n".join([
         *lines,
-        f"{_percent(acceptance.kept)} of the draws would be simulated{exception}; {_percent(acceptance.useful)} of all "
+        f"{_percent(acceptance.kept)} of the draws would be simulated; {_percent(acceptance.useful)} of all "
         "have a rate at which creep is visible and the test lasts (others may, too)",
     ])  # fmt: skip
 

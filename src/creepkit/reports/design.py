@@ -55,7 +55,6 @@ def design_blocks(design: Design, figures: PageFigures | None = None, of: str = 
     for description, reason in design.left_out:
         reasons.setdefault(kind_of_reason(reason), []).append(description)
     lines = [f"left out: {len(names)} that {reason} ({names[0]})" for reason, names in reasons.items()]
-    lines += ["stopped before the end: the best so far"] * design.interrupted
     lines += design.notes if design.tests else ()
     return [*blocks, Items(lines)] if lines else blocks
 
@@ -147,7 +146,6 @@ def design_to_json(design: Design) -> dict[str, object]:
         "plan": [row(test) for test in design.plan],
         "plan_oven_hours": sum(test.hours for test in design.plan),
         "expected": None if design.expected is None else _expectation_to_json(design.expected),
-        "interrupted": design.interrupted,
         "tests": [row(test) for test in design.tests],
         "left_out": dict(design.left_out),
         "notes": list(design.notes),
@@ -162,11 +160,7 @@ def _expectation_to_json(e: Expectation) -> dict[str, Any]:
         known |= fields_to_json(e, "parameter_sd current_parameter_sd")
     if e.chi_squares:
         known["chi_squares"] = [
-            {
-                "true": c.reference_law,
-                "alternative": c.alternative_law,
-                **fields_to_json(c, "current expected refitted"),
-            }
+            {"true": c.reference_law, "alternative": c.alternative_law, **fields_to_json(c, "current expected")}
             for c in e.chi_squares
         ]
     return known

@@ -24,18 +24,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from creepkit.forecasts.banded_output import OutputForecast
     from creepkit.forecasts.forecast import Forecast
-    from creepkit.forecasts.measured_test import ExplainedNuisance, TestScore
-    from creepkit.forecasts.results import OutputForecast, TestForecast, TimeForecast
+    from creepkit.forecasts.forecast_of_test import TestForecast, TimeForecast
+    from creepkit.forecasts.measured_test import TestScore
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit
     from creepkit.reports.svg import PageFigures
 
 
 SHOWN_SHARE = 0.02
 """Of the variance: smaller parts of a band are not named."""
-
-
-LARGEST_LOG = 700.0
 
 
 def forecast_text(forecast: Forecast) -> str:
@@ -120,27 +118,16 @@ def _time_text(one: TimeForecast, end: float) -> str:
 
 
 def score_lines(score: TestScore) -> list[str]:
-    """How a measured test compares, in two lines."""
+    """How a measured test compares, in one line."""
     inside = ", ".join(
         f"{name} {100 * share:.0f} % of the frames in the band"
         + (" and the whole curve in the wider one" if score.whole_inside[name] else "")
         for name, share in score.inside.items()
     )
-    rms = ", ".join(f"{name} {before:.3g} to {score.rms_explained[name]:.3g}" for name, before in score.rms.items())
-    moved = [nuisance_text(one) for one in score.nuisances if abs(one.deviation) > 0.1]
     return [
         f"measured: {inside}; a test lies as far off, or farther, with probability {score.departure_p_value:.2g} "
-        f"(noise of its frames included: {score.p_value:.2g})",
-        f"with the law fixed, a rate, offsets and dimensions of its own describe {100 * score.explained:.0f} % of what "
-        f"differs (rms over noise: {rms}){': ' if moved else ''}{', '.join(moved)}",
+        f"(noise of its frames included: {score.p_value:.2g})"
     ]
-
-
-def nuisance_text(one: ExplainedNuisance) -> str:
-    """A nuisance and how far it lies from its prior mean."""
-    if one.kind == "rate":
-        return f"rate x {math.exp(min(one.value, LARGEST_LOG)):.3g} ({one.deviation:+.1f} sd)"
-    return f"{one.kind} {one.value:.4g} ({one.deviation:+.1f} sd)"
 
 
 def end_shares(one: OutputForecast) -> dict[str, float]:
@@ -185,11 +172,7 @@ def _test_to_json(test: TestForecast) -> dict[str, Any]:
         },
         "score": None
         if score is None
-        else {
-            **fields_to_json(score, "inside whole_inside freedom p_value departure_p_value log_score explained"),
-            **fields_to_json(score, "rms rms_explained"),
-            "nuisances": [fields_to_json(n, "kind value sd prior_mean prior_sd deviation") for n in score.nuisances],
-        },
+        else fields_to_json(score, "inside whole_inside freedom p_value departure_p_value log_score"),
     }
 
 

@@ -25,14 +25,16 @@ from creepkit.rupture_assessment.assessment import (
     interpolated,
 )
 from creepkit.rupture_assessment.checks import AssessmentCheck, effectiveness, physical_realism, repeatability, turning
-from creepkit.rupture_assessment.fitting import conditions_of, fit_method, too_few_tests
-from creepkit.rupture_assessment.methods import METHODS, MINIMUM_RATE, MONKMAN_GRANT
-from creepkit.rupture_assessment.monkman_grant import (
+from creepkit.rupture_assessment.fitting import (
     LEAST_CURVATURE,
     MinimumRateRelation,
+    conditions_of,
     curvature_probability,
+    fit_method,
     fit_relation,
+    too_few_tests,
 )
+from creepkit.rupture_assessment.methods import METHODS, MINIMUM_RATE, MONKMAN_GRANT
 from creepkit.rupture_assessment.observed_tests import (
     NOT_STATED,
     RuptureTests,

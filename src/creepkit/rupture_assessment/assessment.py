@@ -25,8 +25,8 @@ from creepkit.presentation import Presentable, present
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.checks import AssessmentCheck
+from creepkit.rupture_assessment.fitting import MinimumRateRelation
 from creepkit.rupture_assessment.methods import METHODS, Conditions
-from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
 from creepkit.rupture_assessment.observed_tests import RuptureTests
 from creepkit.rupture_assessment.rupture_fit import RuptureFit, RuptureParameter, VarianceFreedom, power_of_ten
 from creepkit.rupture_assessment.strength import (
@@ -272,8 +272,7 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
         check_conditions([temperature])
         if not 0 < stress < 1e9:
             raise FitError(f"stress is {stress!r}; give MPa above zero")
-        T, s = np.array([float(temperature)]), np.array([float(stress)])
-        at = Conditions(s, T, self.tensile(T), np.full(1, np.nan))
+        at = Conditions.isotherm(np.array([float(stress)]), temperature, self.tensile)
         models = self.models(method)
         ends = [curve for (kind, _), curve in bound_curves(models, at, self.settings.level).items() if kind == of]
         curves = [mixed(models, at, of).quantile(0.5), *ends]

@@ -78,7 +78,7 @@ def turning(fit: RuptureFit, tests: RuptureTests, tensile: TensileStrength) -> s
         near = np.abs(tests.temperature - T) <= ISOTHERMAL_RANGE
         low, high = float(tests.stress[near].min()), float(tests.stress[near].max())
         stress = np.geomspace(low, 1.0001 * high, STRESS_POINTS)
-        times = fit.location(_isotherm(stress, T, tensile))
+        times = fit.location(Conditions.isotherm(stress, T, tensile))
         rising = np.flatnonzero(~(np.diff(times) < 0))
         if rising.size:
             return f"the time rises with stress at {celsius_text(T)}, {stress[rising[0]]:.3g} MPa, within the tests"
@@ -105,7 +105,7 @@ def physical_realism(
     )
     known = np.isfinite(tensile(T)) if METHODS[fit.method].needs == "tensile_strength" else np.ones(T.size, bool)
     T = T[known]
-    times = np.array([fit.location(_isotherm(stress, float(t), tensile)) for t in T])
+    times = np.array([fit.location(Conditions.isotherm(stress, float(t), tensile)) for t in T])
     inside = (times >= np.log10(CHECKED_HOURS[0])) & (times <= np.log10(CHECKED_HOURS[1]))
     slopes = -np.diff(times, axis=1) / np.diff(np.log10(stress))
     both = inside[:, 1:] & inside[:, :-1]
@@ -226,8 +226,3 @@ def _changed(
     text = f"the strength at {hours:.3g} h changes by up to {100 * largest:+.1f} % ({len(places)} tests less)"
     fault = f"the strength changes by more than 10 % {name}"
     return AssessmentCheck(name, abs(largest) <= LARGEST_CHANGE, f"{text}; allowed: 10 %", fault)
-
-
-def _isotherm(stress: Floats, temperature: float, tensile: TensileStrength) -> Conditions:
-    T = np.full(stress.shape, temperature)
-    return Conditions(stress, T, tensile(T), np.full(stress.shape, np.nan))

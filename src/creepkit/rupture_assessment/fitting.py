@@ -11,12 +11,14 @@ Effects are integrated out. With one kind of effect by adaptive Gauss-Hermite qu
 rounding, without run-outs: there the integrand is Gaussian.
 
 All functions take several candidates at once, so that derivatives by differences cost one call.
+
+Monkman-Grant's relation is two such fits: rupture times by minimum creep rates, and these by a rate law.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -25,14 +27,16 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_array
 from scipy.special import log_ndtr, logsumexp, stdtrit
 
-from creepkit.arrays import Bools, Floats
+from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import FitError
-from creepkit.rupture_assessment.methods import Basis, Centre, Conditions, RuptureMethod
+from creepkit.records import SECONDS_PER_HOUR
+from creepkit.rupture_assessment.methods import MINIMUM_RATE, MONKMAN_GRANT, Basis, Centre, Conditions, RuptureMethod
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
 from creepkit.rupture_assessment.rupture_fit import (
     LEAST_SCALE,
     RuptureFit,
     RuptureParameter,
+    StudentLogTime,
     VarianceFreedom,
     variance_freedom,
 )
@@ -240,11 +244,11 @@ def _hessian(cost: Cost, point: Floats) -> Floats:
     return np.asarray(matrix + np.tril(matrix, -1).T)
 
 
-def conditions_of(tests: RuptureTests, tensile: TensileStrength) -> Conditions:
+def conditions_of(tests: RuptureTests, tensile: TensileStrength | None = None) -> Conditions:
     """The conditions of tests; tensile : of temperatures, where a test does not state its own."""
-    strength = np.where(
-        np.isfinite(tests.tensile_strength), tests.tensile_strength, tensile(np.asarray(tests.temperature))
-    )
+    strength = tests.tensile_strength
+    if tensile is not None:
+        strength = np.where(np.isfinite(strength), strength, tensile(np.asarray(tests.temperature)))
     return Conditions(tests.stress, tests.temperature, strength, tests.minimum_rate)
 
 
@@ -448,3 +452,71 @@ def _with_half_widths(
         variance = np.einsum("mi,ij,mj->m", jacobian, part, jacobian)
         half = stdtrit(freedom.of(jacobian), 0.5 + 0.5 * level) * np.sqrt(np.maximum(variance, 0.0))
     return {name: (value, float(h)) for (name, value), h in zip(at.items(), half, strict=True)}
+
+
+UNUSED_ENERGY = 300e3
+"""J/mol, of a rate law of tests at one temperature; it is used at that temperature alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class MinimumRateRelation:
+    """Rupture times by minimum rates.
+
+    times : log10 t = c - m log10 of the rate, of the tests with both. rates : the rate law, of all tests with a rate.
+    Its predictions by stress and temperature take the scatters of rates and of times for independent.
+    """
+
+    times: RuptureFit
+    rates: RuptureFit
+
+    def log_time(self, at: Conditions, of: str) -> StudentLogTime:
+        """Distribution of log10 of a time in hours; by the rate where it is known, else by the rate law."""
+        if np.isfinite(at.rate).all():
+            return self.times.log_time(at, of)
+        log_rate = self.rates.log_time(at, of)
+        predicted = replace(at, rate=10.0**log_rate.median / SECONDS_PER_HOUR)
+        by_rate = self.times.log_time(predicted, of)
+        m = self.times["m"].value
+        spread = np.hypot(by_rate.spread, m * log_rate.spread)
+        return StudentLogTime(by_rate.median, spread, np.minimum(by_rate.freedom, log_rate.freedom))
+
+    def test_scatter(self, at: Conditions) -> StudentLogTime:
+        """Distribution of log10 of the time of one test over the median time of its heat, by its rate."""
+        return self.times.test_scatter(at)
+
+
+def fit_relation(tests: RuptureTests, with_rate: RuptureTests, *, level: float) -> MinimumRateRelation:
+    """The relation and its rate law; FitError, in one sentence, where rates are missing or too few."""
+    known = np.isfinite(tests.minimum_rate)
+    if not known.any():
+        raise FitError("no test has a minimum creep rate, which monkman-grant needs; add minimum_rate to the tests")
+    both = tests[known]
+    times = fit_method(MONKMAN_GRANT, both, conditions_of(both), degree=1, fixed={}, level=level)
+    log_rates = replace(
+        with_rate,
+        log_time=frozen(np.log10(with_rate.minimum_rate * SECONDS_PER_HOUR)),
+        censored=frozen(np.zeros(len(with_rate)), dtype=bool),
+    )
+    fixed = {"Q": UNUSED_ENERGY} if with_rate.isothermal else {}
+    rates = fit_method(MINIMUM_RATE, log_rates, conditions_of(with_rate), degree=1, fixed=fixed, level=level)
+    return MinimumRateRelation(times, rates)
+
+
+LEAST_CURVATURE = 0.01
+"""Probability below which rates say that one stress exponent does not hold for all of them."""
+
+
+def curvature_probability(with_rate: RuptureTests) -> float:
+    """Probability of so much curvature of ln rate over ln stress if there were none, by the F test; 1 of few rates."""
+    from scipy.stats import f as f_distribution
+
+    x, y = np.log(with_rate.stress), np.log(with_rate.minimum_rate)
+    line = [np.ones_like(x), x - x.mean(), *([] if with_rate.isothermal else [1.0 / with_rate.temperature])]
+    left = []
+    for columns in (line, [*line, (x - x.mean()) ** 2]):
+        A = np.stack([column / np.abs(column).max() for column in columns], axis=1)
+        if np.linalg.matrix_rank(A) < A.shape[1] or len(y) < A.shape[1] + 2:
+            return 1.0
+        left.append(float(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2)))
+    freedom = len(y) - len(line) - 1
+    return float(f_distribution.sf((left[0] - left[1]) * freedom / max(left[1], 1e-300), 1, freedom))

@@ -32,6 +32,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import SECONDS_PER_HOUR
+from creepkit.rupture_assessment.observed_tests import TensileStrength
 
 LN10 = float(np.log(10.0))
 
@@ -50,6 +51,12 @@ class Conditions:
     temperature: Floats
     tensile_strength: Floats
     rate: Floats
+
+    @classmethod
+    def isotherm(cls, stress: Floats, temperature: float, tensile: TensileStrength) -> Conditions:
+        """At one temperature, K, without rates; stress : (points,) MPa."""
+        T = np.full(stress.shape, float(temperature))
+        return cls(stress, T, tensile(T), np.full(stress.shape, np.nan))
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from scipy.interpolate import PchipInterpolator
 
 from creepkit.arrays import Floats
 from creepkit.records.units import celsius_text
+from creepkit.rupture_assessment.fitting import MinimumRateRelation
 from creepkit.rupture_assessment.methods import Conditions
-from creepkit.rupture_assessment.monkman_grant import MinimumRateRelation
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
 from creepkit.rupture_assessment.rupture_fit import MixedLogTime, RuptureFit, power_of_ten
 
@@ -110,8 +110,7 @@ def strength_estimates(
     if np.isfinite(limit):
         highest = min(highest, TENSILE_LIMIT * limit)
     stress = np.geomspace(lowest, highest, GRID_POINTS)
-    shape = stress.shape
-    at = Conditions(stress, np.full(shape, temperature), np.full(shape, limit), np.full(shape, np.nan))
+    at = Conditions.isotherm(stress, temperature, tensile)
     median = mixed(models, at, "mean").quantile(0.5)
     tested = (stress >= 0.99 * tests.stress.min()) & (stress <= 1.01 * tests.stress.max())
     start = int(np.argmin(np.where(tested, np.abs(median - np.median(tests.log_time)), np.inf)))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -342,20 +342,17 @@ PAPER_JUMP_FRACTIONS = (1 / 6, 5 / 6)
 
 @dataclass(frozen=True)
 class ConditionRange:
-    """One number, uniform from `low` to `high` on its scale.
+    """One number, uniform from `low` to `high`.
 
     fraction_of : the condition of which it is a fraction.
     """
 
     low: float
     high: float
-    scale: Literal["linear", "log"] = "linear"
     fraction_of: str = ""
 
     def values(self, unit_coordinates: Floats) -> Floats:
         """Values, (rows,) in the unit of the condition; unit_coordinates : (rows,) from 0 to 1."""
-        if self.scale == "log":
-            return np.asarray(np.exp(np.log(self.low) + unit_coordinates * np.log(self.high / self.low)))
         return self.low + unit_coordinates * (self.high - self.low)
 
 

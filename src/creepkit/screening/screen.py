@@ -32,8 +32,6 @@ from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.selection.discrimination import equivalent_laws
 from creepkit.inverse.selection.select import select
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.penalties import L2, Subsets, check_penalty
-from creepkit.inverse.sparsity.term_selection import identify_full, identify_reduced
 from creepkit.jobs.progress import ProgressCallback, duration_text
 from creepkit.jobs.worker_pools import ProcessWorkers, process_count
 from creepkit.jobs.worker_process import TaskResult, run_task
@@ -42,7 +40,6 @@ from creepkit.records import History, Predictor
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictors
 from creepkit.registry.reading import read_histories
-from creepkit.screening import files
 from creepkit.screening.alloys import (
     Alloy,
     Compositions,
@@ -51,7 +48,18 @@ from creepkit.screening.alloys import (
     limitations,
     resolve_compositions,
 )
+<<<<<<< HEAD
 from creepkit.screening.results import AlloyResult, ScreeningResult, WeightedLaw
+=======
+from creepkit.screening.results import (
+    AlloyResult,
+    PredictedOutputs,
+    ScreeningResult,
+    WeightedLaw,
+    read_result,
+    write_result,
+)
+>>>>>>> main
 
 
 def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
@@ -71,9 +79,7 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
     # A plate compares alloys by the same laws; what else might explain one of them is a question for select() itself.
     ranking = select(laws, alloy.tests, job.predictor, settings=job.settings, through=through, sums=False)
     best, notes = ranking.best, list(limitations(alloy, job.predictor))
-    dense = sparse = None
-    if job.dense_law is not None:
-        dense, sparse = _fit_dense_law(job, job.dense_law, alloy, notes)
+    dense = None if job.dense_law is None else _fit_dense_law(job, job.dense_law, alloy, notes)
     confirmation = _confirm_best(job, best, alloy, notes)
     return AlloyResult(
         alloy.name,
@@ -83,25 +89,19 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
         decisive=ranking.decisive,
         equivalents=tuple(str(pair) for pair in equivalent_laws(ranking)),
         dense_fit=dense,
-        sparse_fit=sparse,
         confirmation=confirmation,
         notes=(*notes, *best.notes),
     )
 
 
-def _fit_dense_law(
-    job: ScreeningJob, dense: CreepLaw, alloy: Alloy, notes: list[str]
-) -> tuple[Identification | None, Identification | None]:
-    """The dense law, and what a penalty makes of it; a failure of these is a note, for the ranking stands."""
-    law, settings = with_arrhenius(dense, alloy.tests), job.settings
+def _fit_dense_law(job: ScreeningJob, dense: CreepLaw, alloy: Alloy, notes: list[str]) -> Identification | None:
+    """The dense law; a failure of it is a note, for the ranking stands."""
+    law = with_arrhenius(dense, alloy.tests)
     try:
-        if job.penalty is None:
-            return identify(law, alloy.tests, job.predictor, settings=settings, through=job.surrogate), None
-        dense_fit, reductions = identify_full(law, alloy.tests, job.predictor, job.surrogate, settings, None)
-        return dense_fit, identify_reduced(job.penalty, dense_fit, reductions)
+        return identify(law, alloy.tests, job.predictor, settings=job.settings, through=job.surrogate)
     except CreepkitError as error:
         notes.append(f"misfit without sparsity is not known: {error}")
-        return None, None
+        return None
 
 
 def _confirm_best(job: ScreeningJob, best: Identification, alloy: Alloy, notes: list[str]) -> Confirmation | None:
@@ -123,8 +123,8 @@ FITS_FOLDER = "fits"
 class ScreeningJob:
     """How each alloy is identified, and the folder in which results are kept.
 
-    predictor, surrogate : `using` and `through` of identify(). dense_law : the law that is compared with the reduced
-        one, or None; penalty : what reduces it, else the best of `laws` is taken.
+    predictor, surrogate : `using` and `through` of identify(). dense_law : the law that is compared with the best of
+        `laws`, or None.
     confirm : True, False or "when in doubt".
     """
 
@@ -134,7 +134,6 @@ class ScreeningJob:
     surrogate: Predictor | None
     settings: IdentificationSettings
     dense_law: CreepLaw | None
-    penalty: L2 | Subsets | None
     confirm: bool | str
     folder: Path
     task_name: ClassVar[str] = "alloy"
@@ -158,7 +157,7 @@ class ScreeningJob:
         result = replace(screen_alloy(self, self.alloys[number]), fingerprint=self.fingerprint(number))
         if result.identified:
             result.best.save(self.path(number).parent / FITS_FOLDER / self.path(number).name)
-        files.write_result(result, self.path(number))
+        write_result(result, self.path(number))
         return TaskResult(number, "done", accepted=int(result.identified))
 
     @cached_property
@@ -169,7 +168,7 @@ class ScreeningJob:
             f"creepkit {version('creepkit')}",
             *(f"{law.name} {law.fingerprint} {[(n, p.bounds, p.off) for n, p in law.table.items()]}" for law in laws),
             *("none" if one is None else predictor_fingerprint(one) for one in predictors),
-            repr((self.settings, self.dense_law is None, self.penalty, self.confirm)),
+            repr((self.settings, self.dense_law is None, self.confirm)),
         ]
         return "\n".join(lines)
 
@@ -193,8 +192,7 @@ class ScreeningOptions:
     settings : of every identification; weights are "automatic" whatever they say.
     through : a surrogate in which laws of several terms are searched before the predictor gives values (see
         identify()).
-    dense : the law whose misfit without sparsity is compared with the reduced one's (Fig. 7b), None for none.
-    penalty : what makes the reduced law of it, such as Subsets(); by default the reduced law is the best candidate.
+    dense : the law whose misfit without sparsity is compared with the best one's (Fig. 7b), None for none.
     confirm : whether the best law is simulated by the specimen itself: True, False, or "when in doubt", that is where
         a surrogate says that its prediction lies outside its domain.
     """
@@ -202,14 +200,9 @@ class ScreeningOptions:
     settings: IdentificationSettings = field(default_factory=IdentificationSettings)
     through: Predictor | None = None
     dense: CreepLaw | str | None = DENSE_LAW
-    penalty: L2 | Subsets | None = None
     confirm: bool | Literal["when in doubt"] = "when in doubt"
 
     def __post_init__(self) -> None:
-        if self.penalty is not None:
-            check_penalty(self.penalty)
-            if self.dense is None:
-                raise FitError("a penalty reduces the dense law, and there is none; give dense=, such as 'combined'")
         if self.confirm not in (True, False, "when in doubt"):
             raise FitError(f'confirm is {self.confirm!r}; allowed are True, False and "when in doubt"')
 
@@ -235,7 +228,7 @@ def screen(
     compositions : table of what the alloys are made of, or its file; classes follow from it.
     to : folder for one JSON file an alloy, in which an interrupted call finds what is done. Alloys whose tests and
         settings are the same as there are not identified again. Its folder `fits` has the best identification of each.
-    options : settings, surrogate, law without sparsity, penalty and confirmation.
+    options : settings, surrogate, law without sparsity and confirmation.
     workers : processes, by default one for each core; 1 works in this process.
     progress : called as progress(task, done, total, note).
 
@@ -254,7 +247,6 @@ def screen(
             surrogate=options.through,
             settings=replace(options.settings, weights="automatic"),
             dense_law=None if options.dense is None else resolve_law(options.dense),
-            penalty=options.penalty,
             confirm=options.confirm,
             folder=folder,
         )
@@ -327,7 +319,7 @@ def _stored_result(job: ScreeningJob, number: int) -> AlloyResult | None:
     if not path.exists():
         return None
     try:
-        result = files.read_result(path)
+        result = read_result(path)
     except FitError as error:
         _log.warning("%s", error)
         return None
@@ -339,7 +331,7 @@ def _completed_result(job: ScreeningJob, outcome: TaskResult) -> AlloyResult:
     if outcome.status != "done":
         return AlloyResult(job.alloys[outcome.number].name, failure=outcome.text)
     try:
-        return files.read_result(job.path(outcome.number))
+        return read_result(job.path(outcome.number))
     except FitError as error:
         return AlloyResult(job.alloys[outcome.number].name, failure=str(error))
 

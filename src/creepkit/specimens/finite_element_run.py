@@ -25,7 +25,6 @@ from creepkit.kernels.interface import (
     TIME,
     call_entry,
 )
-from creepkit.kernels.rate_jumps import find_rate_jump
 from creepkit.records import Program, Status
 from creepkit.specimens.finite_element_tests import FiniteElementTest, Reduction, solver_settings
 from creepkit.specimens.run import Run, run_from_outputs
@@ -131,10 +130,11 @@ def run_test(
     else:
         simulation = test.simulate(kernel, theta, reduction.settings, reduction.model_of(piece))
     status, end_time, reason = simulation.status, simulation.end_time, simulation.reason
-    if reduction is None:
-        rate_failure = rate_failure_of(kernel, theta, simulation, test.load_history.temperature)
-        if rate_failure is not None:
-            status, end_time, reason = Status.NOT_CONVERGED, *rate_failure
+    failure = None if reduction else last_finite_rate(kernel, theta, simulation, test.load_history.temperature)
+    if failure is not None:
+        status, end_time, reason = Status.NOT_CONVERGED, failure, "the law has no finite creep rate, or no derivatives"
+    if status is Status.NOT_CONVERGED:
+        reason += "; 'creepkit check' says where the rate of a law is no number, or jumps"
     rows = simulation.at(piece.observed_outputs(test.load, simulation), test.history.times)
     return run_from_outputs(
         piece.run_kind, test.stated_history(), piece.outputs, rows, status, end_time, reason, test=test,
@@ -142,93 +142,22 @@ def run_test(
     )  # fmt: skip
 
 
-def uniaxial_points(stresses: Floats, strains: Floats, states: Floats, time: float, temperature: float) -> Floats:
-    """Points of a law, (points, 6 + S), under uniaxial stress; stress and strain a little above zero at least.
+def last_finite_rate(law: CompiledLaw, theta: Floats, simulation: Simulation, temperature: Program) -> float | None:
+    """The last step, s, before a law has no rate at stresses, strains and states of the body; None where it has one.
 
-    stresses : (points,) MPa. strains : (points,). states : (points, S).
-    """
-    points = np.zeros((stresses.size, POINT_SIZE + states.shape[1]))
-    points[:, STRESS] = points[:, PRINCIPAL_STRESS] = np.maximum(stresses, 1e-3)
-    points[:, MEAN_STRESS] = points[:, STRESS] / 3.0
-    points[:, STRAIN], points[:, TIME], points[:, TEMPERATURE] = np.maximum(strains, 1e-9), time, temperature
-    points[:, POINT_SIZE:] = states
-    return points
-
-
-def missing_rate_message(law: CompiledLaw, theta: Floats, points: Floats) -> str:
-    """The first of these points where the law has no rate, or one without derivatives, in words; empty when none is.
-
-    theta : (parameters,) internal values. points : (points, 6 + S).
-    Kernels floor what they take logarithms of: where an equation has no number, such as the logarithm of something
-    negative, its rate may look small instead, but then its derivatives are not finite. A rate too large for a number
-    is one: its logarithm is what the integration works with.
-    """
-    rates, flags = call_entry(law, "update", points, theta)
-    if not flags:
-        return ""
-    bad = np.flatnonzero(~np.isfinite(rates).all(axis=1))
-    point = points[bad[:1]]
-    stress, strain, time, temperature = point[0, [STRESS, STRAIN, TIME, TEMPERATURE]]
-    return (
-        f"law has no finite creep rate, or none with derivatives, at a stress of {stress:.4g} MPa, a creep strain of "
-        f"{strain:.3g}, {time:.4g} s and {temperature:.4g} K"
-    )
-
-
-def rate_jump_message(law: CompiledLaw, theta: Floats, point: Floats, stresses: tuple[float, float]) -> str:
-    """Where the creep rate jumps between two stresses, MPa, in words; empty where it does not.
-
-    theta : (parameters,) internal values. point : (6 + S,), whose stresses are replaced.
-    A point whose stress meets a jump would have to creep at a rate between the two: no implicit step finds one.
-    """
-
-    def log_rates(levels: Floats) -> Floats:
-        states = np.tile(point[POINT_SIZE:], (levels.size, 1))
-        strains = np.full(levels.size, point[STRAIN])
-        rows = uniaxial_points(levels, strains, states, float(point[TIME]), float(point[TEMPERATURE]))
-        return np.asarray(call_entry(law, "update", rows, theta)[0][:, 0])
-
-    jump = find_rate_jump(log_rates, *stresses)
-    if jump is None:
-        return ""
-    before, after = np.exp([jump.before, jump.after])
-    return (
-        f"the law's creep rate jumps from {before:.3g} to {after:.3g} 1/s at a stress of {jump.place:.4g} MPa, where "
-        "no equilibrium is found; let the branches of the law meet there, or blend them"
-    )
-
-
-def rate_failure_of(
-    kernel: CompiledLaw, theta: Floats, simulation: Simulation, temperature: Program
-) -> tuple[float, str] | None:
-    """Until when the law had a creep rate, s, and where it has none: at any step, and beyond an early end.
-
-    theta : (parameters,) internal values. None where it always has one.
-    A simulation that stopped was on its way to other stresses, at most a few times those that it had.
+    theta : (parameters,) internal values. Kernels floor what they take logarithms of: where an equation has no number,
+    such as the logarithm of something negative, its rate may look small, but then its derivatives are not finite.
     """
     assert simulation.values is not None
     temperatures = temperature.at(simulation.times)
     for k in range(1, simulation.times.size):
-        strains, states = simulation.values[k, :, EQUIVALENT_STRAIN], simulation.values[k, :, EQUIVALENT_STRAIN + 1 :]
-        points = uniaxial_points(
-            simulation.mises[k], strains, states, float(simulation.times[k]), float(temperatures[k])
-        )
-        reason = missing_rate_message(kernel, theta, points)
-        if reason:
-            return float(simulation.times[k - 1]), reason
-    if simulation.status is Status.COMPLETE:
-        return None
-    stresses = np.geomspace(0.1, 4.0, 9) * float(np.max(simulation.mises, initial=1.0))
-    worst = simulation.values[-1, np.argmax(simulation.values[-1, :, EQUIVALENT_STRAIN])]
-    strains, states = np.full(9, worst[EQUIVALENT_STRAIN]), np.tile(worst[EQUIVALENT_STRAIN + 1 :], (9, 1))
-    reason = missing_rate_message(
-        kernel,
-        theta,
-        uniaxial_points(stresses, strains, states, max(simulation.end_time, 1.0), float(temperatures[-1])),
-    )
-    if not reason and simulation.status is Status.NOT_CONVERGED:
-        end, last = simulation.end_time, float(temperatures[-1])
-        point = uniaxial_points(stresses[:1], strains[:1], states[:1], end, last)[0]
-        jump = rate_jump_message(kernel, theta, point, (float(stresses[0]), float(stresses[-1])))
-        reason = f"{simulation.reason}: {jump}" if jump else ""
-    return (simulation.end_time, reason) if reason else None
+        strains = simulation.values[k, :, EQUIVALENT_STRAIN:]
+        points = np.empty((len(strains), POINT_SIZE + strains.shape[1] - 1))
+        points[:, [STRESS, PRINCIPAL_STRESS]] = np.maximum(simulation.mises[k], 1e-3)[:, None]
+        points[:, MEAN_STRESS] = points[:, STRESS] / 3.0
+        points[:, STRAIN] = np.maximum(strains[:, 0], 1e-9)
+        points[:, TIME], points[:, TEMPERATURE] = simulation.times[k], temperatures[k]
+        points[:, POINT_SIZE:] = strains[:, 1:]
+        if call_entry(law, "update", points, theta)[1]:
+            return float(simulation.times[k - 1])
+    return None

@@ -152,18 +152,15 @@ class MaterialPoint(PointSpecimen):
 
     def simulate(self, kernel: CompiledLaw, theta: Floats, history: History) -> PointTrajectory:
         """Integrate one candidate, theta (P,) internal values, through one history in six components."""
-        from creepkit.integration.tensor_integration import integrate_tensor_point, prescribed_strain, prescribed_stress
+        from creepkit.integration.tensor_integration import integrate_tensor_point
         from creepkit.integration.time_discretisation import SDIRK4
 
         loading = _loading(history)
-        controls = {name: prescribed_stress(p) for name, p in loading.stress.items()}
-        controls |= {name: prescribed_strain(p) for name, p in loading.strain.items()}
         stress_only = not loading.strain and not history.includes_elastic
         elastic = DEFAULT_ELASTICITY if stress_only and history.elastic is None else _elastic(history)
-        temperature = history.temperature_program()
         settings = self.integration_settings(history.times.size)
         return integrate_tensor_point(
-            kernel, theta, elastic, controls, temperature, history.times, settings=settings, tableau=SDIRK4
+            kernel, theta, elastic, loading, history.temperature, history.times, settings=settings, tableau=SDIRK4
         )
 
     def _differences(self, kernel: CompiledLaw, theta: Floats, steps: Floats, history: History) -> Floats:

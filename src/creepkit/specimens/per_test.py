@@ -6,7 +6,7 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -75,7 +75,8 @@ class PerTest(TestPiece, ABC):
         self, law: CreepLaw, values: Mapping[str, float], history: History, nuisances: Mapping[str, float]
     ) -> TestResponse:
         """What one() gives; errors name test, values and line."""
-        end = float(history.times[-1])
+        stated = ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
+        place = f"specimen '{self.name}', test '{history.name}' with {stated}"
         piece, tested = self.of_test(history, nuisances)
         try:
             found = piece.one(law, values, tested, nuisances)
@@ -83,63 +84,52 @@ class PerTest(TestPiece, ABC):
             nothing = np.full((history.times.size, len(self.outputs)), np.nan)
             return TestResponse(nothing, Status.NOT_CONVERGED, 0.0, str(error))
         except CreepkitError as error:
-            raise SolveError(f"{self._place(values, history)}: {error}") from error
+            raise SolveError(f"{place}: {error}") from error
         except (Exception, SystemExit) as error:  # of the author's code, whatever it is
             last = traceback.extract_tb(error.__traceback__)[-1]
-            raise SolveError(
-                f"{self._place(values, history)}: {type(error).__name__}: {error} ({last.filename}:{last.lineno})"
-            ) from error
-        if not isinstance(found, (OneTest, Mapping)):
-            raise SolveError(
-                f"{self._place(values, history)}: one() gave {quoted(repr(found))}; it must return "
-                f"{{output: values}}, or a "
-                "OneTest where a test ends early"
-            )
-        if not isinstance(found, OneTest):
-            found = OneTest(found, Status.COMPLETE, end)
-        if not isinstance(found.status, Status):
-            raise SolveError(
-                f"{self._place(values, history)}: one() gave the status {quoted(repr(found.status))}; use ck.Status"
-            )
-        ended = end if np.isnan(found.end_time) else found.end_time
-        return TestResponse(self._rows(found, values, history), found.status, ended)
-
-    def _rows(self, found: OneTest, values: Mapping[str, float], history: History) -> Floats:
-        missing = [name for name in self.outputs if name not in found.outputs]
-        if missing:
-            raise SolveError(
-                f"{self._place(values, history)}: one() gave {_listed(found.outputs)}; it must give "
-                f"{_listed(self.outputs)}"
-            )
-        rows = []
+            raise SolveError(f"{place}: {type(error).__name__}: {error} ({last.filename}:{last.lineno})") from error
+        end = float(history.times[-1])
+        one = found if isinstance(found, OneTest) else OneTest(found, Status.COMPLETE, end)
+        if problem := self._problem(found, one):
+            raise SolveError(f"{place}: one() gave {problem}")
+        columns = []
         for name in self.outputs:
-            try:
-                given = np.asarray(found.outputs[name])
-                row = given.astype(float) if not np.iscomplexobj(given) else np.zeros(0)
-            except (TypeError, ValueError):
-                given = row = np.zeros(0)
-            if np.iscomplexobj(given) or (not row.size and history.times.size):
+            column = _real_numbers(one.outputs[name])
+            if column is None or (not column.size and history.times.size):
                 raise SolveError(
-                    f"{self._place(values, history)}: one() gave '{name}' as "
-                    f"{quoted(repr(found.outputs[name]), 60)}; real "
-                    "numbers, one for each time, are needed"
+                    f"{place}: one() gave '{name}' as {quoted(repr(one.outputs[name]), 60)}; real numbers, one for "
+                    "each time, are needed"
                 )
-            if row.shape != history.times.shape:
+            if column.shape != history.times.shape:
                 raise SolveError(
-                    f"{self._place(values, history)}: one() gave '{name}' of shape {row.shape}; the test has "
-                    f"{history.times.size} times"
+                    f"{place}: one() gave '{name}' of shape {column.shape}; the test has {history.times.size} times"
                 )
-            if found.status is Status.COMPLETE and not np.isfinite(row).all():
+            if one.status is Status.COMPLETE and not np.isfinite(column).all():
                 raise SolveError(
-                    f"{self._place(values, history)}: one() gave no finite '{name}' at some time and no end; "
+                    f"{place}: one() gave no finite '{name}' at some time and no end; "
                     "return OneTest(outputs, status, end_time) where a test ends early"
                 )
-            rows.append(row)
-        return np.stack(rows, axis=-1)
+            columns.append(column)
+        return TestResponse(np.stack(columns, axis=-1), one.status, end if np.isnan(one.end_time) else one.end_time)
 
-    def _place(self, values: Mapping[str, float], history: History) -> str:
-        text = ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
-        return f"specimen '{self.name}', test '{history.name}' with {text}"
+    def _problem(self, found: Any, one: Any) -> str:
+        """What one() gave that is no answer, and what is; "" where it is one."""
+        if not isinstance(found, OneTest | Mapping):
+            return f"{quoted(repr(found))}; it must return {{output: values}}, or a OneTest where a test ends early"
+        if not isinstance(one.status, Status):
+            return f"the status {quoted(repr(one.status))}; use ck.Status"
+        if set(self.outputs) - set(one.outputs):
+            return f"{_listed(one.outputs)}; it must give {_listed(self.outputs)}"
+        return ""
+
+
+def _real_numbers(given: object) -> Floats | None:
+    """(...,) of an author's answer; None where it holds others."""
+    try:
+        array = np.asarray(given)
+        return None if np.iscomplexobj(array) else array.astype(float)
+    except (TypeError, ValueError):
+        return None
 
 
 def _listed(names: Iterable[object]) -> str:

@@ -348,12 +348,11 @@ def check_temperature(file: StudyFile) -> None:
     if part.law is not None:
         with file.at("temperature", "law"):
             laws = [ck.law(part.law)]
-    for table, given in (("forms", part.forms or {}), ("prior_odds", part.prior_odds or {})):
-        if laws:
-            check_parameters(file, ("temperature", table), given, laws)
-        for parameter, names in given.items():
-            with file.at("temperature", table, parameter):
-                check_form_names(names)
+    if laws:
+        check_parameters(file, ("temperature", "forms"), part.forms or {}, laws)
+    for parameter, names in (part.forms or {}).items():
+        with file.at("temperature", "forms", parameter):
+            check_form_names(names)
 
 
 # ---- planned tests ---------------------------------------------------------------------------------------------------

@@ -256,12 +256,11 @@ class SelectionTable(_keys(SearchOptions, without=("search", "penalty")), TableM
     further_laws: Annotated[int, Field(ge=0, le=100)] | None = None
 
 
-class TemperatureTable(_keys(DiscoveryOptions, without=("forms", "prior")), TableModel):  # type: ignore[misc]
+class TemperatureTable(_keys(DiscoveryOptions, without=("forms",)), TableModel):  # type: ignore[misc]
     """[temperature]: forms of temperature for the parameters of a law, by default the best law of each group."""
 
     law: Text | None = None
     forms: dict[Text, OneOrMore] | None = None
-    prior_odds: dict[Text, dict[Text, Positive]] | None = None
 
 
 class TensileStrength(TableModel):

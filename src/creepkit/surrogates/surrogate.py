@@ -37,8 +37,15 @@ from creepkit.records import (
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid, specimen_conditions
 from creepkit.surrogates.network_evaluation import SampleArrays, Weights
-from creepkit.surrogates.parameter_gru import ApplicabilityDomain, ParameterGru, SurrogateMetadata
-from creepkit.surrogates.parameter_inputs import LawInputs, LoadHistoryInputs, complete_parameters, zero_coefficients
+from creepkit.surrogates.parameter_gru import (
+    ApplicabilityDomain,
+    LawInputs,
+    LoadHistoryInputs,
+    ParameterGru,
+    SurrogateMetadata,
+    complete_parameters,
+    zero_coefficients,
+)
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw

@@ -27,6 +27,7 @@ from creepkit.dataset.storage import read_dataset
 from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import as_read_back
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
+from creepkit.jobs.progress import ProgressCallback
 from creepkit.surrogates.evaluation import (
     dataset_fingerprint,
     evaluate_rows,
@@ -35,7 +36,7 @@ from creepkit.surrogates.evaluation import (
     training_split,
 )
 from creepkit.surrogates.network_evaluation import SampleArrays, Weights
-from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru, ProgressCallback, Training
+from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru, Training
 from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors, sample_tensors, weights_of
 from creepkit.surrogates.surrogate import CHECKPOINT, Surrogate, load_surrogate
 

@@ -12,8 +12,7 @@ from creepkit.kernels.interface import POINT_SIZE
 from creepkit.kernels.lowering import ArrayKernel
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, State
-from creepkit.sampling.criteria import constraint_functions
-from creepkit.sampling.domains import uniform_in_bounds
+from creepkit.sampling.domains import constraint_functions, uniform_in_bounds
 
 STRESS_RANGE, STRAIN_RANGE, TIME_RANGE, TEMPERATURE_RANGE = (1e-3, 2000.0), (1e-12, 1.0), (1e-3, 1e6), (600.0, 1600.0)
 """Ranges in MPa, 1, s and K."""

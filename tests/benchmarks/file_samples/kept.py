@@ -25,8 +25,7 @@ from creepkit.inverse.selection.ranking import Ranking
 from creepkit.reports.attachments import embed
 from creepkit.reports.contents import Attachment
 from creepkit.rupture_assessment.assessment import load_rupture_assessment
-from creepkit.screening.files import read_result, write_result
-from creepkit.screening.results import AlloyResult, WeightedLaw
+from creepkit.screening.results import AlloyResult, WeightedLaw, read_result, write_result
 from creepkit.studies.execution import Execution, Stage
 from creepkit.studies.kept_results import ResultFolder
 from creepkit.studies.lock import STUDY_LOCK, read_lock

@@ -7,7 +7,6 @@ from creepkit import registry
 from creepkit.discovery.combinations import CHI_SQUARE_95, rank_combinations, squared_mahalanobis
 from creepkit.discovery.forms import candidate_forms, evaluate_forms
 from creepkit.discovery.regression import regress
-from creepkit.errors import FitError
 from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
@@ -121,18 +120,6 @@ def test_forms_that_ten_per_cent_of_temperature_cannot_separate_are_equivalent()
     sharp = rank_combinations(points(PLANTED, conditioned(1e-3, 1e-3), seed=3), libraries())
     assert [form.name for form in sharp.plausible_forms["n"]] == ["linear"]
     assert [form.name for form in sharp.plausible_forms["A"]] == ["arrhenius"]
-
-
-def test_prior_odds_decide_what_the_points_do_not():
-    given = points(PLANTED, conditioned(0.05, 0.3), seed=3)
-    own = {
-        "A": candidate_forms(NORTON, "A", True, T_REF, NINE, FEW["A"], {"logarithmic": 1e3}),
-        "n": candidate_forms(NORTON, "n", False, T_REF, NINE, FEW["n"]),
-    }
-    assert rank_combinations(given, own).best.forms["A"] == "logarithmic"
-    assert rank_combinations(given, libraries()).best.forms["A"] == "arrhenius"
-    with pytest.raises(FitError, match="odds of 'linear' are 0; they must be above zero"):
-        candidate_forms(NORTON, "n", False, T_REF, NINE, ("linear",), {"linear": 0.0})
 
 
 PLUGIN = """

@@ -14,8 +14,14 @@ import creepkit as ck
 from creepkit.errors import DatasetError
 from creepkit.records import PressureJump, Status
 from creepkit.sampling.conditions import TimeGrid, hold_times, planned_test
-from creepkit.sampling.criteria import SimulationOutcome, conditioned_criteria, paper_criteria
-from creepkit.sampling.domains import SamplingDomain, acceptance, sampling_design
+from creepkit.sampling.domains import (
+    SamplingDomain,
+    SimulationOutcome,
+    acceptance,
+    conditioned_criteria,
+    paper_criteria,
+    sampling_design,
+)
 from creepkit.sampling.rates import Draws, sobol_rows
 from helpers.mistakes import said_otherwise
 

@@ -14,8 +14,13 @@ from creepkit.language import temperature
 from creepkit.records import Status
 from creepkit.sampling.coefficients import term_groups
 from creepkit.sampling.conditions import TimeGrid, creep_output, hold_times, planned_test, specimen_conditions
-from creepkit.sampling.criteria import DrawCriterion, OutcomeCriterion, SimulationOutcome, paper_criteria
-from creepkit.sampling.domains import sampling_design
+from creepkit.sampling.domains import (
+    DrawCriterion,
+    OutcomeCriterion,
+    SimulationOutcome,
+    paper_criteria,
+    sampling_design,
+)
 from helpers.cantilever import Cantilever
 from helpers.mistakes import said_otherwise
 

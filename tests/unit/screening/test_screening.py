@@ -14,8 +14,8 @@ from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.readers.history_csv import write_history
 from creepkit.records import PressureJump
-from creepkit.screening import files
 from creepkit.screening.alloys import Alloy, Compositions, atomic_percent, check_tests, limitations, read_compositions
+from creepkit.screening.results import read_result, write_result
 from creepkit.screening.screen import ScreeningOptions, screen
 from helpers.narrow_predictor import Narrow
 from helpers.planted_alloys import NORTON, Deadly, Doubting, bars, bulge
@@ -93,7 +93,7 @@ def test_laws_outside_the_class_of_a_surrogate_are_the_specimens_own():
 
 def test_an_answer_is_read_back_as_it_was(plate, tmp_path):
     answer = plate["X"]
-    found = files.read_result(files.write_result(answer, tmp_path / "X.json"))
+    found = read_result(write_result(answer, tmp_path / "X.json"))
     for field in ("alloy", "verdict", "notes", "failed_laws", "equivalents", "cpu_seconds", "confirmation"):
         assert getattr(found, field) == getattr(answer, field)
     assert found.best.values == answer.best.values

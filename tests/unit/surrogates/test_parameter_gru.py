@@ -11,8 +11,7 @@ from creepkit.dataset.dataset import Dataset
 from creepkit.errors import SolveError, SurrogateError
 from creepkit.records import RecordedLoading, Status
 from creepkit.sampling.conditions import TimeGrid
-from creepkit.surrogates.parameter_gru import ParameterGru, Training
-from creepkit.surrogates.parameter_inputs import LawInputs, LoadHistoryInputs
+from creepkit.surrogates.parameter_gru import LawInputs, LoadHistoryInputs, ParameterGru, Training
 from creepkit.surrogates.parameter_network import sample_tensors
 from creepkit.surrogates.surrogate import Surrogate, load_surrogate
 from creepkit.surrogates.training import train

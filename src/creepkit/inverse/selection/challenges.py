@@ -203,7 +203,7 @@ class AlteredLaw:
     x : (unknowns,) its values. excess : its chi-square above that of the best law. penalty : ln n of each of its
     further parameters, by BIC.
     constraints : (rows, unknowns) derivatives over tolerances of what was held, such as the share of a second law.
-    other : name of the law that has a share of a sum, else "". description : what it is, for people.
+    description : what it is, for people.
     """
 
     kind: Kind
@@ -212,7 +212,6 @@ class AlteredLaw:
     excess: float
     penalty: float
     constraints: Floats
-    other: str
     description: str
 
 
@@ -231,7 +230,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw:
     penalty = bic_penalty(other.u.size, best.frames)
     excess, x = _least_excess(best, problem, x, penalty, share=share)
     description = f"its sum with {other.law.name}, tried with {100 * SHARE:.0f} % of the rate carried by it,"
-    return AlteredLaw("sum", problem, x, excess, penalty, share.jacobian(x), other.law.name, description)
+    return AlteredLaw("sum", problem, x, excess, penalty, share.jacobian(x), description)
 
 
 def above_threshold(best: FittedLaw) -> AlteredLaw:
@@ -249,7 +248,7 @@ def above_threshold(best: FittedLaw) -> AlteredLaw:
     excess, x = _least_excess(best, problem, x, penalty, fixed={position: threshold})
     held = np.zeros((1, x.size))
     held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
-    return AlteredLaw("threshold", problem, x, excess, penalty, held, "", f"{law.name} of {threshold:.3g} MPa")
+    return AlteredLaw("threshold", problem, x, excess, penalty, held, f"{law.name} of {threshold:.3g} MPa")
 
 
 def _comparison_text(excess: float) -> str:
