@@ -13,19 +13,13 @@ from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import make_folder, panels_of, save_figure
 from creepkit.reports.rate_panels import plate_figure
 from creepkit.reports.terminal import print_json, print_table, tell
-<<<<<<< HEAD
-from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
-from creepkit.screening.results import AlloyResult, mean_chi_square
-=======
 from creepkit.screening.results import (
     COMPARISON_STRESS,
     AlloyResult,
     confirmation_text,
     mean_chi_square,
-    mean_relative_squared_error,
     result_columns,
 )
->>>>>>> main
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,43 +92,7 @@ def plot_screening(plate: ScreeningResult, folder: Path) -> list[Path]:
     rates = plate_figure([(one.alloy, one.best) for one in plate.identified])
     for name, figure in {"laws.png": _plot_law_fractions(plate), "rates.png": rates}.items():
         save_figure(figure, folder / name, FitError)
-<<<<<<< HEAD
     return [folder / "laws.png", folder / "rates.png"]
-=======
-    return [folder / name for name in figures]
-
-
-def _draw_by_class(
-    plate: ScreeningResult, figure: Figure, draw: Callable[[AlloyResult, Any, str | None], None]
-) -> None:
-    """Draw the alloys, each in the colour of its class, which the legend names; draw : of alloy, colour and label."""
-    for k, (name, members) in enumerate(plate.by_class().items()):
-        for number, result in enumerate(members):
-            draw(result, f"C{k % 10}", None if number else name)
-    figure.legend(loc="outside lower center", ncols=6, fontsize=8, markerscale=2)
-
-
-def _plot_misfits(plate: ScreeningResult) -> Figure:
-    """Misfit of the reduced law against that of the dense one (Fig. 7b): Eq. (4), and in units of noise."""
-    figure, panels = panel_grid(2, 2, 4.3, 4.6)
-    fits = {one.alloy: (one.dense_fit, one.best) for one in plate.identified if one.dense_fit is not None}
-    for axes, (title, measure) in zip(panels, MISFIT_MEASURES, strict=True):
-        values = np.array([[measure(one) for one in pair] for pair in fits.values()])
-        finite = values[np.isfinite(values)]
-        logarithmic = bool(finite.size and finite.max() >= MIN_LOG_RATIO * finite.min())
-        draw_parity(axes, values, logarithmic=logarithmic, margin=1.2 if logarithmic else 1.0)
-        axes.set(xlabel="law without sparsity", ylabel="reduced law")
-        axes.set_title(title, fontsize=10)
-
-    def draw(result: AlloyResult, colour: Any, label: str | None) -> None:
-        for axes, (_, measure) in zip(panels, MISFIT_MEASURES, strict=True):
-            own = label if axes is panels[0] else None
-            if result.alloy in fits:
-                axes.plot(*map(measure, fits[result.alloy]), "o", ms=5, alpha=0.75, color=colour, label=own)
-
-    _draw_by_class(plate, figure, draw)
-    return figure
->>>>>>> main
 
 
 def _plot_law_fractions(plate: ScreeningResult) -> Figure:

@@ -49,14 +49,8 @@ class AlloyResult:
     laws : identified laws, best first; failed_laws : {law: why it could not be identified}.
     verdict : one sentence on which law it is; equivalents : on each pair of laws that the tests cannot separate.
     failure : why there is no law; empty otherwise.
-<<<<<<< HEAD
-    dense_fit, sparse_fit : the law without sparsity and what a penalty made of it, where they were requested.
-    cpu_seconds : CPU time of the identification.
-=======
     dense_fit : the law without sparsity, where it was requested.
-    predicted : {test: {output: (frames,) mm or strain}} of the best law with the test's own nuisances and offsets, by
-        the specimen where it was confirmed. cpu_seconds : CPU time of the identification.
->>>>>>> main
+    cpu_seconds : CPU time of the identification.
     decisive : whether the ranking of its laws is (see inverse.selection.ranking).
     """
 
@@ -197,11 +191,7 @@ ALLOY_RESULT = DocumentFormat(
 
 
 CODEC = RecordCodec(
-    ranges={
-        AlloyResult: {"predicted": ANY_NUMBER},
-        ConfirmedOutput: {"rms_difference": ANY_NUMBER},
-        **FIT_CODEC.ranges,
-    },
+    ranges={ConfirmedOutput: {"rms_difference": ANY_NUMBER}, **FIT_CODEC.ranges},
     values={Identification: ValueCodec(identification_to_json, identification_from_json)},
 )
 """Of the result of an alloy; its identifications are documents of their own inside it."""

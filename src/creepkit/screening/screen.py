@@ -48,18 +48,7 @@ from creepkit.screening.alloys import (
     limitations,
     resolve_compositions,
 )
-<<<<<<< HEAD
-from creepkit.screening.results import AlloyResult, ScreeningResult, WeightedLaw
-=======
-from creepkit.screening.results import (
-    AlloyResult,
-    PredictedOutputs,
-    ScreeningResult,
-    WeightedLaw,
-    read_result,
-    write_result,
-)
->>>>>>> main
+from creepkit.screening.results import AlloyResult, ScreeningResult, WeightedLaw, read_result, write_result
 
 
 def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
