@@ -289,7 +289,9 @@ def _sums(fit: Identification) -> list[str]:
             )
     if stopped := [one for one in ruptures if one.censored]:
         unexpected = sum(one.predicted < one.measured for one in stopped)
-        lines.append(f"{plural(len(stopped), 'test')} stopped before rupture, of which {unexpected} should have broken")
+        lines.append(
+            f"{plural(len(stopped), 'test')} stopped before rupture, of which {unexpected or 'none'} should have broken"
+        )
     return lines
 
 

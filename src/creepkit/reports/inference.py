@@ -6,7 +6,6 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from creepkit.inverse.sparsity.result import LEAST_CONTRIBUTION
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import unit_text
 from creepkit.reports.blocks import aligned, number
@@ -27,15 +26,13 @@ if TYPE_CHECKING:
 
 
 def sparsity_text(sparsity: Sparsity) -> str:
-    """The verdict, and the contribution of every term without penalty, with it, and after the refit."""
-    strength = "" if sparsity.strength is None else f" of strength {sparsity.strength:g}"
-    rows = []
-    for term, contribution in sparsity.contributions_without_penalty.items():
-        after = sparsity.contributions_after_refit.get(term)
-        numbers = (contribution, sparsity.contributions_with_penalty[term])
-        rows.append((term, *(f"{one:.3f}" for one in numbers), "dropped" if after is None else f"{after:.3f}"))
-    lines = [f"{sparsity.penalty}{strength}: {sparsity.verdict}", *aligned(("", "without", "with", "after"), rows)]
-    return "\n".join([*lines, f"(contributions; below {LEAST_CONTRIBUTION:g} a term is dropped)"])
+    """The verdict, and the contribution of every term in the whole sum, and after the refit."""
+    kept = sparsity.contributions_after_refit
+    rows = [
+        (term, f"{share:.3f}", f"{kept[term]:.3f}" if term in kept else "dropped")
+        for term, share in sparsity.contributions.items()
+    ]
+    return "\n".join([sparsity.verdict, *aligned(("contribution", "whole sum", "kept"), rows)])
 
 
 # ---- uncertainty -----------------------------------------------------------------------------------------------------

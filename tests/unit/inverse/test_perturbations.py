@@ -9,7 +9,7 @@ import creepkit as ck
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.perturbation import DRIFT
 from creepkit.inverse.perturbations import (
     OFFSET_IN_NOISES,
@@ -217,7 +217,7 @@ def test_an_effect_in_the_covariance_is_a_rank_of_one_in_each_test():
     noise = NoiseModel({"strain": OutputNoise(NOISE)})
     with_both = linear.with_effects(effects.values())
     columns = np.stack([e.residual_change for e in effects.values()], axis=-1)
-    expected = covariance(linear.residuals, noise) + columns @ np.swapaxes(columns, 1, 2)
+    expected = CovarianceFactor.of_residuals(linear.residuals, noise).blocks + columns @ np.swapaxes(columns, 1, 2)
     found = CovarianceFactor.of_residuals(with_both.residuals, noise).inverse_times(expected)
     np.testing.assert_allclose(found, np.broadcast_to(np.eye(len(expected[0])), found.shape), atol=1e-5)
     again = with_both.with_effects([effects[DRIFT]])
