@@ -16,18 +16,18 @@ from helpers.paths import ROOT
 BUDGET = {
     "api": 316,
     "app": 603,
-    "cameras": 931,
-    "cli": 2340,
+    "cameras": 832,
+    "cli": 2336,
     "core": 67,
     "dataset": 735,
     "discovery": 1373,
     "experiments": 1322,
     "exporters": 2658,
-    "extraction": 1302,
+    "extraction": 1291,
     "fem": 1427,
     "files": 1380,
     "forecasts": 1290,
-    "instruments": 1282,
+    "instruments": 1222,
     "integration": 762,
     "inverse": 10393,
     "jobs": 251,
@@ -36,21 +36,21 @@ BUDGET = {
     "laws": 136,
     "modules": 770,
     "quality": 1295,
-    "readers": 5840,
-    "records": 2234,
+    "readers": 5839,
+    "records": 2196,
     "registry": 615,
-    "reports": 5642,
+    "reports": 5613,
     "rupture_assessment": 1688,
     "sampling": 1001,
     "screening": 597,
     "specimens": 3184,
     "studies": 3053,
     "surrogates": 1381,
-    "testing": 1796,
+    "testing": 1785,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29588
+TESTS = 29585
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
