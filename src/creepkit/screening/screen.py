@@ -318,7 +318,9 @@ def _stored_result(job: ScreeningJob, number: int) -> AlloyResult | None:
 def _completed_result(job: ScreeningJob, outcome: TaskResult) -> AlloyResult:
     """The result that a worker left, or why it left none."""
     if outcome.status != "done":
-        return AlloyResult(job.alloys[outcome.number].name, failure=outcome.text)
+        return AlloyResult(
+            job.alloys[outcome.number].name, failure=outcome.text.removeprefix(f"{job.task_name} {outcome.number}: ")
+        )
     try:
         return read_result(job.path(outcome.number))
     except FitError as error:

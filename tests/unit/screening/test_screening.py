@@ -140,7 +140,7 @@ def test_workers_find_what_this_process_finds_and_one_that_dies_costs_one_alloy(
     deadly = [h.replace(specimen="deadly") for h in bars("D")]
     apart = screened([*deadly, *TWO[:3]], using={"uniaxial": specimen("uniaxial"), "deadly": Deadly()}, workers=2)
     assert apart.failures == {
-        "D": "its worker process died 2 times, the last time by exit code 3; is there memory enough?"
+        "D": "its worker process died 3 times, the last time by exit code 3; is there memory enough?"
     }
     assert apart["X"].best.values == screened(TWO[:3])["X"].best.values
 
