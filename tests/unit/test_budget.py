@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1290,
     "instruments": 1222,
     "integration": 762,
-    "inverse": 10387,
+    "inverse": 10304,
     "jobs": 251,
     "kernels": 1703,
     "language": 1480,
@@ -39,10 +39,10 @@ BUDGET = {
     "readers": 5839,
     "records": 2194,
     "registry": 615,
-    "reports": 5410,
+    "reports": 5409,
     "rupture_assessment": 1688,
     "sampling": 1001,
-    "screening": 573,
+    "screening": 575,
     "specimens": 3165,
     "studies": 3037,
     "surrogates": 1381,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29585
+TESTS = 29484
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

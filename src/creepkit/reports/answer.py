@@ -16,7 +16,7 @@ from markupsafe import Markup
 from creepkit.exporters.documents import expression_mathml, law_equations
 from creepkit.inverse.adequacy import SHAPE_MISFIT, UNDETECTED_SCATTER
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
-from creepkit.inverse.perturbation import combined_change_text
+from creepkit.inverse.perturbation import beyond_intervals, combined_change_text
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
 from creepkit.language import strain, temperature, time
@@ -259,8 +259,7 @@ def _precision(fit: Identification) -> Iterator[str]:
         yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
     change = combined_change_text(fit.unmodelled)
     if change:
-        beyond = [one for one in fit.unmodelled if not one.included]
-        kinds = " and ".join(dict.fromkeys(one.description for one in beyond[:2]))
+        kinds = " and ".join(dict.fromkeys(one.description for one in beyond_intervals(fit.unmodelled)[:2]))
         yield f"intervals do not include {kinds}: rates move by {change}"
 
 

@@ -14,7 +14,7 @@ from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_parameters import nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
-from creepkit.inverse.perturbation import NOT_INCLUDED
+from creepkit.inverse.perturbation import NOT_INCLUDED, beyond_intervals
 from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
 from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
@@ -100,7 +100,7 @@ def value_blocks(fit: Identification, verdict: str = "", equivalents: Sequence[s
     blocks += [] if fit.sparsity is None else [Paragraph(fit.sparsity.verdict)]
     if not rejected(fit) and (undetermined := fit.undetermined()):
         blocks += [Paragraph("what these tests do not determine, or poorly, given this law:"), Items(undetermined)]
-    unmodelled = [effect.sentence for effect in fit.unmodelled if not effect.included]
+    unmodelled = [effect.sentence for effect in beyond_intervals(fit.unmodelled)]
     if unmodelled:
         blocks += [
             Paragraph("the intervals do not include what would move the rate amid the tests:"),
