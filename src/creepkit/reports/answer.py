@@ -414,17 +414,18 @@ def reference_sentences(fit: Identification) -> list[str]:
     r, state, held = fit.reference, _state(fit), held_quantities(fit)
     lines = []
     if state is not None:
-        hours = _interval(tuple(v / SECONDS_PER_HOUR for v in state.time))
+        hours = interval_text(tuple(v / SECONDS_PER_HOUR for v in state.time))
         at = f"{number(r.stress)} MPa and {celsius_text(r.temperature, digits=0)}"
         lines.append(f"a bar under a true stress of {at} reaches {100 * r.strain:.2g} % strain after {hours} h")
     if held and (held != "strain" or state is None):
-        formula = _interval(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
+        formula = interval_text(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
         lines.append(f"at constant {held} the law's formula has the stress exponent {formula}")
         lines += [] if held == "strain" else ["tests compared at one strain show another exponent"]
     return lines
 
 
-def _interval(values: tuple[float, ...]) -> str:
+def interval_text(values: tuple[float, ...]) -> str:
+    """A value with the ends of its interval, all with the digits in which they differ."""
     value, low, high = values
     digits = interval_digits(value, low, high)
     return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"
