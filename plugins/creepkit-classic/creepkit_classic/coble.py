@@ -27,7 +27,7 @@ COBLE = CreepLaw(
             scale="log",
             off=0.0,
         ),
-        Q: Param("activation energy of boundary diffusion", unit="J/mol", bounds=(5e4, 9e5)),
+        Q: Param("activation energy of boundary diffusion", unit="J/mol", bounds=(2e4, 9e5)),
         Omega: Param("atomic volume", unit="mm^3", bounds=(5e-21, 1e-19), scale="log"),
         d: Param("grain diameter", unit="mm", bounds=(1e-5, 10.0), scale="log"),
     },

@@ -26,7 +26,7 @@ DORN = CreepLaw(
         A: Param("Dorn's constant", unit="1", bounds=(1e-5, 1e20), scale="log", off=0.0),
         n: Param("stress exponent", bounds=(1, 12), widens=True),
         D_0: Param("frequency factor of lattice diffusion", unit="mm^2/s", bounds=(1e-3, 1e6), scale="log"),
-        Q: Param("activation energy of lattice diffusion", unit="J/mol", bounds=(5e4, 9e5)),
+        Q: Param("activation energy of lattice diffusion", unit="J/mol", bounds=(2e4, 9e5)),
         b: Param("Burgers vector", unit="mm", bounds=(1.5e-7, 8e-7), scale="log"),
         G_0: Param("shear modulus at 300 K", unit="MPa", bounds=(5e3, 3e5), scale="log"),
         g: Param("relative slope of the shear modulus", unit="1/K", bounds=(-7e-4, 0.0), off=0.0),

@@ -21,7 +21,7 @@ NABARRO_HERRING = CreepLaw(
     terms={"lattice diffusion": 14 * diffusivity * Omega * stress / (BOLTZMANN * temperature * d**2)},
     params={
         D_0: Param("frequency factor of lattice diffusion", unit="mm^2/s", bounds=(1e-3, 1e6), scale="log", off=0.0),
-        Q: Param("activation energy of lattice diffusion", unit="J/mol", bounds=(5e4, 9e5)),
+        Q: Param("activation energy of lattice diffusion", unit="J/mol", bounds=(2e4, 9e5)),
         Omega: Param("atomic volume", unit="mm^3", bounds=(5e-21, 1e-19), scale="log"),
         d: Param("grain diameter", unit="mm", bounds=(1e-5, 10.0), scale="log"),
     },

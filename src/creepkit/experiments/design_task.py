@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.extrapolation import check_kelvin, extrapolation_text
+from creepkit.inverse.extrapolation import check_isothermal, check_kelvin, extrapolation_text
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.challenges import NOT_EXCLUDED, AlteredLaw, altered_laws
 from creepkit.inverse.selection.ranking import Ranking, rank, ranking_from_scores
@@ -72,6 +72,7 @@ class DesignTask:
             )
         if isinstance(goal, DerivedQuantity):
             check_kelvin(laws[0].ranges, goal.point.get("temperature"))
+            check_isothermal([fit.law for fit in laws], laws[0].ranges, goal.point.get("temperature"))
         altered = [] if ranking is None or goal not in (None, "law") else _altered(laws, ranking)
         chosen: Goal = goal if goal is not None else "law" if len(laws) > 1 or altered else "parameters"
         weights = np.array([one.weight for one in ranked]) if ranked else np.ones(1)

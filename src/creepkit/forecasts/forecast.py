@@ -17,6 +17,7 @@ from creepkit.errors import FitError, nearest
 from creepkit.forecasts.draws import check_tolerances, law_draws
 from creepkit.forecasts.forecast_of_test import TestForecast, forecast_test
 from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.extrapolation import check_isothermal
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
@@ -120,6 +121,8 @@ def forecast(
             raise FitError(f"the tolerance of '{kind}' changes nothing: no law has a temperature; leave it out")
     given = DEFAULT_TARGETS if targets is None else targets
     asked = {output: [float(v) for v in np.atleast_1d(values)] for output, values in given.items()}
+    for history in histories:
+        check_isothermal([f.law for f, _ in weighted], weighted[0][0].ranges, history.temperature_program().values)
     predictors = [_predictor(weighted[0][0], history, using) for history in histories]
     if tolerances:
         check_tolerances(

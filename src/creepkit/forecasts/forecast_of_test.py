@@ -23,7 +23,7 @@ from creepkit.forecasts.banded_output import (
 )
 from creepkit.forecasts.draws import DrawnLaw, LawDraws, crossing_times, drawn_law, first_crossing, has_sampled_draws
 from creepkit.forecasts.measured_test import TestScore, score_test
-from creepkit.inverse.extrapolation import HOUR, extrapolation_text
+from creepkit.inverse.extrapolation import HOUR, UNSEEN_RUPTURE, extrapolation_text
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
@@ -119,7 +119,7 @@ def forecast_test(
     notes = _notes(fit, history, outputs)
     failed = sum(one.failed for one in drawn)
     if RUPTURE_OUTPUT not in fit.noise_model.outputs and any(not t.output for t in times):
-        notes.append("no fitted test broke: when one does is what the law alone says, by its growth of strain")
+        notes.append(UNSEEN_RUPTURE)
     notes += [f"the solver did not finish {failed} of the draws; they are left out"] if failed else []
     score = None
     if any(usable_frames(history, name).any() for name in history.outputs if name in outputs):

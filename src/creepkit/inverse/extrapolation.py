@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError, FitWarning
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+from creepkit.language import CreepLaw, temperature
 from creepkit.records import ZERO_CELSIUS
+from creepkit.records.units import celsius_text
 
 RANGE_TOLERANCE = 1e-3
 """Relative distance from a range within which a point counts as inside: 1 K at 1000 K."""
@@ -19,6 +22,12 @@ UNITS = {"stress": " MPa", "temperature": " K", "time": " h", "strain": ""}
 
 
 HOUR = 3600.0
+
+
+UNSEEN_RUPTURE = (
+    "no fitted test broke: this is when the bar would tear by the growth of strain alone; damage breaks it sooner"
+)
+"""Of a rupture that a law without ruptures among its tests predicts."""
 
 
 def extrapolation_text(
@@ -64,15 +73,15 @@ WRONG_UNIT_MARGIN = 100.0
 """K below the fitted range from which on a temperature that would lie in it in degrees Celsius is refused."""
 
 
-def check_kelvin(ranges: Mapping[str, tuple[float, float]], temperature: ArrayLike | None) -> None:
+def check_kelvin(ranges: Mapping[str, tuple[float, float]], given: ArrayLike | None) -> None:
     """FitError for a temperature far below the fitted ones that would be near them if it were meant in C.
 
-    temperature : number or (...,) K.
+    given : number or (...,) K, or None.
     """
-    if temperature is None or "temperature" not in ranges:
+    if given is None or "temperature" not in ranges:
         return
     low, high = ranges["temperature"]
-    for value in np.atleast_1d(np.asarray(temperature, float)).ravel():
+    for value in np.atleast_1d(np.asarray(given, float)).ravel():
         kelvin = float(value) + ZERO_CELSIUS
         if value < low - WRONG_UNIT_MARGIN and low - WRONG_UNIT_MARGIN <= kelvin <= high + WRONG_UNIT_MARGIN:
             raise FitError(
@@ -81,16 +90,39 @@ def check_kelvin(ranges: Mapping[str, tuple[float, float]], temperature: ArrayLi
             )
 
 
-def warn_of_extrapolation(
-    ranges: Mapping[str, tuple[float, float]], point: Mapping[str, ArrayLike | None], stacklevel: int = 4
+def check_isothermal(
+    laws: Sequence[CreepLaw], ranges: Mapping[str, tuple[float, float]], given: ArrayLike | None
 ) -> None:
-    """FitWarning where a point lies outside the fitted ranges, one for all; FitError for a temperature in Celsius.
+    """FitError for another temperature than that of the tests where a law has none; given : (...,) K, or None."""
+    isothermal = [law.name for law in laws if not law.uses(temperature)]
+    if given is None or "temperature" not in ranges or not isothermal:
+        return
+    (low, high), name = ranges["temperature"], isothermal[0]
+    values = np.atleast_1d(np.asarray(given, float)).ravel()
+    beyond = np.maximum(low - values, values - high)
+    if beyond.max(initial=0.0) > ISOTHERMAL_RANGE:
+        raise FitError(
+            f"law '{name}' has no temperature, and its tests were at {celsius_text(low, high)}: nothing is known of "
+            f"{celsius_text(float(values[np.argmax(beyond)]))}; add tests at another temperature, or fit the law times "
+            f"an activation energy of the literature, such as ck.law('{name}').times(ck.arrhenius(T_ref={low:.6g}, "
+            "Q=300e3)) in J/mol"
+        )
+
+
+def warn_of_extrapolation(
+    laws: Sequence[CreepLaw],
+    ranges: Mapping[str, tuple[float, float]],
+    point: Mapping[str, ArrayLike | None],
+    stacklevel: int = 4,
+) -> None:
+    """FitWarning where a point lies outside the fitted ranges, one for all; FitError of a wrong temperature.
 
     point : {name: numbers (...,), or None} in MPa, K, - and s.
     stacklevel : frames above this one that the warning names: 4 for the caller of the method that calls
         this, which checks its arguments in a frame of its own.
     """
     check_kelvin(ranges, point.get("temperature"))
+    check_isothermal(laws, ranges, point.get("temperature"))
     sentence = extrapolation_text(ranges, point)
     if sentence:
         warnings.warn(sentence, FitWarning, stacklevel=stacklevel)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,17 +13,18 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError
+from creepkit.errors import FitError, FitWarning
 from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import NumericalError, correct_defect
 from creepkit.inverse.explanation import LeftOut
-from creepkit.inverse.extrapolation import RANGE_TOLERANCE, warn_of_extrapolation
+from creepkit.inverse.extrapolation import RANGE_TOLERANCE, UNSEEN_RUPTURE, warn_of_extrapolation
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, has_nuisance, owner_of, prior_mean
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.predictor_documents import PredictorDocument, missing_predictor
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -153,6 +155,11 @@ class Identification(
     def values(self) -> dict[str, float]:
         """{parameter: value} in the author's units."""
         return {e.name: e.value for e in self.estimates}
+
+    @property
+    def stated_laws(self) -> tuple[CreepLaw, ...]:
+        """The law."""
+        return (self.law,)
 
     @property
     def valued(self) -> LawWithValues:
@@ -290,7 +297,9 @@ class Identification(
         T = self.reference.temperature if temperature is None else temperature
         tests, shape = constant_stress_tests(stress, T, self.ranges["time"][1], control)
         if warn:
-            warn_of_extrapolation(self.ranges, {"stress": stress, "temperature": temperature})
+            warn_of_extrapolation(self.stated_laws, self.ranges, {"stress": stress, "temperature": temperature})
+            if RUPTURE_OUTPUT not in self.noise_model.outputs:
+                warnings.warn(UNSEEN_RUPTURE, FitWarning, stacklevel=3)
         time, low, high = self.rupture_times(tests, test_scatter=test_scatter, using=using)
         return time.reshape(shape), low.reshape(shape), high.reshape(shape)
 

@@ -41,7 +41,6 @@ from creepkit.inverse.residuals import (
 from creepkit.inverse.search.local_refinement import (
     AdditionalResiduals,
     Minimum,
-    Penalty,
     Tolerances,
     bounded_least_squares,
     robust_loss,
@@ -92,10 +91,10 @@ class LeastSquaresProblem:
 
     histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
     bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. loss : of the whitened
-        residuals, as scipy names it. penalty : what is added to half the chi-square.
+        residuals, as scipy names it.
     correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
         against a more exact one (see inverse.defect_correction), or None.
-    evaluations : the last residuals, shared by the problems that differ in covariance, priors or penalty alone.
+    evaluations : the last residuals, shared by the problems that differ in covariance or priors alone.
     """
 
     histories: tuple[History, ...]
@@ -107,7 +106,6 @@ class LeastSquaresProblem:
     settings: IdentificationSettings
     covariance_factor: CovarianceFactor
     loss: str = "linear"
-    penalty: Penalty | None = None
     correction: Floats | None = None
     evaluations: EvaluationCache = field(default_factory=EvaluationCache, repr=False)
 
@@ -146,13 +144,12 @@ class LeastSquaresProblem:
     # ---- variants ------------------------------------------------------------------------------------------------
 
     def with_law(self, law: CreepLaw) -> LeastSquaresProblem:
-        """A law of some of this one's parameters, by name, on the same data and covariance, without penalty."""
+        """A law of some of this one's parameters, by name, on the same data and covariance."""
         positions = [self.law.names.index(name) for name in law.names]
         return replace(
             self,
             coordinates=Coordinates(law, self.coordinates.reference),
             bounds=self.bounds.of([*positions, *range(self.parameter_count, self.bounds.width.size)]),
-            penalty=None,
             evaluations=EvaluationCache(),
         )
 
@@ -317,8 +314,6 @@ class LeastSquaresProblem:
         whitened = self.whiten(np.moveaxis(self.candidate_residuals(inside), 0, -1)).T
         total = 0.5 * robust_loss(whitened**2, self.loss).sum(axis=1)
         total += 0.5 * (self.bound_penalties.residuals(inside) ** 2).sum(axis=1)
-        if self.penalty is not None:
-            total += self.penalty.values(inside)
         return np.where(np.isfinite(total), total, FAILED_COST)
 
     # ---- minima ------------------------------------------------------------------------------------------------------
@@ -366,8 +361,7 @@ class LeastSquaresProblem:
         data = self.whiten(np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1))
         values = [data[:, 0], self.bound_penalties.residuals(x), prior_weight * (x - self.bounds.centre)]
         jacobians = [data[:, 1:], self.bound_penalties.jacobian(x), np.diag(prior_weight)]
-        for extra in (self.penalty, additional):
-            if extra is not None:
-                values.append(extra.residuals(x))
-                jacobians.append(extra.jacobian(x))
+        if additional is not None:
+            values.append(additional.residuals(x))
+            jacobians.append(additional.jacobian(x))
         return np.concatenate(values), np.concatenate(jacobians)

@@ -17,7 +17,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import LawError
 from creepkit.language.symbols import GAS_CONSTANT, Param, temperature
 
-ACTIVATION_ENERGY_BOUNDS = (5e4, 9e5)
+ACTIVATION_ENERGY_BOUNDS = (2e4, 9e5)
 """Bounds of an activation energy, J/mol: grain-boundary diffusion to apparent values of precipitate-hardened alloys."""
 
 

@@ -15,6 +15,7 @@ from creepkit.inverse.history_checks import suspect_frames_note, without_suspect
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection import rank
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.language import arrhenius
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
@@ -220,6 +221,33 @@ def test_a_rate_without_a_temperature_is_that_at_the_reference_temperature(fit_o
     assert "MPa, 752 °C" in fit.details()
 
 
+def test_a_law_without_temperature_states_nothing_of_another_temperature():
+    tests = [
+        ck.simulate(
+            "norton",
+            "uniaxial",
+            {"A": 1e-16, "n": 4.0},
+            times=np.linspace(1e5, 1e7, 9),
+            loading=ck.constant_stress(s),
+            temperature=873.15,
+        )
+        for s in (80.0, 100.0)
+    ]
+    fit = ck.identify("norton", [t.replace(name=f"t{k}") for k, t in enumerate(tests)])
+    assert fit.rate(90.0, 875.0, warn=False)[0] > 0
+    asks = (
+        lambda: fit.rate(90.0, 893.15),
+        lambda: ModelAverage.from_ranking(fit).rate(90.0, 893.15),
+        lambda: fit.rupture_time(90.0, 893.15),
+        lambda: fit.forecast(tests[0].replace(temperature=893.15)),
+    )
+    for ask in asks:
+        with pytest.raises(FitError, match="has no temperature, and its tests were at 600 °C: .* of 620 °C; add tests"):
+            ask()
+    with pytest.warns(FitWarning, match="no fitted test broke"):
+        fit.rupture_time(90.0)
+
+
 # ---- candidates ------------------------------------------------------------------------------------------------------
 
 # Which laws suit tests: by curves of known shape.
@@ -265,6 +293,21 @@ def test_tables_of_rates_and_lives():
         for s, t in ((80.0, 9e6), (100.0, 3e6), (120.0, 1e6), (150.0, 3e5), (180.0, 1e5))
     ]
     assert names(rows) == ["norton", "hyperbolic-sine", "kachanov-rabotnov", "sinh-damage"]
+
+
+def test_rates_over_a_threshold_stress_bend_down_and_those_of_a_power_law_do_not():
+    def rates(below, n):
+        factors = 1e-15 * np.exp(0.1 * np.random.default_rng(3).standard_normal(9))
+        rows = zip(np.geomspace(50.0, 130.0, 9), factors, strict=True)
+        return [
+            ck.History(
+                f"m{s:.0f}", np.array([1e6]), {}, ck.constant_stress(s), 900.0, minimum_rate=f * (s - below) ** n
+            )
+            for s, f in rows
+        ]
+
+    assert names(rates(40.0, 4.0)) == ["norton", "hyperbolic-sine", "threshold-stress"]
+    assert names(rates(0.0, 4.0)) == ["norton", "hyperbolic-sine"]
 
 
 def test_a_name_with_primary_creep_is_the_law_itself_with_the_factor():

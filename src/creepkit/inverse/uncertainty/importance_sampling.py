@@ -35,6 +35,7 @@ from creepkit.inverse.uncertainty.quantities import (
     RateStatements,
     quantity_of,
 )
+from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import Predictor
 
@@ -110,6 +111,11 @@ class PosteriorSamples(RateStatements, Presentable, text="reports.inference:post
     u: Floats
     ranges: Mapping[str, tuple[float, float]]
     notes: tuple[str, ...] = ()
+
+    @property
+    def stated_laws(self) -> tuple[CreepLaw, ...]:
+        """The law."""
+        return (self.coordinates.law,)
 
     @property
     def values(self) -> dict[str, Floats]:

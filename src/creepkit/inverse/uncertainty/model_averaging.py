@@ -24,6 +24,7 @@ from creepkit.inverse.uncertainty.quantities import (
     RateStatements,
     log_rate,
 )
+from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import History
 
@@ -78,6 +79,11 @@ class ModelAverage(RateStatements, Presentable, text="reports.inference:model_av
     def ranges(self) -> Mapping[str, tuple[float, float]]:  # type: ignore[override]
         """That the tests cover, as of an Identification."""
         return self.fits[0].ranges
+
+    @property
+    def stated_laws(self) -> tuple[CreepLaw, ...]:
+        """The laws of the mixture."""
+        return tuple(fit.law for fit in self.fits)
 
     def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:
         """What tests will show, over the laws, so that bands hold the doubt about the law; as creepkit.forecast()."""

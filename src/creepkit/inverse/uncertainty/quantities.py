@@ -17,6 +17,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.extrapolation import warn_of_extrapolation
+from creepkit.language import CreepLaw
 from creepkit.language.symbols import GAS_CONSTANT
 
 EXPONENT_STRESS_RATIO = 1.0005
@@ -46,6 +47,11 @@ class RateStatements:
     """
 
     ranges: Mapping[str, tuple[float, float]]
+
+    @property
+    def stated_laws(self) -> tuple[CreepLaw, ...]:
+        """Whose rates are stated."""
+        raise NotImplementedError
 
     def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
         """Value and 95 % interval of a quantity; point : {name: (...,) or None for that of the reference point}."""
@@ -95,7 +101,7 @@ class RateStatements:
         named = dict(zip(("stress", "temperature", "strain", "time"), point, strict=True))
         check_state(**named)
         if warn:
-            warn_of_extrapolation(self.ranges, named, stacklevel=5)
+            warn_of_extrapolation(self.stated_laws, self.ranges, named, stacklevel=5)
         return self.interval_at(quantity, named)
 
 
