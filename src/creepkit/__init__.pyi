@@ -43,8 +43,6 @@ from .inverse.search.particle_swarm import ParticleSwarm as ParticleSwarm
 from .inverse.selection.ranking import rank as rank
 from .inverse.settings import IdentificationSettings as IdentificationSettings
 from .inverse.settings import default_nuisances as default_nuisances
-from .inverse.sparsity.penalties import L2 as L2
-from .inverse.sparsity.penalties import Subsets as Subsets
 from .inverse.uncertainty.quantities import exponent_at as exponent_at
 from .inverse.uncertainty.quantities import rate_at as rate_at
 from .jobs.worker_pools import ParallelExecution as ParallelExecution

@@ -29,7 +29,8 @@ from proportions import share_with_interval
 
 import creepkit as ck
 from creepkit.errors import FitWarning
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.variance_components import scaled_inverse
 
@@ -142,7 +143,7 @@ def fisher_covariance(fit, u, design):
         correlation_length = -5.0 / 48 / np.log(coefficient)
         outputs["amplitude"] = OutputNoise(1e-6, drift=sd / scale, correlation_length=correlation_length)
     known = replace(residuals, relative_noise=np.ones_like(residuals.relative_noise))
-    weights = np.linalg.inv(covariance(known, NoiseModel(outputs)))
+    weights = np.linalg.inv(CovarianceFactor.of_residuals(known, NoiseModel(outputs)).blocks)
     information = np.einsum("tep,tef,tfq->pq", residuals.jacobian, weights, residuals.jacobian, optimize=True)
     width = problem.bounds.width[: len(u)]
     prior = np.concatenate([12.0 / width**2, problem.nuisance_parameters.precision])

@@ -24,7 +24,8 @@ from creepkit.arrays import Floats
 from creepkit.forecasts.draws import DrawnLaw, UncertainQuantity, systematic
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
 from creepkit.inverse.output_transforms import LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -96,10 +97,9 @@ class LinearForecast:
         problem = replace(problem, observations=_on_fitted_scale(fit, problem.observations))
         residuals = problem.residuals(np.concatenate([fit.u, [d.mean for d in dimensions]]))
         noise_model = noise_model_of(fit, problem.observations)
-        present = residuals.present[0]
+        scatter, count, present = fit.scatter_of_rates, fit.u.size, residuals.present[0]
         assert residuals.jacobian is not None
         jacobian, rate = residuals.jacobian[0][present], residuals.log_rate_sensitivity[0][present]
-        scatter, count = fit.scatter_of_rates, fit.u.size
         by_joint = np.zeros((present.sum(), scatter.joint_design.shape[1]))
         by_joint[:, :count] = jacobian[:, :count]
         by_joint[:, [*scatter.new_test(history).known.values()]] = rate[:, None]
@@ -116,7 +116,7 @@ class LinearForecast:
             by_joint,
             rate,
             jacobian[:, [count + k for k in own]] * np.array([dimensions[k].sd for k in own]),
-            covariance(residuals, noise_model)[0][np.ix_(present, present)],
+            CovarianceFactor.of_residuals(residuals, noise_model).blocks[0][np.ix_(present, present)],
             problem.observations.outputs,
             tuple(dimensions[k] for k in own),
             tuple(dimensions),

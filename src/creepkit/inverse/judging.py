@@ -107,7 +107,9 @@ class Judge:
         residuals = replace(judged, test_weights=np.ones(len(known.sd)), relative_noise=known.sd)
         independent, reduced = self._independent_noise, replace(linear, residuals=residuals)
         solution = _within_bounds(reduced, CovarianceFactor.of_residuals(residuals, independent))
-        white = residuals.white_covariance_times(solution.weighted_residuals, independent)
+        noise = NoiseModel({name: OutputNoise(one.noise) for name, one in independent.outputs.items()})
+        of_frames = CovarianceFactor.of_residuals(replace(residuals, random_effect_sensitivities=None), noise).blocks
+        white = np.einsum("tef,tf->te", of_frames, solution.weighted_residuals)
         return JudgedResiduals(
             linear.residuals,
             known,

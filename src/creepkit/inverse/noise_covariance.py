@@ -1,14 +1,13 @@
 """The covariance of residuals by its factors, and likelihoods under it, linear in observations.
 
 A covariance of Ornstein-Uhlenbeck processes, random effects and white noise is that of a state-space model: whitening
-by its Cholesky factor is a Kalman filter, which the compiled core runs (src/core/noise_likelihood.hpp). The covariances
-themselves, as matrices, are creepkit.inverse.noise_model.covariance.
+by its Cholesky factor is a Kalman filter, which the compiled core runs (src/core/noise_likelihood.hpp).
 """
 
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,14 +15,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.core import address, function
 from creepkit.errors import FitError
-from creepkit.inverse.noise_model import (
-    ABSOLUTE_JITTER,
-    OUTPUT_COMPONENTS,
-    RELATIVE_JITTER,
-    SHARED_COMPONENTS,
-    NoiseModel,
-    Residuals,
-)
+from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.observation_series import ObservationSeries
 
 
@@ -92,18 +84,11 @@ class CovarianceFactor:
         return left, values**2
 
     @cached_property
-    def variances(self) -> Floats:
-        """(tests, observations) the diagonal of C, 1 for observations without data."""
-        series, size = self.series, self.components[: -len(SHARED_COMPONENTS)].reshape(-1, len(OUTPUT_COMPONENTS))
-        noise, misfit, offset, drift, _ = size[series.output].T
-        rate, discrepancy, _ = self.components[-len(SHARED_COMPONENTS) :]
-        _, white, offset_effect, unit, rate_effect = series.loadings[:, :5].T
-        correlated = drift**2 + (offset * offset_effect) ** 2 + (discrepancy * unit) ** 2 + (rate * rate_effect) ** 2
-        correlated += (series.loadings[:, 5 : 5 + series.effects] ** 2).sum(axis=1)
-        out = np.ones(series.shape)
-        variance = correlated * (1.0 + RELATIVE_JITTER) + (noise * white) ** 2 + misfit**2 + ABSOLUTE_JITTER
-        out.flat[series.places] = variance / series.root_weights[:, 0] ** 2
-        return out if self.common is None else out + (self.common**2).sum(axis=-1)
+    def blocks(self) -> Floats:
+        """(tests, observations, observations) B of each test: 1 on the diagonal for observations without data."""
+        tests, count = self.series.shape
+        root = np.linalg.inv(self._transformed(np.tile(np.eye(count), (tests, 1, 1)), inverse=False)[0])
+        return np.asarray(root @ np.swapaxes(root, 1, 2))
 
     def _transformed(self, values: Floats, *, inverse: bool) -> tuple[Floats, float]:
         series, rows = self.series, self.series.rows(values)
@@ -173,10 +158,10 @@ def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> t
 
 def effective_sample_size(residuals: Residuals, noise_model: NoiseModel) -> float:
     """Number of independent observations that carry the same information on a common mean as all frames together."""
-    without_offset = replace(
-        noise_model, outputs={name: replace(output, offset=0.0) for name, output in noise_model.outputs.items()}
-    )
-    factor = CovarianceFactor.of_residuals(residuals, without_offset)
-    standard_deviations = np.where(residuals.present, np.sqrt(factor.variances), 0.0)
+    factor = CovarianceFactor.of_residuals(residuals, noise_model.without_offsets)
+    variances = np.diagonal(factor.blocks, axis1=1, axis2=2)
+    if factor.common is not None:
+        variances = variances + (factor.common**2).sum(axis=-1)
+    standard_deviations = np.where(residuals.present, np.sqrt(variances), 0.0)
     information = float((factor.whiten(standard_deviations) ** 2).sum())
     return float(np.clip(information, len(residuals.values), residuals.present.sum()))

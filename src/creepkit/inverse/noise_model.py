@@ -110,21 +110,6 @@ class Residuals:
             self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights, self.shared_noise
         )
 
-    def white_noise(self, noise_model: NoiseModel) -> Floats:
-        """(tests, observations) - standard deviation of the noise of each observation, in the transformed output."""
-        noise = noise_model.per_observation(self.output_index, "noise")
-        return np.asarray(noise * self.relative_noise * self.offset_sensitivity)
-
-    def white_covariance_times(self, values: Floats, noise_model: NoiseModel) -> Floats:
-        """W v, (tests, observations), W the covariance of the noise of frames.
-
-        values : (tests, observations) v, zero where no data are.
-        """
-        noise = self.white_noise(noise_model)
-        if self.shared_noise is None:
-            return np.asarray(noise**2 * values)
-        return self.shared_noise.own_share * noise**2 * values + self.shared_noise.shared_with_frame(noise, values)
-
 
 MINIMUM_TESTS = 3
 """Below this many tests the scatter between them cannot be estimated."""
@@ -210,6 +195,11 @@ class NoiseModel:
         """The same with other components of one output."""
         return replace(self, outputs={**self.outputs, output: replace(self.outputs[output], **components)})
 
+    @property
+    def without_offsets(self) -> NoiseModel:
+        """The same without offsets of tests."""
+        return replace(self, outputs={name: replace(one, offset=0.0) for name, one in self.outputs.items()})
+
 
 def initial_working_noise(observations: ObservationVector, nuisances: Sequence[Nuisance]) -> NoiseModel:
     """Working noise before anything was fitted: a misfit of 0.3, offsets of the floor of the transform."""
@@ -243,46 +233,6 @@ def components_fixed_by_priors(nuisances: Sequence[Nuisance], outputs: Sequence[
         if offset_nuisances and offset_nuisances[0].sd is not None:
             fixed.add((output, "offset"))
     return fixed
-
-
-ABSOLUTE_JITTER, RELATIVE_JITTER = 1e-10, 1e-9
-"""Added to variances, so that a covariance stays positive definite: absolute, and of the correlated variance."""
-
-
-def covariance(residuals: Residuals, noise_model: NoiseModel) -> Floats:
-    """(tests, observations, observations) -; absent observations have unit variance and no correlation."""
-    s, d, present, output = (
-        residuals.offset_sensitivity,
-        residuals.log_rate_sensitivity,
-        residuals.present,
-        residuals.output_index,
-    )
-    drift, offset = noise_model.per_observation(output, "drift"), noise_model.per_observation(output, "offset") * s
-    lags = np.abs(residuals.correlation_coordinate[:, :, None] - residuals.correlation_coordinate[:, None, :])
-    c = (drift**2)[:, :, None] * np.exp(-lags / noise_model.per_observation(output, "correlation_length")[:, :, None])
-    if noise_model.discrepancy > 0:
-        assert residuals.discrepancy_unit is not None
-        unit = noise_model.discrepancy * residuals.discrepancy_unit
-        c += unit[:, :, None] * unit[:, None, :] * np.exp(-lags / noise_model.discrepancy_length)
-    c += offset[:, :, None] * offset[:, None, :]
-    c = np.where(output[:, :, None] == output[:, None, :], c, 0.0) if len(noise_model.outputs) > 1 else c
-    c += noise_model.rate**2 * d[:, :, None] * d[:, None, :]
-    if residuals.random_effect_sensitivities is not None:
-        c += residuals.random_effect_sensitivities @ np.swapaxes(residuals.random_effect_sensitivities, 1, 2)
-    if residuals.shared_noise is not None:
-        c += residuals.shared_noise.covariance(residuals.white_noise(noise_model))
-    k = np.arange(s.shape[1])
-    noise = noise_model.per_observation(output, "noise") * residuals.relative_noise
-    c[:, k, k] = (
-        c[:, k, k] * (1 + RELATIVE_JITTER)
-        + (noise * s) ** 2
-        + noise_model.per_observation(output, "misfit") ** 2
-        + ABSOLUTE_JITTER
-    )
-    present_pairs = present[:, :, None] & present[:, None, :]
-    c = np.where(present_pairs, c / residuals.test_weights[:, None, None], 0.0)
-    c[:, k, k] = np.where(present, c[:, k, k], 1.0)
-    return np.asarray(c)
 
 
 NEGLIGIBLE_DRIFT = 1e-3

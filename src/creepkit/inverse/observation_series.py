@@ -41,30 +41,6 @@ class SharedNoise:
         kept = np.abs(roots).max(axis=(0, 1)) > SMALLEST_LOADING
         return cls(frame, roots[..., kept][np.arange(len(output_index))[:, None], output_index])
 
-    def shared_with_frame(self, noise: Floats, values: Floats) -> Floats:
-        """The part of W v that frames share, W the covariance of white noise; (tests, observations).
-
-        noise : (tests, observations) its standard deviation. values : (tests, observations) v.
-        """
-        out = np.zeros_like(values)
-        for test, frame in enumerate(self.frame):
-            loadings = noise[test, :, None] * self.loadings[test]
-            sums = np.zeros((int(frame.max(initial=0)) + 1, loadings.shape[1]))
-            np.add.at(sums, frame, loadings * values[test, :, None])
-            out[test] = (loadings * sums[frame]).sum(axis=1)
-        return out
-
-    @property
-    def own_share(self) -> Floats:
-        """(tests, observations) - share of the variance that an observation shares with no other."""
-        return np.asarray(1.0 - (self.loadings**2).sum(axis=-1))
-
-    def covariance(self, noise: Floats) -> Floats:
-        """(tests, observations, observations) off its diagonal; noise : (tests, observations) standard deviations."""
-        loadings = noise[..., None] * self.loadings
-        same = (self.frame[:, :, None] == self.frame[:, None, :]) & ~np.eye(self.frame.shape[1], dtype=bool)
-        return np.where(same, loadings @ np.swapaxes(loadings, 1, 2), 0.0)
-
 
 SMALLEST_LOADING = 1e-9
 """A factor that no output has more of is rounding."""

@@ -41,7 +41,6 @@ from creepkit.inverse.residuals import (
 from creepkit.inverse.search.local_refinement import (
     AdditionalResiduals,
     Minimum,
-    Penalty,
     Tolerances,
     bounded_least_squares,
     robust_loss,
@@ -102,14 +101,14 @@ class LeastSquaresProblem:
 
     histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
     bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. robust : whether a single
-        residual far off counts less, as in a search. penalty : what is added to half the chi-square.
+        residual far off counts less, as in a search.
     correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
         against a more exact one (see inverse.defect_correction), or None.
     log_factors : (tests,) ln of the factors on the rates of tests about which residuals are taken, None for the law's
         own rates. With b such a factor, r(x, b) the residuals and d their derivative to it, r(x, b) - d b is linear in
         a rate that scatters where r(x, 0) is not (Lindstrom & Bates (1990), Biometrics 46, 673).
     rate_shift : (tests, observations) -, d b of them, or None.
-    evaluations : the last residuals, shared by the problems that differ in covariance, priors or penalty alone.
+    evaluations : the last residuals, shared by the problems that differ in covariance or priors alone.
     """
 
     histories: tuple[History, ...]
@@ -121,7 +120,6 @@ class LeastSquaresProblem:
     settings: IdentificationSettings
     covariance_factor: CovarianceFactor
     robust: bool = False
-    penalty: Penalty | None = None
     correction: Floats | None = None
     log_factors: Floats | None = None
     rate_shift: Floats | None = None
@@ -162,13 +160,12 @@ class LeastSquaresProblem:
     # ---- variants ------------------------------------------------------------------------------------------------
 
     def with_law(self, law: CreepLaw) -> LeastSquaresProblem:
-        """A law of some of this one's parameters, by name, on the same data and covariance, without penalty."""
+        """A law of some of this one's parameters, by name, on the same data and covariance."""
         positions = [self.law.names.index(name) for name in law.names]
         return replace(
             self,
             coordinates=Coordinates(law, self.coordinates.reference),
             bounds=self.bounds.of([*positions, *range(self.parameter_count, self.bounds.width.size)]),
-            penalty=None,
             evaluations=EvaluationCache(),
         )
 
@@ -355,8 +352,6 @@ class LeastSquaresProblem:
         whitened = self.whiten(np.moveaxis(self.candidate_residuals(inside), 0, -1)).T
         total = 0.5 * (robust_loss(whitened**2) if self.robust else whitened**2).sum(axis=1)
         total += 0.5 * (self.bound_penalties.residuals(inside) ** 2).sum(axis=1)
-        if self.penalty is not None:
-            total += self.penalty.values(inside)
         return np.where(np.isfinite(total), total, FAILED_COST)
 
     # ---- minima ------------------------------------------------------------------------------------------------------
@@ -404,8 +399,7 @@ class LeastSquaresProblem:
         data = self.whiten(np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1))
         values = [data[:, 0], self.bound_penalties.residuals(x), prior_weight * (x - self.bounds.centre)]
         jacobians = [data[:, 1:], self.bound_penalties.jacobian(x), np.diag(prior_weight)]
-        for extra in (self.penalty, additional):
-            if extra is not None:
-                values.append(extra.residuals(x))
-                jacobians.append(extra.jacobian(x))
+        if additional is not None:
+            values.append(additional.residuals(x))
+            jacobians.append(additional.jacobian(x))
         return np.concatenate(values), np.concatenate(jacobians)

@@ -10,7 +10,6 @@ from creepkit.options import Options, option
 
 if TYPE_CHECKING:
     from creepkit.inverse.search.global_search import GlobalSearch
-    from creepkit.inverse.sparsity.penalties import L2, Subsets
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,7 @@ class SearchOptions(Options, title="options of a search", error=FitError):
     """
 
     search: Literal["multi-start", "swarm"] = option("multi-start", "How to begin.")
-    penalty: Literal["l2", "subsets"] | None = option(None, "Reduce a sum of terms.")
+    penalty: Literal["subsets"] | None = option(None, "Keep those terms of a sum that the tests need.")
     sums: bool | None = option(None, "Whether sums of two laws are tried; by default where no law explains the tests.")
     by: Literal["bic", "aicc", "hold-out"] = option("bic", "Of a comparison of laws.", flag="criterion")
 
@@ -32,10 +31,3 @@ class SearchOptions(Options, title="options of a search", error=FitError):
         from creepkit.inverse.search.particle_swarm import ParticleSwarm
 
         return ParticleSwarm() if self.search == "swarm" else None
-
-    @property
-    def term_penalty(self) -> L2 | Subsets | None:
-        """The penalty as identify() takes it."""
-        from creepkit.inverse.sparsity.penalties import L2, Subsets
-
-        return {"l2": L2(), "subsets": Subsets(), None: None}[self.penalty]

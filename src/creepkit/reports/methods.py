@@ -258,10 +258,10 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
 
 
 def _sparsity(found: GroupFindings) -> Iterator[str]:
-    """The penalty on terms of a sum, where one was used."""
+    """How terms of a sum were selected, where they were."""
     for sparse in [one.sparsity for one in found.fits if one.sparsity is not None][:1]:
         dropped = f"left out were {listed([*sparse.dropped_terms])}" if sparse.dropped_terms else "all terms stayed"
-        selected = f"were selected by the penalty {sparse.penalty} and confirmed by BIC"
+        selected = "were selected by BIC among its subsets"
         yield f"The terms of the sum {printable(sparse.law, 120)} {selected}; {dropped}."
 
 

@@ -48,7 +48,7 @@ def ranked_candidates(
         )
     base = settings or ck.IdentificationSettings()
     ends = common_rupture_times(laws, base.changed({"rupture_times": changes.get("rupture_times")})).rupture_times
-    options |= {**changes, "rupture_times": ends, "search": asked.global_search, "penalty": asked.term_penalty}
+    options |= {**changes, "rupture_times": ends, "search": asked.global_search, "penalty": asked.penalty}
     fits = []
     for k, law in enumerate(laws, start=1):
         place = f"law {k} of {len(laws)}: {law.title or law.name}"

@@ -118,7 +118,7 @@ def good_values(name: str) -> dict[str, Any]:
         "laws": ["norton"],
         "using": "uniaxial",
         "values": {"A": 1e-15, "n": 5.0},
-        "penalty": ck.L2(),
+        "penalty": "subsets",
         "specimen": "uniaxial",
         "predictor": ck.specimen("uniaxial"),
         "loading": ck.constant_stress(80.0),

@@ -9,7 +9,7 @@ import pytest
 
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.observation_vector import thinned_history
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
@@ -79,7 +79,7 @@ def test_a_missing_frame_and_an_unknown_noise_leave_the_other_pairs() -> None:
     observations = problem.observations
     assert observations.present.sum() == 58
     residuals, noise = problem.residuals(problem.bounds.centre), NoiseModel({n: OutputNoise(NOISE[n]) for n in PAIR})
-    c = covariance(residuals, noise)[0]
+    c = CovarianceFactor.of_residuals(residuals, noise).blocks[0]
     shown = np.sqrt(np.diag(c))
     for k in range(58):
         same = np.flatnonzero(observations.frame_index[0, :58] == observations.frame_index[0, k])
@@ -115,7 +115,9 @@ def test_the_correlation_goes_through_the_transforms_of_outputs() -> None:
     observations = problem.observations
     pairs = zip(observations.outputs, observations.noise, strict=True)
     noise = NoiseModel({name: OutputNoise(float(size)) for name, size in pairs})
-    c = covariance(problem.residuals(problem.coordinates.u(LAW.to_internal({"A": 1e-15})[0])), noise)[0]
+    c = CovarianceFactor.of_residuals(
+        problem.residuals(problem.coordinates.u(LAW.to_internal({"A": 1e-15})[0])), noise
+    ).blocks[0]
     errors = np.linalg.cholesky([[1.0, rho], [rho, 1.0]]) @ np.random.default_rng(0).standard_normal((20000, 2, 1))
     for frame in (12, 29):
         places = [int(np.flatnonzero((observations.output_index[0] == k) & (observations.frame_index[0] == frame))[0])

@@ -8,14 +8,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from creepkit.inverse.noise_covariance import CovarianceFactor, NoiseLikelihood
-from creepkit.inverse.noise_model import (
-    OUTPUT_COMPONENTS,
-    SHARED_COMPONENTS,
-    NoiseModel,
-    OutputNoise,
-    Residuals,
-    covariance,
-)
+from creepkit.inverse.noise_model import OUTPUT_COMPONENTS, SHARED_COMPONENTS, NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.observation_series import SharedNoise
 
 NAMES = ("amplitude", "width", "rupture_time")
@@ -195,7 +188,11 @@ def test_offsets_far_above_the_noise_cost_no_digits():
 def test_whitening_is_by_the_cholesky_factor_and_solving_by_the_inverse(correlated):
     """Of observations by output, or by frame where the noise of a frame is correlated."""
     residuals, noise = example(frames=12, correlated=correlated)
-    c, factor = covariance(residuals, noise), CovarianceFactor.of_residuals(residuals, noise)
+    factor = CovarianceFactor.of_residuals(residuals, noise)
+    c = factor.blocks
+    for block, here, test in zip(c, residuals.present, range(3), strict=True):
+        exact = np.array(exact_covariance(residuals, exact_sizes(noise), test).tolist(), float)
+        np.testing.assert_allclose(block[np.ix_(here, here)], exact, rtol=1e-9, atol=1e-12)
     values = np.random.default_rng(3).normal(size=(*residuals.values.shape, 4))
     order = np.lexsort((residuals.output_index[0], residuals.shared_noise.frame[0])) if correlated else slice(None)
     root = np.linalg.cholesky(c[:, order][:, :, order])
@@ -203,7 +200,6 @@ def test_whitening_is_by_the_cholesky_factor_and_solving_by_the_inverse(correlat
     np.testing.assert_allclose(factor.inverse_times(values), np.linalg.solve(c, values), rtol=1e-7)
     np.testing.assert_array_equal(factor.whiten(values[..., 1]), factor.whiten(values)[..., 1])
     assert factor.log_determinant == pytest.approx(np.linalg.slogdet(c)[1].sum(), rel=1e-10)
-    np.testing.assert_allclose(factor.variances, np.diagonal(c, axis1=1, axis2=2), rtol=1e-12)
 
 
 def test_correlated_noise_at_a_correlation_of_zero_is_no_other():
@@ -219,7 +215,7 @@ def test_correlated_noise_at_a_correlation_of_zero_is_no_other():
 
 def test_the_likelihood_is_scipys():
     residuals, noise = example(frames=12)
-    c = covariance(residuals, noise)
+    c = CovarianceFactor.of_residuals(residuals, noise).blocks
     truth = sum(
         multivariate_normal(np.zeros(p.sum()), c[k][np.ix_(p, p)]).logpdf(residuals.values[k, p])
         for k, p in enumerate(residuals.present)
@@ -244,7 +240,7 @@ def test_the_order_of_observations_does_not_matter(correlated):
     assert ends[0][0] == pytest.approx(ends[1][0], rel=1e-12)
     np.testing.assert_allclose(ends[0][1], ends[1][1], rtol=1e-10)
     factor = CovarianceFactor.of_residuals(shuffled, noise)
-    expected = np.einsum("te,tef,tf->", shuffled.values, np.linalg.inv(covariance(shuffled, noise)), shuffled.values)
+    expected = np.einsum("te,tef,tf->", shuffled.values, np.linalg.inv(factor.blocks), shuffled.values)
     assert (factor.whiten(shuffled.values) ** 2).sum() == pytest.approx(expected, rel=1e-9)
 
 

@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import f
 
 from creepkit.inverse.known_noise import KnownNoise, chance_of_larger
-from creepkit.inverse.noise_covariance import effective_sample_size, predicted_random_effects
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, autocorrelated_components, covariance
+from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, autocorrelated_components
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.settings import IdentificationSettings
@@ -41,7 +41,7 @@ def made(tests, frames, seed, scatter):
     slopes = 1 / strain
     effect = 0.7 * np.ones_like(slopes)
     shape = residuals_of(np.zeros_like(slopes), slopes, np.ones_like(slopes, bool), times, effect)
-    factor = np.linalg.cholesky(covariance(shape, scatter))
+    factor = np.linalg.cholesky(CovarianceFactor.of_residuals(shape, scatter).blocks)
     return replace(shape, values=(factor @ rng.normal(size=(tests, frames, 1)))[..., 0])
 
 
@@ -134,7 +134,7 @@ def test_a_planted_discrepancy_of_two_outputs_is_found():
                       discrepancy_unit=noise)  # fmt: skip
     parts = {"amplitude": OutputNoise(0.02), "width": OutputNoise(0.4)}
     truth = NoiseModel(parts, discrepancy=2.0, discrepancy_length=1.2)
-    drawn = np.linalg.cholesky(covariance(shape, truth)) @ rng.normal(size=(*clock.shape, 1))
+    drawn = np.linalg.cholesky(CovarianceFactor.of_residuals(shape, truth).blocks) @ rng.normal(size=(*clock.shape, 1))
     start = replace(truth, discrepancy=0.5, discrepancy_length=0.5)
     found = estimate_variance_components(replace(shape, values=drawn[..., 0]), start, (), fixed=())
     assert found.discrepancy == pytest.approx(2.0, rel=0.12)
@@ -239,7 +239,7 @@ def drawn(seed, **noise_model):
         name: OutputNoise(sd, drift=drift if k == 0 else 0.0, correlation_length=0.2)
         for k, (name, sd) in enumerate(zip(NAMES, NOISE, strict=True))
     }
-    factor = np.linalg.cholesky(covariance(residuals, NoiseModel(outputs, **noise_model)))
+    factor = np.linalg.cholesky(CovarianceFactor.of_residuals(residuals, NoiseModel(outputs, **noise_model)).blocks)
     values = (factor @ rng.normal(size=(*SHAPE, 1)))[..., 0]
     bounds = np.array([[-np.inf], [np.inf]]) * np.ones(3)
     return LinearisedProblem(

@@ -9,6 +9,7 @@ import pytest
 from scipy.special import logsumexp
 
 import creepkit as ck
+from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.uncertainty.rate_scatter import log_prior, rate_scatter
 from creepkit.language.symbols import GAS_CONSTANT
 
@@ -118,8 +119,6 @@ def test_the_evidence_is_that_of_the_dense_covariance():
     """Against -ln p of one Gaussian with covariance C + J P^-1 J' + (w d) v (w d)', averaged over scatters."""
     from dataclasses import replace
 
-    from creepkit.inverse.noise_model import covariance
-
     fit = fitted(bars(power_law(5.0, 4e5), factor={2: 2.0})[:6])
     problem, x = fit.least_squares_problem, fit.x
     linear = problem.linearised(x)
@@ -134,7 +133,7 @@ def test_the_evidence_is_that_of_the_dense_covariance():
         d = residuals.log_rate_sensitivity
         columns = [(weights[:, k, None] * d).ravel()[present] for k in range(len(prior_sd))]
         for sd in scatters:
-            blocks = covariance(residuals, replace(noise, rate=float(sd)))
+            blocks = CovarianceFactor.of_residuals(residuals, replace(noise, rate=float(sd))).blocks
             C = np.zeros((present.size, present.size))
             for t, block in enumerate(blocks):
                 part = slice(t * len(block), (t + 1) * len(block))

@@ -15,7 +15,6 @@ from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.search.particle_swarm import ParticleSwarm
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.penalties import L2, check_penalty
 from creepkit.inverse.uncertainty.correlation import correlation
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.profile_likelihood import profile
@@ -112,8 +111,6 @@ MISTAKES = [
     (lambda tests, fit: rank([fit], "hold-up"), "rank(by='hold-up') is not known"),
     (lambda tests, fit: rank([fit, replace(fit, provenance={"data": "others"})]), "were made from different histories"),
     (lambda tests, fit: ck.select([], tests, "uniaxial"), "there are no candidate laws"),
-    (lambda tests, fit: L2(-1.0), "-1"),
-    (lambda tests, fit: check_penalty(L2), "penalty is L2; write L2()"),
     (lambda tests, fit: ParticleSwarm(particles=1), "particles is 1; allowed are whole numbers from 2 to"),
     (lambda tests, fit: ParticleSwarm(iterations=2.5), "iterations is 2.5"),
     (lambda tests, fit: ParticleSwarm(cognitive=2.0, social=2.0), "must be more than 4 together"),

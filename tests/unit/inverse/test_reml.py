@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.residuals import life_sensitivity, orthogonal_distance
 from creepkit.inverse.settings import IdentificationSettings
@@ -124,7 +124,7 @@ def test_the_likelihood_is_that_of_contrasts_that_know_nothing_of_the_values():
     mine, textbook = [], []
     for scatter in scatters:
         linear = linear_model(values, design)
-        c = covariance(linear.residuals, scatter)[0]
+        c = CovarianceFactor.of_residuals(linear.residuals, scatter).blocks[0]
         mine.append(restricted_log_likelihood(linear, scatter))
         textbook.append(multivariate_normal(np.zeros(9), contrasts.T @ c @ contrasts).logpdf(contrasts.T @ values[0]))
     assert np.diff(mine) == pytest.approx(np.diff(textbook), rel=1e-6)
@@ -134,7 +134,7 @@ def test_the_optimum_is_generalised_least_squares():
     rng, design = np.random.default_rng(3), polynomial(20, 1, tests=2)
     values, scatter = rng.normal(size=(2, 20)), white(0.1, drift=1.0, correlation_length=0.7)
     linear = linear_model(values, design)
-    inverses = np.linalg.inv(covariance(linear.residuals, scatter))
+    inverses = np.linalg.inv(CovarianceFactor.of_residuals(linear.residuals, scatter).blocks)
     A = sum(x.T @ c @ x for x, c in zip(design, inverses, strict=True))
     b = sum(x.T @ c @ y for x, c, y in zip(design, inverses, values, strict=True))
     assert linear.solve(CovarianceFactor.of_residuals(linear.residuals, scatter)).step == pytest.approx(

@@ -1,4 +1,4 @@
-"""Local refinement: bounded least squares from one start, a robust loss, and the records of a minimum and of a penalty.
+"""Local refinement: bounded least squares from one start, a robust loss, and the record of a minimum.
 
 The trust region reflective method of scipy, with analytic Jacobians.
 """
@@ -28,14 +28,6 @@ class AdditionalResiduals(Protocol):
 
     def jacobian(self, x: Floats) -> Floats:
         """(additional, unknowns) their derivatives at x (unknowns,)."""
-        ...
-
-
-class Penalty(AdditionalResiduals, Protocol):
-    """A penalty that is added to the cost, and its representation as residuals for least squares."""
-
-    def values(self, u: Floats) -> Floats:
-        """(candidates,) - what is added to the cost; u : (candidates, parameters)."""
         ...
 
 

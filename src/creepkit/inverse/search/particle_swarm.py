@@ -42,7 +42,7 @@ class ParticleSwarm(Options, title="particle swarm", error=FitError, prefix="par
         settings for 300 x 100 (Table S1) nor what happens at the bounds: here they stop a particle, which suits optima
         on bounds.
     refined_candidates : how many of the best particles that differ are refined; 0 leaves the best as it is.
-    Which terms of a sum are needed is the question of a penalty, such as Subsets().
+    Which terms of a sum are needed is the question of penalty="subsets".
     """
 
     particles: int = option(300, "Particles.", Limits(2, MOST))

@@ -1,1 +1,1 @@
-"""Sparse laws: contributions of the terms of a sum, penalties on them, and the reduced law compared with the sum."""
+"""Sparse laws: the terms of a sum that the tests need, and the reduced law compared with the sum."""

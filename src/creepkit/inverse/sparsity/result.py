@@ -29,23 +29,17 @@ class FitStatistics:
 class Sparsity(Presentable, text="reports.inference:sparsity_text"):
     """How a sum was reduced; the terms are those of `law`, the sum.
 
-    penalty : its class; strength : None of a choice among subsets, which has none.
     kept_terms, dropped_terms : of the sum; exponents_off : exponents switched off, where BIC did not rise by it.
-    proposed_terms : that the penalty left, before the reduced law was confirmed.
-    contributions_* : {term: contribution} without penalty, with it, and after the refit of what was kept.
+    contributions, contributions_after_refit : {term: contribution} of the whole sum, and of what was kept.
     full, reduced : statistics of the sum and of the reduced law under one covariance.
     observations : measured values, N of BIC.
     """
 
     law: str
-    penalty: str
-    strength: float | None
     kept_terms: TermNames
     dropped_terms: TermNames
     exponents_off: tuple[str, ...]
-    proposed_terms: TermNames
-    contributions_without_penalty: Mapping[str, float]
-    contributions_with_penalty: Mapping[str, float]
+    contributions: Mapping[str, float]
     contributions_after_refit: Mapping[str, float]
     full: FitStatistics
     reduced: FitStatistics
@@ -76,39 +70,23 @@ class Sparsity(Presentable, text="reports.inference:sparsity_text"):
         return self.reduced.bic - self.full.bic
 
     @property
-    def confirmed(self) -> bool:
-        """Whether what the penalty proposed stood the comparison with the whole sum."""
-        return self.proposed_terms == self.kept_terms
-
-    @property
     def verdict(self) -> str:
-        """What was dropped, what that cost, and whether it was too much, in one or two sentences."""
+        """What was dropped, and what that cost, in one sentence."""
         dropped = _quoted_list([*self.dropped_terms, *(f"exponent {name}" for name in self.exponents_off)])
+        if not dropped:
+            return f"all terms of '{self.law}' are kept"
         cost = (
             f"chi-square rises by {max(self.chi_square_rise, 0.0):.1f} for {self.parameters_dropped} parameters fewer "
             f"(p = {self.p_value:.2g}) and BIC changes by {self.bic_difference:+.1f}"
         )
-        if not dropped:
-            sentence = f"all terms of '{self.law}' are kept"
-        else:
-            verb = "suffices" if len(self.kept_terms) == 1 else "suffice"
-            sentence = f"without {dropped} of '{self.law}' {cost}: {_quoted_list(self.kept_terms)} {verb}"
-        if self.confirmed:
-            return sentence
-        restored = _quoted_list([term for term in self.kept_terms if term not in self.proposed_terms])
-        return (
-            f"{sentence}. The penalty had dropped {restored} too, but without BIC is higher than that of the whole sum"
-        )
+        verb = "suffices" if len(self.kept_terms) == 1 else "suffice"
+        return f"without {dropped} of '{self.law}' {cost}: {_quoted_list(self.kept_terms)} {verb}"
 
 
 def _quoted_list(names: list[str] | TermNames) -> str:
     """'a', 'b' and 'c'."""
     quoted = [f"'{name}'" if not name.startswith("exponent ") else name for name in names]
     return quoted[0] if len(quoted) == 1 else " and ".join([", ".join(quoted[:-1]), quoted[-1]]) if quoted else ""
-
-
-LEAST_CONTRIBUTION = 0.05
-"""A term that contributes less than this is dropped."""
 
 
 TermNames = tuple[str, ...]

@@ -1,104 +1,65 @@
-"""Term selection: a sum is fitted with a penalty, terms are dropped, the rest is refitted and compared with the sum.
+"""Term selection: sets of terms of a sum are fitted to the same tests, and the one of lowest BIC is kept.
 
-Misfit and penalty together have several minima, so that the penalised fit has many starts.
+All are compared under the covariance of the whole sum, so that chi-squares can be subtracted. That covariance contains
+the correlation between frames; each frame then counts as one in BIC. Exponents that can be off are switched off where
+BIC does not rise by it.
+
+How much a term matters is its contribution over the stresses, strains and times of the tests,
+
+    c_i = [ mean_G (f_i / sum_j f_j)^2 ]^(1/2)
+
+with f_i the rate of term i and G the evaluation points: 0.5, 0.8, 1 and 1.3 times the reference stress at each time of
+each test, which is about the range of stress in a specimen. Strain is estimated from the measured outputs. A
+coefficient A_i alone does not show this: its unit depends on the exponents, and its size on all of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from scipy.special import softmax
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import through_for_law
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
+from creepkit.inverse.information_criteria import bic_penalty, determined_parameters
 from creepkit.inverse.initial_search import StartingEstimate
-from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
-from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
-from creepkit.inverse.search.multistart import distinct
+from creepkit.inverse.observation_vector import selected_frames
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import growth_per_strain, reference_end_strain, reference_stresses
+from creepkit.inverse.search.global_search import GlobalSearch
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Subsets, check_penalty
-from creepkit.inverse.sparsity.reduced_laws import ReducedLaw, ReducedLaws, TermProblem, terms_above
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity, TermNames
+from creepkit.kernels import lower
 from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor
+from creepkit.records import History, Predictor, growing_output, is_logarithmic, output_named
 
-CONTINUED_STARTS, COMPLETED_STARTS = 5, 2
-"""Starts that are refined for some steps, and how many of them to the end."""
-
-
-PRELIMINARY_STEPS = 12
-"""Steps of the first refinement."""
+EXHAUSTIVE_LIMIT = 4
+"""Terms up to which every set of them is fitted; of longer sums forward selection adds one after the other."""
 
 
-def penalised_starts(reductions: ReducedLaws) -> list[Floats]:
-    """(unknowns,) each: the optimum without penalty, the same with each term leading, and each term's own optimum."""
-    problem = reductions.problem
-    single_term_optima = [problem.embedded(single.law, single.x) for single in reductions.single_terms()]
-    return [problem.start, *problem.fraction_permutations(), *single_term_optima]
+TOLERANCES = Tolerances(max_steps=40, tolerance=1e-7)
+"""Of the fits of reduced laws."""
 
 
-def penalised_fit(problem: TermProblem, penalty: PenalisedTerms, starts: Sequence[Floats]) -> Minimum:
-    """The lowest minimum of chi-square and penalty, from starts (unknowns,): first some steps, then to the end."""
-    costs = [problem.cost(x, penalty) for x in starts]
-    order = sorted(range(len(starts)), key=lambda k: costs[k])[:CONTINUED_STARTS]
-    preliminary = sorted((problem.minimise(starts[k], penalty, PRELIMINARY_STEPS) for k in order), key=lambda m: m.cost)
-    completed = [m if m.converged else problem.minimise(m.x, penalty) for m in preliminary[:COMPLETED_STARTS]]
-    return min(completed, key=lambda m: m.cost)
-
-
-@dataclass(frozen=True, eq=False)
-class TermChoice:
-    """The terms that a penalty keeps.
-
-    contributions : of all terms under the penalty; x : (unknowns,) there.
-    strength : None of a choice among subsets; trace : of the global search, if there was one.
-    """
-
-    kept_terms: TermNames
-    contributions: Mapping[str, float]
-    x: Floats
-    strength: float | None = None
-    trace: SearchTrace | None = None
-
-
-def choose_terms(
-    reductions: ReducedLaws,
-    penalty: L2 | Subsets,
-    search: GlobalSearch | None = None,
-    progress: IterationCallback | None = None,
-) -> TermChoice:
-    """The terms that a penalty keeps.
-
-    search : a global search of the penalised cost besides the usual starts; not for subsets.
-    """
-    problem = reductions.problem
-    if isinstance(penalty, Subsets):
-        lowest = reductions.lowest_bic(penalty.EXHAUSTIVE_LIMIT)
-        x = problem.embedded(lowest.law, lowest.x)
-        return TermChoice(lowest.kept_terms, problem.contributions_at(x), x)
-    penalised_terms = PenalisedTerms.from_problem(problem.problem, penalty)
-    starts, trace = penalised_starts(reductions), None
-    if search is not None:
-        searched = problem.search_problem(penalised_terms)
-        result = search.minima(searched, progress)
-        starts += [problem.with_nuisances(minimum.x) for minimum in distinct(result.minima, searched.bounds)]
-        trace = result.trace
-    x = penalised_fit(problem, penalised_terms, starts).x
-    contributions = problem.contributions_at(x)
-    return TermChoice(terms_above(contributions), contributions, x, penalised_terms.strength, trace=trace)
-
-
-PredictorOrMapping = Predictor | Mapping[str, Predictor]
+INITIAL_FRACTION = 0.05
+"""Share of the rate with which a further term begins beside fitted ones."""
 
 
 def identify_sparse(
     law: CreepLaw,
     histories: Sequence[History],
-    using: PredictorOrMapping,
+    using: Predictor | Mapping[str, Predictor],
     *,
-    penalty: L2 | Subsets,
     search: GlobalSearch | None = None,
     through: Predictor | None = None,
     settings: IdentificationSettings | None = None,
@@ -106,89 +67,258 @@ def identify_sparse(
 ) -> Identification:
     """Identify the law of those terms of a sum that the histories need; what was dropped is recorded in `sparsity`.
 
-    The whole sum is identified without penalty first: it gives the covariance on which everything is compared. Then
-    misfit and penalty together are minimised from its optimum, from each term's own, and where `search` finds minima;
-    terms that contribute less than 5 % are dropped; what is left is identified without penalty.
-
     through : a surrogate by which terms are chosen; values and intervals are those of `using`.
     """
-    check_penalty(penalty)
-    full, reductions = identify_full(law, histories, using, through, settings, progress)
-    return identify_reduced(penalty, full, reductions, search, progress)
-
-
-def identify_reduced(
-    penalty: L2 | Subsets,
-    full: Identification,
-    reductions: ReducedLaws,
-    search: GlobalSearch | None = None,
-    progress: IterationCallback | None = None,
-) -> Identification:
-    """The same from the whole sum, identified before."""
-    choice = choose_terms(reductions, penalty, search, progress)
-    reduced = confirmed_law(reductions, choice)
-    parameter_count = len(reduced.law.params)
-    initial_nuisances = [
-        replace(nuisance, value=float(nuisance_value))
-        for nuisance, nuisance_value in zip(full.nuisances, reduced.x[parameter_count:], strict=True)
-    ]
-    assert full.predictor is not None
-    start = StartingEstimate(reduced.x[:parameter_count], initial_nuisances, full.reference)
-    fit = identify(reduced.law, full.histories, full.predictor, settings=full.settings, start=start, progress=progress)
-    record = _sparsity_record(full, fit, reductions, reduced, choice, penalty)
-    return replace(fit, search_trace=choice.trace or full.search_trace, sparsity=record)
-
-
-def identify_full(
-    law: CreepLaw,
-    histories: Sequence[History],
-    using: PredictorOrMapping,
-    through: Predictor | None,
-    settings: IdentificationSettings | None,
-    progress: IterationCallback | None,
-) -> tuple[Identification, ReducedLaws]:
-    """The whole sum identified without penalty, and its terms ready to be dropped."""
     if len(law.terms) < 2:
         raise FitError(
             f"law '{law.name}' has one term, '{next(iter(law.terms))}', and a penalty chooses among terms: "
             "identify it without penalty, or a sum of laws with it"
         )
-    full = identify(law, histories, using, settings=settings, through=through, progress=progress)
-    return full, ReducedLaws(TermProblem.from_identification(full, through_for_law(through, law)))
-
-
-def confirmed_law(reductions: ReducedLaws, choice: TermChoice) -> ReducedLaw:
-    """The reduced law, to which dropped terms come back, the largest first, until its BIC is not above the sum's."""
-    kept_terms = list(choice.kept_terms)
-    while True:
-        reduced = reductions.with_terms(kept_terms)
-        if reduced.bic <= reductions.full(reduced).bic or len(kept_terms) == len(reductions.terms):
-            return reduced
-        dropped = [label for label in reductions.terms if label not in kept_terms]
-        kept_terms.append(max(dropped, key=lambda label: choice.contributions[label]))
-
-
-def _sparsity_record(
-    full_fit: Identification,
-    fit: Identification,
-    reductions: ReducedLaws,
-    reduced: ReducedLaw,
-    choice: TermChoice,
-    penalty: L2 | Subsets,
-) -> Sparsity:
-    problem, full = reductions.problem, reductions.full(reduced)
-    return Sparsity(
-        law=problem.law.name,
-        penalty=type(penalty).__name__,
-        strength=choice.strength,
-        kept_terms=reduced.kept_terms,
-        dropped_terms=tuple(label for label in reductions.terms if label not in reduced.kept_terms),
-        exponents_off=reduced.exponents_off,
-        proposed_terms=choice.kept_terms,
-        contributions_without_penalty=problem.contributions_at(full.x),
-        contributions_with_penalty=choice.contributions,
-        contributions_after_refit=reduced.problem.contributions_at(reduced.x),
-        full=FitStatistics(full.chi_square, full.parameter_count, full.bic, full_fit.errors),
-        reduced=FitStatistics(reduced.chi_square, reduced.parameter_count, reduced.bic, fit.errors),
-        observations=problem.problem.observations.count,
+    how = {"settings": settings, "progress": progress}
+    full = identify(law, histories, using, search=search, through=through, **how)  # type: ignore[arg-type]
+    problem, screening = full.least_squares_problem, through_for_law(through, law)
+    terms = TermSets(problem if screening is None else problem.with_predictor(screening), full.x)
+    chosen, count = terms.lowest_bic(), full.u.size
+    u, e = np.split(chosen.minimum.x, [chosen.problem.parameter_count])
+    nuisances = [replace(n, value=float(value)) for n, value in zip(full.nuisances, e, strict=True)]
+    start = StartingEstimate(u, nuisances, full.reference)
+    assert full.predictor is not None
+    fit = identify(chosen.law, full.histories, full.predictor, settings=full.settings, start=start, progress=progress)
+    whole = terms.whole(chosen)
+    record = Sparsity(
+        law=law.name,
+        kept_terms=chosen.kept_terms,
+        dropped_terms=tuple(label for label in law.terms if label not in chosen.kept_terms),
+        exponents_off=chosen.exponents_off,
+        contributions=contributions(whole.problem, whole.minimum.x[:count]),
+        contributions_after_refit=contributions(chosen.problem, u),
+        full=whole.statistics(full),
+        reduced=chosen.statistics(fit),
+        observations=problem.observations.count,
     )
+    return replace(fit, search_trace=full.search_trace, sparsity=record)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedTerms:
+    """A law of some of the terms, and its minimum; exponents_off : its exponents that were switched off."""
+
+    problem: LeastSquaresProblem
+    minimum: Minimum
+    exponents_off: tuple[str, ...] = ()
+
+    @property
+    def law(self) -> CreepLaw:
+        """The law."""
+        return self.problem.law
+
+    @property
+    def kept_terms(self) -> TermNames:
+        """Its terms, in the order of the sum."""
+        return tuple(self.law.terms)
+
+    @cached_property
+    def parameter_count(self) -> int:
+        """Number of parameters of the law that change anything that was measured."""
+        return determined_parameters(self.problem.residuals(self.minimum.x), self.problem.parameter_count)
+
+    @property
+    def bic(self) -> float:
+        """BIC; its deviance is the chi-square, priors included."""
+        return 2.0 * self.minimum.cost + bic_penalty(self.parameter_count, self.problem.observations.count)
+
+    def statistics(self, fit: Identification) -> FitStatistics:
+        """Its statistics; errors are those of an identification of it."""
+        return FitStatistics(2.0 * self.minimum.cost, self.parameter_count, self.bic, fit.errors)
+
+    def without(self, exponent: str, off: float) -> FittedTerms:
+        """The same with an exponent off, fitted from here."""
+        law = self.law.fix(**{exponent: off})
+        problem, x = _of_terms(self.problem, law, self.minimum.x)
+        return FittedTerms(problem, problem.minimise(x, tolerances=TOLERANCES), (*self.exponents_off, exponent))
+
+
+class TermSets:
+    """The laws of some of the terms of a sum, each fitted once; x : (unknowns,) where the whole sum fits well."""
+
+    def __init__(self, problem: LeastSquaresProblem, x: Floats) -> None:
+        self.problem, self.x, self.terms = problem, x, tuple(problem.law.terms)
+        self._fitted: dict[TermNames, FittedTerms] = {}
+
+    def fitted(self, terms: TermNames) -> FittedTerms:
+        """The law of these terms, with as many exponents off as BIC allows, one after the other."""
+        if terms not in self._fitted:
+            best = self._best_of(terms, [self.fitted((label,)) for label in terms] if len(terms) > 1 else [])
+            while True:
+                simpler = [best.without(best.law.names[k], off) for k, off in switchable_exponents(best.law)]
+                lowest = min(simpler, key=lambda one: one.bic, default=best)
+                if lowest is best or lowest.bic > best.bic:
+                    break
+                best = lowest
+            self._fitted[terms] = best
+        return self._fitted[terms]
+
+    def whole(self, reduced: FittedTerms) -> FittedTerms:
+        """The whole sum with all its exponents; it starts from a reduced law too, above which it must not end."""
+        return self._best_of(self.terms, [reduced])
+
+    def lowest_bic(self) -> FittedTerms:
+        """The set of terms of lowest BIC, without those that cannot have it: no part fits better than the sum."""
+        best = min((self.fitted((label,)) for label in self.terms), key=lambda one: one.bic)
+        least = 2.0 * self.whole(best).minimum.cost
+        while True:
+            larger = [(*best.kept_terms, label) for label in self.terms if label not in best.kept_terms]
+            if len(self.terms) <= EXHAUSTIVE_LIMIT:
+                larger = [names for k in range(2, len(self.terms) + 1) for names in combinations(self.terms, k)]
+            ordered = [tuple(label for label in self.terms if label in names) for names in larger]
+            fitted = [self.fitted(names) for names in ordered if least + self._penalty(names) < best.bic]
+            lowest = min(fitted, key=lambda one: one.bic, default=best)
+            if lowest.bic >= best.bic:
+                return best
+            best = lowest
+
+    def _penalty(self, terms: TermNames) -> float:
+        """Of BIC, on these terms with all exponents off."""
+        law = self._law(terms)
+        return bic_penalty(len(law.params) - len(switchable_exponents(law)), self.problem.observations.count)
+
+    def _law(self, terms: TermNames) -> CreepLaw:
+        return self.problem.law if terms == self.terms else self.problem.law.only(*terms)
+
+    def _best_of(self, terms: TermNames, parts: Sequence[FittedTerms]) -> FittedTerms:
+        """The lowest minimum of these terms: from what the whole sum says of them, and from laws of some of them.
+
+        Of one term the middle of its bounds is a start too, with the rate of the whole sum.
+        """
+        problem, x = _of_terms(self.problem, self._law(terms), self.x)
+        starts, rates, law = [x], list(problem.coordinates.term_rates), problem.law
+        if len(terms) == 1:
+            centre = np.concatenate([problem.bounds.centre[: problem.parameter_count], x[problem.parameter_count :]])
+            starts.append(_with_total_rate(problem, centre, _log_total_rate(problem, x)))
+        for part in parts:
+            u, e = np.split(np.array(part.minimum.x), [part.problem.parameter_count])
+            start = np.concatenate([x[: problem.parameter_count], e])
+            start[rates] = _log_total_rate(part.problem, part.minimum.x) + np.log(INITIAL_FRACTION)
+            for k, off in switchable_exponents(law):
+                start[k] = off
+            start[[law.names.index(name) for name in part.law.names]] = u
+            starts.append(problem.bounds.clip(start))
+        minima = (problem.minimise(start, tolerances=TOLERANCES) for start in starts)
+        return FittedTerms(problem, min(minima, key=lambda minimum: minimum.cost))
+
+
+def switchable_exponents(law: CreepLaw) -> list[tuple[int, float]]:
+    """(position, value where it is off) of the parameters of linear scale that can be off within their bounds."""
+    return [
+        (k, p.off)
+        for k, p in enumerate(law.params.values())
+        if p.scale == "linear" and p.off is not None and p.bounds[0] <= p.off <= p.bounds[1]
+    ]
+
+
+def _of_terms(problem: LeastSquaresProblem, law: CreepLaw, x: Floats) -> tuple[LeastSquaresProblem, Floats]:
+    """The problem of a law of some of a problem's parameters, and x (unknowns,) for it, with the same total rate."""
+    names = problem.law.names
+    positions = [*(names.index(name) for name in law.names), *range(problem.parameter_count, x.size)]
+    reduced = problem.with_law(law)
+    return reduced, _with_total_rate(reduced, x[positions], _log_total_rate(problem, x))
+
+
+def _log_total_rate(problem: LeastSquaresProblem, x: Floats) -> float:
+    """ln of the rate of all terms at the reference point, in 1/s; x : (unknowns,)."""
+    rates = list(problem.coordinates.term_rates)
+    return float(np.logaddexp.reduce(x[rates])) if rates else 0.0
+
+
+def _with_total_rate(problem: LeastSquaresProblem, x: Floats, log_total: float) -> Floats:
+    """x (unknowns,) with all rates multiplied by one factor, so that they add up to exp(log_total) 1/s."""
+    shifted = np.array(x)
+    shifted[list(problem.coordinates.term_rates)] += log_total - _log_total_rate(problem, x)
+    return problem.bounds.clip(shifted)
+
+
+# ---- contributions ---------------------------------------------------------------------------------------------------
+
+STRESS_FACTORS = (0.5, 0.8, 1.0, 1.3)
+
+
+TIMES_PER_TEST = 16
+"""Times that are evaluated in each test."""
+
+
+MIN_STRAIN_FRACTION = 0.1
+"""Of linear growth to the end strain: least strain at a time, as smaller ones are noise or loading strain."""
+
+
+LOG_ZERO_RATE = -1e30
+"""ln of a rate of zero."""
+
+
+def contributions(problem: LeastSquaresProblem, u: Floats) -> dict[str, float]:
+    """{term: contribution} of the law of a problem over its tests, at u (parameters,)."""
+    return term_contributions(problem.coordinates, u, problem.histories, problem.predictor)
+
+
+def term_contributions(
+    coordinates: Coordinates, u: Floats, histories: Sequence[History], predictor: Predictor | None = None
+) -> dict[str, float]:
+    """{term: contribution} of a law at u (parameters,), conditioned coordinates; tests weigh alike, whatever frames."""
+    tests = [_points_of_test(history, predictor) for history in histories]
+    loaded = [points for points in tests if points.shape[1]]
+    if not loaded:
+        raise FitError("no test is ever under load: terms of a law cannot be weighed against one another")
+    weight = np.concatenate([np.full(p.shape[1], 1.0 / (len(loaded) * p.shape[1])) for p in loaded])
+    stress, strain, time, temperature = np.concatenate(loaded, axis=1)
+    law, theta = coordinates.law, coordinates.theta(u)
+    log_rates = np.empty((stress.size, len(law.terms)))
+    for k, label in enumerate(law.terms):
+        term = law.only(label)
+        states = [state.initial for state in term.states.values()]
+        columns = [theta[law.names.index(name)] for name in term.names]
+        point = (stress, strain, time, temperature, stress, stress / 3.0)
+        log_rates[:, k] = lower(term, "numpy").internal_log_rate(*point, *states, *columns)
+    shares = softmax(np.maximum(np.nan_to_num(log_rates, nan=LOG_ZERO_RATE), LOG_ZERO_RATE), axis=1)
+    return dict(zip(law.terms, np.sqrt(weight @ shares**2).tolist(), strict=True))
+
+
+def _points_of_test(history: History, predictor: Predictor | None) -> Floats:
+    """(4, points) stress, strain, time, temperature of one test, without those where it bears no load."""
+    frames = selected_frames(history, TIMES_PER_TEST)
+    time = history.times[frames]
+    strain, temperature = _strain_history(history, predictor)[frames], history.temperature_program().at(time)
+    stresses = np.multiply.outer(_stress_history(history, predictor, time), STRESS_FACTORS)
+    broadcast = (np.broadcast_to(v[:, None, None], stresses.shape) for v in (strain, time, temperature))
+    points = np.stack([stresses, *broadcast]).reshape(4, -1)
+    return np.asarray(points[:, points[0] > 0])
+
+
+def _stress_history(history: History, predictor: Predictor | None, times: Floats) -> Floats:
+    """(times, stresses) reference stresses at each time, MPa; times : (times,) s.
+
+    A bulge test has one for each level of pressure, between which it is linear; a specimen whose stress moves by
+    itself, as in relaxation, has all of its reference stresses at all times.
+    """
+    program, test_stresses = history.loading.program(), reference_stresses(history, predictor)
+    levels = np.unique(program.values[program.values > 0])
+    load = program.at(times)
+    if history.loading.quantity == "stress" and test_stresses.size == program.values.size:
+        return np.asarray(load[:, None])
+    if test_stresses.size == levels.size:
+        return np.asarray(np.interp(load, [0.0, *levels], [0.0, *np.sort(test_stresses)])[:, None])
+    return np.broadcast_to(test_stresses, (times.size, test_stresses.size))
+
+
+def _strain_history(history: History, predictor: Predictor | None) -> Floats:
+    """(frames,) - creep strain of the test, estimated from its outputs; never decreasing, never zero."""
+    times, final_strain = history.times, reference_end_strain(history, predictor)
+    lower_limit = MIN_STRAIN_FRACTION * final_strain * times / times[-1]
+    output = growing_output(history)
+    is_used = usable_frames(history, output) if output else np.zeros(times.size, bool)
+    if is_used.sum() > 1 and output_named(output, history.specimen).grows:
+        measured = np.interp(times, times[is_used], history.outputs[output][is_used])
+        start = 0.0 if is_logarithmic(output) else measured[is_used][0]
+        scale = 1.0 if is_logarithmic(output) else growth_per_strain(history, predictor)
+        lower_limit = np.maximum(lower_limit, np.minimum((measured - start) / scale, final_strain))
+    else:
+        lower_limit = final_strain * times / times[-1]
+    return np.asarray(np.maximum.accumulate(np.maximum(lower_limit, 1e-12)))

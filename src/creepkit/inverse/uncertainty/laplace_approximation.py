@@ -21,14 +21,13 @@ from creepkit.inverse.noise_model import (
     NoiseModel,
     Residuals,
     components_fixed_by_priors,
-    covariance,
 )
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, scaled_inverse
 from creepkit.language import CreepLaw, Param
 from creepkit.records import Nuisance
 
-LOG_COMPONENT_STEP = 1e-3
-"""Of the logarithm of a size, for differences of the covariance, which is smooth in it."""
+LOG_STEP = 1e-3
+"""Of the logarithm of a correlation length, for differences of the covariance, which is smooth in it."""
 
 
 MINIMUM_FREEDOM = 3.0
@@ -126,15 +125,16 @@ def _estimated_components(noise_model: NoiseModel, nuisances: Sequence[Nuisance]
 def _covariance_derivative(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> Floats:
     """Derivative of the covariances to the logarithm of one component, (tests, observations, observations)."""
 
-    def at(shift: float) -> Floats:
-        factor = float(np.exp(shift))
+    def at(factor: float) -> Floats:
         if not output:
-            return covariance(residuals, replace(noise_model, **{name: getattr(noise_model, name) * factor}))
-        return covariance(
-            residuals, noise_model.with_output(output, **{name: getattr(noise_model[output], name) * factor})
-        )
+            changed = replace(noise_model, **{name: getattr(noise_model, name) * factor})
+        else:
+            changed = noise_model.with_output(output, **{name: getattr(noise_model[output], name) * factor})
+        return CovarianceFactor.of_residuals(residuals, changed).blocks
 
-    return np.asarray((at(LOG_COMPONENT_STEP) - at(-LOG_COMPONENT_STEP)) / (2.0 * LOG_COMPONENT_STEP))
+    if name.endswith("length"):
+        return np.asarray((at(np.exp(LOG_STEP)) - at(np.exp(-LOG_STEP))) / (2.0 * LOG_STEP))
+    return 2.0 * (at(1.0) - at(0.0))  # a standard deviation
 
 
 DETERMINED_FACTOR, DETERMINED_SHARE = 10.0, 0.25
@@ -207,7 +207,8 @@ def covariance_of_values(
     plain = replace(residuals, random_effect_sensitivities=None, common_effects=None)
     solution = free.solve(CovarianceFactor.of_residuals(plain, working_noise))
     weighted = solution.weighted_jacobian
-    meat = np.einsum("tfp,tfg,tgq->pq", weighted, covariance(residuals, noise_model), weighted, optimize=True)
+    blocks = CovarianceFactor.of_residuals(residuals, noise_model).blocks
+    meat = np.einsum("tfp,tfg,tgq->pq", weighted, blocks, weighted, optimize=True)
     if residuals.common_effects is not None:
         pull = np.einsum("tfp,tfk->pk", weighted, residuals.common_effects)
         meat += pull @ pull.T
