@@ -19,7 +19,7 @@ BUDGET = {
     "cameras": 832,
     "cli": 2255,
     "core": 67,
-    "dataset": 735,
+    "dataset": 726,
     "discovery": 1373,
     "experiments": 1322,
     "exporters": 2613,
@@ -39,18 +39,18 @@ BUDGET = {
     "readers": 5839,
     "records": 2185,
     "registry": 612,
-    "reports": 5409,
-    "rupture_assessment": 1688,
-    "sampling": 1001,
-    "screening": 575,
+    "reports": 5407,
+    "rupture_assessment": 1669,
+    "sampling": 994,
+    "screening": 571,
     "specimens": 3165,
     "studies": 3037,
-    "surrogates": 1381,
+    "surrogates": 1369,
     "testing": 1785,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29457
+TESTS = 29447
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
