@@ -33,8 +33,9 @@ def histories_text(histories: Sequence[History]) -> str:
     if len(histories) == 1:
         (test,) = histories
         name, end, frames, _ = _row(test)
-        outputs = [_output_text(test, one) for one in test.outputs] or [_rate_text(test)]
-        return "\n  ".join([name, *outputs, frames.replace(" to ", " frames to ", 1), end, *_remarks(histories)])
+        lines = [_output_text(test, one) for one in test.outputs]
+        lines.append(frames.replace(" to ", " frames to ", 1) if lines else _rate_text(test))
+        return "\n  ".join([name, *lines, end, *_remarks(histories)])
     table = _table(histories)
     return "\n".join([*aligned(table.columns, table.rows), *_remarks(histories)])
 
