@@ -133,7 +133,7 @@ class Bulge(FiniteElementSpecimen):
                 f"{history.origin} has a geometry of its own ({', '.join(stated)}), which a specimen with a mesh from "
                 "files cannot follow; use one without mesh="
             )
-        piece = replace(self, observation=self.observation_of(history))
+        piece = replace(self, observation=self.observation_of(history)) if history.operator else self
         return FiniteElementSpecimen.of_test(piece, history, nuisances)
 
     @property
