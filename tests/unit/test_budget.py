@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 5839,
     "records": 2185,
     "registry": 612,
-    "reports": 5407,
+    "reports": 5388,
     "rupture_assessment": 1669,
     "sampling": 994,
     "screening": 571,
