@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from creepkit.inverse.adequacy import LARGEST_SCATTER
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.judging import SIGNIFICANCE
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
 from creepkit.inverse.observation_vector import FLOOR_NOISES, FLOOR_SHARE, MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
 from creepkit.inverse.output_transforms import LogTransform
-from creepkit.inverse.variance_components import NOISE_PRIOR_SD
+from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, NOISE_PRIOR_SD
 from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
 from creepkit.language.printing import arrhenius_exponent
 from creepkit.laws.paper import PAPER
@@ -240,8 +239,6 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
             "The noise of a reading has a log-normal prior about the noise that its test states, with a standard "
             f"deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
         )
-    if settings.loss != "linear":
-        yield f"Readings far off have less weight by the loss '{settings.loss}'."
     if settings.test_loss == "student":
         yield f"Tests far from the others have less weight by Student's distribution{cite('student')}."
     if fit.numerical_error is not None:
@@ -291,7 +288,7 @@ def _adequacy(fits: Sequence[Identification], cite: Callable[..., str]) -> Itera
     yield f"Tests contradict a law whose chi-square against {noise} has a probability below {100 * SIGNIFICANCE:g} %."
     if any(len(one.outputs) > 1 for one in judged):
         yield "It is the least of those of all outputs and of each one, times their number."
-    largest = number(math.exp(LARGEST_SCATTER), 2)
+    largest = number(math.exp(LARGEST_RATE_SCATTER), 2)
     yield f"They contradict it, too, where rates of tests scatter by more than a factor of {largest}."
     yield "So do they where a changing exponent or energy, one test, or two groups explain scatter six times better."
     if any(output.noise_source == "estimated" for one in judged for output in one.outputs):
