@@ -73,8 +73,8 @@ def command(
 ) -> None:
     """Every law is fitted to all tests at once.
 
-    Several are compared by their likelihood, as by select() in Python, unless --weights, --search, --penalty or --loss
-    ask for something else; one is identified as by identify(). JSON and plots of each, LaTeX and Python of the best,
+    Several are compared by their likelihood, as by select() in Python, unless --weights, --search or --penalty ask
+    for something else; one is identified as by identify(). JSON and plots of each, LaTeX and Python of the best,
     go to a folder.
     """
     import creepkit as ck
@@ -82,7 +82,7 @@ def command(
     from creepkit.screening.screen import CANDIDATE_LAWS
 
     search = SearchOptions().changed(how)
-    histories = selected(ck.read_histories(_without(files, compositions), reader), only)
+    histories = selected(ck.read_histories(files, reader), only)
     if up_to is not None:
         histories = _truncate_at_strain(histories, up_to)
     if law and confirm and all(is_file_name(name) for name in law):
@@ -94,7 +94,6 @@ def command(
             settings=ck.IdentificationSettings().changed(settings),
             through=through,
             dense=dense,
-            penalty=search.penalty,
             confirm="when in doubt" if confirm is None else confirm,
         )
         laws = LawChanges(temperature="none").changed({**changes, "temperature": "none"}).applied(candidates, [])
@@ -105,7 +104,7 @@ def command(
     compared = search.sums is not None or ("by" in how and len(candidates) > 1)
     if compared and not by_likelihood(search, settings):
         raise FitError(
-            "--sums and --criterion compare laws by their likelihood: leave out --weights, --search, --penalty, --loss"
+            "--sums and --criterion compare laws by their likelihood: leave out --weights, --search, --penalty"
         )
     check_identified_folder(to, candidates)
     options_of_fits: dict[str, Any] = {"compared": compared, **({} if through is None else {"through": through})}
@@ -122,15 +121,6 @@ def command(
         _confirm([ranking.best], histories, surrogate, as_json)
     if further_tests:
         tell(ranking.further_tests(), err=as_json)
-
-
-def _without(files: list[str], compositions: Path | None) -> list[str | Path]:
-    """The files; of a single folder those in it beside the table of compositions."""
-    folder = Path(files[0])
-    if compositions is None or len(files) > 1 or not folder.is_dir():
-        return list(files)
-    inside = [one for one in sorted(folder.iterdir()) if one.resolve() != compositions.resolve()]
-    return list(files) if len(inside) == len([*folder.iterdir()]) else [one for one in inside if one.is_file()]
 
 
 def _screen(

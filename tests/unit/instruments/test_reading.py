@@ -260,17 +260,13 @@ def test_a_record_in_the_zone_of_the_frames_needs_no_alignment() -> None:
         ck.imposed(record(), "D1", FRAMES)
 
 
-def test_records_are_cut_and_thinned_and_gaps_are_found() -> None:
+def test_records_are_thinned_and_gaps_are_found() -> None:
     one = record()
-    part = one.between(490.0, 600.0)
-    assert part.times[[0, -1]].tolist() == [490.0, 600.0]
     program = one.program("D1: P", 0.01)
     np.testing.assert_allclose(program.at(TIMES), LOAD.at(TIMES), atol=0.01)
     rows = np.delete(np.arange(TIMES.size), slice(1000, 1100))
     cut = InstrumentRecord("cut", TIMES[rows], {"P": Channel("P", "pressure", LOAD.at(TIMES[rows]))})
     assert cut.gaps.tolist() == [[999.0, 1100.0]]
-    with pytest.raises(HistoryError, match="no row from 5000 to 6000 s"):
-        one.between(5000.0, 6000.0)
 
 
 def test_the_error_of_the_lag_counts_where_an_output_changes() -> None:
