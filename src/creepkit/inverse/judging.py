@@ -29,7 +29,7 @@ from scipy.optimize import lsq_linear
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
 from creepkit.inverse.explanation import Explanation
-from creepkit.inverse.iterative_estimation import at_own_rates, linearised
+from creepkit.inverse.iterative_estimation import judged_at
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NEGLIGIBLE_DISCREPANCY, NoiseModel, OutputNoise, Residuals
@@ -234,10 +234,9 @@ class Judge:
 def judged_residuals_of(fit: Identification) -> JudgedResiduals | None:
     """What is left of an identification with its histories, as it was judged; None where no noise is known."""
     problem = fit.least_squares_problem
-    linear = fit.linearised or linearised(problem, fit.x, problem.residuals(fit.x))
     error = fit.numerical_error
     errors = problem.predictor.error if error is None else error.remaining
-    linear = at_own_rates(problem, linear, fit.noise_model)
+    linear = judged_at(problem, fit.linear_problem, fit.noise_model)
     return Judge(problem, fit.noise_model, errors, fit.histories).residuals(linear)
 
 
