@@ -15,7 +15,7 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 316,
-    "app": 603,
+    "app": 602,
     "cameras": 832,
     "cli": 2255,
     "core": 67,
@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1290,
     "instruments": 1222,
     "integration": 758,
-    "inverse": 10238,
+    "inverse": 10227,
     "jobs": 251,
     "kernels": 1703,
     "language": 1480,
