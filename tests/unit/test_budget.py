@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 136,
     "modules": 770,
     "quality": 1295,
-    "readers": 5839,
+    "readers": 5838,
     "records": 2185,
     "registry": 612,
     "reports": 5385,
