@@ -24,7 +24,7 @@ BUDGET = {
     "experiments": 1322,
     "exporters": 2613,
     "extraction": 1291,
-    "fem": 1415,
+    "fem": 1414,
     "files": 1351,
     "forecasts": 1290,
     "instruments": 1222,
