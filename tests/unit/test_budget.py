@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 5838,
     "records": 2185,
     "registry": 612,
-    "reports": 5385,
+    "reports": 5384,
     "rupture_assessment": 1669,
     "sampling": 994,
     "screening": 571,
