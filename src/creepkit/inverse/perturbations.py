@@ -29,7 +29,7 @@ from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
@@ -158,7 +158,7 @@ def of_lengths_and_instruments(
 def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> list[Perturbation]:
     """Those of instruments that no nuisance parameter common to tests stands for; x : (unknowns,)."""
     shared = {n.kind for n in problem.settings.nuisances if n.scope != "test"}
-    histories, tests = problem.histories, range(len(problem.histories))
+    histories = problem.histories
     loaded, moved = ([h.loading.quantity in quantities for h in histories] for quantities in (LOADS, IMPOSED))
     errors = list[Perturbation]()
 
@@ -178,7 +178,8 @@ def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedPro
         return np.asarray(linear.residuals.offset_sensitivity * slope * size)
 
     if "temperature" not in shared:
-        slopes = [log_rate_per_kelvin(problem, x, *test_conditions(problem, test)) for test in tests]
+        conditions = [reference_condition(h, problem.predictor) for h in histories]
+        slopes = [log_rate_per_kelvin(problem, x, *condition) for condition in conditions]
         add("temperature", sizes["temperature"], "K", of_rates(slopes, sizes["temperature"]))
     if any(loaded):
         exponents = [stress_exponent(problem, x, test) if known else 0.0 for test, known in enumerate(loaded)]
@@ -329,16 +330,8 @@ def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, stress: float, 
 
 def stress_exponent(problem: LeastSquaresProblem, x: Floats, test: int) -> float:
     """Of the law at the condition of a test by its position; x : (unknowns,)."""
-    return float(local_exponent(problem.coordinates, *test_conditions(problem, test))(x[: problem.parameter_count]))
-
-
-def test_conditions(problem: LeastSquaresProblem, test: int) -> tuple[float, float]:
-    """MPa and K, of a test by its position."""
-    history = problem.histories[test]
-    stresses = reference_stresses(history, problem.predictor)
-    positive = stresses[stresses > 0]
-    stress = float(np.median(positive)) if positive.size else problem.coordinates.reference.stress
-    return stress, float(np.mean(history.temperature_program().values))
+    at = reference_condition(problem.histories[test], problem.predictor)
+    return float(local_exponent(problem.coordinates, *at)(x[: problem.parameter_count]))
 
 
 # ---- what each does to the values ------------------------------------------------------------------------------------

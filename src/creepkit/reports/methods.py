@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from creepkit.inverse.adequacy import LARGEST_SCATTER
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.judging import SIGNIFICANCE
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
 from creepkit.inverse.observation_vector import FLOOR_NOISES, FLOOR_SHARE, MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
 from creepkit.inverse.output_transforms import LogTransform
-from creepkit.inverse.variance_components import NOISE_PRIOR_SD
+from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, NOISE_PRIOR_SD
 from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
 from creepkit.language.printing import arrhenius_exponent
 from creepkit.laws.paper import PAPER
@@ -307,9 +306,9 @@ def _adequacy(fits: Sequence[Identification], cite: Callable[..., str]) -> Itera
         "A law is not contradicted by the tests where its chi-square, against noise that was stated or estimated "
         f"without the law, has a probability of at least {100 * SIGNIFICANCE:g} %"
         f"{several if any(len(one.outputs) > 1 for one in judged) else ''}, the rates of tests scatter by less than a "
-        f"factor of {number(math.exp(LARGEST_SCATTER), 2)}, and nothing else explains that scatter six times better: a "
-        "stress exponent that changes with stress, an activation energy that changes with temperature, one test, or "
-        "two groups of tests. Degrees of freedom are the readings less the unknowns that they determine."
+        f"factor of {number(math.exp(LARGEST_RATE_SCATTER), 2)}, and nothing else explains that scatter six times "
+        "better: a stress exponent that changes with stress, an activation energy that changes with temperature, one "
+        "test, or two groups of tests. Degrees of freedom are the readings less the unknowns that they determine."
     )
     if any(output.noise_source == "estimated" for one in judged for output in one.outputs):
         yield (
