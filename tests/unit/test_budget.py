@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1290,
     "instruments": 1222,
     "integration": 758,
-    "inverse": 10227,
+    "inverse": 10266,
     "jobs": 251,
     "kernels": 1703,
     "language": 1480,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29447
+TESTS = 29467
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
