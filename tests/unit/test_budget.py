@@ -15,7 +15,7 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 316,
-    "app": 603,
+    "app": 602,
     "cameras": 832,
     "cli": 2255,
     "core": 67,
@@ -24,33 +24,33 @@ BUDGET = {
     "experiments": 1322,
     "exporters": 2613,
     "extraction": 1291,
-    "fem": 1415,
+    "fem": 1414,
     "files": 1351,
     "forecasts": 1290,
     "instruments": 1222,
     "integration": 758,
-    "inverse": 10238,
+    "inverse": 10266,
     "jobs": 251,
     "kernels": 1703,
     "language": 1480,
     "laws": 136,
     "modules": 770,
     "quality": 1295,
-    "readers": 5839,
+    "readers": 5838,
     "records": 2185,
     "registry": 612,
-    "reports": 5404,
+    "reports": 5384,
     "rupture_assessment": 1669,
     "sampling": 994,
     "screening": 571,
     "specimens": 3165,
     "studies": 3037,
-    "surrogates": 1369,
+    "surrogates": 1359,
     "testing": 1785,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29447
+TESTS = 29467
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -22,9 +22,8 @@ from creepkit.arrays import Floats
 from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
-from creepkit.inverse.perturbations import LOADS, log_rate_per_kelvin, of_lengths_and_instruments, stress_exponent
+from creepkit.inverse.perturbations import of_lengths_and_instruments, rate_slopes
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.residuals import life_sensitivity
 from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values, positive_semidefinite
 from creepkit.inverse.uncertainty.rate_scatter import redundant_rates
@@ -84,14 +83,8 @@ def _usual_scatter(
     own = any(n.kind == "temperature" for n in settings.nuisances)
     kelvin, load = 0.0 if own else included.get("temperature", 0.0), included.get("load", 0.0)
     redundant = redundant_rates(linear, noise_model) if noise_model.rate > 0 else 0
-    added = []
-    for test in range(tests):
-        per_kelvin = log_rate_per_kelvin(problem, x, *reference_condition(problem.histories[test], problem.predictor))
-        loaded = problem.histories[test].loading.quantity in LOADS
-        exponent = stress_exponent(problem, x, test) if loaded else 0.0
-        usual = (per_kelvin * kelvin) ** 2 + (exponent * load) ** 2
-        added.append(_mean_square(usual, noise_model.rate, redundant))
-    return np.asarray(np.sqrt(added))
+    usual = rate_slopes(problem, x) ** 2 @ np.array([kelvin, load]) ** 2
+    return np.sqrt([_mean_square(float(one), noise_model.rate, redundant) for one in usual])
 
 
 def _mean_square(usual: float, estimate: float, redundant: int) -> float:

@@ -439,7 +439,7 @@ def _with_half_widths(
     spread = np.sqrt(np.maximum(np.diag(part), 0.0))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         at = constants(point)
-        jacobian = gradient(lambda points: np.array([[*constants(p).values()] for p in points]), point, spread, 1e-3)
+        jacobian = gradient(lambda p: np.array([*constants(p).values()]), point, spread, 1e-3)
         variance = np.einsum("mi,ij,mj->m", jacobian, part, jacobian)
         half = stdtrit(freedom.of(jacobian), 0.5 + 0.5 * level) * np.sqrt(np.maximum(variance, 0.0))
     return {name: (value, float(h)) for (name, value), h in zip(at.items(), half, strict=True)}
