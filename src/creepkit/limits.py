@@ -79,7 +79,7 @@ BAND_DRAWS = Limits(50, 100_000)
 
 
 DRAWS_OF_POSTERIOR = Limits(10, 2_000)
-WORKERS, THREADS = Limits(1, 1024), Limits(1, 1024)
+WORKERS = Limits(1, 1024)
 EPOCHS, BATCH = Limits(1, 1_000_000), Limits(1, 1_000_000)
 HIDDEN, LAYERS = Limits(1, 4096), Limits(1, 32)
 LEARNING_RATE, LARGEST_GRADIENT = numbers(0, 1, above=True), numbers(0, 1e12, above=True)

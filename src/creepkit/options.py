@@ -13,7 +13,7 @@ their names, as in --end-h and end_h.
 - Python: `@takes_options(IdentificationSettings)` gives a function with `**changes` the fields as keyword arguments in
   its signature; `settings.changed(changes)` is the record with them.
 - Command line: a parameter `settings: Annotated[dict[str, Any], IdentificationSettings]` of a command becomes an option
-  for each field, and holds the values that were given, ready for `changed()` (see cli.generated_options).
+  for each field, and holds the values that were given, ready for `changed()` (see cli.command_options).
 - Studies: `table_of(IdentificationSettings, base)` is a strict model with a key for each field, None where it is
   missing; `values_of_table()` gives the values that a table states, in creepkit's units, ready for `changed()`.
 """

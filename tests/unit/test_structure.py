@@ -84,9 +84,6 @@ ALLOWED = {
 }
 
 
-"""They read everything of a specimen from its record."""
-
-
 ORDINARY_WORDS = {"point", "shape", "strain", "stress"}
 """Of the names below, those that mean other things as well."""
 

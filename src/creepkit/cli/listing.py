@@ -11,7 +11,9 @@ from creepkit.errors import PluginError, nearest
 from creepkit.reports import catalogue
 from creepkit.reports.terminal import print_json
 
-KINDS = {"laws": "law", "specimens": "specimen", "targets": "", "readers": "", "cameras": "", "plugins": ""}
+KINDS = dict.fromkeys(
+    ("laws", "specimens", "targets", "readers", "cameras", "instruments", "temperature-forms", "plugins")
+)
 
 
 def command(
@@ -27,7 +29,7 @@ def command(
     chosen = kind.lower() if kind.lower() in KINDS else f"{kind.lower()}s"
     if chosen not in KINDS:
         raise PluginError(f"there is no list of '{kind}'; {nearest(kind, KINDS)}")
-    if name is not None and not KINDS[chosen]:
+    if name is not None and chosen not in ("laws", "specimens"):
         raise PluginError(f"only a law or a specimen is shown in full; leave '{name}' out")
     if chosen == "plugins":
         plugins, conflicts = registry.plugins(), registry.conflicts()
@@ -36,7 +38,7 @@ def command(
         else:
             catalogue.print_plugins(plugins, conflicts)
         return
-    found = getattr(registry, "exporters" if chosen == "targets" else chosen)()
+    found = getattr(registry, "exporters" if chosen == "targets" else chosen.replace("-", "_"))()
     single = None
     if name is not None:  # which says what is wrong with it
         single = found[(registry.law(name) if chosen == "laws" else registry.specimen(name)).name]

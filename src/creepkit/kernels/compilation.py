@@ -3,7 +3,7 @@
 Each generated module has a folder of its own, named after the hash of all that it was made from, with the source, the
 machine code and the SHA-256 of both. A folder is built under a temporary name and renamed into place whole; one whose
 checksums do not match is built anew. What is checked is what is executed. Machine code from the cache is executed, so
-nothing that another user owns or can write to is used (files.cache_folders); without a folder, modules run from memory.
+nothing that another user owns or can write to is used (files.writing); without a folder, modules run from memory.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Folders with an index, one line a test, beside the frames: in one file for all tests, or in one file a test.
 
-A laboratory's layout is a declaration of IndexedFolder; INDEXED_TABLE and INDEXED_FILES are two of them. Columns of
+A laboratory's layout is a declaration of IndexedFolderReader; INDEXED_TABLE and INDEXED_FILES are two of them. Columns of
 the index that are no condition known by name become labels, as they stand; one that is nearly such a name is an error.
 """
 

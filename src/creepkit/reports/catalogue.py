@@ -33,7 +33,11 @@ def print_registered(kind: str, found: Mapping[str, Registered[Any]], conflicts:
 def registered_to_json(entry: Registered[Any]) -> dict[str, Any]:
     """What is known of an exporter, a reader or a camera format."""
     value = entry.value
-    return {"name": value.name, "title": getattr(value, "title", ""), "provenance": str(entry.provenance)}
+    return {
+        "name": getattr(value, "name", None) or value.__name__,
+        "title": getattr(value, "title", ""),
+        "provenance": str(entry.provenance),
+    }
 
 
 def print_law(entry: Registered[CreepLaw]) -> None:

@@ -118,7 +118,7 @@ NOT_FOR_AN_EXPORT = [
         for name in ("inverse.checked_identification", "inverse", "reports", "readers", "cameras", "instruments")
     ),
     *(f"creepkit.{name}" for name in ("specimens", "fem", "integration", "core", "surrogates", "dataset", "jobs")),
-    *(f"creepkit.exporters.{name}" for name in ("abaqus_cards", "c", "javascript", "mathml", "mfront")),
+    *(f"creepkit.exporters.{name}" for name in ("material_cards", "c", "javascript", "mfront")),
     *(f"creepkit.laws.{name}" for name in ("combined", "hyperbolic_sine", "time_hardening")),
     *("creepkit_classic", "creepkit_damage", "creepkit_logarithmic", "creepkit_specimens"),
 ]

@@ -1,4 +1,4 @@
-"""Garofalo's law with an activation energy: rate = A sinh(alpha s)^n exp(-Q/(R T)).
+"""The law of Sellars and McTegart, Garofalo's with an activation energy: rate = A sinh(alpha s)^n exp(-Q/(R T)).
 
 A power law of exponent n where alpha s is below 0.8 or so, an exponential of stress above 1.2. A is the coefficient
 that papers print, at infinite temperature; `creepkit.law("hyperbolic-sine").times(arrhenius())` is the same law about
@@ -11,9 +11,9 @@ from creepkit.language import GAS_CONSTANT, CreepLaw, Param, hookimpl, parameter
 
 A, alpha, n, Q = parameters("A alpha n Q")
 
-GAROFALO = CreepLaw(
-    name="garofalo",
-    title="Garofalo's hyperbolic sine with an activation energy",
+SELLARS_MCTEGART = CreepLaw(
+    name="sellars-mctegart",
+    title="Sellars-McTegart: hyperbolic sine with an activation energy",
     terms={"hyperbolic sine": A * sympy.sinh(alpha * stress) ** n * sympy.exp(-Q / (GAS_CONSTANT * temperature))},
     params={
         A: Param("rate coefficient", unit="1/s", bounds=(1e-20, 1e60), scale="log", off=0.0),
@@ -30,4 +30,4 @@ TYPICAL = {"A": 277984.0, "alpha": 0.02447, "n": 6.41, "Q": 6500.0 * GAS_CONSTAN
 
 @hookimpl
 def creepkit_laws() -> list[CreepLaw]:
-    return [GAROFALO]
+    return [SELLARS_MCTEGART]
