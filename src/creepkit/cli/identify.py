@@ -94,7 +94,6 @@ def command(
             settings=ck.IdentificationSettings().changed(settings),
             through=through,
             dense=dense,
-            penalty=search.penalty,
             confirm="when in doubt" if confirm is None else confirm,
         )
         laws = LawChanges(temperature="none").changed({**changes, "temperature": "none"}).applied(candidates, [])

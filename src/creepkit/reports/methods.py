@@ -263,7 +263,10 @@ def _sparsity(found: GroupFindings) -> Iterator[str]:
     """How terms of a sum were selected, where they were."""
     for sparse in [one.sparsity for one in found.fits if one.sparsity is not None][:1]:
         dropped = f"left out were {listed([*sparse.dropped_terms])}" if sparse.dropped_terms else "all terms stayed"
-        selected = "were selected by BIC among its subsets"
+        by = (
+            "BIC among its subsets" if sparse.penalty == "subsets" else "the L2 norm of their contributions, and by BIC"
+        )
+        selected = f"were selected by {by}"
         yield f"The terms of the sum {printable(sparse.law, 120)} {selected}; {dropped}."
 
 
