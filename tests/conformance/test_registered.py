@@ -10,7 +10,7 @@ OFFERED = {
     "law": (KNOWN.laws(), "norton strain-hardening time-hardening hyperbolic-sine drifting-exponent combined"),
     "specimen": (KNOWN.specimens(), "uniaxial relaxation point bulge"),
     "reader": (KNOWN.readers(), "csv indexed-table indexed-files"),
-    "camera format": (KNOWN.cameras(), "vic-3d vic-3d-mat dice matchid zeiss pyvale pyvale-binary"),
+    "camera format": (KNOWN.cameras(), "vic-3d vic-3d-mat dice matchid zeiss pyvale"),
     "exporter": (KNOWN.exporters(), "python c mfront latex"),
     "instrument format": (KNOWN.instruments(), "plate-of-dimples table"),
     "temperature form": (KNOWN.temperature_forms(), "arrhenius linear"),

@@ -169,11 +169,6 @@ def pyvale(frame: Dome | None = None) -> bytes:
     return _table(",", [f'"{name}"' for name in PYVALE_COLUMNS], columns).replace("nan", "-nan(ind)").encode()
 
 
-def pyvale_binary(frame: Dome | None = None) -> bytes:
-    """The same as packed rows."""
-    return _pyvale_rows(frame or dome()).tobytes()
-
-
 SAMPLES: dict[str, tuple[Callable[[], bytes], str, str]] = {
     "vic_3d": (vic_3d, "plate-0012_0.csv", "vic-3d"),
     "vic_3d_decimal_commas": (vic_3d_decimal_commas, "plate-0012_0.csv", "vic-3d"),
@@ -184,6 +179,5 @@ SAMPLES: dict[str, tuple[Callable[[], bytes], str, str]] = {
     "matchid_2023": (matchid_2023, "plate_0012.csv", "matchid"),
     "zeiss": (zeiss, "plate_12_nodemap.txt", "zeiss"),
     "pyvale": (pyvale, "dic_results_0012.csv", "pyvale"),
-    "pyvale_binary": (pyvale_binary, "dic_results_0012.dic3d", "pyvale-binary"),
 }
 """{sample: (content, name of a file, name of the format)}, each one frame of the same dome."""

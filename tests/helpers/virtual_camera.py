@@ -30,7 +30,7 @@ class Dimple:
 
 
 def simulated_dimple(
-    frames=60, rest=25, interval=150.0, pressure=8.0, A=1e-16, n=5.2, law="norton", temperature=1050.0, refinement=1.0
+    frames=60, rest=25, interval=150.0, pressure=8.0, A=1e-16, n=5.2, law="norton", refinement=1.0, specimen=None
 ) -> Dimple:
     """A dimple that creeps after `rest` frames without load.
 
@@ -38,9 +38,9 @@ def simulated_dimple(
     """
     loaded = interval * np.arange(1, frames - rest + 1)
     run = ck.simulate(
-        law, ck.specimen("bulge").replace(refinement=refinement), dict(A=A, n=n), times=loaded,
+        law, specimen or ck.specimen("bulge").replace(refinement=refinement), dict(A=A, n=n), times=loaded,
         loading=ck.PressureJump(pressure, pressure, 1e9),
-        temperature=temperature, elastic=ck.Elastic(E=1e5, nu=0.3),
+        temperature=1050.0, elastic=ck.Elastic(E=1e5, nu=0.3),
     )  # fmt: skip
     top = run.test.model.top
     rise = run._at(np.asarray(run.simulation.displacements[:, top, 1]), loaded)
@@ -113,13 +113,12 @@ class VirtualCamera:
             displacements = moved - points + noise @ tilt.T
             lost = gone | (self._blobs(random, side, 0.5 * self.lost) if self.lost else False)
             valid = ~lost[chosen]
-            sigma = np.where(valid, 0.02, -1.0)
             return CameraFrame(
-                points[chosen], np.where(valid[:, None], displacements[chosen], 0.0), valid, sigma, float(times[index]),
+                points[chosen], np.where(valid[:, None], displacements[chosen], 0.0), valid, float(times[index]),
                 f"{name}, frame {index}",
             )  # fmt: skip
 
-        return Frames(name, times, frame, "virtual camera", "pixel")
+        return Frames(name, times, frame, "virtual camera")
 
     def _innovation(self, index: int, side: int) -> Floats:
         """Noise that begins in a frame; those before the first count from 10^6 on."""

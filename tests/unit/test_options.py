@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from typer.testing import CliRunner
 
 import creepkit as ck
-from creepkit.cli.command_options import CheckedCommand, checked
+from creepkit.cli.command_options import checked
 from creepkit.errors import FitError
 from creepkit.limits import Limits
 from creepkit.options import CELSIUS, HOURS, Options, option, options_of, table_of, takes_options, values_of_table
@@ -35,7 +35,7 @@ def answered(record: type[Options], *words: str) -> Any:
     """The values with which a command that has the options of a record is called; else its message."""
     app, given = typer.Typer(), {}
 
-    @app.command(cls=CheckedCommand)
+    @app.command()
     @checked
     def command(settings: Annotated[dict[str, Any], record]) -> None:  # type: ignore[valid-type]
         given.update(settings)

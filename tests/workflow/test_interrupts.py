@@ -67,9 +67,9 @@ def started(process, folder):
     ("command", "sent", "said"),
     [
         ("identify", signal.SIGINT, "interrupted; files that were there are whole, and the same command starts"),
-        ("screen", signal.SIGTERM, "interrupted by SIGTERM; alloys that are finished are kept, and the same command"),
+        ("screen", signal.SIGTERM, "interrupted by SIGTERM; what is finished is kept, and the same command"),
         ("run", signal.SIGINT, "interrupted; kept: quality; the same command goes on with identification"),
-        ("train", signal.SIGHUP, "interrupted by SIGHUP; the last checkpoint is kept, and the same command goes on"),
+        ("train", signal.SIGHUP, "interrupted by SIGHUP; what is finished is kept, and the same command goes on"),
     ],
 )
 def test_an_interrupt_is_one_line_and_leaves_nothing_half_written(command, sent, said, tmp_path):

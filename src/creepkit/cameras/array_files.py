@@ -1,4 +1,4 @@
-"""Frames in binary files: arrays of MATLAB (versions 5 and 7.3), and packed rows without a head.
+"""Frames in arrays of MATLAB (versions 5 and 7.3).
 
 Names and shapes are read first; of a frame its own columns alone are unpacked. Real arrays of numbers count; objects,
 cells, functions and text in such a file are passed over.
@@ -112,24 +112,3 @@ def _hdf5_table(path: Path) -> ArrayTable:
     with open_hdf5(path, FRAME_FILE) as file:
         numeric = {n: one for n, one in file.items() if isinstance(one, h5py.Dataset) and one.dtype.kind in "fiu"}
         return ArrayTable(path, {name: one.shape[::-1] for name, one in numeric.items() if one.size}, load)
-
-
-def row_table(path: Path, layout: Sequence[tuple[str, str]]) -> ArrayTable:
-    """The columns of a file of packed rows without a head."""
-    row = np.dtype([(name, "u1" if kind == "?" else kind) for name, kind in layout])
-    content = read_bytes(path, FRAME_FILE)
-    if not content or len(content) % row.itemsize:
-        raise HistoryError(
-            f"{path}: {len(content)} bytes are no whole number of rows of {row.itemsize} bytes; is it cut off, or of "
-            "another version?"
-        )
-    rows = np.frombuffer(content, dtype=row)
-    for name, kind in layout:
-        if kind == "?" and (rows[name] > 1).any():
-            k = int(np.argmax(rows[name] > 1))
-            raise HistoryError(
-                f"{path}, point {k + 1}: '{name}' is {rows[name][k]}, where 0 or 1 must be; it is of another layout"
-            )
-    return ArrayTable(
-        path, {name: rows.shape for name, _ in layout}, lambda names: {name: rows[name] for name in names}
-    )

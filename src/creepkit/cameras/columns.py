@@ -16,7 +16,6 @@ from creepkit.records.camera_format import (
     DISPLACEMENTS,
     LENGTH_UNITS,
     LENGTHS_ALLOWED,
-    OUT_OF_PLANE,
     PIXELS,
     TIME_UNITS,
     TIMES_ALLOWED,
@@ -26,10 +25,6 @@ from creepkit.records.camera_format import (
 
 LARGEST_LENGTH = 1e6
 """mm; what is beyond is no coordinate of a test piece."""
-
-
-CONFIDENCE = "confidence"
-OPTIONAL = (CONFIDENCE, "time")
 
 
 COMPARISONS: dict[str, Callable[[Floats, float], Bools]] = {
@@ -47,7 +42,6 @@ class FrameColumns:
 
     names : of all columns as the head writes them. positions : of the columns that are read. quantities : {quantity:
     place in positions}. factors : {quantity: mm or s in its unit}. rules : (place, comparison, value) of lost points.
-    confidence_unit : of the column confidence.
     """
 
     names: tuple[str, ...]
@@ -55,7 +49,6 @@ class FrameColumns:
     quantities: Mapping[str, int]
     factors: Mapping[str, float]
     rules: tuple[tuple[int, str, float], ...]
-    confidence_unit: str
 
     def name_of(self, place: int) -> str:
         """The name of a column that is read."""
@@ -80,7 +73,7 @@ def _places(version: Mapping[str, Sequence[str]], names: Sequence[str], any_case
 
 def _lacking(version: Mapping[str, Sequence[str]], places: Places) -> str:
     """The first quantity without a column of those that a frame needs; "" for none."""
-    return next((one for one in version if one not in OPTIONAL and one not in places), "")
+    return next((one for one in version if one != "time" and one not in places), "")
 
 
 def fits(format: CameraFormat, names: Sequence[str], any_case: bool = False) -> bool:
@@ -91,14 +84,6 @@ def fits(format: CameraFormat, names: Sequence[str], any_case: bool = False) -> 
 def count_of_columns(format: CameraFormat, names: Sequence[str]) -> int:
     """How many of the format's columns are among these names, by the letter, of its nearest version."""
     return max(len(_places(version, names, any_case=False)) for version in format.versions)
-
-
-def looks_planar(format: CameraFormat, names: Sequence[str]) -> bool:
-    """Whether these are the columns of a two-dimensional correlation of the system."""
-    if format.planar and len(_places({name: (name,) for name in format.planar}, names, False)) == len(format.planar):
-        return True
-    found = [_places(version, names, any_case=False) for version in format.versions if "w" in version]
-    return any({"u", "v"} <= {*one} and not {"z", "w"} & {*one} for one in found)
 
 
 def columns_of(format: CameraFormat, names: Sequence[str], location: str) -> FrameColumns:
@@ -130,14 +115,12 @@ def columns_of(format: CameraFormat, names: Sequence[str], location: str) -> Fra
         for k, _ in _places({"": (rule.column,)}, names).get("", ()):
             read += [k] if k not in read else []
             rules.append((read.index(k), rule.comparison, rule.value))
-    lengths = {quantity: k for quantity, (k, _) in wanted.items() if quantity != CONFIDENCE}
     return FrameColumns(
         tuple(names),
         tuple(read),
         {quantity: read.index(k) for quantity, (k, _) in wanted.items()},
-        {one: _factor(format, one, stated[one], quoted(names[k]), location) for one, k in lengths.items()},
+        {one: _factor(format, one, stated[one], quoted(names[k]), location) for one, (k, _) in wanted.items()},
         tuple(rules),
-        stated.get(CONFIDENCE, "") or (format.confidence_unit if CONFIDENCE in wanted else ""),
     )
 
 
@@ -163,9 +146,7 @@ def frame_of(
             lengths[:, :3] -= lengths[:, 3:]
     valid &= ~np.isnan(lengths).any(axis=1)
     _check_sizes(columns, values, lengths, valid, locate)
-    column = columns.quantities.get(CONFIDENCE)
-    confidence = np.full(len(values), np.nan) if column is None else values[:, column]
-    return CameraFrame(lengths[:, :3], lengths[:, 3:], valid, confidence, time, source)
+    return CameraFrame(lengths[:, :3], lengths[:, 3:], valid, time, source)
 
 
 def time_in(columns: FrameColumns, values: Floats) -> float:
@@ -194,11 +175,6 @@ def _check_sizes(
 
 
 def _missing(format: CameraFormat, names: Sequence[str], quantity: str, spellings: Sequence[str]) -> str:
-    if quantity in OUT_OF_PLANE and looks_planar(format, names):
-        return (
-            "a table of a two-dimensional correlation, which has no out-of-plane displacement; export a stereo one, or "
-            "name x, y, u and v alone with format=ck.CameraFormat(...)"
-        )
     listed = ", ".join(quoted(name) for name in names[:20])
     return f"missing column '{spellings[0]}' ({quantity} of {format}); found: {quoted(listed, 400)}"
 

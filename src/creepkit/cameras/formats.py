@@ -10,17 +10,14 @@ axes=(1, -1, -1))`.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from creepkit.hookspecs import hookimpl
 from creepkit.records.camera_format import CameraFormat
 
 VIC_3D = CameraFormat(
     "vic-3d",
     "VIC-3D, CSV of one or several images",
-    {"x": "X", "y": "Y", "z": "Z", "u": "U", "v": "V", "w": "W", "confidence": "sigma"},
+    {"x": "X", "y": "Y", "z": "Z", "u": "U", "v": "V", "w": "W"},
     lost={"sigma": "< 0"},
-    confidence_unit="pixel",
     patterns=("*.csv", "*.txt"),
 )
 
@@ -28,10 +25,9 @@ VIC_3D = CameraFormat(
 VIC_3D_MAT = CameraFormat(
     "vic-3d-mat",
     "VIC-3D, arrays of MATLAB, lengths in mm",
-    {"x": "X", "y": "Y", "z": "Z", "u": "U", "v": "V", "w": "W", "confidence": "sigma"},
+    {"x": "X", "y": "Y", "z": "Z", "u": "U", "v": "V", "w": "W"},
     unit="mm",
     lost={"sigma": "< 0"},
-    confidence_unit="pixel",
     patterns=("*.mat",),
 )
 
@@ -46,13 +42,10 @@ DICE = CameraFormat(
         "u": "MODEL_DISPLACEMENT_X",
         "v": "MODEL_DISPLACEMENT_Y",
         "w": "MODEL_DISPLACEMENT_Z",
-        "confidence": "SIGMA",
     },
     unit="mm",
     lost={"SIGMA": "< 0"},
-    confidence_unit="pixel",
     patterns=("*.txt", "*.csv"),
-    planar=("DISPLACEMENT_X", "DISPLACEMENT_Y"),
 )
 
 
@@ -67,7 +60,6 @@ MATCHID = CameraFormat(
             "u": ("disp.Horizontal Displacement U", "disp.Horizontal Displacement: U"),
             "v": ("disp.Vertical Displacement V", "disp.Vertical Displacement: V"),
             "w": ("disp.Out-Of-Plane: W", "disp.Out-Of-Plane Displacement W"),
-            "confidence": ("stats.Sigma", "corr.Sigma"),
         },
         {
             "image_x": "x_pic",
@@ -103,34 +95,15 @@ PYVALE = CameraFormat(
         "u": "stereo_disp_u",
         "v": "stereo_disp_v",
         "w": "stereo_disp_w",
-        "confidence": "stereo_cost_zncc",
     },
     deformed=True,
     axes=(1, -1, -1),
     lost={"converged": "== 0", "stereo_converged": "== 0"},
-    confidence_unit="ZNCC",
     patterns=("*.csv", "*.txt"),
 )
 
 
-PYVALE_BINARY = replace(
-    PYVALE,
-    name="pyvale-binary",
-    title="pyvale, binary *.dic3d of a stereo correlation",
-    patterns=("*.dic3d",),
-    layout=(
-        *(("subset_x", "<i4"), ("subset_y", "<i4"), ("disp_u", "<f8"), ("disp_v", "<f8"), ("disp_mag", "<f8")),
-        *(("converged", "?"), ("cost_zncc", "<f8"), ("ftol", "<f8"), ("xtol", "<f8"), ("num_iter", "<i4")),
-        *((f"stereo_disp_{name}_px", "<f8") for name in ("u", "v", "mag")),
-        *((f"stereo_disp_{name}_mm", "<f8") for name in "uvw"),
-        *((f"stereo_{name}_mm", "<f8") for name in "xyz"),
-        *(("stereo_converged", "?"), ("stereo_cost_zncc", "<f8"), ("stereo_ftol", "<f8"), ("stereo_xtol", "<f8")),
-        *(("stereo_num_iter", "<i4"), ("epi_dist_px", "<f8")),
-    ),
-)
-
-
-FORMATS = (VIC_3D, VIC_3D_MAT, DICE, MATCHID, ZEISS, PYVALE, PYVALE_BINARY)
+FORMATS = (VIC_3D, VIC_3D_MAT, DICE, MATCHID, ZEISS, PYVALE)
 
 
 @hookimpl

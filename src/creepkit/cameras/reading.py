@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from glob import glob
@@ -16,13 +15,13 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.cameras.array_files import ArrayTable
 from creepkit.cameras.columns import FrameColumns, columns_of, frame_of, time_in
 from creepkit.cameras.recognition import Recognised, recognise
-from creepkit.cameras.sequences import in_order, last_number, missing_numbers, skeleton
-from creepkit.cameras.text_files import FRAME_FILE, HEAD_BYTES, FrameText, frame_ranges, head_bytes, table_in_range
+from creepkit.cameras.sequences import in_order, missing_numbers, skeleton
+from creepkit.cameras.text_files import FRAME_FILE, HEAD_BYTES, FrameText, frame_ranges, table_in_range
 from creepkit.cameras.time_files import read_frame_times
 from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.reading import read_bytes
 from creepkit.records import CameraFrame, Frames
-from creepkit.records.camera_format import TIME_UNITS, CameraFormat
+from creepkit.records.camera_format import CameraFormat
 from creepkit.records.plugin_calls import call_on_file
 
 MOST_LOOKED_AT = 10
@@ -72,7 +71,7 @@ def _frames(
         return frame_of(first.format, own, values, table.location, float(moments[index]), tables.source(index))
 
     missing = missing_numbers(files) if len(files) > 1 else ()
-    return Frames(name, moments, frame, first.format.title, columns.confidence_unit, missing)
+    return Frames(name, moments, frame, first.format.title, missing)
 
 
 def frame_files(path: FramePath, formats: Sequence[CameraFormat], format: FormatLike = None) -> list[Path]:
@@ -234,27 +233,14 @@ def _check_increasing(name: str, moments: Floats) -> None:
 
 
 def _times_of_files(format: CameraFormat, tables: _Tables, columns: FrameColumns) -> Floats:
-    """(frames,) s, as columns, heads or names of the files say; NaN where any does not."""
-    read = _time_source(format, tables, columns)
-    if read is None:
-        return np.full(len(tables), np.nan)
-    moments = np.array([read(index) for index in range(len(tables))])
+    """(frames,) s, as a column of the files says; NaN where any does not."""
+    moments = np.full(len(tables), np.nan)
+    if "time" in columns.quantities:
+        moments = np.array([_time_in_column(format, tables, index) for index in range(len(tables))])
     if np.isnan(moments).any():
         return np.full(len(tables), np.nan)
     _check_increasing(tables.place, moments)
     return moments
-
-
-def _time_source(format: CameraFormat, tables: _Tables, columns: FrameColumns) -> Callable[[int], float] | None:
-    if "time" in columns.quantities:
-        return lambda index: _time_in_column(format, tables, index)
-    if not format.time or len(tables.ranges) > 1:
-        return None
-    source, key, unit = format.time
-    factor = TIME_UNITS[unit]
-    if source == "head":
-        return lambda index: factor * _number_above(tables, index, key)
-    return lambda index: factor * last_number(Path(tables.source(index)).name)
 
 
 def _time_in_column(format: CameraFormat, tables: _Tables, index: int) -> float:
@@ -264,14 +250,4 @@ def _time_in_column(format: CameraFormat, tables: _Tables, index: int) -> float:
         own = columns_of(format, table.names, tables.source(index))
         return time_in(own, table.numbers(own.positions))
     except HistoryError:
-        return float("nan")
-
-
-def _number_above(tables: _Tables, index: int, key: str) -> float:
-    """The number of a line `key: value` above the columns; NaN where there is none."""
-    try:
-        text = head_bytes(Path(tables.source(index))).decode("utf-8", errors="replace")
-        found = re.search(rf"^[#*; \t]*{re.escape(key)}[ \t]*:[ \t]*(\S+)", text, re.IGNORECASE | re.MULTILINE)
-        return float("nan") if found is None else float(found[1])
-    except (HistoryError, ValueError):
         return float("nan")

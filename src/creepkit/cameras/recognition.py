@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatch
 from pathlib import Path
 
-from creepkit.cameras.array_files import ArrayTable, is_matlab, matlab_table, row_table
-from creepkit.cameras.columns import columns_of, count_of_columns, fits, looks_planar
+from creepkit.cameras.array_files import ArrayTable, is_matlab, matlab_table
+from creepkit.cameras.columns import columns_of, count_of_columns, fits
 from creepkit.cameras.text_files import FRAME_FILE, FrameText, TextHead, candidate_heads, head_bytes, table_in_file
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.reading import read_bytes
@@ -36,7 +35,7 @@ class Recognised:
         """The table of this or another file of the same sequence, or of text its beginning."""
         if self.is_text:
             return table_in_file(path, lambda content: self._head_in(content, path), beginning=beginning)
-        return row_table(path, self.format.layout) if self.format.layout else matlab_table(path)
+        return matlab_table(path)
 
     def _head_in(self, content: bytes, path: Path) -> TextHead:
         heads = candidate_heads(content)
@@ -64,17 +63,13 @@ def recognise(path: Path, formats: Sequence[CameraFormat], chosen: bool) -> Reco
     beginning = read_bytes(path, FRAME_FILE, first=32)
     if not beginning:
         raise HistoryError(f"{path}: the file is empty; a frame is a table of points")
-    packed = [one for one in formats if one.layout and (chosen or _named_like(path, one))]
-    if packed:
-        names = tuple(name for name, _ in packed[0].layout)
-        return Recognised(_only(str(path), packed), path, _head_of_arrays(names), chosen)
     if is_matlab(beginning):
         formats = [one for one in formats if chosen or is_for_matlab(one)]
-        heads = [_head_of_arrays(matlab_table(path).names)]
+        heads = [TextHead(b"", 0, 0, "", tuple(matlab_table(path).names))]
     elif path.suffix.lower() == ".mat":
         raise HistoryError(f"{path}: does not begin as a MATLAB file of arrays (version 5 or 7.3) does; is it damaged?")
     else:
-        formats = [one for one in formats if chosen or not (one.layout or is_for_matlab(one))]
+        formats = [one for one in formats if chosen or not is_for_matlab(one)]
         heads = list(candidate_heads(head_bytes(path)))
     for any_case in (False, True) if chosen else (False,):
         for head in heads:
@@ -84,17 +79,9 @@ def recognise(path: Path, formats: Sequence[CameraFormat], chosen: bool) -> Reco
     raise _unknown(path, heads, formats, chosen)
 
 
-def _head_of_arrays(names: Sequence[str]) -> TextHead:
-    return TextHead(b"", 0, 0, "", tuple(names))
-
-
 def is_for_matlab(format: CameraFormat) -> bool:
     """Whether a format is one of files of MATLAB alone."""
     return all(pattern.endswith(".mat") for pattern in format.patterns)
-
-
-def _named_like(path: Path, format: CameraFormat) -> bool:
-    return any(fnmatch(path.name.lower(), pattern.lower()) for pattern in format.patterns)
 
 
 def _only(place: str, accepting: Sequence[CameraFormat]) -> CameraFormat:
@@ -106,12 +93,6 @@ def _only(place: str, accepting: Sequence[CameraFormat]) -> CameraFormat:
 
 def _unknown(path: Path, heads: Sequence[TextHead], formats: Sequence[CameraFormat], chosen: bool) -> HistoryError:
     """What is said of a file that no format fits: the column that it lacks where it has most of one."""
-    planar = next((head for head in heads if any(looks_planar(one, head.names) for one in formats)), None)
-    if planar is not None:
-        return HistoryError(
-            f"{planar.location(path)}: a table of a two-dimensional correlation, which has no out-of-plane "
-            "displacement; export a stereo one, or name x, y, u and v alone with format=ck.CameraFormat(...)"
-        )
     scored = [(count_of_columns(one, head.names), head, one) for head in heads for one in formats]
     count, head, format = max(scored, key=lambda entry: entry[0], default=(0, None, None))
     if head is not None and format is not None and count >= (1 if chosen else FEWEST_NAMES):

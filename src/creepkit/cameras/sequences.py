@@ -14,9 +14,6 @@ from creepkit.errors import HistoryError
 _DIGITS = re.compile(r"(\d+)")
 
 
-_DECIMALS = re.compile(r"\d+(?:\.\d+)?", re.ASCII)
-
-
 MOST_SEQUENCES = 4
 
 
@@ -28,13 +25,6 @@ def skeleton(name: str) -> str:
 def numbers_in(name: str) -> tuple[int, ...]:
     """The numbers in a file's name."""
     return tuple(int(digits) for digits in _DIGITS.findall(name))
-
-
-def last_number(name: str) -> float:
-    """The last number in a file's name without its ending, with its decimals: 12.5 of `t_12.5.csv`; NaN without one."""
-    stem, _, ending = name.rpartition(".")
-    found = _DECIMALS.findall(name if not stem or ending.isdigit() else stem)
-    return float(found[-1]) if found else math.nan
 
 
 def in_order(files: Sequence[Path]) -> list[Path]:

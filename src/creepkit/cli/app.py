@@ -61,30 +61,24 @@ COMMANDS = {name: sentence for stage in STAGES.values() for name, sentence in st
 ALIASES = {"fit": "identify"}
 
 
-KEPT_WHEN_INTERRUPTED = {
-    "run": "stages that are finished are kept, and the same command goes on with the others",
-    "identify --by": "alloys that are finished are kept, and the same command goes on with the others",
-    "surrogate generate": "shards that are finished are kept, and the same command goes on with the others",
-    "surrogate train": "the last checkpoint is kept, and the same command goes on from there",
-    "surrogate sweep": "what is trained and the last checkpoint are kept, and the same command goes on from there",
-}
-"""Half a sentence of each command that goes on where it was."""
+GOES_ON = "what is finished is kept, and the same command goes on with the rest"
+"""Of commands that go on where they were when they are interrupted: run, surrogate, and identify with --by."""
 
 
 def built(name: str) -> Any:
     """The command of this name, with its options made of the records that it takes."""
-    from creepkit.cli.command_options import CheckedCommand, checked
+    from creepkit.cli.command_options import checked
 
     module = importlib.import_module(f"creepkit.cli.{name.replace('list', 'listing')}")
     app = typer.Typer(rich_markup_mode=None)
     functions = getattr(module, "COMMANDS", None)
     if functions is None:
         help = f"{COMMANDS[name]}\n\n{inspect.cleandoc(module.command.__doc__)}"
-        app.command(name, cls=getattr(module, "Command", CheckedCommand), help=help)(checked(module.command))
+        app.command(name, cls=getattr(module, "Command", None), help=help)(checked(module.command))
     else:
         group = typer.Typer(rich_markup_mode=None, no_args_is_help=True, help=COMMANDS[name])
         for one, function in functions.items():
-            group.command(one, cls=CheckedCommand)(checked(function))
+            group.command(one)(checked(function))
         app.add_typer(group, name=name)
     return typer.main.get_group(app).commands[name]
 
@@ -117,11 +111,9 @@ class CommandGroup(TyperGroup):
         try:
             yield
         except KeyboardInterrupt as error:
-            words = [word for word in sys.argv[1:] if not word.startswith("-")][:2]
             name = (ctx.invoked_subcommand if ctx is not None else "") or ""
-            long = next((key for key in (" ".join(words), name) if key in KEPT_WHEN_INTERRUPTED), name)
-            long = f"{name} --by" if name == "identify" and "--by" in sys.argv else long
-            say(interrupted_sentence(name, str(error) or KEPT_WHEN_INTERRUPTED.get(long, "")))
+            goes_on = name in ("run", "surrogate") or (name == "identify" and "--by" in sys.argv)
+            say(interrupted_sentence(name, str(error) or GOES_ON * goes_on))
             raise typer.Exit(exit_code_of_signal()) from None
         except Exception as error:
             if debug or _is_of_the_command_line(error) or isinstance(error, BrokenPipeError):

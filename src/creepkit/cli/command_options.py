@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import typer
-from typer.core import TyperCommand
 
 from creepkit.errors import CreepkitError, quoted
 from creepkit.files.writing import check_folder_target, check_target, overwriting
@@ -131,34 +130,6 @@ def _default(one: Option) -> Any:
     return inspect.Parameter.empty if one.default is inspect.Parameter.empty else None
 
 
-class CheckedCommand(TyperCommand):
-    """A command that refuses, in one sentence, options given twice and empty values: click takes the last of two."""
-
-    def make_parser(self, ctx: Any) -> Any:
-        """Return the parser of click with these checks."""
-        parser: Any = super().make_parser(ctx)
-        parse = parser.parse_args
-
-        def parsed(args: list[str]) -> Any:
-            values, rest, order = parse(args)
-            seen = set()
-            for option in order:
-                if option.param_type_name != "option" or option.is_flag or option.count:
-                    continue
-                name = max(option.opts, key=len)
-                if option.name in seen and not option.multiple:
-                    raise CreepkitError(f"{name} is given twice; keep one of them")
-                seen.add(option.name)
-                given = values.get(option.name)
-                for text in given if isinstance(given, list | tuple) else (given,):
-                    if isinstance(text, str) and not text.strip():
-                        raise CreepkitError(f"{name} is empty; give a value, or leave the option out")
-            return values, rest, order
-
-        parser.parse_args = parsed
-        return parser
-
-
 # ---- text forms ------------------------------------------------------------------------------------------------------
 
 
@@ -203,8 +174,13 @@ NEXT_NAME = re.compile(r",(?=\s*\w[\w.-]*\s*=)")
 """The comma before another NAME=VALUE."""
 
 
-def _by_name(parse: Callable[[str], Any], texts: Sequence[str], *, nested: bool = False) -> dict[str, Any]:
-    """{name: value} from texts NAME=VALUE or A=VALUE,B=VALUE; nested : {group: {name: value}} from GROUP.NAME=VALUE."""
+def _by_name(
+    parse: Callable[[str], Any], texts: Sequence[str], *, nested: bool = False, several: bool = False
+) -> dict[str, Any]:
+    """{name: value} from texts NAME=VALUE or A=VALUE,B=VALUE; nested : {group: {name: value}} from GROUP.NAME=VALUE.
+
+    several : values of a name with commas between them; one that is given again has further values.
+    """
     values: dict[str, Any] = {}
     for text in (part for whole in texts for part in NEXT_NAME.split(whole)):
         name, value = pair(text)
@@ -212,18 +188,9 @@ def _by_name(parse: Callable[[str], Any], texts: Sequence[str], *, nested: bool 
         if nested and not dot:
             raise ValueError(text)
         inner = values.setdefault(group, {}) if nested else values
-        if key in inner:
+        if key in inner and not several:
             raise CreepkitError(f"{name} is given twice; keep one of them")
-        inner[key] = parse(value)
-    return values
-
-
-def _lists_by_name(parse: Callable[[str], Any], texts: Sequence[str]) -> dict[str, tuple[Any, ...]]:
-    """{name: values} from texts NAME=VALUE,...; a name that is given again has further values."""
-    values: dict[str, tuple[Any, ...]] = {}
-    for text in texts:
-        name, listed = pair(text)
-        values[name] = (*values.get(name, ()), *_listed(parse, listed))
+        inner[key] = (*inner.get(key, ()), *_listed(parse, value)) if several else parse(value)
     return values
 
 
@@ -271,47 +238,13 @@ def text_form(hint: Any) -> TextForm:
     if origin is tuple and parts == (float, float):
         return TextForm("LOW:HIGH", _range)
     if _is_mapping(hint):
-        inner = get_args(parts[1])
-        if get_origin(parts[1]) is not None and not _is_mapping(parts[1]) and inner != (float, float):
-            item = text_form(inner[0])
-            parse = functools.partial(_lists_by_name, item.parse)
-            return TextForm(f"NAME={item.metavar},...", parse, several=True)
-        item = text_form(inner[1] if _is_mapping(parts[1]) else parts[1])
-        nested = _is_mapping(parts[1])
-        metavar = f"{'GROUP.' if nested else ''}NAME={item.metavar}"
-        return TextForm(metavar, functools.partial(_by_name, item.parse, nested=nested), several=True)
+        value, nested = parts[1], _is_mapping(parts[1])
+        several = get_origin(value) is not None and not nested and get_args(value) != (float, float)
+        item = text_form(get_args(value)[1] if nested else get_args(value)[0] if several else value)
+        metavar = f"{'GROUP.' * nested}NAME={item.metavar}{',...' * several}"
+        parse = functools.partial(_by_name, item.parse, nested=nested, several=several)
+        return TextForm(metavar, parse, several=True)
     raise TypeError(f"no option is made of {hint}; give its text form in SPECIAL")
-
-
-def _nuisances(texts: Sequence[str]) -> Any:
-    from creepkit.inverse.settings import default_nuisances
-
-    without = [kind.strip() for kind, _, value in (text.partition("=") for text in texts) if value.strip() == "none"]
-    return default_nuisances(*(_nuisance(t) for t in texts if t.partition("=")[2].strip() != "none"), without=without)
-
-
-NUISANCE_SYNTAX = "KIND[=MEAN[:SD]][@START][ for TESTS]"
-"""KIND=none leaves a default out; TESTS is test, alloy or all, or names with commas between them, which share one."""
-
-
-def _nuisance(text: str) -> Any:
-    """One nuisance, from text of NUISANCE_SYNTAX, such as "temperature step=0:30@8250 for all"."""
-    from creepkit.records import Nuisance
-
-    definition, _, whose = text.partition(" for ")
-    definition, _, start = definition.partition("@")
-    kind, _, numbers = definition.partition("=")
-    mean, _, sd = numbers.partition(":")
-    tests = tuple(name.strip() for name in whose.split(",") if name.strip())
-    scope: Any = tests[0] if tests in (("test",), ("alloy",), ("all",)) else "all" if tests else "test"
-    return Nuisance(
-        kind.strip(),
-        scope,
-        mean=parsed_number(mean or "0"),
-        sd=parsed_number(sd) if sd else None,
-        start=parsed_number(start or "0"),
-        tests=() if tests == (scope,) else tests,
-    )
 
 
 def steps(texts: Sequence[str]) -> tuple[tuple[float, float], ...]:
@@ -348,10 +281,11 @@ SPECIAL: dict[Any, TextForm] = {
 def _forms_of_records() -> dict[Any, TextForm]:
     """Those of records, which are imported for the commands that take them alone."""
     from creepkit.records import Nuisance, Predictor
+    from creepkit.studies.arguments import NUISANCE_SYNTAX, nuisances_of_texts
 
     return {
         Predictor: TextForm("NAME", _surrogate),
-        tuple[Nuisance, ...]: TextForm(NUISANCE_SYNTAX, _nuisances, several=True),
+        tuple[Nuisance, ...]: TextForm(NUISANCE_SYNTAX, nuisances_of_texts, several=True),
     }
 
 

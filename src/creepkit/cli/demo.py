@@ -38,14 +38,9 @@ PLANTED_BULGE = EXAMPLE_DATA / "planted_bulge_test"
 HEADINGS = {
     MEASURED: "MEASURED: nine creep curves of CMSX-6 at 980 °C, thinned; six tests ruptured, three were stopped\n"
     "(Federal Institute for Materials Research and Testing, doi 10.5281/zenodo.13937986, CC BY 4.0)",
-    PLANTED: "SIMULATED: nine creep curves with noise, 750 to 850 °C",
     PLANTED_BULGE: "\nSIMULATED: a dimple with camera noise, at two pressures; laws by finite elements",
 }
 """What is said before the study of each."""
-
-
-DAMAGE_LAWS = {"mpc-omega", "kachanov-rabotnov"}
-"""Of the measured curves; they are those of plugins."""
 
 
 FOLDERS = {"curves": PLANTED, "bulge": PLANTED_BULGE, "ruptures": MEASURED}
@@ -66,14 +61,8 @@ def command(
     if data:
         _write_data(to)
         return
-    import creepkit as ck
-    from creepkit.registry.plugin_registry import MORE_LAWS
-
     started = time.perf_counter()
     studies = {to / "creep_curves": MEASURED, to / "bulge_test": PLANTED_BULGE}
-    if not DAMAGE_LAWS <= {*ck.available("laws")}:
-        tell(f"simulated creep curves in the place of measured ones, which need laws of damage; {MORE_LAWS}")
-        studies[to / "creep_curves"] = PLANTED
     results = [_run(source, folder) for folder, source in studies.items()]
     tell(f"time: {time.perf_counter() - started:.0f} s")
     tell(f"results, the best law of each as LaTeX and Python, and the study files' locks: {to}")

@@ -82,7 +82,7 @@ def command(
     from creepkit.screening.screen import CANDIDATE_LAWS
 
     search = SearchOptions().changed(how)
-    histories = selected(ck.read_histories(_without(files, compositions), reader), only)
+    histories = selected(ck.read_histories(files, reader), only)
     if up_to is not None:
         histories = _truncate_at_strain(histories, up_to)
     if law and confirm and all(is_file_name(name) for name in law):
@@ -121,15 +121,6 @@ def command(
         _confirm([ranking.best], histories, surrogate, as_json)
     if further_tests:
         tell(ranking.further_tests(), err=as_json)
-
-
-def _without(files: list[str], compositions: Path | None) -> list[str | Path]:
-    """The files; of a single folder those in it beside the table of compositions."""
-    folder = Path(files[0])
-    if compositions is None or len(files) > 1 or not folder.is_dir():
-        return list(files)
-    inside = [one for one in sorted(folder.iterdir()) if one.resolve() != compositions.resolve()]
-    return list(files) if len(inside) == len([*folder.iterdir()]) else [one for one in inside if one.is_file()]
 
 
 def _screen(

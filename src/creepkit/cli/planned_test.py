@@ -11,8 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from typer.core import TyperCommand
+
 from creepkit.api.options import PlannedTestOptions, elastic_of
-from creepkit.cli.command_options import CheckedCommand, pair, steps
+from creepkit.cli.command_options import pair, steps
 from creepkit.cli.shared import DEFAULT_SPECIMEN
 from creepkit.errors import SolveError
 from creepkit.forecasts.planned_tests import (
@@ -40,7 +42,7 @@ LOAD_TEXT = re.compile(r"([0-9.]+:)?[+-]?[0-9.]+([eE][+-]?[0-9]+)?")
 """The value of a load: a number, or SECONDS:NUMBER."""
 
 
-class Command(CheckedCommand):
+class Command(TyperCommand):
     """A command that takes the loads and lengths of any specimen as options, beside its own."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

@@ -52,7 +52,6 @@ def command(
     import creepkit as ck
     from creepkit.quality import remark_flags
     from creepkit.readers.questions import merged
-    from creepkit.readers.reading import summarise_tables
     from creepkit.reports import histories as report
 
     if len(files) == 1 and files[0].suffix.lower() in (".h5", ".hdf5") and reader is None:
@@ -71,21 +70,18 @@ def command(
         for path in put_questions(read, input if is_terminal else None):
             tell_written(path)
     found, unread = _readable_tests(files, reader, ignored)
-    general = {str(path) for path in files if path.is_file() and reader in (None, "csv", "xlsx")}
-    sources = {history.source.partition(" (")[0] for history in found}
-    tables = [table for path in sorted(general & sources) for table in summarise_tables(Path(path), ignored)]
     framed = [history for history in found if history.outputs]
     quality = ck.check_data_quality(framed, activation_energy=activation_energy)
     remarked = tuple(remark_flags([history for history in found if not history.outputs]))
     quality = replace(quality, flags=(*quality.flags, *remarked), tests=len(found if remarked else framed))
     if as_json:
-        document = {**report.histories_to_json(found, tables), "quality": report.data_quality_to_json(quality)}
+        document = {**report.histories_to_json(found), "quality": report.data_quality_to_json(quality)}
         print_json({**document, "not read": [str(error) for error in unread]} if unread else document)
     else:
         without = len(found) - len(framed)
         counted = f"{without} test{'' if without == 1 else 's'} without frames" if without else ""
         flags = str(quality) if framed or remarked else ""
-        tell("\n".join(filter(None, (report.tables_text(tables), report.histories_text(found), counted, flags))))
+        tell("\n".join(filter(None, (report.histories_text(found), counted, flags))))
     if to is not None:
         for path in _write(found, to):
             tell_written(path, err=as_json)

@@ -12,7 +12,7 @@ from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import PAPER_SPECIMEN, Json, Seed
 from creepkit.errors import DatasetError, SolveError
 from creepkit.jobs.worker_pools import ParallelExecution
-from creepkit.limits import SAMPLES, SECONDS, THREADS
+from creepkit.limits import SAMPLES, SECONDS
 from creepkit.options import Option
 from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell, tell_written
 from creepkit.surrogates.parameter_gru import NetworkSizes, ParameterGru, Training
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 DataSet = Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit surrogate generate wrote.")]
 Device = Annotated[str, Option(help="auto (a GPU where there is one), cpu or cuda.")]
-Threads = Annotated[int | None, Option(help="Of torch; one is quickest on a busy machine.", limits=THREADS)]
 Specimen = Annotated[str, Option(help="Any specimen that says how its tests are loaded.")]
 
 
@@ -85,7 +84,6 @@ def train(
     training: Annotated[dict[str, Any], Training],
     seed: Seed = 0,
     device: Device = "auto",
-    threads: Threads = None,
     plots: Annotated[
         Path | None, typer.Option(help="Folder for pictures; by default beside the file."), OutputPath("folder")
     ] = None,
@@ -100,7 +98,6 @@ def train(
     from creepkit.dataset.storage import read_dataset
     from creepkit.reports.surrogate import write_surrogate_figures
 
-    _set_threads(threads)
     recipe, samples = _recipe(network, training), read_dataset(data, accepted_only=True)
     with ProgressBar() as progress:
         model = ck.train(samples, recipe, to=to, seed=seed, device=device, progress=progress.tick)
@@ -128,7 +125,6 @@ def sweep(
     ],
     seed: Seed = 0,
     device: Device = "auto",
-    threads: Threads = None,
     as_json: Json = False,
 ) -> None:
     """Train networks of several sizes, by default 1, 2 and 3 layers of 64 and 128 units, for 100 epochs.
@@ -139,7 +135,6 @@ def sweep(
     from creepkit.reports.surrogate import size_study_rows
     from creepkit.surrogates.training import size_study
 
-    _set_threads(threads)
     recipe = _recipe(network, {"epochs": 100, **training})
     asked = NetworkSizes(**{"layers": (1, 2, 3), "hidden": (64, 128), **sizes})
     with ProgressBar() as progress:
@@ -176,13 +171,6 @@ def reduce(
 
 
 COMMANDS = {"generate": generate, "train": train, "sweep": sweep, "reduce": reduce}
-
-
-def _set_threads(threads: int | None) -> None:
-    if threads is not None:
-        import torch
-
-        torch.set_num_threads(threads)
 
 
 def _recipe(network: dict[str, Any], training: dict[str, Any]) -> ParameterGru:

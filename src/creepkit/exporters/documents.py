@@ -13,7 +13,6 @@ import html
 import html.entities
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import mpmath
@@ -31,7 +30,7 @@ from creepkit.exporters.law_description import (
 from creepkit.exporters.unit_conversion import ConvertedValues, convert_values
 from creepkit.hookspecs import hookimpl
 from creepkit.language.law import CreepLaw
-from creepkit.language.printing import ArrheniusExponent, LatexLawPrinter, arrhenius_exponent, latex_equations
+from creepkit.language.printing import ArrheniusExponent, LatexLawPrinter, ReadableSums, latex_equations
 from creepkit.language.symbols import GAS_CONSTANT, mean_stress, principal_stress, strain, stress, temperature, time
 from creepkit.records import Exporter, LawWithValues
 
@@ -62,13 +61,13 @@ class LatexExporter:
         law, converted_values, printer = source.law, convert_values(source), LatexLawPrinter(source.law)
         comments_text = (source.title, *source.notes, *(f"Source: {reference}" for reference in law.references))
         lines = comment_lines(comments_text, "%")
+        lines += [f"% R = {GAS_CONSTANT} J/(mol K)"] if law.uses(temperature) else []
         lines += equations_in_latex(law, printer)
         lines += [rf"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
         lines += _value_table(source, converted_values, printer)
         lines += (
             [] if source.units.is_native else [f"In this table, {latex_escaped(converted_values.reference_sentence)}."]
         )
-        lines += _arrhenius_equations(law, converted_values, printer)
         return "\n".join(lines) + "\n"
 
 
@@ -123,68 +122,6 @@ def _upright_unit(text: str) -> str:
     if numerator == "1" and re.fullmatch(r"\w+", denominator):
         return rf"\mathrm{{{latex_escaped(denominator)}}}^{{-1}}"
     return rf"\mathrm{{{latex_escaped(text)}}}".replace(" ", r"\,")
-
-
-# ---- Arrhenius' law without a reference temperature ----------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _ArrheniusTerm:
-    """A term as coefficient x Arrhenius factors x rest."""
-
-    coefficient: sympy.Symbol
-    factors: tuple[ArrheniusExponent, ...]
-    rest: sympy.Expr
-
-
-def _arrhenius_term(law: CreepLaw, term: sympy.Expr) -> _ArrheniusTerm | None:
-    """Take a term apart; None when it has no Arrhenius factor or not exactly one rate coefficient."""
-    factors = sympy.Mul.make_args(term)
-    coefficients = [f for f in factors if f in law.params and law.params[f].scale == "log"]
-    exponents = [a for f in factors if isinstance(f, sympy.exp) for a in sympy.Add.make_args(f.args[0])]
-    activations = {exponent: arrhenius_exponent(exponent) for exponent in exponents}
-    arrhenius_factors = tuple(activation for activation in activations.values() if activation)
-    if len(coefficients) != 1 or not arrhenius_factors:
-        return None
-    others = [f for f in factors if f not in coefficients and not isinstance(f, sympy.exp)]
-    remaining = [exponent for exponent, activation in activations.items() if not activation]
-    return _ArrheniusTerm(coefficients[0], arrhenius_factors, sympy.Mul(*others, sympy.exp(sympy.Add(*remaining))))
-
-
-def _arrhenius_equations(law: CreepLaw, converted_values: ConvertedValues, printer: LatexLawPrinter) -> list[str]:
-    """The law with A_inf exp(-Q/(R T)) in place of A exp[-(Q/R)(1/T - 1/T_ref)], and the value of every A_inf."""
-    parts = {term: _arrhenius_term(law, term) for term in law.terms.values()}
-    if not any(parts.values()):
-        return []
-    right = [_term_without_reference(part, printer) if part else printer.doprint(term) for term, part in parts.items()]
-    rows = _equation_rows(r"\dot{\varepsilon}_{cr}", right)
-    rows += [_coefficient_at_infinity(law, part, converted_values, printer) for part in parts.values() if part]
-    return [f"% The same without a reference temperature, R = {GAS_CONSTANT} J/(mol K):", *_align_environment(rows)]
-
-
-def _term_without_reference(part: _ArrheniusTerm, printer: LatexLawPrinter) -> str:
-    """A_inf times the rest times exp(-Q/(R T))."""
-    rest = "" if part.rest == 1 else printer.doprint(part.rest) + " "
-    factors = " ".join(rf"\exp\!\left[-\frac{{{printer.doprint(f.Q)}}}{{R T}}\right]" for f in part.factors)
-    return f"{_infinity_symbol(printer.doprint(part.coefficient))} {rest}{factors}"
-
-
-def _coefficient_at_infinity(
-    law: CreepLaw, part: _ArrheniusTerm, converted_values: ConvertedValues, printer: LatexLawPrinter
-) -> str:
-    """A_inf = A exp[Q/(R T_ref)] and its number, which may lie far outside double range."""
-    name = printer.doprint(part.coefficient)
-    fractions = [rf"\frac{{{printer.doprint(f.Q)}}}{{R \cdot {f.T_ref:g}\,\mathrm{{K}}}}" for f in part.factors]
-    coefficient = mpmath.mpf(converted_values.values[part.coefficient.name])
-    for factor in part.factors:
-        energy = factor.Q.xreplace({s: sympy.Float(converted_values.values[s.name]) for s in law.params})
-        coefficient *= mpmath.exp(mpmath.mpf(float(energy)) / (GAS_CONSTANT * factor.T_ref))
-    value_text = f"{latex_number(coefficient)} \\; {_upright_unit(converted_values.units[part.coefficient.name])}"
-    return rf"{_infinity_symbol(name)} &= {name} \exp\!\left[{' + '.join(fractions)}\right] = {value_text}"
-
-
-def _infinity_symbol(name: str) -> str:
-    return rf"{name[:-1]},\infty}}" if re.search(r"_\{[^{}]*\}$", name) else rf"{name}_{{\infty}}"
 
 
 class MarkdownExporter:
@@ -280,7 +217,7 @@ class Exponential(sympy.Function):  # type: ignore[misc]
     """exp, which sympy's printer takes for a denominator where its exponent is negative."""
 
 
-class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
+class MathmlPrinter(ReadableSums, MathMLPresentationPrinter):  # type: ignore[misc]
     """Print with numeric characters instead of names, symbols of the point as in papers, Arrhenius factors as such."""
 
     def __init__(self) -> None:
@@ -308,22 +245,19 @@ class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
         return super()._print_Symbol(sym, style)
 
     def _print_Exponential(self, expr: Any) -> Any:
-        activations = {exponent: arrhenius_exponent(exponent) for exponent in sympy.Add.make_args(expr.args[0])}
-        factors = [self._arrhenius(activation) for activation in activations.values() if activation]
-        rest = sympy.Add(*(part for part, found in activations.items() if not found))
+        factors, rest = self._factors(expr.args[0])
         if rest != 0:
             factors.append(self._exponential(self._print(rest)))
         return self._node("mrow", *factors)
 
-    def _arrhenius(self, activation: ArrheniusExponent) -> Any:
+    def _arrhenius_factor(self, activation: ArrheniusExponent) -> Any:
         """exp[-(Q/R)(1/T - 1/T_ref)]."""
-        is_negative = activation.Q.could_extract_minus_sign()
-        energy = self._node("mfrac", self._print(-activation.Q if is_negative else activation.Q), self._leaf("mi", "R"))
+        energy = self._node("mfrac", self._print(activation.energy), self._leaf("mi", "R"))
         reference = self._node("mrow", self._leaf("mn", f"{activation.T_ref:g}"), self._leaf("mtext", "\u00a0K"))
         warm, at_reference = (self._node("mfrac", self._leaf("mn", "1"), T) for T in (self._leaf("mi", "T"), reference))
         opening, minus, closing = (self._leaf("mo", sign) for sign in "(−)")
         difference = self._node("mrow", opening, warm, minus, at_reference, closing)
-        sign = [] if is_negative else [self._leaf("mo", "−")]
+        sign = [self._leaf("mo", "−")] if activation.sign else []
         return self._exponential(self._node("mrow", *sign, energy, difference))
 
     def _exponential(self, argument: Any) -> Any:

@@ -14,7 +14,7 @@ from creepkit.errors import FitError, HistoryError
 from creepkit.extraction.domes import Centers, find_domes, place_centers
 from creepkit.extraction.extraction import Extraction, FieldMap, PlateMotion
 from creepkit.extraction.frame_checks import FrameFlags, frames_at_rest, motion_reasons, residual_reasons
-from creepkit.extraction.noise import NOISE_FRAMES, ErrorFields, NoiseEstimate, estimate_noise, smooth_free, whole
+from creepkit.extraction.noise import NOISE_FRAMES, ErrorFields, estimate_noise, smooth_free, whole
 from creepkit.extraction.plate import RigidMotions, rigid_motions
 from creepkit.extraction.series import PointSeries, ReferencePlate, SeriesOfFrames, read_series, reference_plate
 from creepkit.records import Frames, Specimen, SurfaceObservation, SurfacePoints, SurfaceRegion
@@ -25,6 +25,11 @@ FEWEST_CLAMPED_POINTS = 30
 
 FEWEST_SHARE = 0.5
 """Share of the usual number of points below which a frame is not used."""
+
+
+LARGEST_RISE, SMALLEST_RISE = 0.03, 2e-3
+"""Of the height of the middle, and mm: by how much the plate may rise towards a test piece where it is held and flat. A
+test piece that is larger than was said loses as much of its height to the rigid motion."""
 
 
 LEAST_PRESENCE = 0.5
@@ -170,8 +175,10 @@ def _extract_one(frames: Frames, specimen: Specimen, request: ExtractionRequest,
     frame_flags.add("residual", rough)
     signal = _mean(taken.heights[:, distance < 0.3 * region.moving])
     rest = _rest_of(request, signal, good, piece.read.zero_reference)
+    risen = taken.heights - _zero_level(taken.heights, rest, good)
+    _refuse_a_larger_piece(piece.name, risen[good][-SHOWN_FRAMES:], distance, region)
     surface = np.flatnonzero(distance <= region.held[0])
-    heights = taken.heights[:, surface] - _zero_level(taken.heights[:, surface], rest, good)
+    heights = risen[:, surface]
     points = SurfacePoints(places[surface, :2], plate.areas[series.points[surface]], heights, request.subset)
     loaded = np.setdiff1d(np.flatnonzero(good), rest)
     if loaded.size < 2:
@@ -197,10 +204,7 @@ def _extract_one(frames: Frames, specimen: Specimen, request: ExtractionRequest,
     noise = estimate_noise(seen, fields, np.where(good, signal, np.nan), shown, plate.spacing)
     # Points of overlapping subsets err together: the centre of independent ones is known less well by as much.
     inflation = np.sqrt(max(1.0, np.pi * noise.correlation_length**2 / plate.spacing**2))
-    held = series.valid[good][:, clamped]
-    counts = int(clamped.sum()), int(held.all(axis=0).sum()), int(np.median(held.sum(axis=1)))
-    errors = _motion_errors(taken, fields.clamped_places, noise)
-    motion = PlateMotion(translations, rotations, errors, *counts, _size(taken.clamped_heights))
+    motion = PlateMotion(translations, rotations, int(clamped.sum()), _size(taken.clamped_heights))
     sd = np.sqrt(np.einsum("fii->fi", noise.covariance))
     return Extraction(
         name=piece.name,
@@ -282,6 +286,25 @@ def _take_off(places: Floats, series: PointSeries, clamped: Bools, good: Bools) 
     return TakenOff(np.concatenate([p[0] for p in parts]), motion, np.concatenate([p[2] for p in parts]))
 
 
+def _refuse_a_larger_piece(name: str, heights: Floats, distance: Floats, region: SurfaceRegion) -> None:
+    """HistoryError where what should be flat rises towards the middle: it belongs to the test piece.
+
+    heights : (late frames, points) mm. distance : (points,) mm from the centre.
+    """
+    inner, outer = region.held
+    parts = (distance < 0.3 * region.moving, (distance > inner) & (distance < 0.5 * (inner + outer)))
+    middle, near, far = (
+        float(np.nanmedian(_mean(heights[:, some]))) for some in (*parts, distance > 0.5 * (inner + outer))
+    )
+    if near - far > max(LARGEST_RISE * middle, SMALLEST_RISE):
+        raise HistoryError(
+            f"{name}: the plate between {inner:g} and {outer:g} mm from its centre should be flat, and rises towards "
+            f"it by {1e3 * (near - far):.3g} um of {1e3 * middle:.3g} um in the middle: the test piece is larger than "
+            f"a radius of {region.moving:g} mm; state its lengths, in [[camera]] lengths = {{...}}, in Python "
+            "specimen=ck.specimen(...).replace(...)"
+        )
+
+
 def _rest_of(request: ExtractionRequest, signal: Floats, good: Bools, zero_reference: bool) -> Ints:
     if request.rest is None:
         return frames_at_rest(signal, good, zero_reference, request.load)
@@ -335,16 +358,6 @@ def _positions(signal: Floats) -> Floats:
     growth = np.cumsum(np.maximum(steps - 3.0 * noise, 0.0))
     even = np.linspace(0.0, 1.0, signal.size)
     return even if not growth[-1] > 0.0 else 0.5 * (even + growth / growth[-1])
-
-
-def _motion_errors(taken: TakenOff, places: Floats, noise: NoiseEstimate) -> Floats:
-    """(6,) standard errors of one frame's translations and rotations; those in the plane from independent patches."""
-    distance = np.hypot(*places.T)
-    cell = np.pi * (distance.max() ** 2 - distance.min() ** 2) / len(places)  # mm2 of plate for each point, about
-    independent = np.sqrt(len(places) / max(1.0, np.pi * (0.5 * noise.patch) ** 2 / cell))
-    lever = np.sqrt((places**2).sum(axis=1).mean())
-    in_plane = np.median(taken.motion.residual_sd, axis=0)[:2] / independent
-    return np.array([*in_plane, *noise.plate_sd, float(np.hypot(*in_plane)) / np.sqrt(2.0) / lever])
 
 
 def _maps(heights: Floats, seen: SurfaceObservation, surface: Ints, good: Bools, rest: Ints) -> tuple[FieldMap, ...]:

@@ -28,17 +28,13 @@ TURNED = "z of the frames points away from the cameras, for the surface moves al
 class PlateMotion(NamedTuple):
     """Rigid motion of the clamped plate about the centre of a test piece.
 
-    translations : (frames, 3) mm. rotations : (frames, 3) rad, rotation vectors.
-    standard_errors : (6,) of one frame: translations, then rotations. points : of the ring. in_all_frames : how many of
-    these every good frame holds. in_one_frame : how many a frame holds, the median. residual : (frames,) mm, along z.
+    translations : (frames, 3) mm. rotations : (frames, 3) rad, rotation vectors. points : of the ring. residual :
+    (frames,) mm, along z.
     """
 
     translations: Floats
     rotations: Floats
-    standard_errors: Floats
     points: int
-    in_all_frames: int
-    in_one_frame: int
     residual: Floats
 
 

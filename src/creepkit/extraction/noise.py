@@ -55,30 +55,20 @@ class NoiseEstimate:
 
     covariance : (frames, outputs, outputs) of each frame's outputs, the share of the zero level in it.
     correlation : {(output, output): median of the frames}.
-    rest_sd, block_sd : {output: median over the frames}, both of a single frame, without the zero level; NaN where
-        there is none.
     point_sd : mm, of the height of one point in one frame, its part that changes with time.
-    correlation_length : mm, at which the autocorrelation in space has fallen to 0.1. patch : mm, side of the patches.
-    lag_one : correlation of an output's error in successive frames. integral_frames : frames that share one error.
-    plate_sd : (3,) of the clamped plate in one frame: shift along z, mm, and rotations about x and y, rad.
+    correlation_length : mm, at which the autocorrelation in space has fallen to 0.1.
+    lag_one : correlation of an output's error in successive frames.
     """
 
     covariance: Floats
     correlation: Mapping[tuple[str, str], float]
-    rest_sd: Mapping[str, float]
-    block_sd: Mapping[str, float]
     point_sd: float
     correlation_length: float
-    patch: float
     lag_one: float
-    integral_frames: float
-    plate_sd: Floats
 
     def __post_init__(self) -> None:
-        for name in ("covariance", "plate_sd"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-        for name in ("correlation", "rest_sd", "block_sd"):
-            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+        object.__setattr__(self, "covariance", frozen(self.covariance))
+        object.__setattr__(self, "correlation", MappingProxyType(dict(self.correlation)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +104,13 @@ def estimate_noise(
     reference = int(np.nanargmax(np.where(np.isfinite(signal), np.abs(signal), -1.0)))
     of_plate = clamped_covariance(fields.clamped, fields.clamped_places, patch, rho)
     by_blocks = _block_covariance(seen, fields, patch, rho, reference, of_plate)
-    at_rest = _rest_covariance(gains, fields.rest) if enough else np.full_like(by_blocks, np.nan)
-    growth = _growth(fields, len(gains), enough)
+    covariance = by_blocks
     if enough:
+        at_rest = _rest_covariance(gains, fields.rest) * _growth(fields, len(gains))[:, None, None] ** 2
+        covariance = by_blocks + len(fields.rest) / (len(fields.rest) + PATCHES_WEIGHT) * (at_rest - by_blocks)
         lag_one, integral = time_correlation(fields.rest @ gains[reference, 0])
     else:
         lag_one, integral = time_correlation(smooth_free(signal[np.isfinite(signal)][:, None])[:, 0])
-    share = len(fields.rest) / (len(fields.rest) + PATCHES_WEIGHT) if enough else 0.0
-    covariance = by_blocks + (share * (at_rest * growth[:, None, None] ** 2 - by_blocks) if enough else 0.0)
     # The zero level is a mean of frames at rest, and the reference image's own noise where there are none.
     covariance = covariance * (1.0 + min(integral / max(len(fields.rest), 1), 1.0))
     loaded = shown.all(axis=1)
@@ -130,14 +119,9 @@ def estimate_noise(
     return NoiseEstimate(
         covariance=np.where(shown[:, :, None] & shown[:, None, :], covariance, np.nan),
         correlation=_correlations(names, covariance[some]),
-        rest_sd=_medians(names, at_rest[some]),
-        block_sd=_medians(names, by_blocks[some]),
         point_sd=_point_sd(source),
         correlation_length=rho.length,
-        patch=patch,
         lag_one=lag_one,
-        integral_frames=integral,
-        plate_sd=np.sqrt(np.diag(of_plate)),
     )
 
 
@@ -339,10 +323,10 @@ def _rest_covariance(gains: Floats, rest: Floats) -> Floats:
     return np.asarray(np.matmul(errors, errors.transpose(0, 2, 1)) / len(rest))
 
 
-def _growth(fields: ErrorFields, frames: int, enough: bool) -> Floats:
+def _growth(fields: ErrorFields, frames: int) -> Floats:
     """(frames,) how much more residuals scatter in time than at rest, over a running median of eleven frames."""
     base = _point_sd(fields.rest)
-    if not enough or not base > 0.0 or len(fields.loaded) < 11:
+    if not base > 0.0 or len(fields.loaded) < 11:
         return np.ones(frames)
     each = np.array([_point_sd(row[None]) for row in fields.loaded]) / base
     padded = np.pad(each, 5, mode="edge")
@@ -355,11 +339,6 @@ def _growth(fields: ErrorFields, frames: int, enough: bool) -> Floats:
 def _point_sd(fields: Floats) -> float:
     seen = fields[fields != 0.0]
     return float(np.sqrt((seen**2).mean())) if seen.size else 0.0
-
-
-def _medians(names: Sequence[str], covariance: Floats) -> dict[str, float]:
-    sd = np.sqrt(np.einsum("fii->fi", covariance))
-    return {name: float(np.median(sd[:, k])) for k, name in enumerate(names)}
 
 
 def _correlations(names: Sequence[str], covariance: Floats) -> dict[tuple[str, str], float]:

@@ -6,6 +6,7 @@ Serendipity functions as in Zienkiewicz and Taylor, The Finite Element Method, v
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -197,14 +198,13 @@ def half_bandwidth(elements: Ints) -> int:
 
 
 def outline(elements: Ints) -> Ints:
-    """Element and side number (sides, 2) of the sides that belong to one element only.
+    """Nodes (edges, 3) of the element sides that belong to one element only, first, middle and last.
 
     elements : (elements, 8) nodes of each element.
     """
-    ends = np.sort(elements[:, SIDES[:, [0, 2]]].reshape(-1, 2), axis=1)
-    _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
-    alone = np.sort(first[count == 1])
-    return np.stack([alone // 4, alone % 4], axis=1)
+    sides = elements[:, SIDES].reshape(-1, 3)
+    _, first, count = np.unique(np.sort(sides[:, [0, 2]], axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(sides[np.sort(first[count == 1])])
 
 
 def order_by_neighbours(elements: Ints, count: int) -> Ints:
@@ -263,7 +263,12 @@ def strip_mesh(inner: Floats, outer: Floats, breaks: Floats) -> StripMesh:
     breaks : (layers + 1,) rising from 0 on the inner side to 1 on the outer side.
     With `layers` layers the half-bandwidth of a matrix of two unknowns a node is 6 layers + 9.
     """
-    columns, layers = len(inner) // 2, len(breaks) - 1
+    return StripMesh(strip_nodes(inner, outer, breaks), *_strip_numbers(len(inner) // 2, len(breaks) - 1))
+
+
+@lru_cache(maxsize=64)
+def _strip_numbers(columns: int, layers: int) -> tuple[Ints, ...]:
+    """All of a StripMesh but its nodes; kept, for nodes move and numbers stay."""
     check_elements(columns * layers)
     start = (3 * layers + 2) * np.arange(columns + 1)
     middle = start[:-1] + 2 * layers + 1
@@ -271,18 +276,10 @@ def strip_mesh(inner: Floats, outer: Floats, breaks: Floats) -> StripMesh:
     corners = [a + 2 * j, b + 2 * j, b + 2 * j + 2, a + 2 * j + 2]
     middles = [middle[:, None] + j, b + 2 * j + 1, middle[:, None] + j + 1, a + 2 * j + 1]
     elements = np.stack(corners + middles, axis=2)
-    inner_line = _interleaved(start, middle)
-    outer_line = _interleaved(start + 2 * layers, middle + layers)
-    return StripMesh(
-        nodes=strip_nodes(inner, outer, breaks),
-        elements=elements.reshape(-1, 8),
-        inner=elements[:, 0, [0, 4, 1]],
-        outer=elements[:, -1, [2, 6, 3]],
-        first=np.arange(2 * layers + 1),
-        last=start[-1] + np.arange(2 * layers + 1),
-        inner_line=inner_line,
-        outer_line=outer_line,
-    )
+    first = np.arange(2 * layers + 1)
+    lines = (_interleaved(start + 2 * k, middle + k) for k in (0, layers))
+    parts = elements.reshape(-1, 8), elements[:, 0, [0, 4, 1]], elements[:, -1, [2, 6, 3]], first, start[-1] + first
+    return tuple(frozen(part, dtype=np.int64) for part in (*parts, *lines))
 
 
 def strip_nodes(inner: Floats, outer: Floats, breaks: Floats) -> Floats:
@@ -292,12 +289,12 @@ def strip_nodes(inner: Floats, outer: Floats, breaks: Floats) -> Floats:
     """
     fine = np.empty(2 * len(breaks) - 1)
     fine[::2], fine[1::2] = breaks, 0.5 * (breaks[:-1] + breaks[1:])
-    lines = [_points_across(inner[k], outer[k], breaks if k % 2 else fine) for k in range(len(inner))]
-    return np.concatenate(lines)
-
-
-def _points_across(inner: Floats, outer: Floats, breaks: Floats) -> Floats:
-    return np.asarray((1 - breaks[:, None]) * inner + breaks[:, None] * outer)
+    lines, middles = (
+        (1 - places[:, None]) * inner[first::2, None] + places[:, None] * outer[first::2, None]
+        for first, places in ((0, fine), (1, breaks))
+    )
+    columns = np.concatenate([lines[:-1], middles], axis=1)
+    return np.concatenate([columns.reshape(-1, 2), lines[-1]])
 
 
 def _interleaved(corners: Ints, middles: Ints) -> Ints:

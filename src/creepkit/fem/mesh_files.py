@@ -68,8 +68,7 @@ def read_mesh(
     fixed = np.zeros(at.shape, dtype=bool)
     for name in held:
         fixed[groups.members(name, node_of, "node")] = True
-    edge = outline(body)
-    edges = body[edge[:, :1], SIDES[edge[:, 1]]]
+    edges = outline(body)
     made = edges[edges[:, 1] >= len(places)]
     fixed[made[:, 1]] = fixed[made[:, 0]] & fixed[made[:, 2]]
     names = [(f"{pressed}_S{side + 1}", side) for side in range(4)]

@@ -14,7 +14,7 @@ from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import AxialConstraints, FiniteElementModel, RigidContact, finite_element_model
-from creepkit.fem.mesh import SIDE_SLOPES, SIDE_VALUES, SIDE_WEIGHTS, SIDES, Mesh, check_elements, outline, strip_mesh
+from creepkit.fem.mesh import SIDE_SLOPES, SIDE_VALUES, SIDE_WEIGHTS, Mesh, check_elements, outline, strip_mesh
 
 
 @checked
@@ -126,7 +126,7 @@ class Section:
 
         where : of r (nodes,) and z (nodes,), mm: `lambda r, z: z > 9.999`.
         """
-        edges = _outline(self.elements)
+        edges = outline(self.elements)
         chosen = np.asarray(where(self.nodes[:, 0], self.nodes[:, 1]), dtype=bool)[edges].all(axis=1)
         if not chosen.any():
             raise SolveError(f"side '{name}' of a section: the condition holds on no element side of its outline")
@@ -266,12 +266,6 @@ def _side(section: Section, name: str) -> Ints:
     if name not in section.sides:
         raise SolveError(f"a section has no side '{name}'; {nearest(name, tuple(section.sides))}")
     return np.asarray(section.sides[name])
-
-
-def _outline(elements: Ints) -> Ints:
-    """Nodes (edges, 3) of the element sides that belong to one element only; elements : (elements, 8)."""
-    free = outline(elements)
-    return np.asarray(elements[free[:, :1], SIDES[free[:, 1]]])
 
 
 def _breaks(count: int | ArrayLike) -> Floats:

@@ -57,7 +57,7 @@ _DELIMITER_NAMES = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas",
 """Delimiters, in the order in which they are preferred where a sample speaks for two alike."""
 
 
-_NUMBERS = {
+NUMBERS = {
     sign: re.compile(rf"[+-]?(?:\d+(?:{re.escape(sign)}\d*)?|{re.escape(sign)}\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
     for sign in ".,"
 }
@@ -104,7 +104,7 @@ def decode_text(content: bytes, path: Path, error: type[CreepkitError] = History
     except UnicodeDecodeError as problem:
         if encoding == "utf-8" and not mark:
             return _decode_western(content, path, error)
-        line = _line_of(problem.object, problem.start, encoding)
+        line = problem.object[: problem.start].decode(encoding, errors="replace").count("\n") + 1
         raise error(f"{path}:{line}: found bytes that are not text in {encoding.upper()}; save it in UTF-8") from None
     if not text.isascii() or content.translate(None, _ASCII_OF_TEXT):
         refuse_unprintable(text, lambda k: f"{path}:{text[:k].count(chr(10)) + 1}", error)
@@ -145,10 +145,6 @@ def _decode_western(content: bytes, path: Path, error: type[CreepkitError]) -> s
         start = problem.start
     line = content[:start].count(b"\n") + 1
     raise error(f"{path}:{line}: byte 0x{content[start]:02x} is not text in UTF-8 or Latin-1; save it as CSV in UTF-8")
-
-
-def _line_of(content: bytes, start: int, encoding: str) -> int:
-    return content[:start].decode(encoding, errors="replace").count("\n") + 1
 
 
 def text_lines(text: str) -> list[str]:
@@ -203,7 +199,7 @@ def parse_number(text: str, dialect: Dialect, location: str, name: str) -> float
 
     An exponent may be written E or D. NaN, infinities, digits in groups and whole numbers such as 0123 are no numbers.
     """
-    is_written_well = _NUMBERS[dialect.decimal].fullmatch(text) and not _PADDED.match(text)
+    is_written_well = NUMBERS[dialect.decimal].fullmatch(text) and not _PADDED.match(text)
     value = float_of(text) if is_written_well else math.nan
     if not math.isfinite(value):
         raise HistoryError(f"{location}: '{name}' is {_why_no_number(text, dialect)}")
@@ -225,7 +221,7 @@ def parse_numbers(
         else:
             if np.isfinite(values).all():
                 return values
-    lost, matches = frozenset(missing), _NUMBERS[dialect.decimal].fullmatch
+    lost, matches = frozenset(missing), NUMBERS[dialect.decimal].fullmatch
     values = np.full(len(cells), np.nan)
     for k, cell in enumerate(cells):
         if cell in lost:
@@ -253,7 +249,7 @@ def is_missing(text: str) -> bool:
 
 def is_number(text: str, dialect: Dialect) -> bool:
     """Whether a cell is a number."""
-    return _NUMBERS[dialect.decimal].fullmatch(text) is not None
+    return NUMBERS[dialect.decimal].fullmatch(text) is not None
 
 
 def float_of(text: str) -> float:
@@ -269,10 +265,10 @@ def _why_no_number(text: str, dialect: Dialect) -> str:
         return f"'{shown}', and a value is needed here; write a finite number such as 1.5e-3, or leave the row out"
     if _PADDED.match(text):
         return f"'{shown}', which begins with 0, as where a decimal sign is lost; write it without"
-    if _NUMBERS[dialect.decimal].fullmatch(text):
+    if NUMBERS[dialect.decimal].fullmatch(text):
         return f"'{shown}', too large a number; write a finite number such as 1.5e-3"
     other = "," if dialect.decimal == "." else "."
-    if _NUMBERS[other].fullmatch(text):
+    if NUMBERS[other].fullmatch(text):
         sign, words = ("comma", "decimal points") if other == "," else ("point", "decimal commas")
         return f"'{shown}' with a {sign}, while the table has {words}; write all numbers alike, without separators"
     if _GROUPED.fullmatch(text):
@@ -297,7 +293,7 @@ def _score(sample: Sequence[str], delimiter: str) -> tuple[bool, int, int]:
         counts[len(cells)] = counts.get(len(cells), 0) + 1
         for cell in (cell.rstrip("% ") for cell in cells):
             if cell and (cell[0] in "+-.," or "0" <= cell[0] <= "9"):
-                is_numeric = _NUMBERS["."].fullmatch(cell) or (delimiter != "," and _NUMBERS[","].fullmatch(cell))
+                is_numeric = NUMBERS["."].fullmatch(cell) or (delimiter != "," and NUMBERS[","].fullmatch(cell))
                 numbers += 1 if is_numeric or _CLOCK_TIME.fullmatch(cell) else 0 if _WITH_UNIT.fullmatch(cell) else -2
     return bool(counts), numbers, 0 if delimiter == " " else max(counts.values(), default=0)
 
@@ -320,12 +316,12 @@ def _decimal(lines: Iterable[str], delimiter: str, place: str) -> str:
         if "," not in line and "." not in line:
             continue
         for cell in (cell.rstrip("% ") for cell in _possible_numbers(line, delimiter)):
-            if "," in cell and _NUMBERS[","].fullmatch(cell):
+            if "," in cell and NUMBERS[","].fullmatch(cell):
                 if _THOUSANDS_LIKE.fullmatch(cell):
                     doubtful = doubtful or cell
                 else:
                     commas += 1
-            elif "." in cell and _NUMBERS["."].fullmatch(cell):
+            elif "." in cell and NUMBERS["."].fullmatch(cell):
                 points += 1
     if doubtful and not commas and not points:
         raise HistoryError(

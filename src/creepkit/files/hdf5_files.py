@@ -1,16 +1,15 @@
-"""HDF5 files: written whole or not at all with write errors reported once, and read without following external links.
+"""HDF5 files: written whole or not at all, and read without following external links.
 
-HDF5 tries to write again whenever one of its objects is closed, and h5py prints a traceback for each failure. The first
-error is kept, later writes are discarded, and the error is raised when HDF5 is done.
+They are made in memory: HDF5 would try to write again whenever one of its objects is closed on a disk that is full, and
+h5py print a traceback for each failure.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import h5py
 
@@ -26,42 +25,6 @@ FAILURES = (OSError, RuntimeError, LookupError, ValueError, TypeError, Attribute
 """What h5py and whoever reads by it raise of a damaged file."""
 
 
-class FaultTolerantFile(io.FileIO):
-    """A new file that keeps its first failure to write, for `raise_failure` to raise."""
-
-    failure: OSError | None = None
-
-    def write(self, data: Any, /) -> int:
-        """Write all of it, or keep the failure."""
-        remaining = memoryview(data).cast("B")
-        size = len(remaining)
-        while remaining:
-            written = self._attempt(super().write, remaining)
-            if not written:
-                break
-            remaining = remaining[written:]
-        return size
-
-    def truncate(self, size: int | None = None, /) -> int:
-        """Change the size, or keep the failure."""
-        self._attempt(super().truncate, size)
-        return self.tell() if size is None else size
-
-    def raise_failure(self) -> None:
-        """Raise the failure that was kept."""
-        if self.failure is not None:
-            raise self.failure
-
-    def _attempt(self, operation: Callable[[Any], int | None], argument: Any) -> int | None:
-        """What the operation returns; None once one has failed."""
-        if self.failure is None:
-            try:
-                return operation(argument)
-            except OSError as error:
-                self.failure = error
-        return None
-
-
 @contextmanager
 def write_hdf5(
     path: Path, error: type[CreepkitError], advice: str = ADVICE, *, force: bool = False, internal: bool = False
@@ -70,15 +33,11 @@ def write_hdf5(
 
     advice : what to do when it cannot be written. force, internal : as of replace_on_success().
     """
-    with (
-        replace_on_success(path, error, advice, force=force, internal=internal) as temporary,
-        FaultTolerantFile(temporary, "x+") as raw,
-    ):
-        try:
-            with h5py.File(raw, "w", libver=("v110", "v110")) as file:  # in which attributes may be long
-                yield file
-        finally:
-            raw.raise_failure()  # in the place of what HDF5 says when it reads what was dropped
+    content = io.BytesIO()
+    with replace_on_success(path, error, advice, force=force, internal=internal) as temporary:
+        with h5py.File(content, "w", libver=("v110", "v110")) as file:  # in which attributes may be long
+            yield file
+        temporary.write_bytes(content.getbuffer())
 
 
 @contextmanager

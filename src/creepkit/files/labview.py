@@ -18,6 +18,10 @@ from creepkit.arrays import Floats
 END_OF_HEADER = "***End_of_Header***"
 
 
+START = "label start"
+"""Key of the entry that says when the file was begun."""
+
+
 _KEPT = {"Operator": "label operator", "Project": "label project", "Description": "label description"}
 """Lines of the head that say something of the test, and keys of the entries that they become."""
 
@@ -59,10 +63,10 @@ def table_of_labview(text: str) -> str:
     if not segments:
         return "\n".join(result)
     names, start = _names(segments[0]), _start_of(segments[0])
+    result[1] = f"# {START}: {start.isoformat(' ')}" if start and segments[0].names_at > 1 else result[1]
     result[segments[0].names_at] = delimiter.join(["time (s)", *names])
     for segment in segments:
-        later = _start_of(segment)
-        offset = (later - start).total_seconds() if start and later else 0.0
+        offset = (later - start).total_seconds() if start and (later := _start_of(segment)) else 0.0
         for number, cells in _rows(segment, len(names), offset, file_head.get("Time_Pref", "")):
             line = delimiter.join(cells)
             result[number] = line.replace(".", ",") if comma and delimiter != "," else line

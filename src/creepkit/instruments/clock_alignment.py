@@ -1,4 +1,8 @@
-"""Lag and drift between the clock of a camera and that of an instrument, from the response to changes of load."""
+"""Lag between the clock of a camera and that of an instrument, from the response to changes of load.
+
+One lag holds for the whole test. That one clock gains on the other, which moves the lag within the test, widens its
+interval (docs/measured/clock_alignment.md).
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,6 @@ from creepkit.instruments.response_likelihood import (
     ResponseModel,
     best_model,
     driving_record,
-    innovations,
     log_likelihoods,
     trial_models,
 )
@@ -28,8 +31,8 @@ UNIX_TIME = 1e8
 """s; larger times of a camera count from 1970: no test lasts three years."""
 
 
-DRIFT_SD = 1e-4
-"""s/s, standard deviation that is expected of the gain of one clock on the other: 9 s a day, a poor quartz."""
+DRIFT = 1e-4
+"""s/s, standard deviation of the gain of one clock on the other: 9 s a day, a poor quartz."""
 
 
 LEAST_RANGE = 10.0
@@ -73,9 +76,8 @@ MODEL_LAGS, MOST_MODELS, MODEL_ITERATIONS, ITERATIONS = 3, 2, 2, 7
 iterations that close in on the posterior they are estimated, and iterations at most."""
 
 
-BLOCKS, DRIFTS, RESOLVED, NEGLIGIBLE = 60, 31, 30, 12.0
-"""Blocks of frames with one lag, drifts that are tried at once, grid points within a posterior that resolve it, and
-the fall of a log likelihood beyond which nothing counts."""
+RESOLVED, NEGLIGIBLE = 30, 12.0
+"""Grid points within a posterior that resolve it, and the fall of a log likelihood beyond which nothing counts."""
 
 
 @dataclass(frozen=True)
@@ -127,10 +129,6 @@ class _Task:
         """s about a candidate within which its posterior lies: frames do not tell lags apart, nor do slow ramps."""
         return max(1.5 * self.interval, RAMP_SHARE / self.driving.steepest)
 
-    def warped(self, gain: float, middle: float) -> _Task:
-        """The same with the gain of a clock about a time, s, taken into its times."""
-        return replace(self, times=self.times + gain * (self.times - middle))
-
     def subset(self, kept: Ints) -> _Task:
         """The same with some of its frames."""
         return replace(self, times=self.times[kept], displacements=self.displacements[kept])
@@ -145,7 +143,6 @@ def align_clocks(
     *,
     camera_start: float | None = None,
     search: tuple[float, float] | None = None,
-    drift: float = DRIFT_SD,
     unloaded: Sequence[int] = (),
 ) -> ClockAlignment:
     """The lag of an instrument's clock on a camera's, at which displacements jump where the pressure does.
@@ -154,8 +151,8 @@ def align_clocks(
     camera's clock; above 1e8 they are unix times. displacement : (frames,) mm of the apex, or of any point; NaN where
     it is lost; or (test pieces, frames) of all that one camera sees, which have one lag, with the channel of all of
     them or one each. camera_start : unix time, s, of the camera's time zero. search : s, least and largest lag; by
-    default all at which frames and record meet. drift : standard deviation that is expected of it; 0 where both clocks
-    run alike. unloaded : numbers of frames that seem to be without load, which tells a first loading from later steps.
+    default all at which frames and record meet. unloaded : numbers of frames that seem to be without load, which tells
+    a first loading from later steps.
 
     Every lag is equally likely beforehand; intervals hold 95 % of the posterior probability. Creep and plastic flow
     do not bias it, see response_likelihood. A test piece whose channel does not change, or that does not follow it, is
@@ -183,13 +180,13 @@ def align_clocks(
     )
     if not (np.isfinite([low, high]).all() and low < high):
         raise HistoryError(f"search from {low:g} to {high:g} s of lag; give two finite numbers, the smaller one first")
-    if not (np.isfinite(drift) and 0.0 <= drift <= 0.01):
-        raise HistoryError(f"an expected drift of {drift:g}; give a standard deviation from 0 to 0.01, such as 1e-4")
     candidates = _candidates([_thinned(task, None) for task in tasks], low, high)
     lag, tasks = _checked_best([_thinned(task, candidates[0]) for task in tasks], candidates, (low, high))
     frames = max(task.times.size for task in tasks)
     channels = ", ".join(dict.fromkeys(task.channel for task in tasks))
-    return _posterior(tasks, lag, drift, (low, high), ClockAlignment(zero=zero, channel=channels, frames=frames))
+    lags, probability = _with_drift(tasks, *_posterior(tasks, lag, (low, high)))
+    interval = _interval(lags, probability)
+    return ClockAlignment(zero, float(lags @ probability), interval, lags, probability, channels, frames)
 
 
 def _task(record: InstrumentRecord, channel: str, times: Floats, displacements: Floats, unloaded: Floats) -> _Task:
@@ -337,107 +334,58 @@ def _responds(task: _Task, model: ResponseModel, peak: float) -> bool:
     return bool(peak - alone > LEAST_GAIN)
 
 
-def _posterior(
-    tasks: Sequence[_Task], lag: float, drift: float, search: tuple[float, float], alignment: ClockAlignment
-) -> ClockAlignment:
-    """Posterior of lag and drift on a grid that closes in on them, of all test pieces together."""
-    span = float(max(task.times[-1] for task in tasks) - min(task.times[0] for task in tasks))
-    middle, gain = float(np.mean([task.times.mean() for task in tasks])), 0.0
-    half, gain_half = max(task.reach for task in tasks), 3.5 * drift
-    models: list[list[ResponseModel]] = []
+def _posterior(tasks: Sequence[_Task], lag: float, search: tuple[float, float]) -> tuple[Floats, Floats]:
+    """Lags (points,) s on a grid that closes in on their posterior probabilities (points,), of all test pieces."""
+    half, models = max(task.reach for task in tasks), list[list[ResponseModel]]()
     for iteration in range(ITERATIONS):
-        warped = [task.warped(gain, middle) for task in tasks]
         if iteration < MODEL_ITERATIONS:
-            models = [task.models(lag + half * np.linspace(-0.9, 0.9, MODEL_LAGS)) for task in warped]
-        reach = half + 0.5 * gain_half * span
-        lags = lag + np.linspace(-reach, reach, FINE_LAGS)
-        inner = lags[np.abs(lags - lag) <= half]
-        gains = gain + np.linspace(-gain_half, gain_half, DRIFTS if drift else 1)
-        each = []
-        for task, own in zip(warped, models, strict=True):
-            terms = [task.terms(lags, model, lags[1] - lags[0]) for model in own]
-            each.append(
-                np.logaddexp.reduce([_joint(one, lags, inner, task.times[1:] - middle, gains - gain) for one in terms])
-            )
-        logs = _together(np.array(each), inner)
-        if drift:
-            logs -= 0.5 * (gains[:, None] / drift) ** 2
-        logs[:, (inner < search[0]) | (inner > search[1])] = -np.inf
-        weights = np.exp(logs - logs.max())
-        weights /= weights.sum()
-        relevant = logs > logs.max() - NEGLIGIBLE
-        lag_range, gain_range = np.flatnonzero(relevant.any(axis=0)), np.flatnonzero(relevant.any(axis=1))
-        mean = np.array([weights.sum(axis=0) @ inner, weights.sum(axis=1) @ gains])
-        covariance = float(((gains - mean[1])[:, None] * (inner - mean[0]) * weights).sum())
-        variance = float(weights.sum(axis=1) @ (gains - mean[1]) ** 2)
-        shift = -covariance / variance if variance > 0 else 0.0
-        cut_off = lag_range[0] == 0 or lag_range[-1] == inner.size - 1
+            models = [task.models(lag + half * np.linspace(-0.9, 0.9, MODEL_LAGS)) for task in tasks]
+        lags = lag + np.linspace(-half, half, FINE_LAGS)
+        step = float(lags[1] - lags[0])
+        each = [
+            np.logaddexp.reduce([task.terms(lags, model, step).sum(axis=0) for model in own])
+            for task, own in zip(tasks, models, strict=True)
+        ]
+        logs = _together(np.array(each), lags)
+        logs[(lags < search[0]) | (lags > search[1])] = -np.inf
+        relevant = np.flatnonzero(logs > logs.max() - NEGLIGIBLE)
+        cut_off = relevant[0] == 0 or relevant[-1] == lags.size - 1
         if cut_off and iteration < ITERATIONS // 2 and half < search[1] - search[0]:
             half *= 2.0
-            continue
-        resolved = np.ptp(lag_range) >= RESOLVED and (not drift or np.ptp(gain_range) >= RESOLVED // 3)
-        if resolved and abs(shift) <= 0.02 * span:
+        elif np.ptp(relevant) >= RESOLVED:
             break
-        step, gain_step = inner[1] - inner[0], (gains[1] - gains[0] if drift else 0.0)
-        half = max(0.6 * (np.ptp(inner[lag_range]) + 2 * step), 1e-9) + abs(shift) * gain_half
-        gain_half = 0.6 * (np.ptp(gains[gain_range]) + 2 * gain_step)
-        lag = 0.5 * float(inner[lag_range[0]] + inner[lag_range[-1]]) + shift * (mean[1])
-        middle += shift
-        gain = 0.5 * float(gains[gain_range[0]] + gains[gain_range[-1]])
-    residuals = []
-    for task, own in zip([task.warped(mean[1], middle) for task in tasks], models, strict=True):
-        residuals.append(innovations(task.driving.response(task.times, mean[:1]), task.displacements, own[0])[0])
-    by_lag, by_gain = weights.sum(axis=0), weights.sum(axis=1)
-    return replace(
-        alignment,
-        lag=float(mean[0]),
-        drift=float(mean[1]),
-        middle=middle + alignment.zero,
-        lag_interval=_interval(inner, by_lag),
-        drift_interval=_interval(gains, by_gain) if drift else (0.0, 0.0),
-        lags=inner,
-        probability=by_lag,
-        residual=float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))),
-        noise=float(np.median([own[0].noise for own in models])),
-    )
+        else:
+            half = max(0.6 * (float(np.ptp(lags[relevant])) + 2.0 * step), 1e-9)
+            lag = 0.5 * float(lags[relevant[0]] + lags[relevant[-1]])
+    weights = np.exp(logs - logs.max())
+    return lags, weights / weights.sum()
+
+
+def _with_drift(tasks: Sequence[_Task], lags: Floats, probability: Floats) -> tuple[Floats, Floats]:
+    """Lags and their probabilities where the clocks differ by a normal DRIFT: its mean effect over the test."""
+    span = max(task.times[-1] for task in tasks) - min(task.times[0] for task in tasks)
+    sd = max(DRIFT * span / 12.0**0.5, float(lags[1] - lags[0]))
+    wide = np.linspace(lags[0] - 4.0 * sd, lags[-1] + 4.0 * sd, FINE_LAGS)
+    weights = np.exp(-0.5 * ((wide[:, None] - lags) / sd) ** 2) @ probability
+    return wide, np.asarray(weights / weights.sum())
 
 
 def _together(each: Floats, lags: Floats) -> Floats:
-    """(gains, lags) logarithm of the likelihood of test pieces (pieces, gains, lags), as sure as the surest of them.
+    """(lags,) logarithm of the likelihood of test pieces (pieces, lags), as sure as the surest of them.
 
     What no model of the response follows is the same in all, whose errors therefore are no independent ones: the sum of
     the logarithms counts as if the information in it were that of the piece that has most.
     """
-    by_lag = np.exp(each - each.max(axis=(1, 2), keepdims=True)).sum(axis=1)
+    by_lag = np.exp(each - each.max(axis=1, keepdims=True))
     by_lag /= by_lag.sum(axis=1, keepdims=True)
     means = by_lag @ lags
     information = 1.0 / np.maximum((by_lag * (lags - means[:, None]) ** 2).sum(axis=1), 1e-300)
     return np.asarray(each.sum(axis=0) * information.max() / information.sum())
 
 
-def _joint(terms: Floats, lags: Floats, inner: Floats, offsets: Floats, gains: Floats) -> Floats:
-    """(gains, lags) logarithm of the likelihood; frames at offsets (frames - 1,) s have the lag plus gain * offset.
-
-    Frames are taken in blocks, each at the time of those in it that decide most.
-    """
-    edges = np.unique(np.linspace(0, len(terms), BLOCKS + 1).astype(int))[:-1]
-    weights = np.ptp(terms, axis=1) + 1e-12
-    centres = np.add.reduceat(weights * offsets, edges) / np.add.reduceat(weights, edges)
-    blocks = np.add.reduceat(terms, edges, axis=0)
-    return np.array(
-        [
-            sum(np.interp(inner + gain * centre, lags, block) for centre, block in zip(centres, blocks, strict=True))
-            for gain in gains
-        ]
-    )
-
-
 def _interval(values: Floats, weights: Floats) -> tuple[float, float]:
     """Bounds of 95 % of the probability of grid cells about values (points,)."""
-    if values.size < 2:
-        return float(values[0]), float(values[0])
     half = 0.5 * (values[1] - values[0])
     edges = np.append(values - half, values[-1] + half)
-    cumulative = np.append(0.0, np.cumsum(weights)) / weights.sum()
-    low, high = np.interp((0.025, 0.975), cumulative, edges)
+    low, high = np.interp((0.025, 0.975), np.append(0.0, np.cumsum(weights)), edges)
     return float(low), float(high)

@@ -67,19 +67,16 @@ def _record(
     head = find_head(path)
     chosen = _format_of(head, formats, format)
     columns = _Columns.of(head, chosen, given)
-    reader, times, values, lines = RowReader(head, given.every), _Times(columns), [], list[Ints]()
+    reader, times, values, lines = RowReader(head), _Times(columns), [], list[Ints]()
     missing, count = MISSING | {*chosen.missing, *given.missing}, 0
     for rows in reader.parts():
         count += len(columns.channels) * rows.lines.size
-        if count > (most := raised(MOST_VALUES)) * given.every:
-            raise HistoryError(
-                f"{path}: more than {most} readings; ask for channels=[...], or for every=10, the mean of ten "
-                f"rows; or {how_to_raise(2 * most, most)}"
-            )
+        if count > (most := raised(MOST_VALUES)):
+            what = f"more than {most} readings; ask for channels=[...], or {how_to_raise(2 * most, most)}"
+            raise HistoryError(f"{path}: {what}")
         lines.append(rows.lines)
         times.add(rows)
-        starts = np.arange(0, rows.lines.size, given.every)
-        values.append([means(rows.readings(one.position, missing), starts) for one in columns.channels])
+        values.append([rows.readings(one.position, missing) for one in columns.channels])
     if not lines:
         raise HistoryError(f"{head.place}: no rows below the names; a record needs some")
     numbers = np.concatenate(lines)
@@ -89,9 +86,7 @@ def _record(
         notes.append(f"its last line, {reader.cut}, is cut off and was left out")
     elif not reader.has_end:
         notes.append(f"its last line, {numbers[-1]}, has no end; it may be cut off amid a number")
-    clock = means(resolved.times, np.arange(0, numbers.size, given.every))
-    if given.every > 1:
-        notes.append(f"each row is the mean of {given.every} rows of the file")
+    clock = resolved.times
     first = np.flatnonzero(np.concatenate([[True], np.diff(clock) > 0]))
     if first.size < clock.size:
         notes.append(f"{clock.size - first.size} rows with the time of the row before were averaged with it")

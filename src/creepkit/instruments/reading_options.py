@@ -18,7 +18,7 @@ from creepkit.options import Options, option
 class RecordOptions(Options, title="options of a record", error=HistoryError):
     """What a caller says about a record.
 
-    channels : names of those that are kept; None keeps all. every : rows that are averaged to one. units : {channel:
+    channels : names of those that are kept; None keeps all. units : {channel:
     unit} of heads without one. pressure_reference : of pressures whose unit does not say. ambient_pressure : MPa, that
     turns absolute pressures into gauge pressures. missing : texts that mean a lost reading, beside the usual ones.
     """
@@ -29,7 +29,6 @@ class RecordOptions(Options, title="options of a record", error=HistoryError):
     date_order: Literal["month first", "day first", "year first"] | None = option(None, "Of its dates.")
     time_zone: str = option("", "Of its times, as America/Chicago or +01:00.")
     channels: tuple[str, ...] | None = option(None, "Channels that are kept.", python_only=True)
-    every: int = option(1, "Rows of the record that are averaged to one.", Limits(1, 100_000), flag="record-every")
     units: Mapping[str, str] = option(
         dict, "Units of channels whose heads have none.", flag="record-units", example="P1=bar"
     )

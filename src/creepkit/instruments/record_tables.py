@@ -234,12 +234,11 @@ class Rows:
 class RowReader:
     """Reads the rows of a table, part by part.
 
-    every : rows of a part are a multiple of it, but for the last part. cut : line of a last row that was cut off, 0
-    where none was. has_end : whether the last line has a line end.
+    cut : line of a last row that was cut off, 0 where none was. has_end : whether the last line has a line end.
     """
 
-    def __init__(self, head: TableHead, every: int) -> None:
-        self.head, self.every, self.cut, self.has_end = head, every, 0, True
+    def __init__(self, head: TableHead) -> None:
+        self.head, self.cut, self.has_end = head, 0, True
 
     def parts(self) -> Iterator[Rows]:
         """The parts, none of them empty."""
@@ -255,7 +254,7 @@ class RowReader:
                 lines.append(number)
                 cells.append(row)
                 size += len(line)
-            if size > PART_CHARACTERS and not len(lines) % self.every:
+            if size > PART_CHARACTERS:
                 yield Rows(self.head, np.array(lines), cells)
                 lines, cells, size = [], [], 0
         if lines:

@@ -183,17 +183,8 @@ def log_likelihoods(response: Response, displacements: Floats, model: ResponseMo
 
     displacements : (frames,) mm.
     """
-    innovation, variance = innovations(response, displacements, model)
+    innovation, variance = np.array(list(_innovations(response, displacements, model))).transpose(1, 0, 2)
     return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + innovation**2 / variance))
-
-
-def innovations(response: Response, displacements: Floats, model: ResponseModel) -> tuple[Floats, Floats]:
-    """(frames - 1, lags) mm, by which displacements differ from what was expected before, and variances, mm2.
-
-    displacements : (frames,) mm.
-    """
-    found = np.array(list(_innovations(response, displacements, model)))
-    return found[:, 0], found[:, 1]
 
 
 def _innovations(response: Response, displacements: Floats, model: ResponseModel) -> Iterator[tuple[Floats, Floats]]:

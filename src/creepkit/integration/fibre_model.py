@@ -91,15 +91,6 @@ class FibreModel:
         """The same model that records other sums of the creep strains; rows : (rows, fibres) weights."""
         return FibreModel(self.stress, self.strain, self.modes, self.projection, np.asarray(rows, float))
 
-    def stresses(self, loads: ArrayLike, modulus: float, creep: ArrayLike) -> Floats:
-        """Stresses of the fibres, (..., fibres) MPa.
-
-        loads : (..., loads); modulus : MPa; creep : (..., fibres) signed creep strains.
-        """
-        loads, creep = np.asarray(loads, float), np.asarray(creep, float)
-        amplitudes = creep @ self.projection.T
-        return np.asarray(loads @ (self.stress + modulus * self.strain) + modulus * (amplitudes @ self.modes.T - creep))
-
 
 @dataclass(frozen=True, eq=False)
 class FibreInput:

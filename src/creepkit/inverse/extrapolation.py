@@ -93,7 +93,7 @@ def check_kelvin(ranges: Mapping[str, tuple[float, float]], given: ArrayLike | N
 def check_isothermal(
     laws: Sequence[CreepLaw], ranges: Mapping[str, tuple[float, float]], given: ArrayLike | None
 ) -> None:
-    """FitError for another temperature than that of the tests where a law has none; given : as of check_kelvin."""
+    """FitError for another temperature than that of the tests where a law has none; given : (...,) K, or None."""
     isothermal = [law.name for law in laws if not law.uses(temperature)]
     if given is None or "temperature" not in ranges or not isothermal:
         return

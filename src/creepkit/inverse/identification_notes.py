@@ -24,7 +24,6 @@ from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.iterative_estimation import EstimationResult
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
-from creepkit.inverse.nuisance_plausibility import nuisance_correlation_notes
 from creepkit.inverse.prediction_failures import tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses
@@ -133,7 +132,6 @@ def identification_notes(
             f"the minimum rate stated of {_named(with_both)} was not used: the readings of its test hold it already"
         )
     sentences += unstated_member_notes(histories)
-    sentences += nuisance_correlation_notes(problem, estimation.residuals)
     if (problem.bound_penalties.constraint_violations(estimation.minimum.x[: problem.parameter_count]) > 1e-3).any():
         sentences.append("a constraint of the law does not hold over the tests at these values")
     return (*sentences, *_test_notes(problem, tests, nuisances))

@@ -30,12 +30,12 @@ class Perturbation:
 
     kind : of the nuisance parameter that would stand for it. size : one standard deviation, in its unit, of errors that
         the tests have independently of one another, or of one error common to all tests.
-    rate_change : of ln of the rate at the reference point: one standard deviation of it where the errors are
-        independent; where one is common, what the rate changes by if its size is added to what the tests state.
+    rate_change : one standard deviation of ln of the rate at the reference point; NaN of what intervals include, and of
+        what is common to all tests.
     residual_change : (tests, observations) -, of the residuals, by one standard deviation; saved in kept fits alone.
     common : whether it is one error of all tests, as of an instrument that measures them all. tests : how many have it.
     included : whether the intervals include it.
-    per_kelvin : change of ln rate a kelvin at the reference point, NaN where it is no error of temperature; assumed :
+    per_kelvin : change of ln rate a kelvin at the reference point, NaN where it is no drift of temperature; assumed :
         whether by a usual activation energy, as the law has none.
     """
 
@@ -65,14 +65,14 @@ class Perturbation:
     @property
     def change_text(self) -> str:
         """By how much it changes the rate at the reference point: in per cent, large ones as a factor."""
-        if abs(self.rate_change) >= LARGEST_PER_CENT:
+        if self.rate_change >= LARGEST_PER_CENT:
             return f"a factor of {float(np.exp(self.rate_change)):.2g}"
-        return f"{100 * float(np.expm1(self.rate_change)):+.2g} %" if self.common else f"{100 * self.rate_change:.2g} %"
+        return f"{100 * self.rate_change:.2g} %"
 
     @property
     def sentence(self) -> str:
         """By how much the rate amid the tests would move with what, to follow "would move", without a full stop."""
-        spread = "" if self.common or self.tests == 1 else " (one standard deviation)"
+        spread = "" if self.tests == 1 else " (one standard deviation)"
         energy = ""
         if np.isfinite(self.per_kelvin):
             whence = "assumed, as the law has no temperature" if self.assumed else "by the law"
@@ -82,11 +82,6 @@ class Perturbation:
     @property
     def _cause(self) -> str:
         one = self.tests == 1
-        if self.common:
-            plural = {"temperature": "temperatures", "load": "loads", "modulus": "Young's moduli"}
-            what = self.kind if self.kind.startswith("imposed ") else plural.get(self.kind, f"a {self.kind}")
-            stated = "those stated" if self.kind in plural else "that stated"
-            return f"{what} {self.amount} above {stated}, in {'the test' if one else f'all {self.tests} tests'}"
         each = "the test" if one else f"each of the {self.tests} tests"
         if self.kind == DRIFT:
             drift = "a linear drift of" if one else "independent linear drifts of the temperature,"
@@ -97,9 +92,14 @@ class Perturbation:
         return f"{'an error' if one else 'independent errors'} of {self.amount} in the {self.kind} of {each}"
 
 
+def beyond_intervals(perturbations: Sequence[Perturbation]) -> list[Perturbation]:
+    """Those that intervals do not include, of which it is known what they do to the rate."""
+    return [one for one in perturbations if np.isfinite(one.rate_change)]
+
+
 def combined_change_text(perturbations: Sequence[Perturbation]) -> str:
     """The root sum of squares of the changes of the rate by those that are not included; "" where there are none."""
-    changes = [p.rate_change for p in perturbations if not p.included]
+    changes = [p.rate_change for p in beyond_intervals(perturbations)]
     if not changes:
         return ""
     total = float(np.sqrt(np.sum(np.square(changes))))
@@ -108,5 +108,5 @@ def combined_change_text(perturbations: Sequence[Perturbation]) -> str:
 
 def unmodelled_note(perturbations: Sequence[Perturbation]) -> tuple[str, ...]:
     """One sentence on what intervals do not include, with what it would do to the rate; none where that is little."""
-    parts = [p.sentence for p in perturbations if abs(p.rate_change) > NOTEWORTHY_CHANGE and not p.included]
+    parts = [p.sentence for p in beyond_intervals(perturbations) if p.rate_change > NOTEWORTHY_CHANGE]
     return (f"{NOT_INCLUDED} what would move the rate amid the tests: {'; '.join(parts)}",) if parts else ()

@@ -3,12 +3,12 @@
 A dimple may be thicker than its drawing, a camera may have moved, a furnace may drift; a thermocouple, a load cell or a
 micrometer may be off in every test. Where no nuisance parameter stands for it, it is a perturbation.
 What an error does to values that do not know of it is, to first order, du = -(J'C^-1 J + P)^-1 J'C^-1 s, with s its
-effect on the residuals and C the covariance as it would be found: with the scatter of rates, the offsets or the misfit
-that the error makes. Those that the settings name are in the covariance instead (see inverse.errors_of_tests).
+effect on the residuals and C the covariance as it would be found: with the scatter of rates or the misfit that the
+error makes. Those that the settings name are in the covariance instead (see inverse.errors_of_tests).
 
 A temperature or load that is off changes the creep rate of each test by its own factor. Of tests under an imposed
 strain or displacement the stress is E (strain - creep strain): a modulus or a strain that is off moves it from the
-first reading on, and is found as offsets of the tests.
+first reading on.
 
 The same perturbations, as random effects in the covariance, show what a law would explain
 with them (inverse.judging), and whether the choice of a law rests on their absence
@@ -83,25 +83,22 @@ def perturbations(
     known : those of lengths and instruments, where they have been simulated already.
     working_noise : under which values were found that are not by likelihood.
     """
-    x = linear.x
-    reference = problem.coordinates.reference
-    slope = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature)
-    found, without_energy = [], not problem.law.uses(temperature)
-    for one in _all(problem, x, linear, full_histories, known):
-        change, noise = one.residual_change, working_noise or noise_model
-        if not one.common and working_noise is None:
-            noise = _with_scatter_of(change, problem, linear, noise_model)
-        if (one.kind == "modulus" or one.kind.startswith("imposed ")) and working_noise is None:
-            noise = _with_offset_of(change, problem, linear, noise)
-        if one.kind == DRIFT:
-            noise = _with_misfit_of(change, problem, noise)
-        moved = value_changes(linear, noise, change)
-        moved = moved.sum(axis=0, keepdims=True) if one.common else moved
-        by_error = moved[:, : problem.parameter_count] @ _log_rate_gradient(problem, x)
-        one = replace(one, rate_change=float(by_error[0] if one.common else np.sqrt((by_error**2).sum())))
-        if one.kind in (DRIFT, "temperature"):
-            one = replace(one, per_kelvin=slope, assumed=without_energy)
-        found.append(replace(one, residual_change=np.zeros((0, 0))) if one.common else one)
+    reference, found = problem.coordinates.reference, list[Perturbation]()
+    slope = log_rate_per_kelvin(problem, linear.x, reference.stress, reference.temperature)
+    for one in _all(problem, linear.x, linear, full_histories, known):
+        if one.common:
+            one = replace(one, residual_change=np.zeros((0, 0)))
+        elif not one.included:
+            change, noise = one.residual_change, working_noise
+            if noise is None:
+                noise = _with_scatter_of(change, problem, linear, noise_model)
+            if one.kind == DRIFT:
+                noise = _with_misfit_of(change, problem, noise)
+                one = replace(one, per_kelvin=slope, assumed=not problem.law.uses(temperature))
+            moved = value_changes(linear, noise, change)[:, : problem.parameter_count]
+            by_error = moved @ _log_rate_gradient(problem, linear.x)
+            one = replace(one, rate_change=float(np.linalg.norm(by_error)))
+        found.append(one)
     return tuple(found)
 
 
@@ -391,26 +388,4 @@ def _with_misfit_of(change: Floats, problem: LeastSquaresProblem, noise_model: N
         if name in noise_model.outputs and mask.any():
             size = float(np.hypot(noise_model[name].drift, np.sqrt(np.mean(change[mask] ** 2))))
             noise_model = noise_model.with_output(name, drift=size, correlation_length=1.0)
-    return noise_model
-
-
-def _with_offset_of(
-    change: Floats, problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel
-) -> NoiseModel:
-    """The noise model with the offsets of tests that an error common to them would be estimated as.
-
-    change : (tests, observations) -, of the residuals. Of each output the mean of a test, in its unit, counts.
-    """
-    fixed = components_fixed_by_priors(problem.settings.nuisances, list(noise_model.outputs))
-    observations, slopes = problem.observations, linear.residuals.offset_sensitivity
-    if not any(n.kind == "offset" for n in problem.settings.nuisances):
-        return noise_model
-    for position, name in enumerate(observations.outputs):
-        if (name, "offset") in fixed or name not in noise_model.outputs:
-            continue
-        mask = linear.residuals.present & (observations.output_index == position)
-        weights = np.where(mask, slopes**2, 0.0).sum(axis=1)
-        means = np.where(mask, change * slopes, 0.0).sum(axis=1) / np.maximum(weights, 1e-300)
-        offset = float(np.sqrt(np.mean(means[weights > 0] ** 2))) if (weights > 0).any() else 0.0
-        noise_model = noise_model.with_output(name, offset=float(np.hypot(noise_model[name].offset, offset)))
     return noise_model

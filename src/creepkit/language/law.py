@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.language import algebra
 from creepkit.language.algebra import times
 from creepkit.language.law_record import LawRecord
-from creepkit.language.printing import law_latex, law_text
+from creepkit.language.printing import LatexLawPrinter, latex_equations, law_text
 from creepkit.presentation import present
 
 
@@ -25,6 +25,15 @@ class CreepLaw(LawRecord):
     def __add__(self, other: CreepLaw) -> CreepLaw:
         """The additive law; terms stay apart by name, colliding parameters become A_1, A_2 ..."""
         return algebra.add(self, other) if isinstance(other, CreepLaw) else NotImplemented
+
+    def __radd__(self, other: Any) -> CreepLaw:
+        """For sum(laws)."""
+        return self if isinstance(other, int) and other == 0 else NotImplemented
+
+    def __rmul__(self, factor: float) -> CreepLaw:
+        """The law with a creep rate of so many times its own, as 2 * law; internal variables go on as before."""
+        name, terms = f"{factor:g}*{self.name}", {label: factor * term for label, term in self.terms.items()}
+        return replace(self, name=name, title=self.title and f"{factor:g}*{self.title}", terms=terms, examples=())
 
     def without(self, *terms: str) -> CreepLaw:
         """The law less the named terms and the parameters that only they used."""
@@ -77,9 +86,14 @@ class CreepLaw(LawRecord):
         """The law at one temperature, in K; parameters that no longer matter there are dropped."""
         return algebra.at(self, temperature)
 
+    def expression(self, values: Mapping[Any, float] | None = None) -> Any:
+        """The rate for sympy with values in it, by name or symbol; R and T_ref of Arrhenius factors stay symbols."""
+        return present("reports.law_names:law_expression", self, values or {})
+
     def latex(self) -> str:
-        """The law as a LaTeX equation."""
-        return law_latex(self)
+        """The law as LaTeX equations: of its rate with one summand a term, then of its internal variables."""
+        equations = latex_equations(self, LatexLawPrinter(self))
+        return r",\quad ".join(f"{left} = {' + '.join(right)}" for left, right in equations)
 
     def __str__(self) -> str:
         return law_text(self)

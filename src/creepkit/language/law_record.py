@@ -83,9 +83,6 @@ def _check_names(law: LawRecord, origin: str) -> None:
             raise LawError(f"{origin}: '{name}' is not a plain name; use letters, digits and underscores")
 
 
-_LARGEST_NUMBER = 10**308
-
-
 def _check_expressions(law: LawRecord, origin: str) -> None:
     rates: dict[str, Any] = {f"term '{label}'": expression for label, expression in law.terms.items()}
     rates |= {f"rate of state '{symbol}'": state.rate for symbol, state in law.states.items()}
@@ -98,10 +95,6 @@ def _check_expressions(law: LawRecord, origin: str) -> None:
             raise LawError(
                 f"{origin}, {position}: the expression is too large, its nodes times its symbols above {LARGEST_SIZE}; "
                 "write it with fewer parts, or fewer of them within each other"
-            )
-        if any(abs(number) > _LARGEST_NUMBER for number in expression.atoms(sympy.Number)):
-            raise LawError(
-                f"{origin}, {position}: a number above 1e308 in size has no place in a kernel; scale it down"
             )
 
 

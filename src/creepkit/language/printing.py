@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy
 from sympy.printing.latex import LatexPrinter
@@ -12,18 +11,17 @@ from sympy.printing.str import StrPrinter
 from creepkit.language.law_record import LawRecord
 from creepkit.language.symbols import GAS_CONSTANT, LATEX_SYMBOLS, temperature
 
-_LATEX_NAMES = {"n_inf": r"n_\infty"}
-
-
 # ---- LaTeX ---------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class ArrheniusExponent:
-    """exp[-(Q/R)(1/T - 1/T_ref)] recognised in an expression: Q in J/mol, T_ref in K."""
+class ArrheniusExponent(NamedTuple):
+    """exp[-(Q/R)(1/T - 1/T_ref)] recognised in an expression: Q in J/mol, T_ref in K; -Q is `energy` after `sign`."""
 
     Q: sympy.Expr
     T_ref: float
+
+    sign: str
+    energy: sympy.Expr
 
 
 def arrhenius_exponent(exponent: sympy.Expr) -> ArrheniusExponent | None:
@@ -37,7 +35,9 @@ def arrhenius_exponent(exponent: sympy.Expr) -> ArrheniusExponent | None:
     if not (T_ref.is_Number and T_ref > 0):
         return None
     number, remainder = (-slope * GAS_CONSTANT).as_coeff_Mul()
-    return ArrheniusExponent(_without_rounding(number) * remainder, float(_without_rounding(T_ref)))
+    Q = _without_rounding(number) * remainder
+    sign, energy = ("", -Q) if Q.could_extract_minus_sign() else ("-", Q)
+    return ArrheniusExponent(Q, float(_without_rounding(T_ref)), sign, energy)
 
 
 def _without_rounding(number: sympy.Expr) -> sympy.Expr:
@@ -46,17 +46,30 @@ def _without_rounding(number: sympy.Expr) -> sympy.Expr:
     return sympy.Integer(int(rounded)) if rounded.is_integer() else sympy.Float(rounded)
 
 
-class LatexLawPrinter(LatexPrinter):  # type: ignore[misc]
+class ReadableSums:
+    """Sums with what is added before what is taken away, and exponentials with Arrhenius factors by themselves."""
+
+    def _as_ordered_terms(self, expr: Any, order: Any = None) -> list[Any]:
+        terms = super()._as_ordered_terms(expr, order=order)  # type: ignore[misc]
+        return sorted(terms, key=lambda term: term.could_extract_minus_sign())
+
+    def _factors(self, exponent: Any) -> tuple[list[Any], Any]:
+        """The Arrhenius factors of an exponential as they are printed, and what else stands in its exponent."""
+        found = {part: arrhenius_exponent(part) for part in sympy.Add.make_args(exponent)}
+        factors = [self._arrhenius_factor(one) for one in found.values() if one]  # type: ignore[attr-defined]
+        return factors, sympy.Add(*(part for part, known in found.items() if not known))
+
+
+class LatexLawPrinter(ReadableSums, LatexPrinter):  # type: ignore[misc]
     """Print exponentials as exp[...], those of reciprocal temperature as Arrhenius factors, all else as sympy does."""
 
     def __init__(self, law: LawRecord) -> None:
-        names = {s: _LATEX_NAMES[s.name] for s in law.params if s.name in _LATEX_NAMES}
+        names = {symbol: r"n_\infty" for symbol in law.params if symbol.name == "n_inf"}
         super().__init__({"symbol_names": {**LATEX_SYMBOLS, **names}, "mul_symbol": None})
 
     def _print_exp(self, e: Any, exp: Any = None) -> str:
-        parts = {part: arrhenius_exponent(part) for part in sympy.Add.make_args(e.args[0])}
-        text = "".join(self._arrhenius_factor(result) for result in parts.values() if result)
-        rest = sympy.Add(*(part for part, found in parts.items() if not found))
+        factors, rest = self._factors(e.args[0])
+        text = "".join(factors)
         if rest != 0:
             text += rf"{' ' if text else ''}\exp\!\left[{self._print(rest)}\right]"
         return text if exp is None else rf"\left({text}\right)^{{{exp}}}"
@@ -66,19 +79,8 @@ class LatexLawPrinter(LatexPrinter):  # type: ignore[misc]
         return text if exp is None else rf"\left({text}\right)^{{{exp}}}"
 
     def _arrhenius_factor(self, found: ArrheniusExponent) -> str:
-        is_negative = found.Q.could_extract_minus_sign()
-        sign, energy = ("", -found.Q) if is_negative else ("-", found.Q)
-        return (
-            rf"\exp\!\left[{sign}\frac{{{self._print(energy)}}}{{R}}"
-            rf"\left(\frac{{1}}{{T}} - \frac{{1}}{{{found.T_ref:g}\,\mathrm{{K}}}}\right)\right]"
-        )
-
-
-def law_latex(law: LawRecord) -> str:
-    r"""Return ``\dot{\varepsilon}_{cr} = ...`` with one summand a term; states follow as further equations."""
-    return r",\quad ".join(
-        f"{left} = {' + '.join(right)}" for left, right in latex_equations(law, LatexLawPrinter(law))
-    )
+        difference = rf"\left(\frac{{1}}{{T}} - \frac{{1}}{{{found.T_ref:g}\,\mathrm{{K}}}}\right)"
+        return rf"\exp\!\left[{found.sign}\frac{{{self._print(found.energy)}}}{{R}}{difference}\right]"
 
 
 def latex_equations(law: LawRecord, printer: LatexLawPrinter) -> list[tuple[str, list[str]]]:
@@ -90,21 +92,15 @@ def latex_equations(law: LawRecord, printer: LatexLawPrinter) -> list[tuple[str,
 # ---- plain text ----------------------------------------------------------------------------------------------------
 
 
-class TextPrinter(StrPrinter):  # type: ignore[misc]
+class TextPrinter(ReadableSums, StrPrinter):  # type: ignore[misc]
     """Print expressions for people: Arrhenius factors as exp(-Q/R*(1/T - 1/1073.15))."""
 
     def _print_exp(self, e: Any) -> str:
-        parts = [(part, arrhenius_exponent(part)) for part in sympy.Add.make_args(e.args[0])]
-        text = "*".join(self._arrhenius_factor(result) for _, result in parts if result)
-        rest = sympy.Add(*(part for part, found in parts if not found))
-        if not text:
-            return f"exp({self._print(rest)})"
-        return text if rest == 0 else f"{text}*exp({self._print(rest)})"
+        factors, rest = self._factors(e.args[0])
+        return "*".join([*factors, *([f"exp({self._print(rest)})"] if rest != 0 or not factors else [])])
 
     def _arrhenius_factor(self, found: ArrheniusExponent) -> str:
-        is_negative = found.Q.could_extract_minus_sign()
-        sign, energy = ("", -found.Q) if is_negative else ("-", found.Q)
-        return f"exp({sign}{self._print(energy)}/R*(1/T - 1/{found.T_ref:g}))"
+        return f"exp({found.sign}{self._print(found.energy)}/R*(1/T - 1/{found.T_ref:g}))"
 
 
 def expression_text(expression: sympy.Basic) -> str:

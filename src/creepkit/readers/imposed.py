@@ -49,8 +49,9 @@ HELD_RANGE, OUTLIERS = 0.02, 0.02
 """Of its median: a quantity that is held varies by less, but for this fraction of its frames."""
 
 
-CONSTANT_RATE, LARGEST_MODULUS = 0.05, 1e6
-"""Of the median: a rate of strain between the first frame and any other that is as near is constant; MPa."""
+CONSTANT_RATE, RISING, LARGEST_MODULUS = 0.05, 0.97, 1e6
+"""Of the median: a rate of strain between the first frame and any other that is as near is constant, and a stress below
+this part of its median is still rising; MPa."""
 
 
 LONGEST_RAMP, SUSTAINED, STRAIGHT = 0.1, 0.5, 0.1
@@ -309,15 +310,22 @@ def _grows_steadily(times: Floats, column: Floats) -> bool:
 
 
 def _is_strained_at_constant_rate(times: Floats, strain: Floats, stress: Floats) -> bool:
-    """Whether strain grows by one rate from the first frame on, while the stress rises from nothing.
+    """Whether strain grows by one rate from rest or the first frame on, while the stress rises.
 
     Creep, even steady one, is slower at the lower stress of a ramp, whose elastic strain is not that of creep; where
     the stress rises by more than any modulus times the strain, that is creep strain alone.
     """
+    times, strain, stress = _from_rest(times, strain, stress)
     rates, level = (strain[1:] - strain[0]) / (times[1:] - times[0]), float(np.median(stress))
     is_constant = np.abs(rates - np.median(rates)).max() <= CONSTANT_RATE * np.median(rates)
     is_elastic = stress[1] - stress[0] <= LARGEST_MODULUS * (strain[1] - strain[0])
-    return bool(is_constant and is_elastic and stress[0] <= 0.05 * level and stress[1] < 0.97 * level)
+    return bool(is_constant and is_elastic and stress[0] <= 0.05 * level and stress[1] < RISING * level)
+
+
+def _from_rest(times: Floats, strain: Floats, *others: Floats) -> list[Floats]:
+    """Times, strains and others (frames,) with zeros before the first frame, where the test had begun by then."""
+    is_late = times[0] > 0.0 and strain[0] > 0.0
+    return [np.append(0.0, one) if is_late else one for one in (times, strain, *others)]
 
 
 def _recorded(
@@ -334,7 +342,8 @@ def _recorded(
         return _ramp_and_hold(frames.times, held, start) if start else float(held.mean())
     starts = _level_starts(column, tolerance)
     if not starts:
-        program = recorded_program(frames.times, column, tolerance)
+        begun, record = _from_rest(frames.times, column) if quantity == "strain" else (frames.times, column)
+        program = recorded_program(begun, record, tolerance)
         return program if column.min() < 0.0 else Program(program.times, np.maximum(program.values, 0.0))
     bounds = [*starts, column.size]
     levels = [float(np.median(column[first:last])) for first, last in pairwise(bounds)]

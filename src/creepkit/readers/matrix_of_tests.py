@@ -73,7 +73,7 @@ def _unfolded(table: CellTable, at: int, said: Sequence[str], first: Sequence[st
         not is_stress
         or (unit is None and not temperatures.unit)
         or "" in temperatures.values
-        or not temperatures.values
+        or len(temperatures.values) < len(body)
     ):
         return None
     of_rupture = [text for text in said if _OF_RUPTURE.search(text)]

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
+from datetime import datetime
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -17,13 +19,14 @@ from typing import NamedTuple
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_number
+from creepkit.files.labview import START
 from creepkit.readers.questions import Question
 from creepkit.readers.table import CellTable, SourceText, TableRow
 from creepkit.readers.table_heads import is_frame
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.tests_file import JOINED, SEPARATE, answers_of
 from creepkit.readers.text_files import peek_table, read_text_table
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_written_name
 from creepkit.records.quantities import LENGTH
 
 _IN_HEAD = re.compile(
@@ -143,7 +146,9 @@ def _joined(
             raise Question(path, str(path), what, "parts", (JOINED, SEPARATE))
         kinds = known.columns.kinds
         moved = [time, *(k for k, q in enumerate(columns) if q and (q.startswith("strain") or kinds[q] is LENGTH))]
-        rows, note = _in_one_clock([test.table for test in tests], moved), "each from the end of the one before"
+        gaps = [_gap(one, other, time) for one, other in pairwise(tests)]
+        note = "with the gaps between them" if any(gaps) else "each from the end of the one before"
+        rows = _in_one_clock([test.table for test in tests], moved, gaps)
     entries = {key: entry for test in reversed(tests) for key, entry in test.entries.items()} | dict(first.entries)
     table = replace(first.table, rows=rows).assuming(f"parts joined {note}: {listed}")
     return TabulatedTest(first.name or parts[0].test[0] or parts[0].path.stem, entries, table)
@@ -166,15 +171,30 @@ def _begins_anew(tests: Sequence[TabulatedTest], time: int) -> bool:
     return any(start < end for (_, end), (start, _) in pairwise(numbers))
 
 
-def _in_one_clock(tables: Sequence[CellTable], moved: Sequence[int]) -> list[TableRow]:
-    """The frames of all parts; the first of each is the last of the one before, in the columns that are moved."""
+def _gap(before: TabulatedTest, after: TabulatedTest, time: int) -> float:
+    """s from the last frame of a part to the first of the next, where both say when they were begun; else 0."""
+    begun, ends = list[datetime](), (before.table.rows[-1].cells[time], after.table.rows[0].cells[time])
+    with suppress(ValueError, KeyError):
+        begun = [datetime.fromisoformat(one.entries[START].text) for one in (before, after)]
+    is_in_seconds = split_written_name(before.table.columns[time])[1] == "s"
+    if len(begun) < 2 or not is_in_seconds or not all(is_number(one, before.table.dialect) for one in ends):
+        return 0.0
+    return max((begun[1] - begun[0]).total_seconds() + float_of(ends[1]) - float_of(ends[0]), 0.0)
+
+
+def _in_one_clock(tables: Sequence[CellTable], moved: Sequence[int], gaps: Sequence[float]) -> list[TableRow]:
+    """The frames of all parts; the first of each is the last of the one before, in the columns that are moved.
+
+    gaps : in the first of these, the time, between each part and the next.
+    """
     rows = list(tables[0].rows)
-    for table in tables[1:]:
+    for table, gap in zip(tables[1:], gaps, strict=True):
         sign, dialect = table.dialect.decimal, table.dialect
         if not all(is_number(row.cells[k], dialect) for row in (rows[-1], table.rows[0]) for k in moved):
             what = "a cell of the first row, or of the last of the part before, is no number"
             raise HistoryError(f"{table.location(table.rows[0].line)}: {what}, and parts are joined there; correct it")
         last, first = ([float_of(row.cells[k].replace(sign, ".")) for k in moved] for row in (rows[-1], table.rows[0]))
+        last[0] += gap
         for row in table.rows[1:]:
             cells = list(row.cells)
             for k, end, start in zip(moved, last, first, strict=True):

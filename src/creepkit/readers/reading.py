@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import gc
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import partial
 from glob import glob
@@ -16,18 +16,14 @@ from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.files.delimited_text import refuse_unprintable
 from creepkit.files.reading import read_bytes
 from creepkit.hookspecs import hookimpl
-from creepkit.readers.columns_of_tests import column_called
 from creepkit.readers.creep_schema_json import CREEP_SCHEMA
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.readers.questions import ANSWERS_FILE, collected, raise_all
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
-from creepkit.readers.table import CellTable
-from creepkit.readers.table_heads import names_time
-from creepkit.readers.table_layouts import tests_in
 from creepkit.readers.tests_file import answers_of, read_answers
 from creepkit.readers.tests_in_rows import TEST_TABLE
-from creepkit.readers.text_files import TABLE_FILE, read_text_table
+from creepkit.readers.text_files import TABLE_FILE
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, Reader, accepts_path, histories_in
 
@@ -220,56 +216,3 @@ def _with_unique_names(read: Sequence[tuple[Path, History]]) -> list[History]:
 
 def _folder(path: Path) -> str:
     return (path if path.is_dir() else path.absolute().parent).name
-
-
-# ---- what a file of tables was understood to hold --------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class TableSummary:
-    """The table of one test as it stands in a file.
-
-    place : the file and the sheet. dialect : its delimiter and decimal sign, "" in a spreadsheet. test : its name, ""
-    where the file does not tell. columns : {name as written: creepkit's name}. rows : frames in the file.
-    """
-
-    place: str
-    dialect: str
-    test: str
-    columns: Mapping[str, str]
-    rows: int
-
-
-def summarise_tables(path: Path, ignored: Collection[str] = ()) -> list[TableSummary]:
-    """The tables of a text file or a spreadsheet in one of the general layouts; [] of any other file.
-
-    ignored : columns that are left out.
-    """
-    vocabulary = answers_of(path).added_to(HeaderVocabulary(ignored=ignored))
-    reader = replace(TEST_TABLE, vocabulary=vocabulary)
-    if reader.accepts(path):
-        return [
-            TableSummary(str(path), "", "", {n: column_called(n).quantity or n for n in table.names}, len(table.rows))
-            for table in reader.tables(path, [])
-        ]
-    if SPREADSHEET.accepts(path):
-        grids = [grid for grid in read_sheets(path) if names_time(grid, vocabulary)]
-    elif HISTORY_CSV.accepts(path):
-        grids = [read_text_table(path)]
-    else:
-        return []
-    return [summary for grid in grids for summary in _summaries(grid, vocabulary)]
-
-
-def _summaries(grid: CellTable, vocabulary: HeaderVocabulary) -> list[TableSummary]:
-    known = vocabulary.terms(grid.header["specimen"].text if "specimen" in grid.header else "")
-    return [
-        TableSummary(
-            grid.place,
-            "" if grid.sheet else str(grid.dialect),
-            test.name,
-            {name: known.column(name) for name in test.table.columns},
-            len(test.table.rows),
-        )
-        for test in tests_in(grid, vocabulary)
-    ]

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import is_missing, is_number
+from creepkit.files.delimited_text import NUMBERS, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.questions import ANSWERS_FILE
 from creepkit.readers.table import CellTable, SourceText, TableRow, without_ignored
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit, split_written_name, unit_suffix
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit, split_written_name, unit_suffix, words_of
 from creepkit.records.quantities import LENGTH
 
 _MOST_ROWS, _MOST_BELOW = 60, 6
@@ -64,7 +64,11 @@ _NOT_TESTS = re.compile(
 
 def test_and_column(cell: str, known: Terms) -> tuple[str, str]:
     """Name of the test and of the column in `A1 strain (%)` or `Strain A1 (%)`; ("", cell) where there are not both."""
-    if known.quantity(cell) or known.is_condition(cell):
+    names = (known.column(cell), known.columns.kinds), (known.condition(cell), known.conditions.kinds)
+    found = [(one, kinds) for name, kinds in names if (one := split_unit(name, kinds))]
+    if any(unit in ("", *kinds[quantity].units) for (quantity, unit), kinds in found) or (
+        not found and known.is_condition(cell)
+    ):
         return "", cell
     written, unit = split_written_name(cell)
     words = written.replace(":", " ").replace("_", " ").split()
@@ -83,6 +87,8 @@ def is_time(cell: str, known: Terms) -> bool:
 
 def is_frame(row: TableRow, table: CellTable) -> bool:
     """Whether a row holds numbers or times alone, with marks of missing values."""
+    if all(map(NUMBERS[table.dialect.decimal].fullmatch, row.cells)):
+        return True
     cells = [cell for cell in row.cells if cell]
     numbers = [is_number(cell.rstrip("% "), table.dialect) or is_clock_time(cell) for cell in cells]
     return any(numbers) and all(one or is_missing(cell) for one, cell in zip(numbers, cells, strict=True))
@@ -287,6 +293,12 @@ def heads_of_tests(
                 result.put(f"label line {row.line}", text, row)
         first = filled[min(filled)]
         key = first if known.is_condition(first.rstrip(": ")) else ""
+        if (
+            words_of(key) == "specimen"
+            and len(filled) > 2
+            and not {*map(str.casefold, filled.values())} & {*known.outputs}
+        ):
+            key = "name"
         measured = {} if key else {k: conditions_of_head(cell, known) for k, cell in filled.items()}
         is_measured = bool(measured) and all(measured.values())
         if len(set(filled.values())) == 1 and not key and not (is_measured and len(tests) == 1):

@@ -110,14 +110,6 @@ def with_groups(table: CellTable, known: Terms) -> CellTable:
 
     A group begins where time falls. Groups that no name tells apart, but a condition does, get numbers.
     """
-    if len(table.rows) < 2:
-        return table
-    time = next((k for k, name in enumerate(table.columns) if known.quantity(name) == "time"), None)
-    clock = [row.cells[time] for row in table.rows] if time is not None else [""]
-    if not all(is_number(cell, table.dialect) for cell in clock):
-        return table
-    times = list(map(float_of, clock))
-    starts = {0, *(k for k in range(1, len(times)) if times[k] < times[k - 1])}
     keys = [k for k, name in enumerate(table.columns) if names_tests(name) or words_of(name) == "specimen"]
     stated = keys + [
         k
@@ -125,18 +117,22 @@ def with_groups(table: CellTable, known: Terms) -> CellTable:
         if known.quantity(name) in (None, "temperature", *known.number_kinds) and known.is_condition(name)
     ]
     filled = {k: [row for row, cell in enumerate(cells_of(table.rows, k)) if not is_missing(cell)] for k in stated}
-    sparse = [
-        k
-        for k in stated
-        if filled[k] and filled[k][0] == 0 and set(filled[k]) <= starts and len(filled[k]) < len(times)
-    ]
+    sparse = [k for k, rows in filled.items() if rows and rows[0] == 0 and len(rows) < len(table.rows)]
+    time = next((k for k, name in enumerate(table.columns) if known.quantity(name) == "time"), None)
+    if not sparse or time is None or not all(is_number(cell, table.dialect) for cell in cells_of(table.rows, time)):
+        return table
+    times = list(map(float_of, cells_of(table.rows, time)))
+    starts = {0, *(k for k in range(1, len(times)) if times[k] < times[k - 1])}
+    sparse = [k for k in sparse if starts.issuperset(filled[k])]
+    if not sparse:
+        return table
     rows, above = list[TableRow](), dict[int, str]()
     for row in table.rows:
         above |= {k: row.cells[k] for k in sparse if not is_missing(row.cells[k])}
         rows.append(TableRow(row.line, [above.get(k, cell) for k, cell in enumerate(row.cells)]))
-    notes = tuple(f"blank cells of '{table.columns[k]}' hold what stands above them" for k in sparse)
-    result = replace(table, rows=rows, assumptions=(*table.assumptions, *notes)) if sparse else table
-    if keys or len(starts) < 2 or not sparse:
+    notes = (f"blank cells of '{table.columns[k]}' hold what stands above them" for k in sparse)
+    result = replace(table, rows=rows).assuming(*notes)
+    if keys or len(starts) < 2:
         return result
     numbers = [str(sum(start <= k for start in starts)) for k in range(len(rows))]
     rows = [TableRow(row.line, [number, *row.cells]) for number, row in zip(numbers, rows, strict=True)]
@@ -259,11 +255,11 @@ def _without_page_heads(table: CellTable) -> CellTable:
     """The table without the lines at the beginning of further pages, which repeat that of the first one."""
     seen, rows = set[str](), list[TableRow]()
     for row in table.rows:
-        text = " ".join(row.cells) if any(map(_PAGE.search, row.cells)) else ""
-        plain = re.sub(r"\d+", "", text)
+        text = " ".join(row.cells)
+        plain = re.sub(r"\d+", "", text) if _PAGE.search(text) else ""
         if plain not in seen:
             rows.append(row)
-            seen |= {plain} if text else set()
+            seen |= {plain} if plain else set()
     return replace(table, rows=rows)
 
 
@@ -332,10 +328,17 @@ def _tests_of_pairs(headed: HeadedTable) -> list[TabulatedTest]:
 # ---- one column a test ---------------------------------------------------------------------------------------------
 
 
+def _columns_of_tests(headed: HeadedTable) -> list[int]:
+    """Positions of the columns beside a time but for the one temperature of a furnace that several tests share."""
+    others = [k for k, cell in enumerate(headed.names) if k not in headed.times and cell]
+    furnace = [k for k in others if headed.known.quantity(headed.names[k]) == "temperature"]
+    return [k for k in others if k not in furnace or len(furnace) > 1 or len(others) < 3]
+
+
 def _are_columns(headed: HeadedTable) -> bool:
     """Whether the columns beside one time are one a test."""
     known = headed.known
-    others = [cell for k, cell in enumerate(headed.names) if k not in headed.times and cell]
+    others = [headed.names[k] for k in _columns_of_tests(headed)]
     if len(headed.times) != 1 or len(others) < 2 or known.declared.intersection(others):
         return False
     named = [test_and_column(cell, known) for cell in others]
@@ -361,26 +364,28 @@ def _kinds_of_unit(cell: str) -> list[str]:
 
 def _are_conditions(headed: HeadedTable) -> bool:
     """Whether the columns beside a time are named by a load or a temperature, as `120 MPa`."""
-    written = [cell for k, cell in enumerate(headed.written) if cell and k not in headed.times]
-    return all(conditions_of_head(cell, headed.known) for cell in written)
+    return all(conditions_of_head(headed.written[k], headed.known) for k in _columns_of_tests(headed))
 
 
 def _tests_of_columns(headed: HeadedTable) -> list[TabulatedTest]:
-    time = headed.times[0]
-    tests = [
-        TestColumns(test, {time: headed.names[time], k: column})
-        for k, cell in enumerate(headed.names)
-        if k != time and cell
-        for test, column in [_test_and_strain(headed, k)]
-    ]
-    beside = [[cell for k, cell in enumerate(row.cells) if cell and k > time] for row in headed.rows]
+    own = _columns_of_tests(headed)
+    shared = {k: cell for k, cell in enumerate(headed.names) if cell and k not in own}
+    tests, first = list[TestColumns](), own[0]
+    for k in own:
+        test, column = _test_and_strain(headed, k)
+        same = next((n for n, one in enumerate(tests) if test and one.test == test), None)
+        if same is None or column in tests[same].columns.values():
+            tests.append(TestColumns(test, {**shared, k: column}))
+        else:
+            tests[same] = TestColumns(test, {**tests[same].columns, k: column})
+    beside = [[cell for k, cell in enumerate(row.cells) if cell and k >= first] for row in headed.rows]
     if all(one.test.isdigit() for one in tests) and not any(len(set(cells)) > 1 for cells in beside):
         raise HistoryError(
             f"{headed.place}: several columns of one quantity, and no conditions above each, may be tests or sensors "
             "of one test; name the tests, such as 'A1 strain (%)', or keep one column, with '# ignore: NAME' for the "
             "others"
         )
-    return _tests_of_blocks(headed, tests, range(time + 1))
+    return _tests_of_blocks(headed, tests, {*range(first), *shared})
 
 
 def _test_and_strain(headed: HeadedTable, k: int) -> tuple[str, str]:
@@ -425,8 +430,10 @@ def _tests_of_blocks(
         if name in results:
             raise HistoryError(f"{place}: two tests are called '{quoted(name)}'; give each its own name")
         check_columns(f"{place}, test '{quoted(name)}'", columns)
-        # In pairs its time is among what the columns of a test hold.
-        cut = [row for row in with_columns(rows, list(test.columns)) if not all(map(is_missing, row.cells[1:]))]
+        # A time goes on where another test does, and the temperature of a furnace, too.
+        others = [k for k, one in enumerate(columns) if known.quantity(one) not in ("time", "temperature")]
+        cut = with_columns(rows, list(test.columns))
+        cut = [row for row in cut if not all(is_missing(row.cells[k]) for k in others or range(1, len(columns)))]
         if not cut:
             what = f"test '{quoted(name)}' has no rows below the names of its columns"
             raise HistoryError(f"{place}: {what}; remove it or fill it")

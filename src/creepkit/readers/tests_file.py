@@ -104,12 +104,8 @@ def read_answers(file: Path) -> dict[str, dict[str, Any]]:
     known = HeaderVocabulary().terms()
     for pattern, table in data.items():
         if not isinstance(table, dict):
-            errors.append(
-                HistoryError(
-                    f"{file}: '{quoted(pattern)}' stands in no table; begin with the files that it is about, such as "
-                    '["*.csv"]'
-                )
-            )
+            what = f"'{quoted(pattern)}' stands in no table; begin with the files that it is about, such as"
+            errors.append(HistoryError(f'{file}: {what} ["*.csv"]'))
             continue
         for key, value in table.items():
             if problem := _problem(key, value, known):
@@ -134,7 +130,5 @@ def _problem(key: str, value: Any, known: Terms) -> str:
         return "" if is_single else "write a number or a text"
     near = get_close_matches(key, ["columns", "ended", "parts"], 1)
     meant = near[0] if near else known.suggestion(key)
-    allowed = (
-        "allowed are columns, ended, parts, and conditions as in the head of a file, such as stress_MPa or specimen"
-    )
+    allowed = "allowed are columns, ended, parts, and conditions as in the head of a file, such as stress_MPa"
     return f"is no key; did you mean '{meant}'?" if meant else f"is no key; {allowed}"

@@ -137,7 +137,14 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "span": (
         *("outer span", "support span", "outer support span", "lower span", "outer roller spacing", "support distance"),
-        *("auflagerabstand", "stützweite", "äußere stützweite", "portée", "distance entre appuis"),
+        *(
+            "distance between supports",
+            "auflagerabstand",
+            "stützweite",
+            "äußere stützweite",
+            "portée",
+            "distance entre appuis",
+        ),
     ),
     "inner_span": (
         *("inner span", "load span", "loading span", "inner loading span", "inner support span", "upper span"),

@@ -33,14 +33,10 @@ COORDINATES, DISPLACEMENTS = ("x", "y", "z"), ("u", "v", "w")
 OUT_OF_PLANE = ("z", "w")
 
 
-QUANTITIES_OF_FRAMES = (*COORDINATES, *DISPLACEMENTS, "confidence", "time", "image_x", "image_y")
+QUANTITIES_OF_FRAMES = (*COORDINATES, *DISPLACEMENTS, "time", "image_x", "image_y")
 
 
 _UNIT_IN_BRACKETS = re.compile(r"^([^\[(]*)[\[(]([^\])]*)[\])]$")
-
-
-_PACKED = re.compile(r"\?|[<>=|]?(?:[iu][1248]|f[248])", re.ASCII)
-"""Types of packed numbers, as NumPy calls them."""
 
 
 _RULE = re.compile(r"\s*(<=|>=|<|>|==)\s*([+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*", re.ASCII)
@@ -91,22 +87,16 @@ class CameraFormat:
 
     name, title : short name, and one sentence. columns : {quantity: column}, or a tuple of such mappings, one for each
         version of the system; a column may be a tuple of spellings, and is given without its unit. Quantities are
-        x y z (coordinates), u v w (displacements), where there are such columns confidence and time, and image_x,
-        image_y (pixels) where only they tell the system from another one. Without z and w the format is that of a flat
-        surface that moves in its plane.
+        x y z (coordinates), u v w (displacements), where there is such a column time, and image_x, image_y (pixels)
+        where only they tell the system from another one. Without z and w the format is that of a flat surface that
+        moves in its plane.
     unit : of lengths where the head of the file states none; "" makes that an error.
     deformed : whether x y z are where the points are now, rather than where they were in the reference image.
     axes : factors of x, y, z, each 1 or -1, that turn them into right-handed axes whose z points to the cameras. Two
         factors of -1, or none, are a rotation; one, or three, say that the axes of the files are left-handed, as those
         are whose y points down and whose z points to the cameras.
     lost : {column: rule} of points that the correlation lost, such as {"sigma": "< 0"}; NaN is one in all systems.
-    confidence_unit : of the column confidence, where the head states none.
-    patterns : names of files, such as "*.csv". planar : columns by which a two-dimensional table of the system is
-        recognised, which is refused.
-    time : where the time of a frame stands unless it is a column: ("head", key, unit) for a line `key: value` above the
-        columns, ("name", "", unit) for the last number in the file's name, 12.5 of t_12.5.csv; () for
-        nowhere.
-    layout : ((column, NumPy type), ...) of the packed rows of a binary file without a head.
+    patterns : names of files, such as "*.csv".
     """
 
     name: str
@@ -116,11 +106,7 @@ class CameraFormat:
     deformed: bool = False
     axes: tuple[int, int, int] = (1, 1, 1)
     lost: Mapping[str, str] | tuple[LostRule, ...] = ()
-    confidence_unit: str = ""
     patterns: tuple[str, ...] = ("*.csv", "*.txt", "*.dat")
-    planar: tuple[str, ...] = ()
-    time: tuple[str, str, str] | tuple[()] = ()
-    layout: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         given = (self.columns,) if isinstance(self.columns, Mapping) else self.columns
@@ -130,21 +116,7 @@ class CameraFormat:
             raise HistoryError(f"{self}: '{self.unit}' is no unit of length; {nearest(self.unit, LENGTH_UNITS)}")
         if not {*self.axes} <= {1, -1}:
             raise HistoryError(f"{self}: axes are {quoted(repr(self.axes), 60)}; give three factors that are 1 or -1")
-        if self.time and (self.time[0] not in ("head", "name") or self.time[2] not in TIME_UNITS):
-            raise HistoryError(
-                f"{self}: time is {self.time!r}; write ('head', key, unit) or ('name', '', unit) with one of the units "
-                f"{TIMES_ALLOWED}"
-            )
         lost = tuple(self._rule(*rule) for rule in self.lost.items()) if isinstance(self.lost, Mapping) else self.lost
-        names = [column for column, _ in self.layout]
-        for column, kind in self.layout:
-            if not (column and _PACKED.fullmatch(kind)):
-                raise HistoryError(
-                    f"{self}: layout holds {quoted(repr((column, kind)), 60)}; give a column and its type, such as "
-                    "('stereo_x_mm', '<f8')"
-                )
-            if names.count(column) > 1:
-                raise HistoryError(f"{self}: layout has the column '{quoted(column)}' twice; give each its own name")
         object.__setattr__(self, "columns", tuple(self._checked_columns(one) for one in given))
         object.__setattr__(self, "lost", lost)
 

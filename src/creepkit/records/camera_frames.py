@@ -78,34 +78,30 @@ class CameraFrame:
 
     points : (points, 3) mm, of the undeformed surface. displacements : (points, 3) mm, since the reference image.
     valid : (points,) which points the correlation found; what the others hold means nothing.
-    confidence : (points,) the system's own measure of each point, such as sigma in pixels; NaN where it gives none.
     time : s, NaN where the file does not say. source : the file.
     """
 
     points: Floats
     displacements: Floats
     valid: Bools
-    confidence: Floats
     time: float = float("nan")
     source: str = ""
 
     def __post_init__(self) -> None:
         points, displacements = frozen(self.points), frozen(self.displacements)
-        valid, confidence = frozen(self.valid, dtype=bool), frozen(self.confidence)
+        valid = frozen(self.valid, dtype=bool)
         if points.ndim != 2 or points.shape[1:] != (3,) or displacements.shape != points.shape:
             raise HistoryError(
                 f"{self.source or 'frame'}: points and displacements have the shapes {points.shape} and "
                 f"{displacements.shape}; both must be (points, 3)"
             )
-        if valid.shape != points.shape[:1] or confidence.shape != points.shape[:1]:
-            raise HistoryError(
-                f"{self.source or 'frame'}: {points.shape[0]} points with {valid.size} marks of validity and "
-                f"{confidence.size} of confidence; give one of each for every point"
-            )
+        if valid.shape != points.shape[:1]:
+            what = f"{points.shape[0]} points with {valid.size} marks of validity; give one for every point"
+            raise HistoryError(f"{self.source or 'frame'}: {what}")
         seen = np.concatenate([points[valid], displacements[valid]], axis=1)
         if not np.isfinite(seen).all():
             raise HistoryError(f"{self.source or 'frame'}: a valid point has a coordinate that is no finite number")
-        set_fields(self, points=points, displacements=displacements, valid=valid, confidence=confidence)
+        set_fields(self, points=points, displacements=displacements, valid=valid)
 
 
 @checked
@@ -115,7 +111,7 @@ class Frames(Sequence[CameraFrame]):
 
     name : of the sequence, such as its folder. times : (frames,) s, as the files say; NaN where they do not.
     read_frame : returns the frame of an index, 0 to len(times) - 1.
-    system : the camera system or format that wrote it. confidence_unit : of CameraFrame.confidence, such as "pixel".
+    system : the camera system or format that wrote it.
     missing : numbers that are absent from the names of the files, of frames that were lost or left out.
     """
 
@@ -123,7 +119,6 @@ class Frames(Sequence[CameraFrame]):
     times: Floats
     read_frame: Callable[[int], CameraFrame]
     system: str = ""
-    confidence_unit: str = ""
     missing: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
@@ -141,14 +136,12 @@ class Frames(Sequence[CameraFrame]):
         times: ArrayLike,
         *,
         valid: ArrayLike | None = None,
-        confidence: ArrayLike | None = None,
         name: str = "frames",
     ) -> Frames:
         """Frames in memory.
 
         points : (points, 3) or (frames, points, 3) mm. displacements : (frames, points, 3) mm. times : (frames,) s.
         valid : (frames, points); None: where all coordinates are finite.
-        confidence : (frames, points); None: not known.
         """
         moved = np.asarray(displacements, dtype=float)
         if moved.ndim != 3 or moved.shape[2] != 3:
@@ -157,15 +150,12 @@ class Frames(Sequence[CameraFrame]):
             rest = np.broadcast_to(np.asarray(points, dtype=float), moved.shape)
             seen = np.isfinite(rest).all(axis=2) & np.isfinite(moved).all(axis=2)
             marks = seen if valid is None else seen & np.broadcast_to(np.asarray(valid, dtype=bool), moved.shape[:2])
-            sure = np.broadcast_to(np.asarray(np.nan if confidence is None else confidence, float), moved.shape[:2])
             moments = np.broadcast_to(np.asarray(times, dtype=float), moved.shape[:1])
         except ValueError as error:
             raise HistoryError(f"frames '{name}': the shapes do not belong together ({error})") from None
 
         def frame(index: int) -> CameraFrame:
-            return CameraFrame(
-                rest[index], moved[index], marks[index], sure[index], float(moments[index]), f"{name}, frame {index}"
-            )
+            return CameraFrame(rest[index], moved[index], marks[index], float(moments[index]), f"{name}, frame {index}")
 
         return cls(name, moments, frame)
 

@@ -15,50 +15,36 @@ from creepkit.presentation import Presentable
 @checked
 @dataclass(frozen=True, eq=False)
 class ClockAlignment(Presentable, text="reports.instrument_records:alignment_text"):
-    """Times of a camera as times of an instrument's record: t - zero + lag + drift (t - middle).
+    """Times of a camera as times of an instrument's record: t - zero + lag.
 
-    zero : s on the camera's clock, at which the record's own time is zero where lag and drift are zero.
-    lag : s by which the instrument's clock is ahead of the camera's at `middle`. drift : its gain, s/s.
-    middle : s on the camera's clock, where the errors of lag and drift are independent.
-    lag_interval, drift_interval : with 95 % probability; both bounds equal where a value was stated, not estimated.
-    lags, probability : (points,) s and (points,) the posterior probability of each lag, which sums to 1.
-    residual : mm, standard deviation of what the elastic response and a slow drift leave of the displacements.
-    noise : mm, that of the displacements from frame to frame. steps : (steps,) s, camera times of the changes of
-        pressure that decide. channel : of the record. frames : how many were used.
+    zero : s on the camera's clock, at which the record's own time is zero where the lag is zero.
+    lag : s by which the instrument's clock is ahead of the camera's. lag_interval : with 95 % probability; both bounds
+    equal where it was stated, not estimated. lags, probability : (points,) s and (points,) the posterior probability of
+    each lag, which sums to 1. channel : of the record. frames : how many were used.
     """
 
     zero: float = 0.0
     lag: float = 0.0
-    drift: float = 0.0
-    middle: float = 0.0
     lag_interval: tuple[float, float] = (0.0, 0.0)
-    drift_interval: tuple[float, float] = (0.0, 0.0)
     lags: Floats = field(default_factory=lambda: frozen([]))
     probability: Floats = field(default_factory=lambda: frozen([]))
-    residual: float = float("nan")
-    noise: float = float("nan")
-    steps: Floats = field(default_factory=lambda: frozen([]))
     channel: str = ""
     frames: int = 0
 
     def __post_init__(self) -> None:
-        numbers = (self.zero, self.lag, self.drift, self.middle, *self.lag_interval, *self.drift_interval)
-        if not np.isfinite(numbers).all() or not abs(self.drift) < 1.0:
-            raise HistoryError(
-                f"an alignment with lag {self.lag} s and drift {self.drift}; give finite numbers, a drift within +-1"
-            )
-        set_fields(self, lags=frozen(self.lags), probability=frozen(self.probability), steps=frozen(self.steps))
+        if not np.isfinite((self.zero, self.lag, *self.lag_interval)).all():
+            raise HistoryError(f"an alignment with lag {self.lag} s and zero {self.zero} s; give finite numbers")
+        set_fields(self, lags=frozen(self.lags), probability=frozen(self.probability))
 
     @classmethod
-    @checked_with_own_words("lag", "drift", "zero")
-    def stated(cls, lag: float, drift: float = 0.0, zero: float = 0.0) -> ClockAlignment:
-        """An alignment that is known: the record's time is t - zero + lag + drift (t - zero)."""
-        return cls(zero, lag, drift, zero, (lag, lag), (drift, drift))
+    @checked_with_own_words("lag", "zero")
+    def stated(cls, lag: float, zero: float = 0.0) -> ClockAlignment:
+        """An alignment that is known: the record's time is t - zero + lag."""
+        return cls(zero, lag, (lag, lag))
 
     def camera_time(self, record_times: ArrayLike) -> Floats:
         """(...,) s on the camera's clock.
 
         record_times : (...,) s on the record's own clock.
         """
-        times = np.asarray(record_times, dtype=float)
-        return np.asarray((times - self.lag - self.drift * (self.zero - self.middle)) / (1.0 + self.drift) + self.zero)
+        return np.asarray(record_times, dtype=float) - self.lag + self.zero

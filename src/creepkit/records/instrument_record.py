@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -117,17 +117,6 @@ class InstrumentRecord(Presentable, text="reports.instrument_records:record_text
         if not measured.any():
             raise HistoryError(f"{self.origin}: channel '{name}' holds no reading; choose another one")
         return self.times[measured], values[measured]
-
-    def between(self, start: float, end: float) -> InstrumentRecord:
-        """The rows from one time to another, s, of the same clock with the same zero."""
-        rows = (self.times >= start) & (self.times <= end)
-        if not rows.any():
-            first, last = self.times[[0, -1]]
-            raise HistoryError(
-                f"{self.origin}: no row from {start:g} to {end:g} s; the record holds {first:g} to {last:g} s"
-            )
-        cut = {name: replace(channel, values=channel.values[rows]) for name, channel in self.channels.items()}
-        return replace(self, times=self.times[rows], channels=cut)
 
     def program(self, channel: str, tolerance: float) -> Program:
         """A channel as a program of few straight pieces over the record's own clock, from its time zero on.

@@ -41,13 +41,6 @@ class Specimen(Predictor):
         """The loading of a test with two levels, the second from `jump_time`, s, on; None where it does not say."""
         return None
 
-    def plotted_series(self, outputs: Mapping[str, Floats]) -> dict[str, Floats] | None:
-        """{title: (frames,)} of what is plotted; None for the outputs themselves.
-
-        outputs : {name: (frames,)} in the units of the specimen.
-        """
-        return None
-
     @property
     def surface_region(self) -> SurfaceRegion:
         """Which part of the surface moves and which is clamped."""

@@ -161,11 +161,6 @@ class Registry:
         exporter: Exporter = self._one(contributions.EXPORTER, name)
         return exporter
 
-    def temperature_form(self, name: str) -> Callable[..., Any]:
-        """The function of T_ref of a name; LawError with the nearest name when there is none."""
-        form: Callable[..., Any] = self._one(contributions.TEMPERATURE_FORM, name)
-        return form
-
     def distributions_of(self, law: CreepLaw) -> str:
         """Return the distributions, with versions, of the laws that a law's name says it was made of.
 

@@ -80,10 +80,10 @@ def read_record(path: str | Path, format: str | None = None, **options: Any) -> 
     format : name of one of `available("instruments")`; by default the one whose columns are there.
     time="", date="" : names of their columns, where they are not called so. time_unit="" : "s", "ms", "min", "h", of
     times without a unit. date_order=None : "month first", "day first" or "year first". time_zone="" : such as
-    "America/Chicago" or "+01:00". channels=None : names of those that are kept; all by default. every=1 : rows that are
-    averaged to one. units={} : {channel: unit} of heads without one. pressure_reference=None : "gauge" or "absolute",
-    of pressures whose unit does not say. ambient_pressure=None : MPa, to be taken off absolute pressures. missing=() :
-    texts in the place of a reading, beside the usual ones.
+    "America/Chicago" or "+01:00". channels=None : names of those that are kept; all by default. units={} : {channel:
+    unit} of heads without one. pressure_reference=None : "gauge" or "absolute", of pressures whose unit does not say.
+    ambient_pressure=None : MPa, to be taken off absolute pressures. missing=() : texts in the place of a reading,
+    beside the usual ones.
     """
     formats = [entry.value for entry in default_registry().instruments().values()]
     return instrument_files.read_record(path, formats, format, options)

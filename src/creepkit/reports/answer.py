@@ -16,7 +16,7 @@ from markupsafe import Markup
 from creepkit.exporters.documents import expression_mathml, law_equations
 from creepkit.inverse.adequacy import SHAPE_MISFIT, UNDETECTED_SCATTER
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
-from creepkit.inverse.perturbation import combined_change_text
+from creepkit.inverse.perturbation import beyond_intervals, combined_change_text
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
 from creepkit.language import strain, temperature, time
@@ -259,8 +259,7 @@ def _precision(fit: Identification) -> Iterator[str]:
         yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
     change = combined_change_text(fit.unmodelled)
     if change:
-        beyond = [one for one in fit.unmodelled if not one.included]
-        kinds = " and ".join(dict.fromkeys(one.description for one in beyond[:2]))
+        kinds = " and ".join(dict.fromkeys(one.description for one in beyond_intervals(fit.unmodelled)[:2]))
         yield f"intervals do not include {kinds}: rates move by {change}"
 
 
@@ -415,17 +414,18 @@ def reference_sentences(fit: Identification) -> list[str]:
     r, state, held = fit.reference, _state(fit), held_quantities(fit)
     lines = []
     if state is not None:
-        hours = _interval(tuple(v / SECONDS_PER_HOUR for v in state.time))
+        hours = interval_text(tuple(v / SECONDS_PER_HOUR for v in state.time))
         at = f"{number(r.stress)} MPa and {celsius_text(r.temperature, digits=0)}"
         lines.append(f"a bar under a true stress of {at} reaches {100 * r.strain:.2g} % strain after {hours} h")
     if held and (held != "strain" or state is None):
-        formula = _interval(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
+        formula = interval_text(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
         lines.append(f"at constant {held} the law's formula has the stress exponent {formula}")
         lines += [] if held == "strain" else ["tests compared at one strain show another exponent"]
     return lines
 
 
-def _interval(values: tuple[float, ...]) -> str:
+def interval_text(values: tuple[float, ...]) -> str:
+    """A value with the ends of its interval, all with the digits in which they differ."""
     value, low, high = values
     digits = interval_digits(value, low, high)
     return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"

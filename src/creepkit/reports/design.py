@@ -33,10 +33,10 @@ def design_text(design: Design) -> str:
 
 
 def design_blocks(design: Design, figures: PageFigures | None = None, of: str = "") -> list[Block]:
-    """The advice, the cheapest test, a table of the best ones, with `figures` the map, and what else is to be said."""
+    """The advice, a table of the best tests, with `figures` the map, and what else is to be said."""
     blocks: list[Block] = [Paragraph(design.sentence, "lead")]
     if design.tests:
-        blocks += [Paragraph(cheapest_text(design)), _table(design)]
+        blocks.append(_table(design))
         if figures is not None:
             caption = (
                 "Expected information for an hour of machine time over first load and duration; the plan is marked. "
@@ -94,10 +94,6 @@ def _directions(design: Design) -> list[Block]:
     return [Paragraph(head), Items(items)]
 
 
-LARGE_SHARE = 0.5
-"""Of the highest expected information: what the cheapest test that is named gives at least."""
-
-
 def order_text(design: Design) -> str:
     """By what the planned tests are ordered, as a sentence."""
     if design.goal != "law":
@@ -108,28 +104,6 @@ def order_text(design: Design) -> str:
         "information; tests that were judged over the uncertainty of the parameters stand before all that were judged "
         "at their estimates alone, which flatters them"
     )
-
-
-def cheapest_text(design: Design) -> str:
-    """Which planned test reaches the goal in the least machine time, as a sentence; "" where there are none."""
-    if not design.tests:
-        return ""
-    if design.goal == "law":
-        judged = [test for test in design.tests if test.at_draws] or design.tests
-        able = [test for test in judged if test.expectation.probability >= DECISIVE_WEIGHT]
-        does = f"separates the laws with a probability of {DECISIVE_WEIGHT:g} or more"
-        if not able:
-            best = design.tests[0]
-            return (
-                f"no test considered {does}; nearest comes {best.description} ({best.expectation.probability:.2g}, "
-                f"{best.machine_time})"
-            )
-    else:
-        most = max(test.expectation.information for test in design.tests)
-        able = [test for test in design.tests if test.expectation.information >= LARGE_SHARE * most]
-        does = f"gives at least {100 * LARGE_SHARE:.0f} % of the highest expected information of a test"
-    cheapest = min(able, key=lambda test: test.hours)
-    return f"the cheapest test that {does}: {cheapest.description} ({cheapest.machine_time})"
 
 
 def _by(chi_square: float) -> str:

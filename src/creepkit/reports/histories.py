@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.readers.reading import TableSummary
 from creepkit.records import SECONDS_PER_HOUR, History, load_unit, output_named, output_unit
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, aligned, as_text, plural
 from creepkit.reports.figures import Course, over_time
@@ -27,22 +26,6 @@ if TYPE_CHECKING:
 
 MOST_VALUES = 4
 """Of a label that are told."""
-
-
-def tables_text(tables: Sequence[TableSummary]) -> str:
-    """Where tables stand, how they are written, and which column means what; one line for those that are alike."""
-    groups: dict[str, list[TableSummary]] = {}
-    for table in tables:
-        renamed = [f"{new} ('{old}')" if old != new else new for old, new in table.columns.items()]
-        groups.setdefault(", ".join(renamed), []).append(table)
-    lines = []
-    for columns, group in groups.items():
-        first, rows = group[0], sorted({table.rows for table in group})
-        how = ", ".join(part for part in (first.test and f"test {first.test}", first.dialect) if part)
-        count = f" and {len(group) - 1} more" if len(group) > 1 else ""
-        span = f"{rows[0]}" if len(rows) == 1 else f"{rows[0]} to {rows[-1]}"
-        lines.append(f"{first.place}{how and f' ({how})'}{count}: {columns}; rows {span}")
-    return "\n".join(lines)
 
 
 def histories_text(histories: Sequence[History]) -> str:
@@ -147,10 +130,9 @@ def _end_text(history: History) -> str:
     return "stopped before rupture" if history.unruptured else ""
 
 
-def histories_to_json(histories: Sequence[History], tables: Sequence[TableSummary]) -> dict[str, Any]:
+def histories_to_json(histories: Sequence[History]) -> dict[str, Any]:
     """The tests without their frames, for JSON: times in s, temperatures in K, outputs in creepkit's units."""
     return {
-        "tables": [fields_to_json(table, "place dialect test columns rows") for table in tables],
         "tests": [
             {
                 **fields_to_json(history, "name source specimen alloy strain_measure includes_elastic"),
@@ -169,7 +151,7 @@ def histories_to_json(histories: Sequence[History], tables: Sequence[TableSummar
                 },
             }
             for history in histories
-        ],
+        ]
     }
 
 

@@ -14,7 +14,7 @@ from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_parameters import nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
-from creepkit.inverse.perturbation import NOT_INCLUDED
+from creepkit.inverse.perturbation import NOT_INCLUDED, beyond_intervals
 from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
 from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
@@ -100,7 +100,7 @@ def value_blocks(fit: Identification, verdict: str = "", equivalents: Sequence[s
     blocks += [] if fit.sparsity is None else [Paragraph(fit.sparsity.verdict)]
     if not rejected(fit) and (undetermined := fit.undetermined()):
         blocks += [Paragraph("what these tests do not determine, or poorly, given this law:"), Items(undetermined)]
-    unmodelled = [effect.sentence for effect in fit.unmodelled if not effect.included]
+    unmodelled = [effect.sentence for effect in beyond_intervals(fit.unmodelled)]
     if unmodelled:
         blocks += [
             Paragraph("the intervals do not include what would move the rate amid the tests:"),
@@ -236,7 +236,7 @@ def _table_of_tests(fit: Identification) -> Table:
     rows = []
     observations, readings = compared_observations(fit), judged_readings(fit)
     for k, test in enumerate(fit.tests):
-        first = test.outputs[0] if test.outputs else None
+        first, end = test.outputs[0] if test.outputs else None, test.rupture
         unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
         rows.append(
             (
@@ -249,8 +249,8 @@ def _table_of_tests(fit: Identification) -> Table:
                 "–" if first is None else f"{number(first.offset, 2)}{unit}",
                 number(test.rate_factor, 3),
                 number(test.weight, 2),
-                *_rate_cells(None if first is not None else test.minimum_rate),
-                *_end_cells(test.rupture if first is None or (test.rupture and test.rupture.used) else None),
+                *_single_cells(None if first is not None else test.minimum_rate),
+                *_single_cells(end if first is None or (end and end.used) else None, SECONDS_PER_HOUR),
             )
         )
     columns = [
@@ -289,7 +289,9 @@ def _sums(fit: Identification) -> list[str]:
             )
     if stopped := [one for one in ruptures if one.censored]:
         unexpected = sum(one.predicted < one.measured for one in stopped)
-        lines.append(f"{plural(len(stopped), 'test')} stopped before rupture, of which {unexpected} should have broken")
+        lines.append(
+            f"{plural(len(stopped), 'test')} stopped before rupture, of which {unexpected or 'none'} should have broken"
+        )
     return lines
 
 
@@ -320,24 +322,14 @@ def logarithmic_output(fit: Identification) -> str:
 # ---- tests without curves --------------------------------------------------------------------------------------------
 
 
-def _rate_cells(rate: SingleValue | None) -> tuple[str, str, str]:
-    if rate is None:
+def _single_cells(one: SingleValue | None, unit: float = 1.0) -> tuple[str, str, str]:
+    """What was measured, what the law predicts with its interval, and their ratio; unit : of the cells."""
+    if one is None:
         return ("", "", "")
-    predicted = f"{number(rate.predicted, 3)} [{number(rate.low, 3)}, {number(rate.high, 3)}]"
-    return number(rate.measured, 3), predicted if math.isfinite(rate.predicted) else "none", _ratio(rate.ratio)
-
-
-def _end_cells(end: SingleValue | None) -> tuple[str, str, str]:
-    if end is None:
-        return ("", "", "")
-    lasted = f"{'> ' if end.censored else ''}{number(end.measured / SECONDS_PER_HOUR)}"
-    low, predicted, high = (number(v / SECONDS_PER_HOUR) for v in (end.low, end.predicted, end.high))
-    by_law = f"{predicted} [{low}, {high}]" if math.isfinite(end.predicted) else "never"
-    return lasted, by_law, "" if end.censored else _ratio(end.ratio)
-
-
-def _ratio(ratio: float) -> str:
-    return number(ratio, 3) if math.isfinite(ratio) else "–"
+    low, predicted, high, measured = (number(v / unit) for v in (one.low, one.predicted, one.high, one.measured))
+    by_law = f"{predicted} [{low}, {high}]" if math.isfinite(one.predicted) else "none"
+    known = math.isfinite(one.ratio) and not one.censored
+    return f"{'> ' * one.censored}{measured}", by_law, number(one.ratio, 3) if known else ""
 
 
 # ---- noise and nuisance parameters -----------------------------------------------------------------------------------

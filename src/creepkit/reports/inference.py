@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import unit_text
 from creepkit.reports.blocks import aligned, number
-from creepkit.reports.figures import panels_of, place_legend_right, save_figure, span
 from creepkit.reports.json_values import finite
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.cross_validation import CrossValidation
     from creepkit.inverse.single_values import SingleValue
@@ -44,49 +38,11 @@ def sparsity_text(sparsity: Sparsity) -> str:
 # ---- uncertainty -----------------------------------------------------------------------------------------------------
 
 
-LOGARITHMIC_RATIO = 30.0
-"""Ratio of largest to smallest value beyond which the axis of a profile is logarithmic."""
-
-
 def profile_text(profile: ProfileLikelihood) -> str:
     """One line: the best value and the interval by the profile."""
     low, high = (f"{end:.4g}" if end is not None else "open" for end in (profile.low, profile.high))
     value = f"{profile.name} = {profile.best:.5g} {unit_text(profile.unit)}".rstrip()
     return "; ".join([f"{value}, {100 * profile.level:g} % interval [{low}, {high}] by its profile", *profile.notes])
-
-
-def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -> Figure:
-    """The rise of chi-square over the quantity, its limit, and the parabola of Laplace's approximation.
-
-    Between the values of the profile its signed root is interpolated, which is nearly straight.
-    """
-    figure, axes = panels_of(6.0, 4.2)
-    (low, high), values = profile.laplace, profile.values
-    positive = bool((values > 0).all()) and low > 0
-    scale, inverse = (np.log, np.exp) if positive else (np.asarray, np.asarray)
-    root = np.sqrt(np.maximum(profile.chi_square, 0.0)) * np.sign(values - profile.best)
-    places = scale(values)
-    grid = np.unique(np.concatenate([places, np.linspace(places[0], places[-1], 300)]))
-    axes.plot(inverse(grid), np.interp(grid, places, root) ** 2, "-", color="C0", label="profile")
-    axes.plot(values, profile.chi_square, "o", ms=4, color="C0")
-    ends = np.array([scale(low), scale(high)])
-    grid = np.linspace(float(ends[0]), float(ends[1]), 80)
-    axes.plot(
-        inverse(grid),
-        profile.limit * ((grid - ends.mean()) / (0.5 * np.ptp(ends))) ** 2,
-        "--",
-        color="C1",
-        label="Laplace",
-    )
-    axes.axhline(profile.limit, color="black", lw=0.8, label=f"{100 * profile.level:g} %")
-    for end in (profile.low, profile.high):
-        if end is not None:
-            axes.axvline(end, color="black", lw=0.8, ls=":")
-    span(axes, "x", values, logarithmic=positive and float(values.max() / values.min()) > LOGARITHMIC_RATIO)
-    unit = unit_text(profile.unit) and f", {profile.unit}"
-    axes.set(xlabel=f"{profile.name}{unit}", ylabel="rise of chi-square", ylim=(0.0, 1.6 * profile.limit))
-    place_legend_right(axes)
-    return save_figure(figure, path)
 
 
 def posterior_text(samples: PosteriorSamples) -> str:

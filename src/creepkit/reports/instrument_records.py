@@ -84,22 +84,14 @@ def record_figure(record: InstrumentRecord, path: str | Path | None = None) -> F
 
 
 def alignment_text(alignment: ClockAlignment) -> str:
-    """Lag and drift with their intervals, in a few lines."""
-    low, high = alignment.lag_interval
+    """The lag with its interval."""
     if not alignment.lags.size:
-        return f"clock of the record ahead by {alignment.lag:g} s, drift {alignment.drift:g} (stated)"
-    lines = [
-        f"clock of the record ahead by {alignment.lag:.4g} s ({low:.4g} to {high:.4g} s, 95 %) at "
-        f"{_camera_time_text(alignment.middle)}, from {alignment.frames} frames and channel '{alignment.channel}'"
-    ]
-    if alignment.drift_interval != (0.0, 0.0):
-        low, high = (1e6 * x for x in alignment.drift_interval)
-        lines.append(f"  gains {1e6 * alignment.drift:.3g} us a second ({low:.3g} to {high:.3g}, 95 %)")
-    lines.append(
-        f"  displacements differ from what was expected by {1e3 * alignment.residual:.3g} um (rms), "
-        f"their noise is {1e3 * alignment.noise:.3g} um"
+        return f"clock of the record ahead by {alignment.lag:g} s (stated)"
+    low, high = alignment.lag_interval
+    return (
+        f"clock of the record ahead by {alignment.lag:.4g} s ({low:.4g} to {high:.4g} s, 95 %), from "
+        f"{alignment.frames} frames and channel '{alignment.channel}'"
     )
-    return "\n".join(lines)
 
 
 def _camera_time_text(time: float) -> str:

@@ -11,11 +11,10 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
-from creepkit.inverse.compared_tests import UNTESTABLE, rests_on_durations
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
 from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, chi_square_by_test
 from creepkit.records import is_logarithmic
-from creepkit.reports.answer import titled_law, unit_text, value_cells
+from creepkit.reports.answer import titled_law
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
 from creepkit.reports.compared_values import judged_readings, misfit_of
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
@@ -28,7 +27,7 @@ from creepkit.reports.figures import (
     shortened,
     wrapped,
 )
-from creepkit.reports.identification import rejected, scatter_of_rates, verdict_given_law
+from creepkit.reports.identification import scatter_of_rates
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
 from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.load_programs import program_text
@@ -55,15 +54,11 @@ CHI_SQUARE_NOTE = (
 )
 
 
-LAW_REJECTED = "the law does not fit"
-"""What stands for what tests say of a parameter, where they reject the law."""
-
-
 def ranking_text(ranking: Ranking) -> str:
     """How well the best law describes the tests, the verdict, then all laws."""
     equivalent = [] if ranking.decisive else [str(pair) for pair in equivalents_among_remaining(ranking)]
     head: list[Block] = [Paragraph(ranking.best.headline), Paragraph(ranking.verdict), Items(equivalent)]
-    return as_text([*head, *ranking_blocks(ranking), *credible_values(ranking)])
+    return as_text([*head, *ranking_blocks(ranking)])
 
 
 def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str = "") -> list[Block]:
@@ -176,29 +171,6 @@ def equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
     if any(r.fit.predictor is None or not r.fit.histories for r in ranking.laws):
         return []
     return [pair for pair in ranking.equivalents() if {pair.first, pair.second} <= names]
-
-
-def credible_values(ranking: Ranking | None) -> list[Block]:
-    """Values and intervals of every credible law, where the tests do not decide for one; each given its own law."""
-    if ranking is None or ranking.decisive or len(ranking.credible) < 2:
-        return []
-    rows = [
-        (
-            titled_law(one.fit.law),
-            f"{one.weight:.3f}",
-            e.name,
-            *value_cells(one.fit.law, e),
-            unit_text(e.unit),
-            LAW_REJECTED if rejected(one.fit) else verdict_given_law(one.fit, e),
-        )
-        for one in ranking.credible
-        for e in one.fit.estimates
-    ]
-    columns = ("law", "weight", "parameter", "value", "95 % interval", "unit", "given this law")
-    caption = "values of every credible law, of weight above 0.05: each interval holds only if its law is right"
-    untested = [one.fit for one in ranking.credible if rests_on_durations(one.fit.law, one.fit.histories)]
-    said = [Paragraph(f"{', '.join(fit.law.name for fit in untested)}: {UNTESTABLE}", "note")] if untested else []
-    return [Table(caption, columns, rows, numeric=(1, 3, 4)), *said]
 
 
 # ---- commands --------------------------------------------------------------------------------------------------------

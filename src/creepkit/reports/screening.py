@@ -1,33 +1,29 @@
-"""A screened plate as text for a terminal and as plots after Fig. 7 of Chen et al."""
+"""A screened plate as text for a terminal, and its laws and rates as pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.frame_noise import usable_frames
-from creepkit.records import growing_output, output_named, specimen_of
 from creepkit.reports.blocks import aligned
-from creepkit.reports.figures import draw_parity, make_folder, panel_grid, panels_of, save_figure
+from creepkit.reports.figures import make_folder, panels_of, save_figure
+from creepkit.reports.rate_panels import plate_figure
 from creepkit.reports.terminal import print_json, print_table, tell
 from creepkit.screening.results import (
     COMPARISON_STRESS,
     AlloyResult,
     confirmation_text,
     mean_chi_square,
-    mean_relative_squared_error,
     result_columns,
 )
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from creepkit.records import History
     from creepkit.screening.results import ScreeningResult
 
 
@@ -88,91 +84,15 @@ def _failure_text(alloy: str, failure: str) -> str:
     return failure if f"'{alloy}'" in failure else f"alloy '{alloy}': {failure}"
 
 
-def plotted_series(test: History, outputs: Mapping[str, Floats]) -> dict[str, Floats]:
-    """What is drawn of a test: {title: (frames,)}, what its specimen says, else the output that shows creep.
-
-    outputs : {name: (frames,)} in the units of the specimen.
-    """
-    specimen = specimen_of(test)
-    drawn: dict[str, Floats] | None = None if specimen is None else specimen.plotted_series(outputs)
-    if drawn is not None:
-        return drawn
-    output = output_named(growing_output(test), test.specimen)
-    return {output.label: np.asarray(outputs[output], float)} if output in outputs else {}
-
-
-def _quantity_label(tests: Sequence[History]) -> str:
-    """The quantity that is drawn, and its unit."""
-    output = output_named(growing_output(tests[0]), tests[0].specimen)
-    quantity = "displacement" if output.quantity == "length" else output.long_name
-    return f"{quantity}, {output.unit}" if output.unit else quantity
-
-
-MISFIT_MEASURES = (
-    ("loss of Eq. (4), mean over outputs", mean_relative_squared_error),
-    ("chi-square, mean over outputs", mean_chi_square),
-)
-
-
-MIN_LOG_RATIO = 5.0
-"""Ratio of the ends of an axis below which it is linear."""
-
-
-Pairs: TypeAlias = Mapping[str, list[tuple[Floats, Floats]]]
-"""{title of a series: measured and identified values, (frames,) each, of every test that has them}."""
-
-
 def plot_screening(plate: ScreeningResult, folder: Path) -> list[Path]:
-    """Write laws.png, parity.png and, with a dense law, misfit.png; their paths."""
+    """Write laws.png, the share of each law by class, and rates.png, the rate of each alloy; their paths."""
     if not plate.identified:
         raise FitError("no alloy of this plate has a law, so there is nothing to draw; see Plate.failed")
-    first = plate.histories[plate.identified[0].alloy][0].specimen  # one quantity on the axes: tests of one specimen
-    pairs = {
-        one.alloy: found
-        for one in plate.identified
-        if plate.histories[one.alloy][0].specimen == first and (found := _pairs(plate, one))
-    }
-    figures = {"laws.png": _plot_law_fractions(plate)}
-    if any(one.dense_fit is not None for one in plate.identified):
-        figures["misfit.png"] = _plot_misfits(plate)
-    if pairs:
-        figures["parity.png"] = _plot_parity(plate, pairs)
     make_folder(folder, FitError)
-    for name, figure in figures.items():
+    rates = plate_figure([(one.alloy, one.best) for one in plate.identified])
+    for name, figure in {"laws.png": _plot_law_fractions(plate), "rates.png": rates}.items():
         save_figure(figure, folder / name, FitError)
-    return [folder / name for name in figures]
-
-
-def _draw_by_class(
-    plate: ScreeningResult, figure: Figure, draw: Callable[[AlloyResult, Any, str | None], None]
-) -> None:
-    """Draw the alloys, each in the colour of its class, which the legend names; draw : of alloy, colour and label."""
-    for k, (name, members) in enumerate(plate.by_class().items()):
-        for number, result in enumerate(members):
-            draw(result, f"C{k % 10}", None if number else name)
-    figure.legend(loc="outside lower center", ncols=6, fontsize=8, markerscale=2)
-
-
-def _plot_misfits(plate: ScreeningResult) -> Figure:
-    """Misfit of the reduced law against that of the dense one (Fig. 7b): Eq. (4), and in units of noise."""
-    figure, panels = panel_grid(2, 2, 4.3, 4.6)
-    fits = {one.alloy: (one.dense_fit, one.best) for one in plate.identified if one.dense_fit is not None}
-    for axes, (title, measure) in zip(panels, MISFIT_MEASURES, strict=True):
-        values = np.array([[measure(one) for one in pair] for pair in fits.values()])
-        finite = values[np.isfinite(values)]
-        logarithmic = bool(finite.size and finite.max() >= MIN_LOG_RATIO * finite.min())
-        draw_parity(axes, values, logarithmic=logarithmic, margin=1.2 if logarithmic else 1.0)
-        axes.set(xlabel="law without sparsity", ylabel="reduced law")
-        axes.set_title(title, fontsize=10)
-
-    def draw(result: AlloyResult, colour: Any, label: str | None) -> None:
-        for axes, (_, measure) in zip(panels, MISFIT_MEASURES, strict=True):
-            own = label if axes is panels[0] else None
-            if result.alloy in fits:
-                axes.plot(*map(measure, fits[result.alloy]), "o", ms=5, alpha=0.75, color=colour, label=own)
-
-    _draw_by_class(plate, figure, draw)
-    return figure
+    return [folder / "laws.png", folder / "rates.png"]
 
 
 def _plot_law_fractions(plate: ScreeningResult) -> Figure:
@@ -198,41 +118,6 @@ def _law_fraction(members: tuple[AlloyResult, ...], law: str, decisive: bool) ->
     """Mean weight of a law over the members that are decisive, or over those that are not, as a share of all."""
     weights = [w.weight for m in members if m.decisive is decisive for w in m.laws if w.fit.law.name == law]
     return sum(weights) / len(members)
-
-
-def _pairs(plate: ScreeningResult, result: AlloyResult) -> Pairs:
-    """The series of an alloy where both values are numbers."""
-    pairs: dict[str, list[tuple[Floats, Floats]]] = {}
-    for test in plate.histories[result.alloy]:
-        predicted, measured = (plotted_series(test, o) for o in (result.predicted.get(test.name, {}), test.outputs))
-        used = usable_frames(test, growing_output(test))
-        for title in predicted.keys() & measured.keys():
-            finite = used & np.isfinite(measured[title]) & np.isfinite(predicted[title])
-            if finite.any():
-                pairs.setdefault(title, []).append((measured[title][finite], predicted[title][finite]))
-    return dict(sorted(pairs.items()))
-
-
-def _plot_parity(plate: ScreeningResult, pairs: Mapping[str, Pairs]) -> Figure:
-    """Identified against measured, of each series that is drawn (Fig. 7a, of all alloys); pairs : by alloy."""
-    titles = list(dict.fromkeys(title for series in pairs.values() for title in series))
-    quantity = _quantity_label(plate.histories[next(iter(pairs))])
-    figure, panels = panel_grid(len(titles), 4, 3.7, 4.0)
-    for axes, title in zip(panels, titles, strict=True):
-        values = [pair for series in pairs.values() for pair in series.get(title, ())]
-        errors = np.concatenate([identified - measured for measured, identified in values])
-        draw_parity(axes, np.zeros(1), *(one for pair in values for one in pair))
-        axes.set(xlabel=f"measured {quantity}", ylabel=f"identified {quantity}")
-        axes.set_title(f"{title}, rms {float(np.sqrt(np.mean(errors**2))):.2g}", fontsize=10)
-
-    def draw(result: AlloyResult, colour: Any, label: str | None) -> None:
-        for title, values in pairs.get(result.alloy, {}).items():
-            for pair in values:
-                panels[titles.index(title)].plot(*pair, ".", ms=2, alpha=0.6, color=colour, label=label)
-                label = None
-
-    _draw_by_class(plate, figure, draw)
-    return figure
 
 
 def print_screening(plate: ScreeningResult, written: list[Path], as_json: bool) -> None:

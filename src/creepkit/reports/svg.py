@@ -18,14 +18,10 @@ from markupsafe import Markup
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
 from creepkit.reports.blocks import Paragraph, Picture, printable
-from creepkit.reports.figures import POWER_OF_TEN, save_figure
+from creepkit.reports.figures import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-LONGEST_LABEL = 160
-"""Characters of one line of text in a figure."""
-
 
 LEGIBLE = 9.0
 """Pixels of 1/96 inch: the smallest text to which a narrow screen shrinks a figure."""
@@ -82,7 +78,6 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
     for ground in (figure.patch, *(axes.patch for axes in figure.axes)):
         ground.set_visible(False)
     save_figure(figure, None)  # a dollar in a name is a dollar
-    _shorten_texts(figure)
     buffer = io.StringIO()
     with warnings.catch_warnings(), matplotlib.rc_context(_SETTINGS):
         warnings.filterwarnings("ignore", "Glyph", UserWarning)  # the browser has other fonts
@@ -94,7 +89,7 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
         _thin(figure)
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(buffer, metadata={"Date": None})
-    root = ElementTree.fromstring(buffer.getvalue())
+    root = ElementTree.fromstring("".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in buffer.getvalue()))
     _compact(root, identifier)
     # pixels of 1/96 inch of points of 1/72 inch: as wide as it was drawn, and the least at which it can be read
     natural = 4.0 * float(str(root.get("viewBox")).split()[2]) / 3.0
@@ -112,33 +107,6 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
         element.text = printable(text)
         root.insert(position, element)
     return ElementTree.tostring(root, encoding="unicode")
-
-
-def _shorten_texts(figure: Figure) -> None:
-    """Names in labels and legends on a line of bounded length, without characters that cannot be seen."""
-    from matplotlib.text import Text
-    from matplotlib.ticker import FixedFormatter, FuncFormatter
-
-    for text in figure.findobj(Text):
-        content: str = text.get_text()
-        if content and not POWER_OF_TEN.fullmatch(content):
-            text.set_text("\n".join(printable(line, LONGEST_LABEL) for line in content.split("\n")))
-    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
-        formatter = axis.get_major_formatter()
-        if isinstance(formatter, FuncFormatter):  # which stands for labels that are given
-            formatter.func = _printable_labels(formatter.func)
-        elif isinstance(formatter, FixedFormatter):
-            formatter.seq = [printable(label, LONGEST_LABEL // 2) for label in formatter.seq]
-
-
-def _printable_labels(label_of: Callable[..., str]) -> Callable[..., str]:
-    """The same labels without characters that cannot be seen."""
-
-    def label(*place: Any) -> str:
-        text = label_of(*place)
-        return text if POWER_OF_TEN.fullmatch(text) else printable(text, LONGEST_LABEL // 2)
-
-    return label
 
 
 # ---- fewer bytes -----------------------------------------------------------------------------------------------------

@@ -12,11 +12,9 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
 
-from creepkit.arrays import Floats
 from creepkit.errors import FitError, nearest
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
@@ -31,7 +29,6 @@ from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor
 from creepkit.screening.alloys import UNKNOWN_CLASS, Alloy, Compositions
 
-PredictedOutputs: TypeAlias = Mapping[str, Floats]
 """{output: (frames,) mm or strain} of one test."""
 
 
@@ -53,8 +50,7 @@ class AlloyResult:
     verdict : one sentence on which law it is; equivalents : on each pair of laws that the tests cannot separate.
     failure : why there is no law; empty otherwise.
     dense_fit : the law without sparsity, where it was requested.
-    predicted : {test: {output: (frames,) mm or strain}} of the best law with the test's own nuisances and offsets, by
-        the specimen where it was confirmed. cpu_seconds : CPU time of the identification.
+    cpu_seconds : CPU time of the identification.
     decisive : whether the ranking of its laws is (see inverse.selection.ranking).
     """
 
@@ -67,7 +63,6 @@ class AlloyResult:
     failure: str = ""
     dense_fit: Identification | None = None
     confirmation: Confirmation | None = None
-    predicted: Mapping[str, PredictedOutputs] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     cpu_seconds: float = 0.0
     decisive: bool = False
@@ -183,7 +178,7 @@ class ScreeningResult(Presentable, text="reports.screening:screening_text"):
         return present("screening.results:write_csv", self, Path(path))
 
     def plot(self, folder: str | Path) -> list[Path]:
-        """Draw measured against identified displacement, misfit with and without sparsity, and shares of laws."""
+        """Draw the share of each law by class, and the rate of each alloy by its law; the paths of the pictures."""
         return present("reports.screening:plot_screening", self, Path(folder))
 
 
@@ -196,11 +191,7 @@ ALLOY_RESULT = DocumentFormat(
 
 
 CODEC = RecordCodec(
-    ranges={
-        AlloyResult: {"predicted": ANY_NUMBER},
-        ConfirmedOutput: {"rms_difference": ANY_NUMBER},
-        **FIT_CODEC.ranges,
-    },
+    ranges={ConfirmedOutput: {"rms_difference": ANY_NUMBER}, **FIT_CODEC.ranges},
     values={Identification: ValueCodec(identification_to_json, identification_from_json)},
 )
 """Of the result of an alloy; its identifications are documents of their own inside it."""

@@ -48,14 +48,7 @@ from creepkit.screening.alloys import (
     limitations,
     resolve_compositions,
 )
-from creepkit.screening.results import (
-    AlloyResult,
-    PredictedOutputs,
-    ScreeningResult,
-    WeightedLaw,
-    read_result,
-    write_result,
-)
+from creepkit.screening.results import AlloyResult, ScreeningResult, WeightedLaw, read_result, write_result
 
 
 def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
@@ -77,7 +70,6 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
     best, notes = ranking.best, list(limitations(alloy, job.predictor))
     dense = None if job.dense_law is None else _fit_dense_law(job, job.dense_law, alloy, notes)
     confirmation = _confirm_best(job, best, alloy, notes)
-    predictor = job.predictor if confirmation is None else job.predictor.specimen
     return AlloyResult(
         alloy.name,
         laws=tuple(WeightedLaw(r.fit, r.excess, r.weight) for r in ranking.laws),
@@ -87,7 +79,6 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
         equivalents=tuple(str(pair) for pair in equivalent_laws(ranking)),
         dense_fit=dense,
         confirmation=confirmation,
-        predicted=_predict_tests(best, alloy.tests, predictor.for_law(best.law)),
         notes=(*notes, *best.notes),
     )
 
@@ -111,15 +102,6 @@ def _confirm_best(job: ScreeningJob, best: Identification, alloy: Alloy, notes: 
     except CreepkitError as error:
         notes.append(f"not confirmed: {error}")
         return None
-
-
-def _predict_tests(best: Identification, tests: Sequence[History], predictor: Predictor) -> dict[str, PredictedOutputs]:
-    prediction = best.predict(tests, predictor)
-    columns = [*enumerate(prediction.outputs)]
-    return {
-        test.name: {name: prediction.of(k)[:, column] for column, name in columns if name in test.outputs}
-        for k, test in enumerate(tests)
-    }
 
 
 FITS_FOLDER = "fits"
@@ -336,7 +318,9 @@ def _stored_result(job: ScreeningJob, number: int) -> AlloyResult | None:
 def _completed_result(job: ScreeningJob, outcome: TaskResult) -> AlloyResult:
     """The result that a worker left, or why it left none."""
     if outcome.status != "done":
-        return AlloyResult(job.alloys[outcome.number].name, failure=outcome.text)
+        return AlloyResult(
+            job.alloys[outcome.number].name, failure=outcome.text.removeprefix(f"{job.task_name} {outcome.number}: ")
+        )
     try:
         return read_result(job.path(outcome.number))
     except FitError as error:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -143,7 +144,7 @@ def stress_ratio(law: CompiledLaw, model: FiniteElementModel, poisson: float) ->
 
 
 def trained_basis(
-    models: Sequence[FiniteElementModel], settings: SolverSettings, *, modes: int = MODES, points: int | None = None
+    models: tuple[FiniteElementModel, ...], settings: SolverSettings, *, modes: int = MODES, points: int | None = None
 ) -> ReducedBasis:
     """Modes and points for meshes of the same numbering; from memory, from disk, or trained now (some CPU seconds).
 
@@ -178,8 +179,9 @@ _FORMAT = DocumentFormat(
 )
 
 
-def _key(models: Sequence[FiniteElementModel], settings: SolverSettings, modes: int, points: int) -> str:
-    """Of everything that a basis follows from."""
+@lru_cache(maxsize=256)
+def _key(models: tuple[FiniteElementModel, ...], settings: SolverSettings, modes: int, points: int) -> str:
+    """Of everything that a basis follows from; kept, for a fit asks a thousand times."""
     digest = hashlib.sha256(repr((_FORMAT, settings, modes, points)).encode())
     for source in (__file__, reduced_order_training.__file__, core.library_path()):
         digest.update(Path(source).read_bytes())  # what it is trained by, and solved with

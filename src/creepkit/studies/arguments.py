@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.api.options import PlannedTestOptions, elastic_of
-from creepkit.errors import SurrogateError, nearest, quoted
+from creepkit.errors import FitError, SurrogateError, nearest, quoted
 from creepkit.experiments.design_task import GoalOptions
 from creepkit.experiments.rig import Rig, changed_rigs
 from creepkit.forecasts.planned_tests import (
@@ -39,7 +40,7 @@ from creepkit.records import (
 )
 from creepkit.records.quantities import LENGTH, QUANTITIES, QuantityKind
 from creepkit.studies.study_file import KeyPath, StudyFile
-from creepkit.studies.tables import ForecastTable, NuisanceTable, Step
+from creepkit.studies.tables import ForecastTable, Step
 
 if TYPE_CHECKING:
     from creepkit.inverse.settings import IdentificationSettings
@@ -196,7 +197,6 @@ def specimen_of_study(file: StudyFile) -> Specimen:
 def settings_of(file: StudyFile) -> IdentificationSettings:
     """Settings of every identification: the defaults with what the study changes."""
     import creepkit as ck
-    from creepkit.inverse.settings import default_nuisances
 
     model, base = file.model, ck.IdentificationSettings()
     changes: dict[str, Any] = {"seed": model.study.seed, "suspect_frames": model.data.suspect_frames}
@@ -208,10 +208,9 @@ def settings_of(file: StudyFile) -> IdentificationSettings:
         for name, value in changes.items():
             with file.at(place, name):
                 base.changed({name: value})
-        if part.nuisances or part.without_nuisances:
-            further = [_nuisance(file, k, one) for k, one in enumerate(part.nuisances)]
-            with file.at(place, "without_nuisances" if part.without_nuisances else "nuisances"):
-                changes["nuisances"] = default_nuisances(*further, without=part.without_nuisances)
+        if part.nuisances:
+            with file.at(place, "nuisances"):
+                changes["nuisances"] = nuisances_of_texts(part.nuisances)
     with file.at("identification"):
         return base.changed(changes)
 
@@ -226,18 +225,15 @@ def settings_of_group(
     """
     settings, names = settings_of(file), [test.name for test in tests]
     part = file.model.identification
+    stated = any(text.startswith("rate") for text in part.nuisances) if part is not None else False
     kept = []
-    for k, one in enumerate(part.nuisances if part is not None else ()):
-        for test in one.tests:
-            if test not in everywhere:
-                place = ("identification", "nuisances", k, "tests")
-                raise file.error(place, f"there is no test '{test}'; {nearest(test, everywhere)}")
-    stated = {one.kind for one in part.nuisances} if part is not None else set()
     for nuisance in settings.nuisances:
+        for test in nuisance.tests:
+            if test not in everywhere:
+                place = ("identification", "nuisances")
+                raise file.error(place, f"there is no test '{test}'; {nearest(test, everywhere)}")
         own = [test for test in nuisance.tests if test in names]
-        if nuisance.tests and not own:
-            continue
-        if nuisance.kind == "rate" and len(tests) == 1 and "rate" not in stated:
+        if (nuisance.tests and not own) or (nuisance.kind == "rate" and len(tests) == 1 and not stated):
             continue
         kept.append(replace(nuisance, tests=() if len(own) == len(names) else tuple(own)))
     taken = {one.key for one in kept}
@@ -251,22 +247,37 @@ def settings_of_group(
     return replace(settings, nuisances=tuple(kept))
 
 
-def _nuisance(file: StudyFile, number: int, part: NuisanceTable) -> Nuisance:
-    place = ("identification", "nuisances", number)
-    with file.at(*place, "kind"):
-        Nuisance(part.kind, start=1.0 if part.kind.endswith("step") else 0.0)
-    values: dict[str, Any] = {}
-    for key in ("mean", "sd", "mean_mm", "sd_mm", "mean_K", "sd_K"):
-        name, _, unit = key.partition("_")
-        if getattr(part, key) is None:
-            continue
-        if unit != _unit_of_kind(part.kind) and part.kind != "offset":
-            right = f"{name}_{_unit_of_kind(part.kind)}".rstrip("_")
-            raise file.error((*place, key), f"a nuisance '{part.kind}' is given as {right}")
-        values[name] = getattr(part, key)
-    with file.at(*place):
-        start = SECONDS_PER_HOUR * (part.start_h or 0.0)
-        return Nuisance(part.kind, part.scope, output=part.output or "", tests=tuple(part.tests), start=start, **values)
+NUISANCE_SYNTAX = "KIND[=MEAN[:SD]][@START][ for TESTS]"
+"""KIND=none leaves a default out; TESTS is test, alloy or all, or names with commas between them, which share one.
+START is in s, MEAN and SD in the unit of the kind."""
+
+
+def nuisances_of_texts(texts: Sequence[str]) -> tuple[Nuisance, ...]:
+    """The default nuisance parameters with those of texts of NUISANCE_SYNTAX, and without those that are none."""
+    from creepkit.inverse.settings import default_nuisances
+
+    left_out = {text: text.partition("=")[0].strip() for text in texts if text.partition("=")[2].strip() == "none"}
+    further = (_nuisance(text) for text in texts if text not in left_out)
+    return default_nuisances(*further, without=[*left_out.values()])
+
+
+def _nuisance(text: str) -> Nuisance:
+    """One nuisance, such as "temperature step=0:30@8250 for all"."""
+    definition, _, whose = text.partition(" for ")
+    definition, _, start = definition.partition("@")
+    kind, _, numbers = definition.partition("=")
+    mean, _, sd = numbers.partition(":")
+    tests = tuple(name.strip() for name in whose.split(",") if name.strip())
+    scope: Any = tests[0] if tests in (("test",), ("alloy",), ("all",)) else "all" if tests else "test"
+    try:
+        numbers_of: dict[str, Any] = {
+            name: float(part) for name, part in (("mean", mean), ("sd", sd), ("start", start)) if part
+        }
+    except ValueError:
+        numbers_of = {"mean": math.nan}
+    if not all(map(math.isfinite, numbers_of.values())):
+        raise FitError(f"'{quoted(text)}' is not known; write {NUISANCE_SYNTAX}, such as thickness=0.49:0.03")
+    return Nuisance(kind.strip(), scope, tests=() if tests == (scope,) else tests, **numbers_of)
 
 
 def _unit_of_kind(kind: str) -> str:

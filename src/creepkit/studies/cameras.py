@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from creepkit.api.extraction import WATCHED, ImposedChannels, extract_as_described, history_of, imposed_on, operator_of
 from creepkit.api.options import elastic_of
@@ -42,8 +42,7 @@ MOST_REASON = 300
 CONTRADICTIONS = (
     *(("format", "columns"), ("times", "interval_s"), ("operator", "window_mm"), ("operator", "rings_mm")),
     *(("window_mm", "rings_mm"), ("lag_s", "search_s"), ("record", "load"), ("record", "temperature_C")),
-    ("infrared", "temperature_C"),
-    ("infrared", "thermocouples_mm"),
+    *(("infrared", one) for one in ("temperature_C", "thermocouples_mm")),
 )
 """Keys of a [[camera]] of which one may be given."""
 
@@ -133,8 +132,7 @@ class StudyCamera:
         for name in ("channels", "thermocouples_mm", "lag_s", "search_s", "camera_start"):
             if self.record_number is None and name in given:
                 raise self.file.error(self.key(name), "belongs to a record; say record = its name")
-        warm = part.temperature_C is not None or part.infrared is not None
-        if self.record_number is None and (len(part.load) != 1 or not warm):
+        if self.record_number is None and (len(part.load) != 1 or not {"temperature_C", "infrared"} & given):
             what = "does not say what was imposed; give record, or load and temperature_C, as load = { ... = 5 }"
             raise self.file.error(self.key(), what)
         for name in ("operator", "clock", "stated_loading", "lengths", "files", "images", "alloys"):
@@ -199,7 +197,9 @@ class StudyCamera:
             watched = [n for n, s in ck.available("specimens").items() if s.is_watched]
             what = f"specimen '{found.name}' does not say how cameras see its surface; {nearest(found.name, watched)}"
             raise self.file.error(key, what)
-        return found
+        with self.file.at(*self.key("lengths")):
+            lengths = arguments.lengths_of(self.file, self.key("lengths"), self.part.lengths, found)
+            return cast("Specimen", cast("Any", found).replace(**lengths))
 
     @cached_property
     def operator(self) -> str:

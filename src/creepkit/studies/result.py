@@ -34,10 +34,6 @@ CARRIED_FOLDER = "inputs"
 """Of the data files that a report carries."""
 
 
-MOST_VERDICTS, LONGEST_LINE = 5, 300
-"""Verdicts, and characters of a line, of a result that is printed."""
-
-
 MOST_IDENTIFIED = 1_000_000
 """Characters of identifications that a report carries."""
 
@@ -81,16 +77,10 @@ class StudyResult:
     documents: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
-        """Stages by their states, the verdict on each group, and where the report is."""
-        counted = ", ".join(f"{n} {state}" for state, n in Counter(one.state for one in self.stages).items()) or "none"
-        found = {name: one.best.headline for name, one in self.rankings.items()}
-        verdicts = [f"{name}: {headline}" if name else headline for name, headline in found.items()]
-        if len(verdicts) > MOST_VERDICTS:
-            verdicts[MOST_VERDICTS:] = [f"and {len(verdicts) - MOST_VERDICTS} more groups"]
-        failed = [f"failed: {one.stage}: {one.sentence}" for one in self.failures]
-        head = f"StudyResult '{self.title}': {len(self.histories)} tests; stages: {counted}"
-        lines = [head, *verdicts, *failed, f"report: {self.report or 'none'}"]
-        return "\n  ".join(line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 1]}…" for line in lines)
+        """Title, how many tests, how stages ended, and where the report is; `creepkit run` prints what was found."""
+        states = ", ".join(f"{count} {state}" for state, count in Counter(one.state for one in self.stages).items())
+        tests = f"{len(self.histories)} tests; stages: {states or 'none'}"
+        return f"StudyResult '{self.title}': {tests}; report: {self.report or 'none'}"
 
     @property
     def title(self) -> str:

@@ -104,7 +104,8 @@ class Study:
                 what = "is a file of the study itself, or written by another table already; give file = another name"
                 raise file.error(key, f"'{name}' {what}")
             if among_data or file.path.parent / name in data:
-                raise file.error(key, f"'{name}' would be among the data files; give file = another name")
+                what = "would be among the data files; give file = another name, or name those more exactly"
+                raise file.error(key, f"'{name}' {what}")
             taken.add(name.casefold())
 
     @cached_property

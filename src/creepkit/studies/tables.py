@@ -228,22 +228,6 @@ class SpecimenTable(TableModel):
     lengths: dict[Text, Positive] = {}
 
 
-class NuisanceTable(TableModel):
-    """[[identification.nuisances]]: what differs between tests; mean and sd in the unit of the kind."""
-
-    kind: Text
-    scope: Literal["test", "alloy", "all"] = "test"
-    output: Text | None = None
-    tests: Texts = []
-    start_h: Positive | None = None
-    mean: float | None = None
-    mean_mm: float | None = None
-    mean_K: float | None = None
-    sd: Positive | None = None
-    sd_mm: Positive | None = None
-    sd_K: Positive | None = None
-
-
 ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws", "bounds", "sums", "by")
 """Options of identifications whose keys stand in tables of their own, in [study], [data] and [selection]."""
 
@@ -255,6 +239,7 @@ class IdentificationTable(_OF_IDENTIFICATION, TableModel):  # type: ignore[misc]
     """[identification]: candidate laws and how each is fitted, for every group of tests.
 
     confirm : whether the best law is simulated by the specimen itself; by default where cameras gave the tests.
+    nuisances : as "thickness=0.49:0.03", mean and standard deviation; "rate=none" leaves out one that is usual.
     """
 
     laws: OneOrMore
@@ -262,8 +247,7 @@ class IdentificationTable(_OF_IDENTIFICATION, TableModel):  # type: ignore[misc]
     group_by: Text | None = None
     predictor: Text | None = None
     bounds: dict[Text, Bounds] = {}
-    nuisances: Annotated[list[NuisanceTable], Field(max_length=50)] = []
-    without_nuisances: Texts = []
+    nuisances: Texts = []
 
 
 class SelectionTable(_keys(SearchOptions, without=("search", "penalty")), TableModel):  # type: ignore[misc]

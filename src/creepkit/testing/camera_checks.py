@@ -25,16 +25,15 @@ LOST = 4
 
 @finding("tables in its own words")
 def check_own_tables(format: CameraFormat, _: Path | None) -> str:
-    """Each version, with columns in another order, as a table with commas and with decimal commas, or as rows."""
-    suffix = format.patterns[0].removeprefix("*") if format.layout else ".csv"
+    """Each version, with columns in another order, as a table with commas and with decimal commas."""
     for number, version in enumerate(format.versions, start=1):
         with tempfile.TemporaryDirectory() as folder:
             for label, content in _written(format, version).items():
-                path = Path(folder) / f"frame_{number}{suffix}"
+                path = Path(folder) / f"frame_{number}.csv"
                 path.write_bytes(content)
                 gap = _difference(format, version, path)
                 assert not gap, f"version {number}, {label}: {gap}".replace(f"{folder}/", "")
-                if not format.layout and not is_for_matlab(format):  # else others are meant than tables of text
+                if not is_for_matlab(format):  # else others are meant than tables of text
                     _require_alone(format, path)
     return f"{len(format.versions)} versions of {POINTS} points read as they were meant, 1 of them lost"
 
@@ -97,14 +96,6 @@ def _columns(format: CameraFormat, version: Mapping[str, tuple[str, ...]]) -> di
 def _written(format: CameraFormat, version: Mapping[str, tuple[str, ...]]) -> dict[str, bytes]:
     """{how: content} of a file."""
     columns = _columns(format, version)
-    if format.layout:
-        rows = np.zeros(POINTS, dtype=[(name, "u1" if kind == "?" else kind) for name, kind in format.layout])
-        plain = {ColumnName.of(head).name: values for head, values in columns.items()}
-        for name, _ in format.layout:
-            parsed = ColumnName.of(name)
-            if parsed.name in plain and parsed.unit != "px":
-                rows[name] = plain[parsed.name]
-        return {"packed rows": rows.tobytes()}
     heads, table = list(columns)[::-1], np.stack(list(columns.values())[::-1], axis=1)
     lines = [";".join(heads), *(";".join(f"{value:.9g}" for value in row) for row in table)]
     semicolons = "\n".join([lines[0], *(line.replace(".", ",") for line in lines[1:])])
@@ -127,6 +118,4 @@ def _difference(format: CameraFormat, version: Mapping[str, tuple[str, ...]], pa
     read = np.concatenate([frame.points, frame.displacements], axis=1)
     if not np.allclose(read[sound], meant[sound], rtol=1e-8, atol=1e-10):
         return "points or displacements are not those of the table"
-    if "confidence" in version and not np.isfinite(frame.confidence).all():
-        return "the confidence of points is not read"
     return "" if "time" not in version or frame.time == 0.5 else "the time of the frame is not read"

@@ -238,10 +238,8 @@ SIMULATION = "simulate norton --set A=1e-16 --set n=4 --stress 100"
 GENERATE = "surrogate generate norton --dry-run"
 
 MEANINGLESS = [
-    (f"{SIMULATION} --end-h 10 --end-h 20", "--end-h is given twice; keep one of them"),
     (f"{SIMULATION} --end-h 1_0", "--end-h 1_0 is not known; write NUMBER"),
     (f"{SIMULATION} --end-h 1e-320", "--end-h is 1e-320; allowed are numbers from 1e-09"),
-    (f"{SIMULATION} --end-h 10 --specimen ''", "--specimen is empty; give a value, or leave the option out"),
     (f"{SIMULATION} --end-h 10 --set n", "--set A=1e-16 n=4 n is not known; write NAME=NUMBER"),
     (f"{SIMULATION} --end-h 10 --set n=5", "n is given twice"),
     (f"{SIMULATION} --end-h 1 --modulus-gpa nan", "--modulus-gpa nan is not known; write NUMBER"),

@@ -53,7 +53,7 @@ def changed(frames, changes):
 
 
 def rebuilt(frame, **changes):
-    fields = ("points", "displacements", "valid", "confidence", "time", "source")
+    fields = ("points", "displacements", "valid", "time", "source")
     return CameraFrame(**{name: changes.get(name, getattr(frame, name)) for name in fields})
 
 
@@ -75,7 +75,6 @@ def test_the_rigid_motion_is_that_of_the_plate(extraction):
     turn = np.degrees(np.linalg.norm(extraction.motion.rotations[-1]))
     assert turn == pytest.approx(CAMERA.turn, rel=0.06)  # the walk ends within 3 % of it, with some jitter
     assert extraction.motion.points >= 400
-    assert (extraction.motion.standard_errors[:3] < 5e-4).all()
 
 
 def test_means_on_rings(dimple, frames):
@@ -150,6 +149,20 @@ def test_axes_that_point_away_from_the_cameras_are_turned(extraction, frames, gi
     assert "  assumed: z of the frames points away from the cameras" in str(found)
     (again,) = ck.read_histories(ck.write_history(found.history, tmp_path / "D1.csv"))
     assert again.labels["assumed"].startswith("z of the frames points away from the cameras")
+
+
+def test_a_dimple_of_15_mm_loses_no_height_to_the_plate():
+    """Beside a rigid motion and a tilt; as one of 7.5 mm it is refused, for the plate about that would be the dome."""
+    lengths = dict(cavity_radius=15.0, roof_radial=15.0, roof_axial=3.0, outer_radius=20.0, plate_thickness=8.0)
+    wide = ck.specimen("bulge").replace(apex_thickness=1.0, **lengths)
+    large = simulated_dimple(frames=26, rest=12, specimen=wide)
+    frames = held(VirtualCamera(points=3600, spacing=1.0, seed=3).frames(large))
+    (found,) = ck.extract(frames, wide, subset=1.2)
+    errors = (found.outputs["amplitude"] - large.truth("field 0-15 mm")[:, 0])[12:]
+    assert found.outputs["amplitude"][-1] > 0.5
+    assert abs(errors.mean()) < 1e-3
+    with pytest.raises(HistoryError, match=r"D1: the plate between 10 and 15 mm .* larger than a radius of 7.5 mm"):
+        ck.extract(frames, subset=1.2)
 
 
 def test_several_dimples_are_named_by_rows(dimple):

@@ -185,12 +185,12 @@ def test_a_trained_model_is_near_its_finite_elements(tmp_path, monkeypatch) -> N
     """A law that training did not see, within half a per cent of the largest displacement; kept on disk."""
     monkeypatch.setenv("CREEPKIT_CACHE", str(tmp_path))
     settings = SolverSettings(deflection_limit=0.05)
-    basis = trained_basis([TUBE], settings, modes=16, points=36)
+    basis = trained_basis((TUBE,), settings, modes=16, points=36)
     assert len(basis.modes) == 16
     assert basis.points.size == 36
     assert (basis.factors > 0).all()
     assert list(tmp_path.glob("reduced_bases/*.safetensors"))
-    assert trained_basis([TUBE], settings, modes=16, points=36) is basis
+    assert trained_basis((TUBE,), settings, modes=16, points=36) is basis
     creep, values = CASES["damage"]
     runs = [made_by(model, creep, values) for model in (TUBE, ReducedOrderModel(TUBE, basis))]
     times = np.linspace(10.0, 9e3, 40)

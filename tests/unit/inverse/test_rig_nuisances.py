@@ -191,17 +191,4 @@ def test_a_rate_step_takes_the_place_where_a_law_has_no_temperature():
         assert n.sd < 0.05
 
 
-# ---- what cannot be told apart -----------------------------------------------------------------------------------
-
-
-def test_nuisances_that_do_the_same_are_named_or_refused():
-    """At one temperature a step of temperature is one of the rate: the same but for a factor."""
-    both = (GROUPS[0], replace(GROUPS[0], kind="rate step", sd=1.0))
-    fit = identify(LAW, planted(), BAR, settings=replace(QUICK, nuisances=both))
-    assert any("'temperature step@8250' and 'rate step@8250' cannot be told apart" in note for note in fit.notes)
-    free = tuple(replace(n, sd=np.inf) for n in both)
-    with pytest.raises(FitError, match="do the same to every test, and neither has a prior"):
-        identify(LAW, planted(), BAR, settings=replace(QUICK, nuisances=free))
-
-
 # ---- settings ----------------------------------------------------------------------------------------------------

@@ -8,7 +8,6 @@ from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
-from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY
 from creepkit.inverse.settings import USUAL_ERRORS, IdentificationSettings
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
 from creepkit.language import Elastic, arrhenius
@@ -45,10 +44,6 @@ def moved(tests, kelvin, share):
 
 def campaign_of_six(rate=0.05):
     return planted(AT_TEMPERATURES, VALUES, CONDITIONS, seed=4, rate=rate, noise=2e-5)
-
-
-def common(fit):
-    return {e.kind: e for e in fit.unmodelled if e.common}
 
 
 def shifts_of_rate(tests, fit, at=(70.0, 1000.0)):
@@ -118,27 +113,9 @@ def test_lives_hold_them_too():
     (mean, with_errors), (_, alone) = (
         one.scatter_of_rates.joint(np.array([0.05])) for one in (fit, fit.by_tests_alone)
     )
-    reference = shifts_of_rate(tests, fit, (fit.reference.stress, fit.reference.temperature))
-    assert [common(fit)[kind].rate_change for kind in ("temperature", "load")] == pytest.approx(reference, rel=0.02)
     row = gradient(log_rate(fit.coordinates, 70.0, 1000.0), fit.u, np.ones(3))
     assert row @ (with_errors - alone) @ row == pytest.approx(np.sum(np.square(shifts_of_rate(tests, fit))), rel=0.02)
     assert mean.size == 3
-
-
-# ---- errors common to all tests ------------------------------------------------------------------------------------
-
-
-def test_a_law_without_temperature_takes_the_usual_energy_and_says_so():
-    tests = planted(
-        NORTON, {"A": 1e-15, "n": 4.0}, [(s, 1020.0) for s in (60.0, 70.0, 80.0)], seed=4, rate=0.05, noise=2e-5
-    )
-    effect = common(identify(NORTON, tests, Steady(), settings=SETTINGS))["temperature"]
-    expected = -USUAL_ACTIVATION_ENERGY / (R * 1020.0**2) * USUAL_ERRORS["temperature"]
-    assert effect.rate_change == pytest.approx(expected, rel=1e-3)
-    assert effect.sentence == (
-        "by -13 % with temperatures 3 K above those stated, in all 3 tests (4.7 % a kelvin, assumed, as the law has no "
-        "temperature)"
-    )
 
 
 # ---- values under these errors ---------------------------------------------------------------------------------------

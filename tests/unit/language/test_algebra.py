@@ -334,3 +334,13 @@ def test_two_states_have_two_energies_unless_they_share_a_coefficient():
 def test_wrong_choices_are_explained(chosen, message):
     with pytest.raises(LawError, match=message):
         law(h * CREEP).times(arrhenius(), **chosen)
+
+
+def test_laws_are_summed_multiplied_and_written_with_values_as_expressions_are():
+    assert sum([NORTON, STRAIN_HARDENING]) == NORTON + STRAIN_HARDENING
+    assert (2 * NORTON).rate == 2 * NORTON.rate
+    warm = NORTON.times(arrhenius(T_REF))
+    Q, R, T, T_ref = (*sympy.symbols("Q R", real=True), ck.temperature, sympy.Symbol("T_ref", real=True))
+    shown = warm.expression({"A": 3.0, warm.symbol("n"): 5})
+    assert sympy.simplify(shown - 3.0 * stress**5 * sympy.exp(-Q / R * (1 / T - 1 / T_ref))) == 0
+    assert r"^{n_\infty + " in DRIFTING_EXPONENT.latex()  # what is added before what is taken away

@@ -371,6 +371,12 @@ def test_what_was_imposed(tmp_path: Path) -> None:
     stress = 200.0 * (1.0 - np.exp(-rate / 2e-3))
     test = read_bar(tmp_path, creep(names, list(zip(times, rate, stress, strict=True)), head))
     assert (test.specimen, "strain imposed, for its rate is constant" in test.labels["assumed"]) == ("relaxation", True)
+    for first in (14.0, 18.0, 25.0):  # MPa of the first of 80 frames behind the elastic part, of a tensile test
+        rate = np.linspace(5e-4, 4e-2, 80)
+        stress = first + (34.0 - first) * (1.0 - np.exp(-(rate - 5e-4) / 6e-3)) + 0.25 * np.sin(np.arange(80))
+        test = read_bar(tmp_path, creep(names, list(zip(rate / 1e-4, rate, stress, strict=True)), head))
+        assert (test.specimen, "strain imposed, for its" in test.labels["assumed"]) == ("relaxation", True), first
+        np.testing.assert_allclose(test.loading.program().at(np.array([0.0, 2.0, 200.0])), [0, 2e-4, 2e-2], atol=1e-9)
     swinging = 100.0 * (1.05 + np.sin(np.arange(times.size)))
     with pytest.raises(HistoryError, match="stress and strain both change.*specimen: uniaxial.*specimen: relaxation"):
         read_bar(tmp_path, creep(names, list(zip(times, 1e-3 * times**0.3, swinging, strict=True)), head))

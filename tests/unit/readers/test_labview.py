@@ -175,6 +175,13 @@ def parts(folder: Path, names: list[str], head: str, starts: tuple[float, ...]) 
     return ck.read_histories(folder)
 
 
+def test_parts_keep_the_gap_between_them(tmp_path: Path) -> None:
+    for name, text in (("tests.toml", '["*"]\nparts = "joined"\n'), ("R1_part1.lvm", FILES["one head"])):
+        (tmp_path / name).write_text(text)
+    (tmp_path / "R1_part2.lvm").write_text(head() + segment(start="14:00:00.00"))
+    assert (ck.read_histories(tmp_path)[0].times / 3600.0).tolist() == [0.0, 1.0, 2.0, 7.0, 8.0]
+
+
 def test_parts_of_a_test_are_joined_or_asked_about(tmp_path: Path) -> None:
     cases = (
         (["R1_part1.csv", "R1_part2.csv"], ""),

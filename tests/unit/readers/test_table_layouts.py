@@ -126,6 +126,8 @@ WIDE = {
     ";Time (h);Strain (%);Time (h);Strain (%)\n;0;0;0;0\n;1;0,5;1;0,7\n;2;0,9;3;1,5\n",
     "pairs named in the columns": "Stress (MPa);60;;80\nTemperature (°C);850;;860\n"
     "Time A1 (h);Strain A1 (%);Time A2 (h);Strain A2 (%)\n0;0;0;0\n1;0,5;1;0,7\n2;0,9;3;1,5\n",
+    "each with its furnace": "Stress (MPa);60;80;;\nTime (h);A1 strain (%);A2 strain (%);A1 T (°C);A2 T (°C)\n"
+    "0;0;0;850;860\n1;0,5;0,7;850;860\n2;0,9;;850;860\n3;;1,5;850;860\n",
     "a column of tests": "Test;Time (h);Strain (%);Stress (MPa);Temperature (°C)\nA1;0;0;60;850\nA1;1;0,5;60;850\n"
     "A1;2;0,9;60;850\nA2;0;0;80;860\nA2;1;0,7;80;860\nA2;3;1,5;80;860\n",
 }
@@ -141,6 +143,23 @@ def test_two_tests_side_by_side(read, layout: str):
     np.testing.assert_allclose(first.outputs["strain"], [0, 0.005, 0.009], rtol=1e-15)
     np.testing.assert_allclose(second.outputs["strain"], [0, 0.007, 0.015], rtol=1e-15)
     assert first.source.endswith("x.csv (A1)")
+
+
+def test_tests_in_one_furnace_share_its_column(read):
+    """Wherever it stands and whatever names the tests; it goes on where one of them has ended."""
+    rows = "0;649;0;0\n1;651;0,5;0,7\n2;650;0,9;\n3;650;;1,5\n"
+    moved = "".join(";".join([a, c, d, b]) + "\n" for a, b, c, d in (row.split(";") for row in rows.splitlines()))
+    for names, body in (
+        ("Specimen;;A1;A2\nStress (MPa);;60;80\nTime (h);Temperature (°C);Strain (%);Strain (%)\n", rows),
+        ("Stress (MPa);;60;80\ntime_h;furnace_C;strain_A1_pct;strain_A2_pct\n", rows),
+        ("Stress (MPa);60;80;\nTime (h);A1 creep (%);A2 creep (%);Furnace (°C)\n", moved),
+        ("Time (h);Furnace (°C);Creep 60 MPa (%);Creep 80 MPa (%)\n", rows),
+    ):
+        tests = read(names + body)
+        assert [one.loading.program().values.max() for one in tests] == [60.0, 80.0], names
+        assert [one.times.tolist() for one in tests] == [[0.0, 3600.0, 7200.0], [0.0, 3600.0, 10800.0]], names
+        assert all(one.mean_temperature == pytest.approx(923.15, abs=0.6) for one in tests), names
+        assert "MPa" in names.split("\n")[-2] or [one.name for one in tests] == ["A1", "A2"], names
 
 
 def test_one_value_for_all_tests_is_told(read):

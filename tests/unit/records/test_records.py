@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.cameras.reading import TIME_UNITS
 from creepkit.instruments.column_heads import channel_unit
 from creepkit.quality import check_data_quality
 from creepkit.readers.history_csv import HISTORY_CSV, history_text
@@ -27,7 +26,7 @@ from creepkit.records import (
     kind_and_start,
     with_changed_history,
 )
-from creepkit.records.camera_format import LENGTH_UNITS
+from creepkit.records.camera_format import LENGTH_UNITS, TIME_UNITS
 from creepkit.records.quantities import LENGTH, STRESS, TEMPERATURE, TIME
 from creepkit.records.recorded_programs import recorded_program
 from creepkit.records.units import UNITS, celsius_text

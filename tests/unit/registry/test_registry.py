@@ -95,7 +95,7 @@ def test_every_object_has_its_name_and_its_plugin() -> None:
 
     assert all(isinstance(found.value, CreepLaw) and found.value.name == name for name, found in laws.items())
     assert str(laws["norton"].provenance).startswith("plugin 'norton' (creepkit ")
-    assert Registry().temperature_form("arrhenius")(T_ref=1000.0) == arrhenius(T_ref=1000.0)
+    assert Registry().temperature_forms()["arrhenius"].value(T_ref=1000.0) == arrhenius(T_ref=1000.0)
 
 
 def test_an_unknown_name_is_an_error_of_its_kind_with_the_nearest_name() -> None:
@@ -103,7 +103,6 @@ def test_an_unknown_name_is_an_error_of_its_kind_with_the_nearest_name() -> None
     for error, ask, name, sentence in (
         (LawError, registry.law, "nortn", r"there is no law 'nortn': did you mean 'norton'\?"),
         (SolveError, registry.specimen, "uniaxal", r"there is no specimen 'uniaxal': did you mean 'uniaxial'\?"),
-        (LawError, registry.temperature_form, "linaer", r"there is no temperature form .* did you mean 'linear'\?"),
         (HistoryError, registry.reader, "no-such", "there is no reader 'no-such': known: "),
         (ExportError, registry.exporter, "no-such", "there is no exporter 'no-such': known: "),
         (ExportError, registry.exporter, "UMAT", "choose one of those that serve it: abaqus, calculix, mfront"),

@@ -294,7 +294,7 @@ def test_ends_of_an_interval_differ_from_its_value_as_printed(value: float, half
 
 
 def test_what_an_interval_does_not_include_adds_in_quadrature() -> None:
-    effects = [Perturbation("load", 1.0, "%", -0.04, common=True), Perturbation("thickness", 0.01, "mm", 0.03)]
+    effects = [Perturbation("offset of strain", 1e-4, "", 0.04), Perturbation("thickness", 0.01, "mm", 0.03)]
     assert combined_change_text(effects) == "5 %"
     assert combined_change_text([replace(effects[0], rate_change=0.7)]) == "a factor of 2"
     assert combined_change_text([]) == ""

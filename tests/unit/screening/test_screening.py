@@ -17,7 +17,6 @@ from creepkit.records import PressureJump
 from creepkit.screening.alloys import Alloy, Compositions, atomic_percent, check_tests, limitations, read_compositions
 from creepkit.screening.results import read_result, write_result
 from creepkit.screening.screen import ScreeningOptions, screen
-from creepkit.specimens.bulge.outputs import profile_displacement
 from helpers.narrow_predictor import Narrow
 from helpers.planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
@@ -85,14 +84,11 @@ def test_where_a_guard_doubts_the_specimen_is_asked(excess, holds):
 
 
 def test_laws_outside_the_class_of_a_surrogate_are_the_specimens_own():
-    """Values, curves and the place of the law among the others are those of the bars; a note says by what."""
+    """Values and the place of the law among the others are those of the bars; a note says by what."""
     narrow, itself = (screened(TWO[:3], using=using)["X"] for using in (Narrow(), specimen("uniaxial")))
     assert narrow.best.law.name == "norton"
     assert narrow.best.values == itself.best.values
     assert "identified with 'uniaxial' in the place of 'narrow': law 'norton' is none of its laws" in narrow.notes
-    for name, outputs in itself.predicted.items():
-        assert np.isfinite(narrow.predicted[name]["strain"]).all()
-        assert narrow.predicted[name]["strain"] == pytest.approx(outputs["strain"])
 
 
 def test_an_answer_is_read_back_as_it_was(plate, tmp_path):
@@ -101,7 +97,6 @@ def test_an_answer_is_read_back_as_it_was(plate, tmp_path):
     for field in ("alloy", "verdict", "notes", "failed_laws", "equivalents", "cpu_seconds", "confirmation"):
         assert getattr(found, field) == getattr(answer, field)
     assert found.best.values == answer.best.values
-    np.testing.assert_array_equal(found.predicted["X-60"]["strain"], answer.predicted["X-60"]["strain"])
 
 
 def test_interrupted_it_goes_on_where_it_was(tmp_path):
@@ -145,7 +140,7 @@ def test_workers_find_what_this_process_finds_and_one_that_dies_costs_one_alloy(
     deadly = [h.replace(specimen="deadly") for h in bars("D")]
     apart = screened([*deadly, *TWO[:3]], using={"uniaxial": specimen("uniaxial"), "deadly": Deadly()}, workers=2)
     assert apart.failures == {
-        "D": "its worker process died 2 times, the last time by exit code 3; is there memory enough?"
+        "D": "its worker process died 3 times, the last time by exit code 3; is there memory enough?"
     }
     assert apart["X"].best.values == screened(TWO[:3])["X"].best.values
 
@@ -223,14 +218,6 @@ def test_tests_of_another_specimen_need_a_predictor_of_their_own():
     both = CompositePredictor({"bulge": BULGE, "uniaxial": ck.specimen("uniaxial")})
     check_tests(mixed, both)
     assert "tests of several specimens (bulge, uniaxial) are identified together" in limitations(mixed, both)
-
-
-def test_displacement_at_a_radius_is_equation_3():
-    rows = {"amplitude": np.array([0.5, 0.5]), "width": np.array([4.0, 4.0]), "shape": np.array([2.0, 2.0])}
-    np.testing.assert_allclose(profile_displacement(rows, 4.0), 0.5 / np.e, rtol=1e-14)
-    np.testing.assert_allclose(profile_displacement(rows, 2.0), 0.5 * np.exp(-0.25), rtol=1e-14)
-    assert np.isnan(profile_displacement({"amplitude": np.ones(2)}, 2.0)).all()
-    np.testing.assert_array_equal(profile_displacement({"amplitude": np.ones(2)}, 0.0), 1.0)
 
 
 def test_one_test_says_what_it_cannot_know():

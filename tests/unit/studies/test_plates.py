@@ -189,7 +189,7 @@ def nuisances_of(folder: Path, text: str, priors: list[ck.Nuisance], names: list
 
 
 def test_a_nuisance_of_one_dimple_is_of_its_alloy_alone(tmp_path: Path) -> None:
-    stated = 'nuisances = [{ kind = "thickness", mean_mm = 0.49, sd_mm = 0.01, tests = ["east D1"] }]\n'
+    stated = 'nuisances = ["thickness=0.49:0.01 for east D1"]\n'
     own = nuisances_of(tmp_path, stated, [], ["east D1"])
     assert [(one.kind, one.mean, one.tests) for one in own] == [("offset", 0.0, ()), ("thickness", 0.49, ())]
     assert [one.kind for one in nuisances_of(tmp_path, stated, [], ["west D1"])] == ["offset"]
@@ -212,7 +212,7 @@ def test_priors_of_the_table_enter_and_rates_of_one_test_do_not(tmp_path: Path) 
         ("thickness", 0.02, ()),
         ("temperature", 2.0, ("east D1",)),
     ]
-    stated = 'nuisances = [{ kind = "rate", sd = 0.2 }, { kind = "thickness", mean_mm = 0.4, sd_mm = 0.1 }]\n'
+    stated = 'nuisances = ["rate=0:0.2", "thickness=0.4:0.1"]\n'
     kinds = [(n.kind, n.sd) for n in nuisances_of(tmp_path, stated, priors, ["east D1"])]
     assert kinds == [("offset", None), ("rate", 0.2), ("thickness", 0.1)]
 

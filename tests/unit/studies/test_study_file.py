@@ -95,7 +95,7 @@ def test_a_misspelt_table_is_refused(table):
 
 
 SEVERAL_TYPES = (
-    "only fix ignore tests without_nuisances load weights laws files methods tensile_strengths temperature_C "
+    "only fix ignore tests nuisances load weights laws files methods tensile_strengths temperature_C "
     "parameters targets frames names channels missing"
 )
 """Keys whose values may be of more than one type."""
@@ -189,10 +189,9 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
         (BASE + 'predictor = "dimpel"\n', 5, "did you mean 'dimple'"),
         (BASE + 'predictor = "/etc/passwd"\n', 5, "absolute"),
         (BASE + 'loss = "lin"\n', 5, "must be one of these: linear, "),
-        (BASE + 'without_nuisances = ["offst"]\n', 5, "did you mean 'offset'"),
-        (BASE + '[[identification.nuisances]]\nkind = "thicknes"\n', 6, "thickness"),
-        (BASE + '[[identification.nuisances]]\nkind = "thickness"\nsd = 0.1\n', 7, "given as sd_mm"),
-        (BASE + '[[identification.nuisances]]\nkind = "temperature"\nsd_mm = 0.1\n', 7, "given as sd_K"),
+        (BASE + 'nuisances = ["offst=none"]\n', 5, "did you mean 'offset'"),
+        (BASE + 'nuisances = ["thicknes=0.5"]\n', 5, "thickness"),
+        (BASE + 'nuisances = ["thickness=thin"]\n', 5, "write KIND"),
         (BASE + '[specimen]\nname = "bulg"\n', 6, "did you mean 'bulge'"),
         (BASE + '[specimen]\nname = "bulge"\nlengths = { apex_mm = 1 }\n', 7, "did you mean"),
         (BASE + '[specimen]\nname = "bulge"\nlengths = { apex_thickness_kg = 1 }\n', 7, "no unit of 'apex_thickness'"),

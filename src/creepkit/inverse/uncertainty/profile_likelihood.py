@@ -17,8 +17,6 @@ left of second order would count as misfit: with d half way between the optimum 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -31,11 +29,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, TESTS_ALONE
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
-from creepkit.presentation import Presentable, present
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+from creepkit.presentation import Presentable
 
 CONSTRAINT_WIDTH = 0.02
 """w over the standard deviation of the quantity."""
@@ -78,10 +72,6 @@ class ProfileLikelihood(Presentable, text="reports.inference:profile_text"):
     level: float
     laplace: tuple[float, float]
     notes: tuple[str, ...] = field(default=())
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """The rise of chi-square over the quantity, with that of Laplace's approximation; written to `path`."""
-        return present("reports.inference:profile_figure", self, path)
 
 
 @dataclass(frozen=True)

@@ -156,22 +156,9 @@ def _flat(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{name}.")
         elif isinstance(value, list | tuple) and any(isinstance(one, Mapping) for one in value):
-            for k, one in enumerate(value, start=1):
-                inner = one if isinstance(one, Mapping) else {"": one}
-                yield from _flat(inner, f"{prefix}{name}[{k}].")
+            yield from _flat({f"{name}[{k}]": one for k, one in enumerate(value, start=1)}, prefix)
         else:
-            yield f"{prefix}{name}", _in_words(value)
-
-
-def _in_words(value: Any) -> Any:
-    """A setting as people write it; None and empty texts stay."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, list | tuple):
-        return ", ".join(
-            f"({_in_words(one)})" if isinstance(one, list | tuple) else str(_in_words(one)) for one in value
-        )
-    return value
+            yield f"{prefix}{name}", ", ".join(map(str, value)) if isinstance(value, list | tuple) else value
 
 
 def _missing_blocks(contents: ReportContents) -> list[Block]:

@@ -15,7 +15,7 @@ from creepkit.reports.answer import (
     KeyFigure,
     answer,
     asked_figures,
-    interval_digits,
+    interval_text,
     rate_and_exponent,
     tests_text,
     titled_law,
@@ -55,7 +55,7 @@ from creepkit.reports.identification import (
 from creepkit.reports.identification_plot import summary_figure
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.law_names import LawNames
-from creepkit.reports.ranking import credible_values, explanation, ranking_blocks
+from creepkit.reports.ranking import explanation, ranking_blocks
 from creepkit.reports.rate_panels import plate_figure, rupture_rows
 from creepkit.reports.rupture import rupture_blocks, strength_blocks
 from creepkit.reports.svg import PageFigures
@@ -232,7 +232,7 @@ def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
 
 def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> Iterator[PageSection]:
     """The sections of one material; of several a table of all, and one for each."""
-    drawn, most = len(found) <= MOST_RANKINGS_DRAWN, _figures_of_tests(found)
+    drawn, most = len(found) <= MOST_RANKINGS_DRAWN, max(MOST_TEST_FIGURES // max(len(found), 1), 1)
     if len(found) == 1:
         yield from _sections_of(found[0], figures, "", most, drawn=drawn)
     elif found:
@@ -251,7 +251,7 @@ def _sections_of(
     determined = sum(e.verdict == "determined" for e in fit.estimates)
     said = f"{determined} of {plural(len(fit.estimates), 'value')} determined by these tests"
     values = value_blocks(fit, found.verdict, found.equivalents)
-    values += [*credible_values(ranking), Items(found.remarks)]
+    values.append(Items(found.remarks))
     yield PageSection(f"{prefix}values", "Values and verdict", values, result=said)
     worst = worst_tests(fit)[:1]
     far = f"; farthest from the law: {printable(fit.tests[worst[0]].name, 60)}" if len(fit.tests) > 1 and worst else ""
@@ -267,21 +267,11 @@ def _sections_of(
     yield PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", noise_blocks(fit), result=said)
 
 
-def _figures_of_tests(found: Sequence[GroupFindings]) -> int:
-    """How many tests of each group are drawn, so that the page has at most MOST_TEST_FIGURES of them."""
-    counts = sorted(len(one.fit.tests) for one in found)
-    left, most = MOST_TEST_FIGURES, 0
-    for k, count in enumerate(counts):
-        most = max(most, min(count, left // (len(counts) - k)))
-        left -= min(count, most)
-    return max(most, 1)
-
-
 def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
     rows = []
     for one in found:
         fit = one.fit
-        rate, exponent = (_with_interval(values) for values in rate_and_exponent(fit))
+        rate, exponent = map(interval_text, rate_and_exponent(fit))
         properties = (rate, combined_change_text(fit.unmodelled) or "–", exponent)
         rows.append(
             (
@@ -306,12 +296,6 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
         "law or effect that was tried does as well; the verdict of each material says what is missing"
     )
     return Table(caption, columns, rows, numeric=(2, 5, 6, 7, 8))
-
-
-def _with_interval(values: tuple[float, ...]) -> str:
-    value, low, high = values
-    digits = interval_digits(value, low, high)
-    return f"{number(value, digits)} ({number(low, digits)} to {number(high, digits)})"
 
 
 # ---- other stages ----------------------------------------------------------------------------------------------------

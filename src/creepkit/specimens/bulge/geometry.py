@@ -259,6 +259,7 @@ class MeshLayout(NamedTuple):
         return self.floor, self.roof, self.wall, self.corner, len(self.breaks)
 
 
+@lru_cache(maxsize=256)
 def mesh_layout(size: DimpleDimensions, refinement: float) -> MeshLayout:
     """The layout of a dimple with `refinement` times as many columns and layers as it needs."""
     taper = float(np.clip((size.roof_radial / size.cavity_radius - 0.2) / 0.8, 0.0, 1.0))

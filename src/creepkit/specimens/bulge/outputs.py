@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-
-from creepkit.arrays import Floats
 from creepkit.records import Output
 
 OBSERVED = (
@@ -27,22 +22,3 @@ RING_OUTPUTS = tuple(
 )
 """Columns of what is observed on rings: u_z in mm at the first, second ... radius of the operator. Noise as that of the
 amplitude."""
-
-
-PLOT_RADII = (0.0, 2.0, 4.0)
-"""mm, those of the paper's Fig. 7a."""
-
-
-def profile_displacement(outputs: Mapping[str, Floats], radius: float) -> Floats:
-    """D exp(-(r / S)^p), (frames,) mm; NaN where width or shape is not above zero or was not observed.
-
-    outputs : {name: (frames,)}, "amplitude" and "width" in mm, "shape". radius : mm.
-    """
-    amplitude = np.asarray(outputs["amplitude"], float)
-    if radius == 0.0:
-        return amplitude
-    not_observed = np.full(amplitude.shape, np.nan)
-    width, shape = (np.asarray(outputs.get(name, not_observed), float) for name in ("width", "shape"))
-    valid = (width > 0) & (shape > 0)
-    ratio = np.where(valid, radius / np.where(valid, width, 1.0), np.nan)
-    return np.asarray(amplitude * np.exp(-(ratio ** np.where(valid, shape, 1.0))))

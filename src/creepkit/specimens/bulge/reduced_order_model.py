@@ -133,19 +133,15 @@ class BulgeReducedOrderModel(Predictor):
         """The reduced-order model of a test piece."""
         if piece.mesh is not None:
             model = piece.finite_elements()
-            basis = trained_basis([model], solver_settings(self.specimen), modes=self.modes, points=self.points)
+            basis = trained_basis((model,), solver_settings(self.specimen), modes=self.modes, points=self.points)
             return ReducedOrderModel(model, basis)
         reduced = _model_of_geometry(self.specimen, piece.geometry, self.modes, self.points)
         return _with_leading_modes(reduced, SEARCH_MODES) if self.searching else reduced
 
     def train(self) -> str:
         """Train the model of the specimen's own dimple, and keep it on disk; its modes and points, in words."""
-        model = self.cubature_model()
+        model = self.reduced_model_of(self.specimen)
         return f"{len(model.basis.modes)} modes, {len(model.basis.points)} of {model.model.weights.size} points"
-
-    def cubature_model(self) -> ReducedOrderModel:
-        """The model of the specimen's own dimple, whose points can be drawn."""
-        return self.reduced_model_of(self.specimen)
 
     @property
     def error(self) -> dict[str, float]:  # type: ignore[override]
@@ -159,8 +155,7 @@ class BulgeReducedOrderModel(Predictor):
 
     def refined(self) -> Predictor | None:
         """What it stands for: the specimen itself on its finer discretisation."""
-        refined: Predictor | None = self.specimen.refined()
-        return refined
+        return self.specimen.refined()  # type: ignore[no-any-return]
 
 
 @lru_cache(maxsize=16)
@@ -204,7 +199,7 @@ def _model_of_geometry(specimen: Any, geometry: DimpleGeometry, modes: int, poin
     candidates = _thicknesses(nominal_geometry(specimen.geometry, geometry), refinement)
     alike = [each for each in candidates if _same_numbering(model, each)] or [model]
     places = np.linspace(0, len(alike) - 1, min(len(alike), TRAINED_THICKNESSES)).round().astype(int)
-    family = [alike[k] for k in places]
+    family = tuple(alike[k] for k in places)
     settings = solver_settings(specimen)
     return ReducedOrderModel(model, trained_basis(family, settings, modes=modes, points=points))
 

@@ -37,7 +37,7 @@ from creepkit.records import (
 from creepkit.specimens.bulge.camera_points import observe_surface, surface_center
 from creepkit.specimens.bulge.geometry import LENGTH_RANGE, REFINEMENT_RANGE, DimpleGeometry, model_of_geometry
 from creepkit.specimens.bulge.observation import Observation
-from creepkit.specimens.bulge.outputs import OBSERVED, PLOT_RADII, RING_OUTPUTS, profile_displacement
+from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
 from creepkit.specimens.finite_element_specimen import FiniteElementSpecimen
 from creepkit.specimens.load_scaling import LoadScaling
 
@@ -133,7 +133,7 @@ class Bulge(FiniteElementSpecimen):
                 f"{history.origin} has a geometry of its own ({', '.join(stated)}), which a specimen with a mesh from "
                 "files cannot follow; use one without mesh="
             )
-        piece = replace(self, observation=self.observation_of(history))
+        piece = replace(self, observation=self.observation_of(history)) if history.operator else self
         return FiniteElementSpecimen.of_test(piece, history, nuisances)
 
     @property
@@ -179,17 +179,6 @@ class Bulge(FiniteElementSpecimen):
         names = DimpleGeometry.lengths if self.mesh is None else ()
         lengths = (Dimension(n, getattr(self.geometry, n), LENGTH_RANGE, **_LENGTHS.get(n, {})) for n in names)
         return (*lengths, Dimension("window", self.observation.window, LENGTH_RANGE, of_piece=False))
-
-    def plotted_series(self, outputs: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Displacements of the top at the radii of the paper's Fig. 7a, {title: (frames,)} mm.
-
-        outputs : {name: (frames,)} amplitude, width (mm) and shape; without the last two, the middle alone. Of a test
-        that was observed on rings, their displacements, mm.
-        """
-        if "amplitude" not in outputs:
-            return {o.long_name: np.asarray(outputs[o], float) for o in RING_OUTPUTS if o in outputs}
-        radii = PLOT_RADII if {"width", "shape"} <= outputs.keys() else PLOT_RADII[:1]
-        return {f"r = {radius:g} mm": profile_displacement(outputs, radius) for radius in radii}
 
     def outputs_of_test(self, history: History) -> tuple[Output, ...]:
         """What the operator of a history observes, or that of the specimen where it names none.
