@@ -77,7 +77,7 @@ def select(
     *,
     through: Predictor | Literal["auto"] | None = "auto",
     sums: bool | None = None,
-    by: Literal["bic", "aicc", "hold-out"] = "bic",
+    by: Literal["bic", "aicc"] = "bic",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     **changes: Any,

@@ -284,16 +284,13 @@ def _comparison(found: GroupFindings, cite: Callable[..., str]) -> Iterator[str]
     """How the laws of a material were compared."""
     if found.ranking is None:
         return
-    if found.ranking.criterion in CRITERIA:
-        name, penalty = CRITERIA[found.ranking.criterion]
-        yield (
-            f"The laws were compared by the {name}{cite(found.ranking.criterion)}: chi-square, under the covariance of "
-            "the law that fits the tests best, plus the logarithm of the determinant that integrates nuisance "
-            f"parameters out, plus {penalty} for K parameters that the tests determine and n independent readings, as "
-            "many as their autocorrelation leaves."
-        )
-    else:
-        yield "The laws were compared by the error of tests that were held out."
+    name, penalty = CRITERIA[found.ranking.criterion]
+    yield (
+        f"The laws were compared by the {name}{cite(found.ranking.criterion)}: chi-square, under the covariance of "
+        "the law that fits the tests best, plus the logarithm of the determinant that integrates nuisance "
+        f"parameters out, plus {penalty} for K parameters that the tests determine and n independent readings, as "
+        "many as their autocorrelation leaves."
+    )
     yield (
         "The weight of a law is exp(-difference / 2) over the sum of all laws tried, and a law is credible with a "
         f"weight above {CREDIBLE_WEIGHT:g}. A law is called decisive where its weight is above {DECISIVE_WEIGHT:g}, it "

@@ -45,17 +45,12 @@ if TYPE_CHECKING:
     from creepkit.records import History, LawWithValues
 
 
-CRITERIA = ("bic", "aicc", "hold-out")
-
-
-Criterion = Literal["bic", "aicc", "hold-out"]
+Criterion = Literal["bic", "aicc"]
 
 
 @dataclass(frozen=True)
 class RankedLaw:
-    """One law in a ranking: criterion less the best, its weight, and its chi-square under the covariance
-    of the best (NaN where laws were compared by held out data).
-    """
+    """One law in a ranking: criterion less the best, weight, and chi-square under the covariance of the best."""
 
     fit: Identification
     excess: float

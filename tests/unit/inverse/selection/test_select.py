@@ -88,14 +88,12 @@ def test_a_law_and_its_special_case_are_not_told_apart():
     assert "strain-hardening" in str(ranking)
 
 
-def test_hold_out_and_sums_are_asked_for_by_name():
+def test_sums_are_asked_for_by_name():
     values = {"A_1": 2e-17, "n_1": 4.5, "A_2": 1e-16, "n_2": 4.0, "m": -0.5}
     law = ck.law("norton") + ck.law("strain-hardening")
     tests = measured(law, values)
     ranking = ck.select(LAWS[:2], tests, "uniaxial", nuisances=[], starts=3, sums=True)
     assert ranking.best.law.fingerprint == law.fingerprint
-    held = ck.select(LAWS[:2], tests, "uniaxial", nuisances=[], starts=3, by="hold-out")
-    assert held.best.law.name == "strain-hardening"
 
 
 def test_a_law_that_cannot_be_identified_is_named_and_the_others_go_on():
