@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1290,
     "instruments": 1222,
     "integration": 758,
-    "inverse": 10316,
+    "inverse": 10303,
     "jobs": 251,
     "kernels": 1703,
     "language": 1480,

@@ -102,7 +102,11 @@ def _alterations(
     best = replace(best, largest=limit + SURELY_EXCLUDED)
     for fit in fits[1:]:
         if summands.isdisjoint(fit.law.name.split("+")):
-            yield "sum", f"a sum with {fit.law.name}", partial(sum_with_share, best, FittedLaw.of(fit))
+            yield (
+                "sum",
+                f"a sum with {fit.law.name}",
+                partial(sum_with_share, best, FittedLaw(fit.least_squares_problem, fit.x)),
+            )
     yield "threshold", f"{best.law.name} above a threshold", partial(above_threshold, best)
 
 
@@ -158,24 +162,18 @@ class FittedLaw:
     largest: float = np.inf
 
     @classmethod
-    def of(cls, fit: Identification) -> FittedLaw:
-        """That of an identification, at its values."""
-        return cls(fit.least_squares_problem, fit.x)
-
-    @classmethod
     def at_least_chi_square(cls, fit: Identification) -> FittedLaw:
         """That of an identification, where its chi-square under the noise that was found is least.
 
         Values by other weights, or under errors of tests, are not there: whatever is fitted under that noise would seem
         better than the law itself.
         """
-        problem, x, frames = fit.least_squares_problem, fit.x, fit.effective_frames
-        if fit.settings.weights == "likelihood" and not fit.settings.included_errors:
-            return cls(problem, x, frames)
-        with contextlib.suppress(CreepkitError):
-            refined = problem.minimise(x, tolerances=LAST_STEPS).x
-            x = min(x, refined, key=lambda one: _chi_square(problem, one))
-        return cls(problem, x, frames)
+        problem, x = fit.least_squares_problem, fit.x
+        if fit.settings.weights != "likelihood" or fit.settings.included_errors:
+            with contextlib.suppress(CreepkitError):
+                refined = problem.minimise(x, tolerances=LAST_STEPS).x
+                x = min(x, refined, key=lambda one: _chi_square(problem, one))
+        return cls(problem, x, fit.effective_frames)
 
     @property
     def law(self) -> CreepLaw:

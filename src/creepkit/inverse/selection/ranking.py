@@ -30,8 +30,9 @@ from creepkit.inverse.information_criteria import (
     aicc_penalty,
     bic_penalty,
     criterion_weights,
+    determined_parameters,
 )
-from creepkit.inverse.selection.discrimination import under_common_covariance
+from creepkit.inverse.selection.discrimination import linearised_problem, under_common_covariance
 from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
@@ -228,7 +229,8 @@ def rank(
     independent_frames, chi_square = common.independent_frames, common.chi_square
     penalty = bic_penalty if criterion == "bic" else aicc_penalty
     score = chi_square + common.log_determinant
-    score = score + [penalty(determined_parameter_count(fit), independent_frames) for fit in fits]
+    counts = [determined_parameters(linearised_problem(fit).residuals, fit.u.size) for fit in fits]
+    score = score + [penalty(count, independent_frames) for count in counts]
     ranking = ranking_from_scores(
         fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed
     )
@@ -272,15 +274,3 @@ def ranking_from_scores(
     order = np.argsort(excess, kind="stable")
     laws = tuple(RankedLaw(fits[k], float(excess[k]), float(weight[k]), float(chi_squares[k])) for k in order)
     return Ranking(laws, criterion, float(independent_frames), MappingProxyType(dict(failed or {})))
-
-
-def determined_parameter_count(fit: Identification) -> int:
-    """How many parameters the data determine: the others have the variance of their bounds, uncorrelated."""
-    covariance = fit.by_tests_alone.covariance
-    variances = np.diag(covariance)
-    is_uncorrelated = (covariance != 0).sum(axis=1) == 1
-    return int(
-        (
-            ~(is_uncorrelated & np.isclose(variances, np.ptp(fit.law.internal_bounds, axis=0) ** 2 / 12.0, rtol=1e-6))
-        ).sum()
-    )

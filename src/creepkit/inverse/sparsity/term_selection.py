@@ -99,7 +99,9 @@ def identify_sparse(
     nuisances = [replace(n, value=float(value)) for n, value in zip(full.nuisances, e, strict=True)]
     start = StartingEstimate(u, nuisances, full.reference)
     assert full.predictor is not None
-    fit = identify(chosen.law, full.histories, full.predictor, settings=full.settings, start=start, progress=progress)
+    fit = identify(
+        chosen.problem.law, full.histories, full.predictor, settings=full.settings, start=start, progress=progress
+    )
     whole = terms.whole(chosen)
     record = Sparsity(
         law=law.name,
@@ -125,14 +127,9 @@ class FittedTerms:
     exponents_off: tuple[str, ...] = ()
 
     @property
-    def law(self) -> CreepLaw:
-        """The law."""
-        return self.problem.law
-
-    @property
     def kept_terms(self) -> TermNames:
         """Its terms, in the order of the sum."""
-        return tuple(self.law.terms)
+        return tuple(self.problem.law.terms)
 
     @cached_property
     def parameter_count(self) -> int:
@@ -150,8 +147,7 @@ class FittedTerms:
 
     def without(self, exponent: str, off: float) -> FittedTerms:
         """The same with an exponent off, fitted from here."""
-        law = self.law.fix(**{exponent: off})
-        problem, x = _of_terms(self.problem, law, self.minimum.x)
+        problem, x = _of_terms(self.problem, self.problem.law.fix(**{exponent: off}), self.minimum.x)
         return FittedTerms(problem, problem.minimise(x, tolerances=TOLERANCES), (*self.exponents_off, exponent))
 
 
@@ -167,7 +163,8 @@ class TermSets:
         if terms not in self._fitted:
             best = self._best_of(terms, [self.fitted((label,)) for label in terms] if len(terms) > 1 else [])
             while True:
-                simpler = [best.without(best.law.names[k], off) for k, off in switchable_exponents(best.law)]
+                law = best.problem.law
+                simpler = [best.without(law.names[k], off) for k, off in switchable_exponents(law)]
                 lowest = min(simpler, key=lambda one: one.bic, default=best)
                 if lowest is best or lowest.bic > best.bic:
                     break
@@ -211,18 +208,15 @@ class TermSets:
 
     def _penalty(self, terms: TermNames) -> float:
         """Of BIC, on these terms with all exponents off."""
-        law = self._law(terms)
+        law = self.problem.law.only(*terms)
         return bic_penalty(len(law.params) - len(switchable_exponents(law)), self.problem.observations.count)
-
-    def _law(self, terms: TermNames) -> CreepLaw:
-        return self.problem.law if terms == self.terms else self.problem.law.only(*terms)
 
     def _best_of(self, terms: TermNames, parts: Sequence[FittedTerms]) -> FittedTerms:
         """The lowest minimum of these terms: from what the whole sum says of them, and from laws of some of them.
 
         Of one term the middle of its bounds is a start too, with the rate of the whole sum.
         """
-        problem, x = _of_terms(self.problem, self._law(terms), self.x)
+        problem, x = _of_terms(self.problem, self.problem.law.only(*terms), self.x)
         starts = self._starts(problem, x, parts)
         if len(terms) == 1:
             centre = np.concatenate([problem.bounds.centre[: problem.parameter_count], x[problem.parameter_count :]])
@@ -239,7 +233,7 @@ class TermSets:
             start[rates] = _log_total_rate(part.problem, part.minimum.x) + np.log(INITIAL_FRACTION)
             for k, off in switchable_exponents(law):
                 start[k] = off
-            start[[law.names.index(name) for name in part.law.names]] = u
+            start[[law.names.index(name) for name in part.problem.law.names]] = u
             starts.append(problem.bounds.clip(start))
         return starts
 

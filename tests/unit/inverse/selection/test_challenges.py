@@ -107,7 +107,7 @@ def test_the_share_is_held_in_the_fit(power_law_narrow):
     assert _chi_square(single, best.x) == pytest.approx(
         float((single.whiten(single.residuals(best.x).values) ** 2).sum())
     )
-    assert _least_excess(FittedLaw.of(best), single, best.x + 0.05, 0.0)[0] == pytest.approx(0.0, abs=0.02)
+    assert _least_excess(FittedLaw(single, best.x), single, best.x + 0.05, 0.0)[0] == pytest.approx(0.0, abs=0.02)
     assert np.exp(-0.5 * NOT_EXCLUDED) == pytest.approx(0.05 / 0.95)
 
 
