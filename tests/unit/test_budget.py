@@ -15,42 +15,42 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 316,
-    "app": 603,
+    "app": 602,
     "cameras": 832,
     "cli": 2255,
     "core": 67,
-    "dataset": 735,
+    "dataset": 726,
     "discovery": 1373,
     "experiments": 1322,
     "exporters": 2613,
     "extraction": 1291,
-    "fem": 1419,
+    "fem": 1415,
     "files": 1351,
     "forecasts": 1290,
     "instruments": 1222,
     "integration": 758,
-    "inverse": 10303,
+    "inverse": 10227,
     "jobs": 251,
     "kernels": 1703,
     "language": 1480,
     "laws": 136,
     "modules": 770,
     "quality": 1295,
-    "readers": 5839,
+    "readers": 5838,
     "records": 2185,
     "registry": 612,
-    "reports": 5409,
-    "rupture_assessment": 1688,
-    "sampling": 1001,
-    "screening": 575,
+    "reports": 5385,
+    "rupture_assessment": 1669,
+    "sampling": 994,
+    "screening": 571,
     "specimens": 3165,
     "studies": 3037,
-    "surrogates": 1381,
+    "surrogates": 1359,
     "testing": 1785,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29457
+TESTS = 29447
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from creepkit.app.contents import PageContents
 from creepkit.errors import CreepkitError, SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
-from creepkit.fem.mesh import SIDES, outline
+from creepkit.fem.mesh import outline
 from creepkit.records import History, Specimen
 from creepkit.specimens.bulge.gaussian_fit import GaussianFit
 from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
@@ -106,9 +106,8 @@ def rom_data(predictor: BulgeReducedOrderModel, lengths: Mapping[str, float] | N
 
 def _contour(mesh: FiniteElementModel) -> list[int]:
     """Numbers of the nodes along the outline of a body, from where it leaves its axis to where it meets it again."""
-    sides = outline(mesh.elements)
-    edges = mesh.elements[sides[:, 0, None], SIDES[sides[:, 1]]]
-    after = {first: (middle, last) for first, middle, last in edges.tolist() if mesh.nodes[middle, 0] > 0.0}
+    edges = outline(mesh.elements).tolist()
+    after = {first: (middle, last) for first, middle, last in edges if mesh.nodes[middle, 0] > 0.0}
     (start,) = {*after} - {last for _, last in after.values()}
     found = [start]
     while found[-1] in after:

@@ -73,8 +73,8 @@ def command(
 ) -> None:
     """Every law is fitted to all tests at once.
 
-    Several are compared by their likelihood, as by select() in Python, unless --weights, --search, --penalty or --loss
-    ask for something else; one is identified as by identify(). JSON and plots of each, LaTeX and Python of the best,
+    Several are compared by their likelihood, as by select() in Python, unless --weights, --search or --penalty ask
+    for something else; one is identified as by identify(). JSON and plots of each, LaTeX and Python of the best,
     go to a folder.
     """
     import creepkit as ck
@@ -104,7 +104,7 @@ def command(
     compared = search.sums is not None or ("by" in how and len(candidates) > 1)
     if compared and not by_likelihood(search, settings):
         raise FitError(
-            "--sums and --criterion compare laws by their likelihood: leave out --weights, --search, --penalty, --loss"
+            "--sums and --criterion compare laws by their likelihood: leave out --weights, --search, --penalty"
         )
     check_identified_folder(to, candidates)
     options_of_fits: dict[str, Any] = {"compared": compared, **({} if through is None else {"through": through})}

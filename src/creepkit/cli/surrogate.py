@@ -133,17 +133,17 @@ def sweep(
     """
     from creepkit.dataset.storage import read_dataset
     from creepkit.reports.surrogate import size_study_rows
-    from creepkit.surrogates.training import size_study
+    from creepkit.surrogates.training import size_study, size_study_to_json
 
     recipe = _recipe(network, {"epochs": 100, **training})
     asked = NetworkSizes(**{"layers": (1, 2, 3), "hidden": (64, 128), **sizes})
     with ProgressBar() as progress:
-        trainings = size_study(
+        trainings = size_study_to_json(size_study(
             read_dataset(data, accepted_only=True), recipe, asked, to=to, seed=seed, device=device,
             progress=progress.tick,
-        )  # fmt: skip
+        ))  # fmt: skip
     if as_json:
-        print_json({"trainings": [vars(e) for e in trainings]})
+        print_json({"trainings": trainings})
     else:
         print_table("", *size_study_rows(trainings))
 

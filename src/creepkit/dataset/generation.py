@@ -11,7 +11,7 @@ import hashlib
 import itertools
 import logging
 import time
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -293,32 +293,21 @@ class ProgressRecord:
         return self.done[number] if self.draws is None else self.job.rows
 
 
-class ProgressReporter:
-    """Reports the progress of a job; rates count the work since the reporter was made."""
+def progress_reporter(record: ProgressRecord, progress: ProgressCallback | None) -> Callable[[], None]:
+    """What reports the progress of a job when it has changed; rates count the work from now on."""
+    start, before, reported = time.monotonic(), record.count, [-1]
+    task = "accepted samples" if record.draws is None else "draws"
 
-    def __init__(self, record: ProgressRecord, progress: ProgressCallback | None) -> None:
-        self._record = record
-        self._progress = progress
-        self._start = time.monotonic()
-        self._initial_count = record.count
-        self._last_reported = -1
-
-    def report(self) -> None:
-        """Report the progress when it has changed."""
-        done = self._record.count
-        if self._progress is None or done == self._last_reported:
+    def report() -> None:
+        done = record.count
+        if progress is None or done == reported[0]:
             return
-        self._last_reported = done
-        task = "accepted samples" if self._record.draws is None else "draws"
-        self._progress(task, min(done, self._record.target), self._record.target, self._note(done))
+        reported[0], rate = done, (done - before) / max(time.monotonic() - start, 1e-3)
+        left = f"{rate:.3g}/s, {duration_text(max(record.target - done, 0) / rate)} left, " if rate > 0 else ""
+        accepted = f"{100 * record.acceptance_rate:.0f} % accepted" if record.done else ""
+        progress(task, min(done, record.target), record.target, f"{left}{accepted}")
 
-    def _note(self, done: int) -> str:
-        rate = (done - self._initial_count) / max(time.monotonic() - self._start, 1e-3)
-        accepted = f"{100 * self._record.acceptance_rate:.0f} % accepted" if self._record.done else ""
-        if rate <= 0:
-            return accepted
-        remaining = max(self._record.target - done, 0) / rate
-        return f"{rate:.3g}/s, {duration_text(remaining)} left, {accepted}"
+    return report
 
 
 POLL_INTERVAL = 0.5
@@ -393,7 +382,7 @@ def _shard_rows(wanted: object) -> int:
 
 def run_until_enough(record: ProgressRecord, workers: Workers, progress: ProgressCallback | None) -> None:
     """Have shards simulated until there are enough; DatasetError when one cannot be."""
-    reporter = ProgressReporter(record, progress)
+    report = progress_reporter(record, progress)
     running: dict[Future[TaskResult], int] = {}
     while record.leading_run() is None:
         while len(running) < workers.size and (shard := record.next_shard(running.values())) is not None:
@@ -417,7 +406,7 @@ def run_until_enough(record: ProgressRecord, workers: Workers, progress: Progres
                     "folder that all machines share"
                 )
             record.mark_done(number, result.accepted)
-        reporter.report()
+        report()
 
 
 def is_complete(job: GenerationJob, record: ProgressRecord, path: Path) -> bool:

@@ -48,10 +48,10 @@ from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
-from creepkit.inverse.identify import identify, identify_values
+from creepkit.inverse.identify import identify
 from creepkit.inverse.information_criteria import criterion_weights
 from creepkit.inverse.initial_search import StartingEstimate
-from creepkit.inverse.iterative_estimation import linearised, starting_point
+from creepkit.inverse.iterative_estimation import starting_point
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback
@@ -547,7 +547,7 @@ class _RefitCache:
             x = starting_point(problem.nuisance_parameters, u, nuisances)
             residuals = problem.residuals(x)
             linear, factor = (
-                linearised(problem, x, residuals),
+                problem.linearised(x, residuals),
                 CovarianceFactor.of_residuals(residuals, fit.noise_model),
             )
             solution = replace(linear, free=np.ones_like(linear.free)).solve(factor)
@@ -565,8 +565,8 @@ class _RefitCache:
         self.fitted[tuple(best.forms.values())] = replace(best, fit=fit)
 
     def _identify(self, law: CreepLaw, start: Floats | None) -> Identification:
-        estimate = StartingEstimate(start, reference=self.estimates.reference)
-        return identify_values(law, self.histories, self.predictor, settings=self.settings, start=estimate)
+        estimate = StartingEstimate(start, reference=self.estimates.reference, values_only=True)
+        return identify(law, self.histories, self.predictor, settings=self.settings, start=estimate)
 
     def _starts(
         self, law: CreepLaw, regression: FormCombination, joint_fit: Identification | None

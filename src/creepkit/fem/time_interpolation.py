@@ -42,14 +42,10 @@ class TimeInterpolation:
         program : (segments, 10) the load history, see fem.solver.LoadProgram.
         beta : the law's leading exponent of time.
         """
-        rows = []
         reached = program[: int(segments[-1]) + 1]
-        starts = reached[:, START].copy()
-        for n, start in enumerate(starts):
-            mine = np.flatnonzero(segments == n)
-            at_start = np.flatnonzero((segments == n) & (times == start))
-            first = int(at_start[-1]) if at_start.size else int(mine[0]) - 1
-            rows.append((first, int(mine[-1])))
+        starts, numbers = reached[:, START].copy(), np.arange(len(reached))
+        ends = zip(np.searchsorted(segments, numbers), np.searchsorted(segments, numbers, "right"), starts, strict=True)
+        rows = [(int(a + np.count_nonzero(times[a:b] == start)) - 1, int(b) - 1) for a, b, start in ends]
         # a load that rises from nothing gives no power of time; long after zero only the change of load matters
         loaded = reached[:, [PRESSURE, MOTION]].any(axis=1)
         young = np.where(starts == 0.0, loaded, starts <= OFFSET) & (beta < 1.0)

@@ -19,7 +19,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import owner_of, prior_mean
 from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.single_values import EXTRAPOLATION_FACTOR
-from creepkit.inverse.uncertainty.importance_sampling import covariance_root
+from creepkit.inverse.uncertainty.laplace_approximation import covariance_root
 from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 from creepkit.inverse.uncertainty.quantities import log_rate
 from creepkit.inverse.uncertainty.rate_scatter import USUAL_SD, NewTest

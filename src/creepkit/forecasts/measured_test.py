@@ -29,7 +29,7 @@ from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
 from creepkit.inverse.output_transforms import LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.uncertainty.importance_sampling import covariance_root
+from creepkit.inverse.uncertainty.laplace_approximation import covariance_root
 from creepkit.inverse.uncertainty.rate_scatter import NewTest
 from creepkit.records import History, Nuisance, Predictor
 

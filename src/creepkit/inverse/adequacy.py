@@ -11,7 +11,7 @@ from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.inverse.single_values import ContradictingValues
-from creepkit.inverse.variance_components import SMALLEST_RATE_SCATTER
+from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, SMALLEST_RATE_SCATTER
 from creepkit.records import output_unit
 from creepkit.records.units import time_text
 
@@ -25,10 +25,6 @@ SHAPE_MISFIT = 5.0
 
 UNDETECTED_SCATTER = 1.5 * SMALLEST_RATE_SCATTER
 """Of ln rate between tests: an estimate that is not above is at its lower bound."""
-
-
-LARGEST_SCATTER = 1.0
-"""Of ln rate between tests, a factor of 2.7: more is no scatter of one alloy."""
 
 
 NOTEWORTHY_EXPECTATION = 1.05
@@ -141,7 +137,7 @@ class Adequacy:
     @property
     def scatters_too_much(self) -> bool:
         """Whether rates of tests scatter by more than those of one alloy do."""
-        return self.rate_scatter > 0.99 * LARGEST_SCATTER
+        return self.rate_scatter > 0.99 * LARGEST_RATE_SCATTER
 
     @property
     def explains(self) -> bool:

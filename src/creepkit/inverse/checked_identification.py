@@ -49,7 +49,7 @@ def identify(
     through : a cheaper predictor in which the minima of the search are refined before `using` (finite elements) gives
         values and intervals; "auto" takes the reduced-order model of `using` where that states its own error.
         A surrogate that does not know the class of the law is replaced by its specimen, and a note says so.
-    settings : what is minimised, nuisance parameters, starts, seed, frames, robust losses, and whether suspect frames
+    settings : what is minimised, nuisance parameters, starts, seed, frames, and whether suspect frames
         are left out. changes : single fields of it, see IdentificationSettings:
         starts=4, nuisances=["offset", Nuisance("rate", sd=0.1)], weights="likelihood".
     """

@@ -118,7 +118,7 @@ def with_correction_at_frames(
 
 def _predicted(problem: LeastSquaresProblem, x: Floats) -> Floats:
     """(tests, observations) what the predictor itself says at x (unknowns,), in the output's unit."""
-    observations = problem.observations
+    observations, problem = problem.observations, problem.about_rates(x, None)
     corrected = observations.inverse(problem.residuals(x).values + observations.transformed_values)
     return corrected if problem.correction is None else corrected - problem.correction
 

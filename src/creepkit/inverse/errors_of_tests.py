@@ -22,16 +22,10 @@ from creepkit.arrays import Floats
 from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
-from creepkit.inverse.perturbations import (
-    LOADS,
-    log_rate_per_kelvin,
-    of_lengths_and_instruments,
-    stress_exponent,
-    test_conditions,
-)
+from creepkit.inverse.perturbations import of_lengths_and_instruments, rate_slopes
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import life_sensitivity
-from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values
+from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values, positive_semidefinite
 from creepkit.inverse.uncertainty.rate_scatter import redundant_rates
 from creepkit.inverse.variance_components import LinearisedProblem
 
@@ -89,14 +83,8 @@ def _usual_scatter(
     own = any(n.kind == "temperature" for n in settings.nuisances)
     kelvin, load = 0.0 if own else included.get("temperature", 0.0), included.get("load", 0.0)
     redundant = redundant_rates(linear, noise_model) if noise_model.rate > 0 else 0
-    added = []
-    for test in range(tests):
-        per_kelvin = log_rate_per_kelvin(problem, x, *test_conditions(problem, test))
-        loaded = problem.histories[test].loading.quantity in LOADS
-        exponent = stress_exponent(problem, x, test) if loaded else 0.0
-        usual = (per_kelvin * kelvin) ** 2 + (exponent * load) ** 2
-        added.append(_mean_square(usual, noise_model.rate, redundant))
-    return np.asarray(np.sqrt(added))
+    usual = rate_slopes(problem, x) ** 2 @ np.array([kelvin, load]) ** 2
+    return np.sqrt([_mean_square(float(one), noise_model.rate, redundant) for one in usual])
 
 
 def _mean_square(usual: float, estimate: float, redundant: int) -> float:
@@ -121,11 +109,5 @@ def error_covariances(
         covariance_of_values(with_errors(linear, some), noise_model, working_noise)
         for some in ((), of_instruments, errors)
     )
-    return _excess(with_all, without), _excess(with_common, without)
-
-
-def _excess(covariance: Floats, least: Floats) -> Floats:
-    """(unknowns, unknowns) what a covariance is more than another, without eigenvalues below zero by rounding."""
-    scale = np.sqrt(np.diag(covariance))
-    values, vectors = np.linalg.eigh((covariance - least) / np.outer(scale, scale))
-    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale))
+    of_all, of_common = (positive_semidefinite(c - without, np.sqrt(np.diag(c))) for c in (with_all, with_common))
+    return of_all, of_common

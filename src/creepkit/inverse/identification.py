@@ -27,7 +27,7 @@ from creepkit.inverse.nuisance_parameters import NuisanceEstimate, has_nuisance,
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.predictor_documents import PredictorDocument, missing_predictor
-from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.problem import NOTEWORTHY_FACTOR, LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import LawAtTests, constant_stress_tests
@@ -196,7 +196,17 @@ class Identification(
             problem = problem.with_nuisances(replace(nuisances, sd=prior_sd))
         if self.numerical_error is not None:
             problem, _ = correct_defect(problem, self.x)
+        log_factors = np.log([m.rate_factor for m in self.tests])
+        if self.settings.weights == "likelihood" and np.abs(log_factors).max() > NOTEWORTHY_FACTOR:
+            problem = problem.about_rates(self.x, log_factors)
         return problem.with_covariance(CovarianceFactor.of_residuals(self.residuals_of(problem), self.noise_model))
+
+    @property
+    def linear_problem(self) -> LinearisedProblem:
+        """The problem made linear at the values; of an identification from a file predicted again."""
+        if self.linearised is not None:
+            return self.linearised
+        return self.least_squares_problem.linearised(self.x, self.residuals_of(self.least_squares_problem))
 
     @property
     def scatter_of_rates(self) -> RateScatter:

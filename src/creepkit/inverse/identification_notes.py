@@ -89,14 +89,7 @@ def data_digest(problem: LeastSquaresProblem) -> str:
     for array in (observations.values, observations.times, observations.present, observations.output_index):
         digest.update(np.ascontiguousarray(array).tobytes())
     names = [h.name for h in problem.histories]
-    method = (
-        names,
-        observations.outputs,
-        observations.transforms,
-        settings.loss,
-        settings.test_loss,
-        settings.nuisances,
-    )
+    method = (names, observations.outputs, observations.transforms, settings.test_loss, settings.nuisances)
     digest.update(repr(method).encode())
     return digest.hexdigest()[:16]
 
@@ -107,7 +100,7 @@ def identification_notes(
     """What limits the trust in an identification, one sentence each."""
     problem = estimation.problem
     sentences, law, histories, settings = [], problem.law, problem.histories, problem.settings
-    if not estimation.minimum.converged:
+    if not estimation.converged:
         sentences.append("the last refinement stopped at its largest number of steps: raise starts or look at the plot")
     temperatures = {round(float(v), 1) for h in histories for v in h.temperature_program().values}
     if max(temperatures) - min(temperatures) > 5 and not law.uses(temperature):
@@ -132,7 +125,7 @@ def identification_notes(
             f"the minimum rate stated of {_named(with_both)} was not used: the readings of its test hold it already"
         )
     sentences += unstated_member_notes(histories)
-    if (problem.bound_penalties.constraint_violations(estimation.minimum.x[: problem.parameter_count]) > 1e-3).any():
+    if (problem.bound_penalties.constraint_violations(estimation.x[: problem.parameter_count]) > 1e-3).any():
         sentences.append("a constraint of the law does not hold over the tests at these values")
     return (*sentences, *_test_notes(problem, tests, nuisances))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -39,12 +38,10 @@ from creepkit.inverse.iterative_estimation import (
     SIMULATION_LIMITS,
     EstimationResult,
     IterationLimits,
-    at_own_rates,
-    at_rates,
+    at_reported_values,
     estimate_iteratively,
-    linearised,
+    judged_at,
     starting_point,
-    under_errors_of_tests,
 )
 from creepkit.inverse.judging import Judge
 from creepkit.inverse.kept_fits import kept_where_asked
@@ -107,25 +104,38 @@ def identify(
     A surrogate that does not know this class of laws is replaced by its specimen, or left out; a note says so.
     start : an estimate to begin from instead of a global search.
     """
-    how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
-    if settings is not None and settings.weights == "automatic":
-        how["settings"] = replace(settings, weights="likelihood" if settings.loss == "linear" else "noise")
-        return describing(identify(law, histories, using, through=through, **how))
-    fit = identify_values(law, histories, using, through=through, **how)
+    settings = settings or IdentificationSettings()
+    automatic = settings.weights == "automatic"
+    if automatic:
+        settings = replace(settings, weights="likelihood")
+    using, through, notes = predictors_for_law(law, using, through)
+    histories, left_out = compared_tests(law, histories, settings)
     with single_threaded_blas():
+        best, outcome, numerical_error = _estimated(law, histories, using, settings, search, through, start, progress)
+        fit = _reported(histories, best, outcome, numerical_error)
+        fit = replace(fit, notes=(*left_out, *fit.notes, *widened_notes(law, fit.law), *notes))
+        if start is not None and start.values_only:
+            return fit
+        if automatic and misses_shape(fit):
+            return describing(fit)
         fit = with_samples(fit, through_for_law(through, law)) if needs_samples(fit) else fit
     return _without_one_test(fit)
+
+
+def misses_shape(fit: Identification) -> bool:
+    """Whether an identification by likelihood misses the shape of curves, by more noises than SHAPE_MISFIT."""
+    adequacy = fit.adequacy
+    missed = adequacy is not None and adequacy.rejects and adequacy.discrepancy_in_noises > SHAPE_MISFIT
+    return missed and fit.settings.weights == "likelihood"
 
 
 def describing(fit: Identification) -> Identification:
     """An identification by likelihood, with values that describe the tests where these contradict the law.
 
-    Where it misses the shape of curves, by more noises than SHAPE_MISFIT, its likelihood is that of the misfit: values
-    are those of frames of equal weight.
+    Where it misses the shape of curves its likelihood is that of the misfit: values are those of frames of equal
+    weight.
     """
-    adequacy = fit.adequacy
-    is_missed = adequacy is not None and adequacy.rejects and adequacy.discrepancy_in_noises > SHAPE_MISFIT
-    if not is_missed or fit.predictor is None:
+    if not misses_shape(fit) or fit.predictor is None:
         return fit
     start, settings = StartingEstimate.from_identification(fit), replace(fit.settings, weights="noise")
     values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
@@ -141,13 +151,8 @@ def _without_one_test(fit: Identification) -> Identification:
     first, *rest = adequacy.explanations
     others = [h for h in fit.histories if h.name not in first.tests]
     try:
-        without = identify_values(
-            fit.law,
-            others,
-            fit.least_squares_problem.predictor,
-            settings=fit.settings,
-            start=StartingEstimate.from_identification(fit),
-        )
+        start = StartingEstimate.from_identification(fit, values_only=True)
+        without = identify(fit.law, others, fit.least_squares_problem.predictor, settings=fit.settings, start=start)
     except CreepkitError:
         return fit
     values = {e.name: (e.value, e.low, e.high) for e in without.estimates}
@@ -164,62 +169,45 @@ def _beside_the_others(fit: Identification, without: Identification, test: int, 
     problem, x, log_factors = fit.least_squares_problem, fit.x.copy(), np.zeros(len(fit.histories))
     x[: len(without.u)] = without.u
     log_factors[test] = found.size
-    linear = at_rates(problem, linearised(problem, x, problem.residuals(x)), log_factors)
+    linear = problem.about_rates(x, log_factors).linearised(x)
     others = RateExplanations(problem, x, linear, without.noise_model)
     size = float(others.scatter.log_factor[test])
     return others.one_test(test, found.odds, size if np.isfinite(size) else found.size)
 
 
-@kept_where_asked
-def identify_values(
+def _estimated(
     law: CreepLaw,
     histories: Sequence[History],
-    using: Predictor | Mapping[str, Predictor],
-    *,
-    settings: IdentificationSettings | None = None,
-    search: GlobalSearch | None = None,
-    through: Predictor | None = None,
-    start: StartingEstimate | None = None,
-    progress: IterationCallback | None = None,
-) -> Identification:
-    """As identify(), without samples of the posterior where a value is at its bound."""
-    settings = settings or IdentificationSettings()
-    using, through, notes = predictors_for_law(law, using, through)
-    histories, left_out = compared_tests(law, histories, settings)
-    with single_threaded_blas():
-        problem = LeastSquaresProblem.from_histories(
-            law, histories, using, settings, None if start is None else start.reference
-        )
-        if start is not None and start.u is not None:
-            lower, upper = (bound[: len(law.params)] for bound in (problem.bounds.lower, problem.bounds.upper))
-            search_outcome = SearchOutcome([np.clip(start.u, lower, upper)], 0, None)
-        else:
-            search_outcome = initial_search(problem, through, search or MultiStart(), progress)
-        start = start or StartingEstimate(None)
-        count, reference = len(law.params), problem.coordinates.reference
-        best, numerical_error = _best_estimate(problem, search_outcome, through, start, progress)
-        for _ in range(MOST_WIDENINGS):
-            u = best.minimum.x[:count]
-            wider = widened(problem.law, problem.coordinates.theta(u))
-            if wider is None:
-                break
-            wider_problem = LeastSquaresProblem.from_histories(wider, histories, using, settings, reference)
-            problem = replace(wider_problem, evaluations=problem.evaluations)
-            start, search_outcome = StartingEstimate(u, (), reference), search_outcome._replace(starts=[u])
-            best, numerical_error = _best_estimate(problem, search_outcome, through, start, progress)
-        u, gradient = best.minimum.x[:count], _gradient(best)[:count]
-        check_bounds(best.problem.bound_penalties, u, gradient, problem.observations.count)
-        best = under_errors_of_tests(best)
-        fit = _result(histories, best, search_outcome, numerical_error)
-    return replace(fit, notes=(*left_out, *fit.notes, *widened_notes(law, fit.law), *notes))
-
-
-def _gradient(best: EstimationResult) -> Floats:
-    """(unknowns,) derivative of half the chi-square of the data to x."""
-    residuals = best.residuals
-    assert residuals.jacobian is not None
-    factor = CovarianceFactor.of_residuals(residuals, best.working_noise)
-    return np.asarray(np.einsum("te,tep->p", factor.inverse_times(residuals.values), residuals.jacobian))
+    using: Predictor,
+    settings: IdentificationSettings,
+    search: GlobalSearch | None,
+    through: Predictor | None,
+    start: StartingEstimate | None,
+    progress: IterationCallback | None,
+) -> tuple[EstimationResult, SearchOutcome, NumericalError | None]:
+    """The best estimate, where it began, and the error of the predictor there; within bounds as wide as it needs."""
+    count, start = len(law.params), start or StartingEstimate(None)
+    problem = LeastSquaresProblem.from_histories(law, histories, using, settings, start.reference)
+    if start.u is None:
+        outcome = initial_search(problem, through, search or MultiStart(), progress)
+    else:
+        bounds = problem.bounds.of(range(count))
+        outcome = SearchOutcome([np.clip(start.u, bounds.lower, bounds.upper)], 0, None)
+    for widenings in range(MOST_WIDENINGS + 1):
+        best, numerical_error = _best_estimate(problem, outcome, through, start, progress)
+        u = best.x[:count]
+        wider = widened(problem.law, problem.coordinates.theta(u)) if widenings < MOST_WIDENINGS else None
+        if wider is None:
+            break
+        start, outcome = StartingEstimate(u, (), problem.coordinates.reference), outcome._replace(starts=[u])
+        wider_problem = LeastSquaresProblem.from_histories(wider, histories, using, settings, start.reference)
+        problem = replace(wider_problem, evaluations=problem.evaluations)
+    residuals, jacobian = best.linear.residuals, best.linear.residuals.jacobian
+    assert jacobian is not None
+    factor = CovarianceFactor.of_residuals(residuals, best.noise)
+    gradient = np.einsum("te,tep->p", factor.inverse_times(residuals.values), jacobian)
+    check_bounds(best.problem.bound_penalties, u, gradient[:count], problem.observations.count)
+    return best, outcome, numerical_error
 
 
 def _best_estimate(
@@ -233,28 +221,24 @@ def _best_estimate(
 
     The predictor is corrected where the last estimate begins: at an end of its own, or near one that is known.
     """
-    working_estimator = _working_estimator(problem)
+    estimator = _working_estimator(problem)
     known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in search_outcome.starts]
-    problem = replace(problem, loss=problem.settings.loss)
-    limits, working_noise = IterationLimits(), None
+    limits, noise = IterationLimits(), None
     if through is not None and start.u is None:
-        cheaper = problem.with_predictor(through)
-        best = _best_of(cheaper, starts, working_estimator, APPROXIMATE_LIMITS, progress)
-        starts, working_noise = [best.minimum.x], best.working_noise
+        best = _best_of(problem.with_predictor(through), starts, estimator, APPROXIMATE_LIMITS, progress)
+        starts, noise = [best.x], best.noise
     if problem.predictor.reduced_order_model() is not None:
         limits = SIMULATION_LIMITS
     if start.u is not None:
         limits = replace(limits, rounds=REFIT_ROUNDS)
-    nearly_there = through is not None or start.u is not None
+    x, nearly_there = starts[0], through is not None or start.u is not None
     if not nearly_there or problem.predictor.refined() is None:
-        best = _best_of(problem, starts, working_estimator, limits, progress, working_noise)
-        problem, x, working_noise = best.problem, best.minimum.x, best.working_noise
+        best = _best_of(problem, starts, estimator, limits, progress, noise)
+        problem, x, noise = best.problem, best.x, best.noise
         limits = replace(limits, rounds=REFIT_ROUNDS)
         if problem.predictor.refined() is None:
             return best, None
-    else:
-        x = starts[0]
     known: Floats | None = None
     for _ in range(MOST_CORRECTIONS):
         corrected, error = correct_defect(problem, x)
@@ -265,9 +249,8 @@ def _best_estimate(
         ):
             break
         numerical_error = error
-        estimator = _working_estimator(corrected, error)
-        best = estimate_iteratively(corrected, x, estimator, limits, progress, working_noise)
-        x, working_noise, known = best.minimum.x, best.working_noise, corrected.correction
+        best = estimate_iteratively(corrected, x, _working_estimator(corrected, error), limits, progress, noise)
+        x, noise, known = best.x, best.noise, corrected.correction
         if error is None or known is None:
             break
         numerical_error = replace(error, shift=shift_of_values(best.problem, x, known))
@@ -288,7 +271,7 @@ def _best_of(
     if len(starts) > 1 and estimator.by_likelihood:
         ends = [estimate_iteratively(problem, x, estimator, replace(limits, rounds=1), None, noise) for x in starts]
         best = max(ends, key=lambda end: end.log_likelihood)
-        problem, starts, noise = best.problem, [best.minimum.x], best.working_noise
+        problem, starts, noise = best.problem, [best.x], best.noise
     ends = [estimate_iteratively(problem, x, estimator, limits, progress, noise) for x in starts]
     return max(ends, key=lambda end: end.log_likelihood)
 
@@ -300,35 +283,32 @@ def _working_estimator(
     return WorkingNoiseEstimator(problem.settings, problem.observations, errors)
 
 
-def _result(
+def _reported(
     histories: Sequence[History],
-    best: EstimationResult,
+    found: EstimationResult,
     search_outcome: SearchOutcome,
     numerical_error: NumericalError | None,
 ) -> Identification:
-    """Noise model, intervals and goodness of fit at the optimum."""
-    problem, x = best.problem, best.x
-    residuals = problem.residuals(x).with_test_weights(best.residuals.test_weights)
-    law, coordinates, count = problem.law, problem.coordinates, problem.parameter_count
+    """Noise model, intervals, judgement and goodness of fit, all at the reported values."""
+    estimator = _working_estimator(found.problem, numerical_error)
+    best = at_reported_values(found) if estimator.by_likelihood else found
+    problem, linear, x = best.problem, best.linear, best.x
+    noise_model = estimator.final(linear, best.noise)
+    law, coordinates, count, residuals = problem.law, problem.coordinates, problem.parameter_count, linear.residuals
     u = x[:count]
-    working_estimator = _working_estimator(problem, numerical_error)
-    linear, by_likelihood = best.linearised, working_estimator.by_likelihood
-    noise_model = working_estimator.final(linear, best.working_noise)
-    unestimated = working_estimator.unestimated_drift_components(noise_model)
+    unestimated = estimator.unestimated_drift_components(noise_model)
     covariance, freedom = restricted_covariance(linear, noise_model, problem.settings.nuisances, unestimated)
-    working_noise = None
-    if not by_likelihood:
-        working_noise = with_single_value_weight(best.working_noise, problem.observations)
+    working_noise, errors, judged = None, best.errors, linear
+    if not estimator.by_likelihood:
+        errors, judged = errors_of_tests(problem, x, linear, noise_model), judged_at(problem, linear, noise_model)
+        working_noise = with_single_value_weight(best.noise, problem.observations)
         covariance = covariance_of_values(linear, noise_model, working_noise)
-    judged = at_own_rates(problem, linear, noise_model)
-    found_at = judged if by_likelihood else linear
-    errors = best.errors if by_likelihood else errors_of_tests(problem, linear.x, linear, noise_model)
     unmodelled = perturbations(
         problem, linear, noise_model, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
     )
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
-    rates = RateExplanations(problem, linear.x, judged, noise_model)
-    of_errors, of_common = error_covariances(found_at, noise_model, errors, working_noise)
+    rates = RateExplanations(problem, x, judged, noise_model)
+    of_errors, of_common = error_covariances(linear, noise_model, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
     prediction = problem.predictor.predict(
         law,
@@ -345,7 +325,8 @@ def _result(
     used = compares_rupture_times(law, problem.settings)
     single_values = values_of_tests.compared(histories, without_curves=used)
     random_effects = predicted_random_effects(residuals, noise_model)
-    tests = test_fits(problem, residuals, random_effects, histories, prediction, single_values)
+    by_law = problem.about_rates(x, None).residuals(x).with_test_weights(residuals.test_weights)
+    tests = test_fits(problem, by_law, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance + of_errors))[count:]
     )
@@ -353,7 +334,7 @@ def _result(
     failed = np.isin(prediction.status[0], FAILED) | tests_without_prediction(prediction, histories)[0]
     failed |= (prediction.status[0] != Status.RUPTURED) & [test.misses_readings for test in tests]
     unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
-    judge = Judge(problem, noise_model, working_estimator.predictor_errors, histories)
+    judge = Judge(problem, noise_model, estimator.predictor_errors, histories)
     adequacy = judge.adequacy_with_remedies(judged, unmodelled, rates.found).with_unpredicted(unpredicted)
     adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
     estimates = parameter_estimates(law, coordinates, u, law_covariance)
@@ -366,7 +347,7 @@ def _result(
         noise_model=noise_model,
         rms=pooled_log_strain_rms(tests),
         log_likelihood=best.log_likelihood,
-        effective_frames=effective_sample_size(best.residuals, noise_model),
+        effective_frames=effective_sample_size(residuals, noise_model),
         freedom=median_freedom(freedom[:count]),
         tests=tests,
         ranges=fitted_ranges(problem),
@@ -378,7 +359,7 @@ def _result(
         errors=pooled_errors(histories, prediction, tests),
         error_covariance=error_covariance if problem.settings.included_errors else None,
         nuisances=nuisance_estimates,
-        converged=best.minimum.converged,
+        converged=best.converged,
         adequacy=replace(adequacy, implausible=implausible),
         numerical_error=numerical_error,
         unmodelled=unmodelled,
@@ -397,10 +378,8 @@ def _result(
         histories=tuple(histories),
         predictor=problem.predictor,
         search_trace=search_outcome.trace,
-        linearised=best.linearised,
-        problem=replace(
-            problem, covariance_factor=CovarianceFactor.of_residuals(residuals, noise_model), loss="linear"
-        ),
+        linearised=linear,
+        problem=problem.with_covariance(CovarianceFactor.of_residuals(residuals, noise_model)),
     )
 
 

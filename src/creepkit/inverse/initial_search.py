@@ -28,17 +28,19 @@ class StartingEstimate:
     """Where an identification begins instead of with a global search; it takes two rounds at most.
 
     u : (parameters,) conditioned coordinates about `reference`, None for a global search in these coordinates.
-    nuisances : explicit nuisances as they were estimated before.
+    nuisances : explicit nuisances as they were estimated before. values_only : whether values and intervals are all
+    that is asked for: no samples of the posterior where a value is at its bound, no refit without a test that is off.
     """
 
     u: Floats | None
     nuisances: Sequence[NuisanceEstimate] = ()
     reference: ReferencePoint | None = None
+    values_only: bool = False
 
     @classmethod
-    def from_identification(cls, fit: Identification) -> StartingEstimate:
+    def from_identification(cls, fit: Identification, *, values_only: bool = False) -> StartingEstimate:
         """The estimates of another identification of the same law."""
-        return cls(fit.u, fit.nuisances, fit.reference)
+        return cls(fit.u, fit.nuisances, fit.reference, values_only)
 
 
 class SearchOutcome(NamedTuple):
@@ -77,5 +79,4 @@ def search_problem(problem: LeastSquaresProblem, predictor: Predictor) -> LeastS
 
     The likelihoods decide between its minima, since the covariance is not yet known. Its unknowns are u alone.
     """
-    loss = "soft_l1" if problem.settings.loss == "linear" else problem.settings.loss
-    return replace(problem.with_predictor(predictor).with_fixed_nuisances(), loss=loss)
+    return replace(problem.with_predictor(predictor).with_fixed_nuisances(), robust=True)

@@ -1,4 +1,11 @@
-"""Iterative estimation: parameters given the noise model, and the noise model given the residuals, in turn."""
+"""Iterative estimation: values given the noise, the noise given residuals, and the rates of tests, in turn.
+
+Where readings are far more exact than rates are alike, residuals are not linear in the rates of tests: by likelihood
+they are taken about the rate that each test has, the best linear prediction of the round before. That is the
+alternation of Lindstrom & Bates (1990), Biometrics 46, 673; about the law's own rates values are biased and a scatter
+of rates is taken for a misfit of the shape. The end is one point: values, covariance, judgement and scatter are all of
+the problem made linear there.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +20,9 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.perturbation import Perturbation
-from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
-from creepkit.inverse.variance_components import (
-    BOUND_TOLERANCE,
-    LinearisedProblem,
-    restricted_log_likelihood,
-    scaled_inverse,
-)
+from creepkit.inverse.problem import LARGEST_FACTOR, NOTEWORTHY_FACTOR, LeastSquaresProblem
+from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
+from creepkit.inverse.variance_components import LinearisedProblem, restricted_log_likelihood, scaled_inverse
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, robust_test_weights, with_single_value_weight
 
 PRIOR_STEPS = 30
@@ -32,12 +34,16 @@ LIKELIHOOD_TOLERANCE = 1e-5
 and above what the steps of a solver leave."""
 
 
-MOST_ERROR_STEPS, ERROR_STEP = 4, 0.02
-"""Steps of values under the errors of tests, and the largest one left out, in standard deviations."""
+MOST_LAST_STEPS, LAST_STEP = 4, 0.02
+"""Last steps of values by likelihood, and the largest one left out, in standard deviations."""
 
 
 CONVERGED_GAIN = 0.02
 """Gain of the log-likelihood, and change of a test's weight, that ends the rounds."""
+
+
+MOST_RATE_STEPS = 3
+"""Steps of the rates of tests at given values."""
 
 
 @dataclass(frozen=True)
@@ -59,172 +65,164 @@ SIMULATION_LIMITS = IterationLimits(rounds=5, steps=25, tolerance=1e-6)
 
 @dataclass(frozen=True)
 class EstimationResult:
-    """The end of an iterative estimation: values and working noise that agree, and their log-likelihood.
+    """The end of an iterative estimation: values and noise that agree, and their log-likelihood.
 
-    problem : with the priors of nuisance parameters as they were estimated; minimum : its optimum; residuals : there,
-    with the weights of tests; linearised : the problem made linear there. x : (unknowns,) the values: the optimum, from
-    where errors of tests move those by likelihood; errors : that were in the covariance.
+    problem : with the priors of nuisance parameters, and about the rates of tests, as they were estimated.
+    linear : the problem made linear at the values. noise : under which values were found. errors : of tests, that the
+    covariance holds beside it. converged : whether the last refinement ended by itself.
     """
 
     problem: LeastSquaresProblem
-    minimum: Minimum
-    residuals: Residuals
-    working_noise: NoiseModel
+    linear: LinearisedProblem
+    noise: NoiseModel
     log_likelihood: float
-    linearised: LinearisedProblem
-    x: Floats
+    converged: bool = True
     errors: tuple[Perturbation, ...] = ()
+
+    @property
+    def x(self) -> Floats:
+        """(unknowns,) the values."""
+        return self.linear.x
 
 
 def estimate_iteratively(
     problem: LeastSquaresProblem,
     x: Floats,
-    working_estimator: WorkingNoiseEstimator,
+    estimator: WorkingNoiseEstimator,
     limits: IterationLimits,
     progress: IterationCallback | None,
-    working_noise: NoiseModel | None = None,
+    noise: NoiseModel | None = None,
 ) -> EstimationResult:
-    """Values and working noise in turn from x (unknowns,), (u, e); the best round.
+    """Values and noise in turn from x (unknowns,), (u, e); the best round.
 
-    working_noise : from which to begin, if it is known already.
+    noise : from which to begin, if it is known already.
     """
-    robust, best = working_estimator.settings.test_loss == "student", None
-    residuals = problem.residuals(x)
-    working_noise = working_noise or working_estimator.starting_noise(len(problem.histories))
+    robust, by_likelihood = estimator.settings.test_loss == "student", estimator.by_likelihood
+    residuals, best = problem.residuals(x), None
+    noise = noise or estimator.starting_noise(len(problem.histories))
+    tolerances = Tolerances(limits.steps, max(limits.tolerance, LIKELIHOOD_TOLERANCE * by_likelihood))
     for round_index in range(limits.rounds):
         previous_weights = residuals.test_weights
-        test_weights = robust_test_weights(residuals, working_noise) if robust else previous_weights
-        residuals = residuals.with_test_weights(test_weights)
-        linear = linearised(problem, x, residuals)
-        working_noise = working_estimator.estimate(residuals, working_noise, linear)
-        if (
-            best is not None
-            and working_estimator.by_likelihood
-            and _expected_gain(linear, working_noise) < CONVERGED_GAIN
-        ):
+        if robust:
+            residuals = residuals.with_test_weights(robust_test_weights(residuals, noise))
+        if by_likelihood and best is not None:
+            problem, residuals = about_own_rates(problem, x, residuals, noise)
+        linear = problem.linearised(x, residuals)
+        noise = estimator.estimate(residuals, noise, linear)
+        if by_likelihood and best is not None and _expected_gain(linear, noise) < CONVERGED_GAIN:
+            best = EstimationResult(problem, linear, noise, _log_likelihood(problem, linear, noise), best.converged)
             break
-        problem = problem.with_covariance(_covariance_factor(problem, residuals, working_noise, working_estimator))
-        tolerance = max(limits.tolerance, LIKELIHOOD_TOLERANCE) if working_estimator.by_likelihood else limits.tolerance
-        minimum = problem.minimise(x, tolerances=Tolerances(limits.steps, tolerance))
-        x = minimum.x
-        residuals = problem.residuals(x).with_test_weights(test_weights)
-        current = _round_result(problem, minimum, residuals, working_noise)
-        problem = current.problem
+        problem = problem.with_covariance(_covariance_factor(problem, residuals, noise, estimator))
+        minimum = problem.minimise(x, tolerances=tolerances)
+        x, weights = minimum.x, residuals.test_weights
+        residuals = problem.residuals(x).with_test_weights(weights)
+        problem = _with_priors_found(problem, residuals, noise, x)
+        linear = problem.linearised(x, residuals)
+        current = EstimationResult(problem, linear, noise, _log_likelihood(problem, linear, noise), minimum.converged)
         if progress is not None:
             progress("round", round_index + 1, limits.rounds)
         gain = np.inf if best is None else current.log_likelihood - best.log_likelihood
-        best = current if best is None or gain > 0 or robust else best
-        if abs(gain) < CONVERGED_GAIN and np.abs(test_weights - previous_weights).max() < CONVERGED_GAIN:
+        # a likelihood about other rates of tests is another approximation
+        moved = best is not None and best.problem.log_factors is not problem.log_factors
+        best = current if best is None or gain > 0 or robust or moved else best
+        if abs(gain) < CONVERGED_GAIN and np.abs(weights - previous_weights).max() < CONVERGED_GAIN:
             break
     assert best is not None
     return best
 
 
-def under_errors_of_tests(result: EstimationResult) -> EstimationResult:
-    """An estimate by likelihood with its values under the covariance that holds the errors of tests.
+def at_reported_values(found: EstimationResult) -> EstimationResult:
+    """An estimate by likelihood where it is reported, about the rates of tests.
 
-    By Gauss-Newton steps from the optimum without them, with errors and residuals made linear at each, and every test
-    about a rate of its own: where readings are far more exact than rates are alike, residuals are not linear in these.
+    Values are moved to the optimum under the covariance that holds the errors of tests, by Gauss-Newton steps with
+    errors and residuals made linear at each.
     """
-    problem, linear, noise = result.problem, result.linearised, result.working_noise
-    if problem.settings.weights != "likelihood" or not problem.settings.included_errors:
-        return result
-    for step in range(MOST_ERROR_STEPS):
-        about = at_own_rates(problem, linear, noise)
-        errors = errors_of_tests(problem, linear.x, about, noise)
-        result = replace(result, errors=errors) if step == 0 else result
-        solution = about.solve(CovarianceFactor.of_residuals(with_errors(about, errors).residuals, noise))
+    problem, linear, noise = found.problem, found.linear, found.noise
+    free = linear.free
+    for _ in range(MOST_LAST_STEPS):
+        problem, residuals = about_own_rates(problem, linear.x, linear.residuals, noise)
+        linear = replace(problem.linearised(linear.x, residuals), free=free)
+        errors = errors_of_tests(problem, linear.x, linear, noise)
+        solution = linear.solve(CovarianceFactor.of_residuals(with_errors(linear, errors).residuals, noise))
+        found = replace(found, problem=problem, linear=linear, errors=errors)
+        if (np.abs(solution.step) <= LAST_STEP * np.sqrt(np.diag(solution.covariance))).all():
+            break
         x = linear.x.copy()
-        x[linear.free] += solution.step
+        x[free] += solution.step
         x = problem.bounds.clip(x)
-        if (np.abs(x - linear.x)[linear.free] <= ERROR_STEP * np.sqrt(np.diag(solution.covariance))).all():
+        moved = problem.residuals(x).with_test_weights(residuals.test_weights)
+        if not is_finite(moved):
             break
-        residuals = problem.residuals(x).with_test_weights(result.residuals.test_weights)
-        assert residuals.jacobian is not None
-        if not (np.isfinite(residuals.values).all() and np.isfinite(residuals.jacobian).all()):
-            break
-        linear = replace(linearised(problem, x, residuals), free=linear.free)
-    return replace(result, x=linear.x)
+        linear = replace(problem.linearised(x, moved), free=free)
+    return found
 
 
-NOTEWORTHY_FACTOR = 0.03
-"""Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
+def is_finite(residuals: Residuals) -> bool:
+    """Whether residuals and their derivatives are numbers."""
+    jacobian = residuals.jacobian
+    return jacobian is not None and bool(np.isfinite(residuals.values).all() and np.isfinite(jacobian).all())
 
 
-def at_own_rates(problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel) -> LinearisedProblem:
-    """The linear problem with every test about a rate of its own, by which a law is judged."""
-    log_factors = predicted_random_effects(linear.residuals, noise_model)[1]
-    return linear if np.abs(log_factors).max() < NOTEWORTHY_FACTOR else at_rates(problem, linear, log_factors)
+def judged_at(problem: LeastSquaresProblem, linear: LinearisedProblem, noise: NoiseModel) -> LinearisedProblem:
+    """The linear problem about the rates of tests, by which a law is judged; values by weights are about the law's."""
+    moved, residuals = about_own_rates(problem, linear.x, linear.residuals, noise)
+    return linear if moved is problem else replace(linear, residuals=residuals)
 
 
-def at_rates(problem: LeastSquaresProblem, linear: LinearisedProblem, log_factors: Floats) -> LinearisedProblem:
-    """The linear problem about rates of tests with factors; log_factors : (tests,) their ln.
+def about_own_rates(
+    problem: LeastSquaresProblem, x: Floats, residuals: Residuals, noise: NoiseModel
+) -> tuple[LeastSquaresProblem, Residuals]:
+    """The problem about the rate that each test has beside the law at x (unknowns,), and its residuals there.
 
-    As `linear`, which is about the law's rates, where some rate has no coefficient or nothing is predicted there.
+    residuals : of the problem at x, with the weights of tests. As it is where its rates are those that are predicted.
     """
-    if not problem.coordinates.every_rate_has_coefficient:
-        return linear
-    there = problem.residuals_at_rates(linear.x, log_factors)
-    values = there.values - log_factors[:, None] * there.log_rate_sensitivity
-    finite = np.isfinite(values).all() and there.jacobian is not None and np.isfinite(there.jacobian).all()
-    residuals = replace(
-        there, values=values, present=linear.residuals.present, test_weights=linear.residuals.test_weights
-    )
-    return replace(linear, residuals=residuals) if finite else linear
+    for _ in range(MOST_RATE_STEPS):
+        log_factors = np.clip(predicted_random_effects(residuals, noise)[1], -LARGEST_FACTOR, LARGEST_FACTOR)
+        known = 0.0 if problem.log_factors is None else problem.log_factors
+        if np.abs(log_factors - known).max() < NOTEWORTHY_FACTOR:
+            break
+        moved = problem.about_rates(x, log_factors)
+        there = moved.residuals(x).with_test_weights(residuals.test_weights)
+        if moved.log_factors is None or not is_finite(there):
+            break
+        problem, residuals = moved, there
+    return problem, residuals
 
 
 def _covariance_factor(
-    problem: LeastSquaresProblem,
-    residuals: Residuals,
-    working_noise: NoiseModel,
-    working_estimator: WorkingNoiseEstimator,
+    problem: LeastSquaresProblem, residuals: Residuals, noise: NoiseModel, estimator: WorkingNoiseEstimator
 ) -> CovarianceFactor:
     """The covariance under which the values of a round are found."""
-    fitting_noise = (
-        working_noise
-        if working_estimator.by_likelihood
-        else with_single_value_weight(working_noise, problem.observations)
-    )
+    fitting_noise = noise if estimator.by_likelihood else with_single_value_weight(noise, problem.observations)
     # A stopped test that says nothing here may say something a step further.
     return CovarianceFactor.of_residuals(replace(residuals, present=problem.observations.present), fitting_noise)
 
 
-def _expected_gain(linear: LinearisedProblem, working_noise: NoiseModel) -> float:
+def _expected_gain(linear: LinearisedProblem, noise: NoiseModel) -> float:
     """Growth of the log-likelihood, to first order, if the values moved to the optimum under this noise."""
     residuals = linear.residuals
-    factor = CovarianceFactor.of_residuals(residuals, working_noise)
+    factor = CovarianceFactor.of_residuals(residuals, noise)
     chi_square = (factor.whiten(residuals.values) ** 2).sum() + (linear.precision * linear.prior_residual**2).sum()
     return 0.5 * float(chi_square - linear.solve(factor).chi_square)
 
 
-def linearised(problem: LeastSquaresProblem, x: Floats, residuals: Residuals) -> LinearisedProblem:
-    """The problem made linear at x (unknowns,), (u, e): weak priors of the bounds on u, their own on e."""
-    nuisances, bounds, count = problem.nuisance_parameters, problem.bounds, problem.parameter_count
-    precision = np.concatenate([12.0 / bounds.width[:count] ** 2, nuisances.precision])
-    prior_residual = np.concatenate([np.zeros(count), x[count:] - nuisances.mean[: x.size - count]])
-    tolerance = BOUND_TOLERANCE * bounds.width
-    free = (x > bounds.lower + tolerance) & (x < bounds.upper - tolerance)
-    return LinearisedProblem(
-        residuals, precision, prior_residual, free, np.stack([bounds.lower - x, bounds.upper - x]), x
-    )
-
-
-def _round_result(
-    problem: LeastSquaresProblem, minimum: Minimum, residuals: Residuals, working_noise: NoiseModel
-) -> EstimationResult:
-    """The end of a round, with the prior standard deviations that its residuals show."""
-    nuisances = problem.nuisance_parameters
-    if any(n.sd is None for n in nuisances.nuisances):
-        assert residuals.jacobian is not None
-        whitened = CovarianceFactor.of_residuals(residuals, working_noise).whiten(residuals.jacobian)
-        nuisances = _with_prior_sd(nuisances, np.einsum("tfp,tfq->pq", whitened, whitened), minimum.x)
-        problem = problem.with_nuisances(nuisances)
-    linear = linearised(problem, minimum.x, residuals)
+def _log_likelihood(problem: LeastSquaresProblem, linear: LinearisedProblem, noise: NoiseModel) -> float:
     # The optimum under weights is none of the noise model: that it is flat in the law's parameters says nothing for it.
     by_likelihood = problem.settings.weights == "likelihood"
-    integrated = np.arange(minimum.x.size) >= (0 if by_likelihood else problem.parameter_count)
-    likelihood = restricted_log_likelihood(linear, working_noise, integrated)
-    return EstimationResult(problem, minimum, residuals, working_noise, likelihood, linear, minimum.x)
+    integrated = np.arange(linear.x.size) >= (0 if by_likelihood else problem.parameter_count)
+    return restricted_log_likelihood(linear, noise, integrated)
+
+
+def _with_priors_found(
+    problem: LeastSquaresProblem, residuals: Residuals, noise: NoiseModel, x: Floats
+) -> LeastSquaresProblem:
+    """The problem with the prior standard deviations that residuals at x (unknowns,) show."""
+    nuisances = problem.nuisance_parameters
+    if all(n.sd is not None for n in nuisances.nuisances):
+        return problem
+    assert residuals.jacobian is not None
+    whitened = CovarianceFactor.of_residuals(residuals, noise).whiten(residuals.jacobian)
+    return problem.with_nuisances(_with_prior_sd(nuisances, np.einsum("tfp,tfq->pq", whitened, whitened), x))
 
 
 def _with_prior_sd(nuisance_parameters: NuisanceParameters, normal_matrix: Floats, x: Floats) -> NuisanceParameters:

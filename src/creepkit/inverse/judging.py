@@ -27,9 +27,9 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.inverse.adequacy import LARGEST_SCATTER, Adequacy, LargestDeviation, OutputAdequacy
+from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
 from creepkit.inverse.explanation import Explanation
-from creepkit.inverse.iterative_estimation import at_own_rates, linearised
+from creepkit.inverse.iterative_estimation import judged_at
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NEGLIGIBLE_DISCREPANCY, NoiseModel, OutputNoise, Residuals
@@ -38,7 +38,7 @@ from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import life_sensitivity
-from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
+from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, LinearSolution
 from creepkit.records import History, is_logarithmic
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ class Judge:
         alone = any(o.p_value < SIGNIFICANCE for o in outputs)
         left = [p_value < SIGNIFICANCE and (o.p_value < SIGNIFICANCE or not alone) for o in outputs]
         outputs = [o if kept else replace(o, discrepancy=0.0) for o, kept in zip(outputs, left, strict=True)]
-        explained = p_value >= SIGNIFICANCE and not self.noise_model.rate > 0.99 * LARGEST_SCATTER
+        explained = p_value >= SIGNIFICANCE and not self.noise_model.rate > 0.99 * LARGEST_RATE_SCATTER
         return Adequacy(
             "explains" if explained else "leaves a discrepancy",
             tuple(outputs),
@@ -234,10 +234,9 @@ class Judge:
 def judged_residuals_of(fit: Identification) -> JudgedResiduals | None:
     """What is left of an identification with its histories, as it was judged; None where no noise is known."""
     problem = fit.least_squares_problem
-    linear = fit.linearised or linearised(problem, fit.x, problem.residuals(fit.x))
     error = fit.numerical_error
     errors = problem.predictor.error if error is None else error.remaining
-    linear = at_own_rates(problem, linear, fit.noise_model)
+    linear = judged_at(problem, fit.linear_problem, fit.noise_model)
     return Judge(problem, fit.noise_model, errors, fit.histories).residuals(linear)
 
 

@@ -158,7 +158,7 @@ def kept_where_asked(identify: Identify) -> Identify:
         if kept is None:
             return identify(law, histories, using, **how)
         predictor, through, _ = predictors_for_law(law, using, how.get("through"))
-        key = _key(getattr(identify, "__name__", ""), law, histories, predictor, {**how, "through": through})
+        key = _key(law, histories, predictor, {**how, "through": through})
         fit = kept.load(key, histories, predictor)
         if fit is not None:
             kept.read += 1
@@ -175,11 +175,10 @@ def kept_where_asked(identify: Identify) -> Identify:
     return cast(Identify, run)
 
 
-def _key(kind: str, law: Any, histories: Any, predictor: Predictor, how: Mapping[str, Any]) -> str:
+def _key(law: Any, histories: Any, predictor: Predictor, how: Mapping[str, Any]) -> str:
     """Hash of all that decides an identification."""
     start, through = how.get("start"), how.get("through")
     parts = {
-        "kind": kind,
         "versions": {name: version(name) for name in COMPUTING},
         "code": code_fingerprint(),
         "law": [law.name, law.fingerprint, [(name, repr(p.bounds), repr(p.off)) for name, p in law.table.items()]],
@@ -190,7 +189,10 @@ def _key(kind: str, law: Any, histories: Any, predictor: Predictor, how: Mapping
         "search": repr(how.get("search")),
         "start": None
         if start is None
-        else [None if start.u is None else np.asarray(start.u).tolist(), repr(start.nuisances), repr(start.reference)],
+        else [
+            None if start.u is None else np.asarray(start.u).tolist(),
+            repr([start.nuisances, start.reference, start.values_only]),
+        ],
     }
     return short_hash(canonical_json(parts))
 

@@ -29,7 +29,7 @@ from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
@@ -158,40 +158,26 @@ def of_lengths_and_instruments(
 def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> list[Perturbation]:
     """Those of instruments that no nuisance parameter common to tests stands for; x : (unknowns,)."""
     shared = {n.kind for n in problem.settings.nuisances if n.scope != "test"}
-    histories, tests = problem.histories, range(len(problem.histories))
-    loaded, moved = ([h.loading.quantity in quantities for h in histories] for quantities in (LOADS, IMPOSED))
-    errors = list[Perturbation]()
-
-    included = problem.settings.included_errors
-    sizes = {**USUAL_ERRORS, **included}
-
-    def add(kind: str, size: float, unit: str, change: Floats) -> None:
-        known = ("motion" if kind.startswith("imposed ") else kind) in included
-        form: dict[str, Any] = {"common": True, "tests": len(histories), "included": known}
-        errors.append(Perturbation(kind, size, unit, residual_change=change, **form))
-
-    def of_rates(by_test: Sequence[float], size: float) -> Floats:
-        return np.asarray(size * np.array(by_test, float)[:, None] * linear.residuals.log_rate_sensitivity)
-
-    def of_outputs(slope: Floats, size: float) -> Floats:
-        slope = np.where(np.isfinite(slope) & np.array(moved)[:, None], slope, 0.0)
-        return np.asarray(linear.residuals.offset_sensitivity * slope * size)
-
-    if "temperature" not in shared:
-        slopes = [log_rate_per_kelvin(problem, x, *test_conditions(problem, test)) for test in tests]
-        add("temperature", sizes["temperature"], "K", of_rates(slopes, sizes["temperature"]))
-    if any(loaded):
-        exponents = [stress_exponent(problem, x, test) if known else 0.0 for test, known in enumerate(loaded)]
-        add("load", 100 * sizes["load"], "%", of_rates(exponents, sizes["load"]))
-    if any(moved):
-        imposed = [h for h, counts in zip(histories, moved, strict=True) if counts]
-        known = all(problem.predictor.for_history(h).follows("modulus") for h in imposed)
-        if known and "modulus" not in shared:
-            change = of_outputs(_slope(problem, x, "modulus"), sizes["modulus"])
-            add("modulus", 100 * sizes["modulus"], "%", change)
-        kind = f"imposed {' and '.join(sorted({h.loading.quantity for h in imposed}))}"
-        add(kind, 100 * sizes["motion"], "%", of_outputs(_motion_slope(problem, x), sizes["motion"]))
-    return [one for one in errors if one.size > 0]
+    included, rates = problem.settings.included_errors, linear.residuals.log_rate_sensitivity
+    per_kelvin, exponents = rate_slopes(problem, x).T[..., None]
+    effects = {"temperature": per_kelvin * rates, **({"load": exponents * rates} if exponents.any() else {})}
+    moved = np.array([h.loading.quantity in IMPOSED for h in problem.histories])
+    imposed = [h for h, is_moved in zip(problem.histories, moved, strict=True) if is_moved]
+    if imposed:
+        outputs = linear.residuals.offset_sensitivity * moved[:, None]
+        if "modulus" not in shared and all(problem.predictor.for_history(h).follows("modulus") for h in imposed):
+            effects["modulus"] = outputs * _slope(problem, x, "modulus")
+        effects["motion"] = outputs * _motion_slope(problem, x)
+    made = []
+    for name, size in {**USUAL_ERRORS, **included}.items():
+        if name in effects and name not in shared and size > 0:
+            kind = (
+                f"imposed {' and '.join(sorted({h.loading.quantity for h in imposed}))}" if name == "motion" else name
+            )
+            amount, unit = (size, "K") if name == "temperature" else (100 * size, "%")
+            form: dict[str, Any] = {"common": True, "tests": len(moved), "included": name in included}
+            made.append(Perturbation(kind, amount, unit, residual_change=size * effects[name], **form))
+    return made
 
 
 def tolerated_dimensions(problem: LeastSquaresProblem) -> list[Dimension]:
@@ -211,7 +197,7 @@ def _length(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, 
     included = problem.settings.included_errors
     share = included.get("dimensions", 1.0)
     slope, sizes = _slope(problem, x, kind, nominal), share * nominal * np.array(tolerances)
-    change = linear.residuals.offset_sensitivity * np.where(np.isfinite(slope), slope, 0.0) * sizes[:, None]
+    change = linear.residuals.offset_sensitivity * slope * sizes[:, None]
     form: dict[str, Any] = {"tests": len(sizes), "included": "dimensions" in included}
     made = Perturbation(kind, float(np.median(sizes)), "mm", residual_change=change, **form)
     return [made] if made.size > 0 else []
@@ -274,7 +260,7 @@ def _advance(history: History, times: Floats, values: Floats, *, explicit_time: 
 
 
 def _slope(problem: LeastSquaresProblem, x: Floats, kind: str, at: Floats | None = None) -> Floats:
-    """(tests, observations) derivative of the outputs to a nuisance.
+    """(tests, observations) derivative of the outputs to a nuisance, 0 where nothing is predicted.
 
     at : (tests,) its values, by default those of the fit, or zero.
     """
@@ -284,7 +270,8 @@ def _slope(problem: LeastSquaresProblem, x: Floats, kind: str, at: Floats | None
     prediction = problem.predictor.predict(
         problem.law, theta[None], problem.histories, nuisances=nuisances, sensitivities=True
     )
-    return np.asarray(problem.observations.select_outputs(prediction.nuisance_jacobian[kind], prediction)[0])
+    slope = problem.observations.select_outputs(prediction.nuisance_jacobian[kind], prediction)[0]
+    return np.where(np.isfinite(slope), slope, 0.0)
 
 
 def _motion_slope(problem: LeastSquaresProblem, x: Floats) -> Floats:
@@ -297,7 +284,8 @@ def _motion_slope(problem: LeastSquaresProblem, x: Floats) -> Floats:
         return np.asarray(problem.observations.select_outputs(prediction.values, prediction)[0])
 
     with np.errstate(invalid="ignore"):  # of tests that end before
-        return np.asarray((outputs(MOTION_STEP) - outputs(-MOTION_STEP)) / (2.0 * MOTION_STEP))
+        slope = (outputs(MOTION_STEP) - outputs(-MOTION_STEP)) / (2.0 * MOTION_STEP)
+    return np.where(np.isfinite(slope), slope, 0.0)
 
 
 def _moved(history: History, change: float) -> History:
@@ -327,18 +315,17 @@ def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, stress: float, 
     return 0.5 * (up - down)
 
 
-def stress_exponent(problem: LeastSquaresProblem, x: Floats, test: int) -> float:
-    """Of the law at the condition of a test by its position; x : (unknowns,)."""
-    return float(local_exponent(problem.coordinates, *test_conditions(problem, test))(x[: problem.parameter_count]))
+def rate_slopes(problem: LeastSquaresProblem, x: Floats) -> Floats:
+    """(tests, 2) of ln rate at the conditions of each test: d / dT, 1/K, and the stress exponent, 0 without a load.
 
-
-def test_conditions(problem: LeastSquaresProblem, test: int) -> tuple[float, float]:
-    """MPa and K, of a test by its position."""
-    history = problem.histories[test]
-    stresses = reference_stresses(history, problem.predictor)
-    positive = stresses[stresses > 0]
-    stress = float(np.median(positive)) if positive.size else problem.coordinates.reference.stress
-    return stress, float(np.mean(history.temperature_program().values))
+    x : (unknowns,).
+    """
+    rows = []
+    for history in problem.histories:
+        at = reference_condition(history, problem.predictor)
+        exponent = float(local_exponent(problem.coordinates, *at)(x[: problem.parameter_count]))
+        rows.append((log_rate_per_kelvin(problem, x, *at), exponent if history.loading.quantity in LOADS else 0.0))
+    return np.array(rows)
 
 
 # ---- what each does to the values ------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.bound_penalties import BoundPenalties, constraint_points
 from creepkit.inverse.bounds import Bounds
@@ -46,6 +46,7 @@ from creepkit.inverse.search.local_refinement import (
     robust_loss,
 )
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, NuisanceValues, Prediction, Predictor, concatenated_tests
@@ -64,6 +65,15 @@ PRIOR_STRENGTH = 1e-4
 Far too weak to bias a value. Without it one unknown that changes nothing, as the share of the largest principal stress
 in tension, leaves the Jacobian short of its rank, and scipy's steps are then always as long as the trust region.
 """
+
+
+NOTEWORTHY_FACTOR = 0.03
+"""Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
+
+
+LARGEST_FACTOR = 1.0
+"""Of ln rate of a test, up to which its curve is simulated with that factor: one that is further off may break at its
+own rate before it was measured."""
 
 
 class EvaluationCache:
@@ -90,10 +100,14 @@ class LeastSquaresProblem:
     """A law against histories under a covariance; the unknowns are x = (u, e).
 
     histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
-    bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. loss : of the whitened
-        residuals, as scipy names it.
+    bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. robust : whether a single
+        residual far off counts less, as in a search.
     correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
         against a more exact one (see inverse.defect_correction), or None.
+    log_factors : (tests,) ln of the factors on the rates of tests about which residuals are taken, None for the law's
+        own rates. With b such a factor, r(x, b) the residuals and d their derivative to it, r(x, b) - d b is linear in
+        a rate that scatters where r(x, 0) is not (Lindstrom & Bates (1990), Biometrics 46, 673).
+    rate_shift : (tests, observations) -, d b of them, or None.
     evaluations : the last residuals, shared by the problems that differ in covariance or priors alone.
     """
 
@@ -105,8 +119,10 @@ class LeastSquaresProblem:
     bounds: Bounds
     settings: IdentificationSettings
     covariance_factor: CovarianceFactor
-    loss: str = "linear"
+    robust: bool = False
     correction: Floats | None = None
+    log_factors: Floats | None = None
+    rate_shift: Floats | None = None
     evaluations: EvaluationCache = field(default_factory=EvaluationCache, repr=False)
 
     @classmethod
@@ -161,6 +177,17 @@ class LeastSquaresProblem:
         """The same with a correction (tests, observations), in the output's unit, added to predictions."""
         return replace(self, correction=correction, evaluations=EvaluationCache())
 
+    def about_rates(self, x: Floats, log_factors: Floats | None) -> LeastSquaresProblem:
+        """The same about other rates of tests near x (unknowns,); log_factors : (tests,) their ln, or None.
+
+        None is larger than LARGEST_FACTOR; where some rate has no coefficient of its own, none has such a factor.
+        """
+        if log_factors is None or not self.coordinates.every_rate_has_coefficient:
+            return replace(self, log_factors=None, rate_shift=None)
+        log_factors = np.clip(log_factors, -LARGEST_FACTOR, LARGEST_FACTOR)
+        there = replace(self, log_factors=log_factors, rate_shift=None)
+        return replace(there, rate_shift=log_factors[:, None] * there.residuals(x).log_rate_sensitivity)
+
     def with_covariance(self, covariance_factor: CovarianceFactor) -> LeastSquaresProblem:
         """The same under another covariance."""
         return replace(self, covariance_factor=covariance_factor)
@@ -201,15 +228,16 @@ class LeastSquaresProblem:
 
     def residuals(self, x: Floats) -> Residuals:
         """Residuals of one x (unknowns,), with exact derivatives to x; the last few are cached."""
-        fixed_values = self.nuisance_parameters.mean.tobytes() if self.nuisance_parameters.fixed else b""
-        return self.evaluations.residuals(x.tobytes() + fixed_values, lambda: self._evaluated(x))
+        held = [self.nuisance_parameters.mean if self.nuisance_parameters.fixed else None, self.log_factors]
+        key = x.tobytes() + b"".join(b"" if values is None else values.tobytes() for values in held)
+        residuals = self.evaluations.residuals(key, lambda: self._evaluated(x))
+        return replace(residuals, values=self._about_rates(residuals.values, residuals.present))
 
     def candidate_residuals(self, u: Floats) -> Floats:
         """(candidates, tests, observations) - of u (candidates, parameters), nuisance parameters at their means."""
-        self.evaluations.count += len(u)
-        prediction = self._prediction(u, jacobian=False)
-        self.evaluations.failures.record(prediction, self.histories)
-        return candidate_residuals(self.observations, prediction, self.correction)
+        prediction = self._counted(u, jacobian=False)
+        values = candidate_residuals(self.observations, prediction, self.correction)
+        return self._about_rates(values, self.observations.present)
 
     def candidate_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
         """Residuals (candidates, tests, observations) of u (candidates, parameters), and their derivatives to u.
@@ -221,19 +249,54 @@ class LeastSquaresProblem:
             evaluated = [single.residuals(one) for one in u]
             jacobians = [r.jacobian for r in evaluated if r.jacobian is not None]
             return np.stack([r.values for r in evaluated]), np.stack(jacobians)
-        prediction = self._prediction(u, jacobian=True)
-        self.evaluations.count += len(u)
-        self.evaluations.failures.record(prediction, self.histories)
+        prediction = self._counted(u, jacobian=True)
         values, internal_jacobian = candidate_residuals_and_jacobian(self.observations, prediction, self.correction)
         jacobian = np.einsum("ctep,cpq->cteq", internal_jacobian, self.coordinates.jacobian(u))
-        return values, np.where(self.observations.present[..., None], jacobian, 0.0)
+        present = self.observations.present
+        return self._about_rates(values, present), np.where(present[..., None], jacobian, 0.0)
+
+    def linearised(self, x: Floats, residuals: Residuals | None = None) -> LinearisedProblem:
+        """The problem made linear at x (unknowns,), (u, e): weak priors of the bounds on u, their own on e.
+
+        residuals : there, with the weights of tests.
+        """
+        nuisances, bounds, count = self.nuisance_parameters, self.bounds, self.parameter_count
+        precision = np.concatenate([12.0 / bounds.width[:count] ** 2, nuisances.precision])
+        prior_residual = np.concatenate([np.zeros(count), x[count:] - nuisances.mean[: x.size - count]])
+        tolerance, steps = BOUND_TOLERANCE * bounds.width, np.stack([bounds.lower - x, bounds.upper - x])
+        free = (steps[0] < -tolerance) & (steps[1] > tolerance)
+        return LinearisedProblem(residuals or self.residuals(x), precision, prior_residual, free, steps, x)
+
+    def check_predicted(self, u: Floats) -> None:
+        """FitError, with counts over all that were tried, where nothing is predicted at u (candidates, parameters)."""
+        self.evaluations.failures.check(self._prediction(u, jacobian=False), self.histories, self.law.name)
+
+    def _about_rates(self, values: Floats, present: Bools) -> Floats:
+        """Residuals (..., tests, observations), less what the rates do about which they are taken."""
+        return values if self.rate_shift is None else values - np.where(present, self.rate_shift, 0.0)
+
+    def _counted(self, u: Floats, *, jacobian: bool) -> Prediction:
+        self.evaluations.count += len(u)
+        prediction = self._prediction(u, jacobian=jacobian)
+        self.evaluations.failures.record(prediction, self.histories)
+        return prediction
 
     def _prediction(self, u: Floats, *, jacobian: bool) -> Prediction:
         """Of u (candidates, parameters), the nuisance parameters at their means."""
         nuisances = replace(self.nuisance_parameters, fixed=True).predictor_values(np.zeros(0))
-        return self._predicted(u, nuisances, self.histories, jacobian)
+        return self._predicted(u, nuisances, jacobian)
 
-    def _predicted(
+    def _predicted(self, u: Floats, nuisances: NuisanceValues, sensitivities: bool) -> Prediction:
+        if self.log_factors is None:
+            return self._predicted_tests(u, nuisances, self.histories, sensitivities)
+        groups, rates = [], list(self.coordinates.coefficients)
+        for k, history in enumerate(self.histories):
+            moved, own = u.copy(), {key: values[:, [k]] for key, values in nuisances.items()}
+            moved[:, rates] += self.log_factors[k]
+            groups.append(([k], self._predicted_tests(moved, own, [history], sensitivities)))
+        return concatenated_tests(groups, self.histories)
+
+    def _predicted_tests(
         self, u: Floats, nuisances: NuisanceValues, histories: Sequence[History], sensitivities: bool
     ) -> Prediction:
         tests = (self.law, self.coordinates.theta(u), histories)
@@ -243,35 +306,10 @@ class LeastSquaresProblem:
             prediction = self.predictor.predict(*tests, nuisances=nuisances, sensitivities=sensitivities)
         return with_minimum_rates(prediction, self.predictor, *tests, nuisances, sensitivities=sensitivities)
 
-    def check_predicted(self, u: Floats) -> None:
-        """FitError, with counts over all that were tried, where nothing is predicted at u (candidates, parameters)."""
-        prediction = self._prediction(u, jacobian=False)
-        self.evaluations.failures.check(prediction, self.histories, self.law.name)
-
-    def residuals_at_rates(self, x: Floats, log_factors: Floats) -> Residuals:
-        """Residuals of one x (unknowns,) where each test has a factor on its rates; log_factors : (tests,) their ln.
-
-        Where some rate has no coefficient of its own, none has such a factor.
-        """
-        u, e = x[: self.parameter_count], x[self.parameter_count :]
-        if not self.coordinates.every_rate_has_coefficient:
-            return self.residuals(x)
-        nuisances, groups = self.nuisance_parameters.predictor_values(e), []
-        for k, history in enumerate(self.histories):
-            moved = u.copy()
-            moved[list(self.coordinates.coefficients)] += log_factors[k]
-            own = {key: values[:, [k]] for key, values in nuisances.items()}
-            groups.append(([k], self._predicted(moved[None], own, [history], True)))
-        return self._residuals_of(u, concatenated_tests(groups, self.histories))
-
     def _evaluated(self, x: Floats) -> Residuals:
         u, e = x[: self.parameter_count], x[self.parameter_count :]
-        nuisances = self.nuisance_parameters.predictor_values(e)
-        prediction = self._predicted(u[None], nuisances, self.histories, True)
+        prediction = self._predicted(u[None], self.nuisance_parameters.predictor_values(e), True)
         self.evaluations.failures.record(prediction, self.histories)
-        return self._residuals_of(u, prediction)
-
-    def _residuals_of(self, u: Floats, prediction: Prediction) -> Residuals:
         coordinates = self.coordinates
         residuals = residuals_of_prediction(
             self.observations,
@@ -312,7 +350,7 @@ class LeastSquaresProblem:
         """
         inside = self.bounds.of(range(self.parameter_count)).clip(u)
         whitened = self.whiten(np.moveaxis(self.candidate_residuals(inside), 0, -1)).T
-        total = 0.5 * robust_loss(whitened**2, self.loss).sum(axis=1)
+        total = 0.5 * (robust_loss(whitened**2) if self.robust else whitened**2).sum(axis=1)
         total += 0.5 * (self.bound_penalties.residuals(inside) ** 2).sum(axis=1)
         return np.where(np.isfinite(total), total, FAILED_COST)
 
@@ -349,7 +387,7 @@ class LeastSquaresProblem:
         if nuisances.size:
             scale[-nuisances.size :] = np.minimum(nuisances.sd, self.bounds.width[-nuisances.size :])
         minimum = bounded_least_squares(
-            system, inside, self.bounds, scale, tolerances or Tolerances(), fixed=fixed, loss=self.loss
+            system, inside, self.bounds, scale, tolerances or Tolerances(), fixed=fixed, robust=self.robust
         )
         assert minimum.whitened_residuals is not None
         return replace(minimum, whitened_residuals=minimum.whitened_residuals[: self.observations.count])

@@ -52,8 +52,6 @@ class IdentificationSettings(Options, title="settings of an identification", err
     starts : of the multi-start search, half of them where two parameters beside rates are sought, two for one;
     sobol_points : that are screened for them, a power of two is best; a quarter of them for two, an eighth for one.
     frames : that are compared in each history, with all their outputs. seed : of random draws.
-    loss : of frames, for values only; intervals and noise model are Gaussian, in which outliers are noise. An
-        identification by likelihood takes none.
     nuisances : what differs between tests; by default an offset of each output and test-to-test scatter of the rate,
         both estimated.
     weights : of the values; noise, intervals and ranking are by one likelihood, with white noise and autocorrelation of
@@ -79,7 +77,6 @@ class IdentificationSettings(Options, title="settings of an identification", err
     sobol_points: int = option(64, "Points that are screened for the starts; 8 a start.", SOBOL_POINTS)
     frames: int = option(60, "Frames of each test that are compared.", Limits(2, 100_000))
     seed: int = option(0, "Seed of random draws.", SEED)
-    loss: Literal["linear", "soft_l1", "huber", "cauchy", "arctan"] = option("linear", "Of frames.")
     nuisances: tuple[Nuisance, ...] = option(
         (Nuisance("offset"), Nuisance("rate")),
         "What differs between tests beside the default; rate=none leaves one out.",
@@ -107,11 +104,6 @@ class IdentificationSettings(Options, title="settings of an identification", err
         _check_weights(self.weights)
         _check_usual_errors(self.usual_errors)
         super().__post_init__()
-        if self.weights == "likelihood" and self.loss != "linear":
-            raise FitError(
-                f"loss '{self.loss}' does not go with weights 'likelihood', which judges values, noise and laws; "
-                "leave one of them out, or set test_loss='student' against tests that are far off"
-            )
         for nuisance in self.nuisances:
             _check_nuisance(nuisance)
         for first, second in combinations(self.nuisances, 2):

@@ -193,6 +193,7 @@ class StatedConditions:
         """The question of a condition, which the key states; choices : likely values."""
         place = location or self.location
         path = Path(re.sub(r"(?:, sheet '.*|:\d+)$", "", place))
+        place += f" ({self.labels['format']})" if "format" in self.labels else ""
         return Question(path, place, sentence, key, choices, is_free=is_free)
 
     def all_labels(self) -> dict[str, str]:

@@ -128,8 +128,9 @@ UNUSED = "unused"
 
 def column_question(table: CellTable, sentence: str, *choices: dict[str, str]) -> Question:
     """The question of what columns of a table are; choices : {column: what it is}, the likely one first."""
-    place = table.location(table.columns_line)
-    return Question(table.path, place, sentence, "columns", choices, is_free=True)
+    place, kind = table.location(table.columns_line), table.header.get("label format")
+    where = f"{place} ({kind.text})" if kind else place
+    return Question(table.path, where, sentence, "columns", choices, is_free=True)
 
 
 def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:

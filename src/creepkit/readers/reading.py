@@ -65,24 +65,21 @@ def read_histories(
                 read.setdefault((history.source or str(source), history.name), (source, history))
     raise_all(errors)
     histories = _with_unique_names(list(read.values()))
-    said = {text.casefold() for one in histories for text in (one.name, *one.labels, *one.labels.values())}
     for folder in {path if path.is_dir() else path.parent for path, _ in read.values()}:
-        raise_all(_ends_of_nothing(folder, said))
+        raise_all(_ends_of_nothing(folder))
     return histories
 
 
-def _ends_of_nothing(folder: Path, said: Collection[str]) -> Iterator[HistoryError]:
-    """Texts under `ended` in the answers of a folder that stand in none of its files; said : what tests say."""
+def _ends_of_nothing(folder: Path) -> Iterator[HistoryError]:
+    """Texts under `ended` in the answers of a folder that stand in none of its files."""
     file = folder / ANSWERS_FILE
     for pattern, answers in read_answers(file).items() if file.is_file() else ():
-        ended = answers.get("ended")
-        ended = ended if isinstance(ended, dict) else {}
-        keys = {key: " ".join(key.casefold().removeprefix("()").split()) for key in ended}
-        missing = [key for key, text in keys.items() if not any(text in one for one in said)]
-        files = [path for path in sorted(folder.glob("*")) if missing and fnmatchcase(path.name, pattern)]
-        texts = [_text_of(path) for path in files if path.is_file()]
-        for key in missing:
-            if texts and not any(keys[key] in text for text in texts):
+        ended = answers["ended"] if isinstance(answers.get("ended"), dict) else {}
+        files = [path for path in sorted(folder.glob("*")) if path.is_file() and fnmatchcase(path.name, pattern)]
+        texts = [*map(_text_of, files)] if ended else []
+        for key in ended:
+            plain = " ".join(key.casefold().removeprefix("()").split())
+            if texts and not any(plain in text for text in texts):
                 what = f"'{quoted(key)}' stands in no file of that name"
                 yield HistoryError(f'{file}: ["{quoted(pattern)}"] ended: {what}; correct or remove it')
 

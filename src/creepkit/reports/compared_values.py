@@ -85,7 +85,7 @@ OWN_RATE_CHI_SQUARE = (
 LAW_RATE_MISFIT = "mean square misfit over noise² with the law's rate for every test"
 
 
-LAW_RATE_MEANING = f"{LAW_RATE_MISFIT} holds the scatter between tests, which is no fault of the law"
+LAW_RATE_MEANING = f"{LAW_RATE_MISFIT} holds the scatter between tests"
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.selection.ranking import RankedLaw, Ranking
+from creepkit.inverse.selection.ranking import Ranking
 from creepkit.reports.ranking import equivalents_among_remaining
 from creepkit.screening.results import AlloyResult
 
@@ -54,8 +54,7 @@ def findings_of(group: ReportGroup) -> GroupFindings | None:
     if isinstance(result, AlloyResult):
         if not result.identified:
             return None
-        laws = tuple(RankedLaw(w.fit, w.bic_difference, w.weight) for w in result.laws)
-        ranking = Ranking(laws, failed=result.failed_laws) if len(laws) > 1 else None
+        ranking = Ranking(result.laws, failed=result.failed_laws) if len(result.laws) > 1 else None
         decisive = None if ranking is None else result.decisive
         return GroupFindings(
             group.name, result.best, ranking, result.verdict, result.equivalents, result.notes, decisive

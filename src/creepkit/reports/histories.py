@@ -33,8 +33,9 @@ def histories_text(histories: Sequence[History]) -> str:
     if len(histories) == 1:
         (test,) = histories
         name, end, frames, _ = _row(test)
-        outputs = [_output_text(test, one) for one in test.outputs] or [_rate_text(test)]
-        return "\n  ".join([name, *outputs, f"frames: {frames}", end, *_remarks(histories)])
+        lines = [_output_text(test, one) for one in test.outputs]
+        lines.append(frames.replace(" to ", " frames to ", 1) if lines else _rate_text(test))
+        return "\n  ".join([name, *lines, end, *_remarks(histories)])
     table = _table(histories)
     return "\n".join([*aligned(table.columns, table.rows), *_remarks(histories)])
 
@@ -74,7 +75,7 @@ def _counted(texts: Counter[str], total: int) -> list[str]:
 def _row(history: History) -> tuple[str, ...]:
     """Name, specimen and conditions; end; frames; outputs of a test."""
     count, unused = history.times.size, int((~np.asarray(history.used)).sum())
-    frames = f"{count} up to {history.times[-1] / SECONDS_PER_HOUR:.4g} h{f', {unused} not used' if unused else ''}"
+    frames = f"{count} to {history.times[-1] / SECONDS_PER_HOUR:.4g} h{f', {unused} not used' if unused else ''}"
     outputs = [_output_text(history, name) for name in history.outputs]
     if "strain" in history.outputs:
         outputs[0] = f"largest strain {100 * float(np.nanmax(np.abs(history.outputs['strain']))):.4g} %"

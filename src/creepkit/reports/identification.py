@@ -61,8 +61,8 @@ MOST_CORRELATED = 12
 
 
 REJECTED = (
-    "this law does not fit the tests: its values only bring it as near to them as it comes, and what the tests "
-    "determine, the creep rate and the stress exponent amid them are not derived from it"
+    "this law does not fit the tests: its values only bring it as near to them as it comes; rates and stress exponents "
+    "of the tests are not derived from it"
 )
 
 

@@ -247,6 +247,6 @@ def residual_caption(fit: Identification) -> str:
     if judged_readings(fit) is None:
         return "measured less identified"
     return (
-        "measured less identified over the standard deviation of the noise of the reading, with the test's own rate, "
-        "rupture life and offset, as where the law is judged; grey: two standard deviations"
+        "measured less identified over the noise of the reading, the test's own rate, life and offset taken out; "
+        "grey: two standard deviations"
     )

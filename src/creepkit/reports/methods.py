@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from creepkit.inverse.adequacy import LARGEST_SCATTER
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.judging import SIGNIFICANCE
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
 from creepkit.inverse.observation_vector import FLOOR_NOISES, FLOOR_SHARE, MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
 from creepkit.inverse.output_transforms import LogTransform
-from creepkit.inverse.variance_components import NOISE_PRIOR_SD
+from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, NOISE_PRIOR_SD
 from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
 from creepkit.language.printing import arrhenius_exponent
 from creepkit.laws.paper import PAPER
@@ -116,13 +115,9 @@ def _tests(fits: Sequence[Identification]) -> Iterator[str]:
     if compared:
         yield f"Compared were {listed(compared)}."
     if any(one is not None and one.followed_to_rupture.any() for one in map(compared_observations, fits)):
-        yield (
-            "Readings of tests followed to rupture have orthogonal residuals: with a, the difference of predicted and "
-            "measured transformed strain at the time of a reading, and b, the difference of the logarithms of the "
-            "measured time and of the time at which the measured strain is predicted, the residual is "
-            "√2 |a b| / √(a² + b²) with the sign of a; rupture times have ln(measured / predicted), and tests stopped "
-            "before it count only where they lasted longer than predicted."
-        )
+        yield "Readings of tests followed to rupture have orthogonal residuals √2 |a b| / √(a² + b²), signed as a."
+        yield "There a is predicted less measured transformed strain, b ln of the measured over the predicted time."
+        yield "Tests stopped before rupture count only where they lasted longer than predicted."
 
 
 def _transforms(fit: Identification) -> Iterator[str]:
@@ -134,8 +129,8 @@ def _transforms(fit: Identification) -> Iterator[str]:
         if output in (RUPTURE_OUTPUT, MINIMUM_RATE_OUTPUT):
             yield f"{'rupture times' if output == RUPTURE_OUTPUT else 'minimum creep rates'} by their logarithms"
         elif isinstance(transform, LogTransform):
-            floor = f"{100 * FLOOR_SHARE:g} % of the median end value and at least {FLOOR_NOISES:g} times the noise"
-            yield f"{name} ε as arsinh(ε / 2f), which is ln(ε / f) well above the floor f, {floor} of a reading"
+            floor = f"{100 * FLOOR_SHARE:g} % of the median end value, at least {FLOOR_NOISES:g} noises"
+            yield f"{name} ε as arsinh(ε / 2f), a logarithm above the floor f ({floor})"
         else:
             yield f"{name} linearly, divided by the standard deviation of its readings"
 
@@ -205,14 +200,13 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
     """How the optimum was sought, what was weighted how, and what intervals are made of."""
     settings, noise = fit.settings, fit.noise_model
     search = str(fit.search_trace.search if fit.search_trace is not None else fit.provenance.get("search", "")).lower()
-    how = ""
+    region = f"by least squares in a trust region{cite('trust region')}"
+    yield f"Parameters were sought within the bounds of the table of symbols {region}."
     if search.startswith("multi-start"):
         points = f"at most {settings.sobol_points} points of a Sobol' sequence{cite('sobol')}"
-        how = f" from up to {plural(settings.starts, 'start')}, picked out of {points} (seed {settings.seed})"
+        yield f"Up to {plural(settings.starts, 'start')} were picked out of {points} (seed {settings.seed})."
     elif "swarm" in search:
-        how = f" by a particle swarm{cite('swarm')} (seed {settings.seed})"
-    refined = f"and refined by least squares in a trust region{cite('trust region')}"
-    yield f"Parameters were sought within the bounds of the table of symbols{how}, {refined}."
+        yield f"It began where a particle swarm{cite('swarm')} ended (seed {settings.seed})."
     minimised = "The sum of the relative squared errors of the outputs was minimised"
     if isinstance(settings.weights, Mapping):
         weights = ", ".join(f"{name.replace('_', ' ')} {number(value, 3)}" for name, value in settings.weights.items())
@@ -227,32 +221,24 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
     yield f"{components} were estimated by restricted maximum likelihood{cite('reml')}."
     freedom = f"Satterthwaite's degrees of freedom{cite('satterthwaite')}"
     if settings.weights == "likelihood":
-        yield (
-            f"95 % intervals follow from the whole covariance with {freedom}; parameters have weak Gaussian priors, "
-            "with the variance of a uniform distribution between their bounds."
-        )
+        yield f"95 % intervals follow from the whole covariance with {freedom}."
+        yield "Parameters have weak Gaussian priors, with the variance of a uniform distribution between their bounds."
     else:
-        yield (
-            f"95 % intervals are those of the covariance of this weighted estimate under that noise, with {freedom}: "
-            "H⁻¹ (Jᵀ W C W J + P) H⁻¹ with H = Jᵀ W J + P, where J are the derivatives of the residuals, W the "
-            f"weights, C the covariance of the noise and P the precision of the priors{cite('weighted least squares')}."
-        )
+        weighted = f"this weighted estimate{cite('weighted least squares')}, H⁻¹ (Jᵀ W C W J + P) H⁻¹"
+        yield f"95 % intervals are those of the covariance of {weighted} with H = Jᵀ W J + P, with {freedom}."
+        yield "J are derivatives of residuals, W weights, C the covariance of the noise, P the precision of the priors."
     nuisances = list(dict.fromkeys(one.kind for one in settings.nuisances))
     if nuisances:
         yield f"Nuisance parameters of the tests with Gaussian priors are {listed(nuisances)}."
     yield rate_scatter_sentence(fit)
-    yield (
-        "Autocorrelated parts have the covariance s² exp(-d / l) at a distance d, in ln t of outputs that are compared "
-        "by their logarithm and else in time over the duration of a test; those were kept by which the likelihood "
-        f"gains more than by chance in {100 * AUTOCORRELATION_CONFIDENCE:g} % of cases."
-    )
+    chance = f"{100 * AUTOCORRELATION_CONFIDENCE:g} % of cases"
+    yield "Autocorrelated parts have the covariance s² exp(-d / l), d in ln t of logarithms, else in relative time."
+    yield f"Those were kept by which the likelihood gains more than by chance in {chance}."
     if any(one.stated > 0 for one in noise.outputs.values()):
         yield (
             "The noise of a reading has a log-normal prior about the noise that its test states, with a standard "
             f"deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
         )
-    if settings.loss != "linear":
-        yield f"Readings far off have less weight by the loss '{settings.loss}'."
     if settings.test_loss == "student":
         yield f"Tests far from the others have less weight by Student's distribution{cite('student')}."
     if fit.numerical_error is not None:
@@ -263,10 +249,7 @@ def _sparsity(found: GroupFindings) -> Iterator[str]:
     """How terms of a sum were selected, where they were."""
     for sparse in [one.sparsity for one in found.fits if one.sparsity is not None][:1]:
         dropped = f"left out were {listed([*sparse.dropped_terms])}" if sparse.dropped_terms else "all terms stayed"
-        by = (
-            "BIC among its subsets" if sparse.penalty == "subsets" else "the L2 norm of their contributions, and by BIC"
-        )
-        selected = f"were selected by {by}"
+        selected = "were selected by BIC among its subsets"
         yield f"The terms of the sum {printable(sparse.law, 120)} {selected}; {dropped}."
 
 
@@ -285,18 +268,12 @@ def _comparison(found: GroupFindings, cite: Callable[..., str]) -> Iterator[str]
     if found.ranking is None:
         return
     name, penalty = CRITERIA[found.ranking.criterion]
-    yield (
-        f"The laws were compared by the {name}{cite(found.ranking.criterion)}: chi-square, under the covariance of "
-        "the law that fits the tests best, plus the logarithm of the determinant that integrates nuisance "
-        f"parameters out, plus {penalty} for K parameters that the tests determine and n independent readings, as "
-        "many as their autocorrelation leaves."
-    )
-    yield (
-        "The weight of a law is exp(-difference / 2) over the sum of all laws tried, and a law is credible with a "
-        f"weight above {CREDIBLE_WEIGHT:g}. A law is called decisive where its weight is above {DECISIVE_WEIGHT:g}, it "
-        "was among the laws asked for, it is not contradicted by the tests, and neither a share of another law nor an "
-        "effect that was not modelled changes that."
-    )
+    yield f"The laws were compared by the {name}{cite(found.ranking.criterion)}: chi-square, plus {penalty}."
+    yield "Chi-square is that under the covariance of the best law, with nuisance parameters integrated out."
+    yield "K counts the parameters that the tests determine, n the readings that autocorrelation leaves apart."
+    yield f"The weight of a law is exp(-difference / 2) over the sum of all; it is credible above {CREDIBLE_WEIGHT:g}."
+    yield f"It is decisive above {DECISIVE_WEIGHT:g} if it was asked for and the tests do not contradict it."
+    yield "Nor may a share of another law, or an effect that was not modelled, change that."
 
 
 def _adequacy(fits: Sequence[Identification], cite: Callable[..., str]) -> Iterator[str]:
@@ -304,22 +281,18 @@ def _adequacy(fits: Sequence[Identification], cite: Callable[..., str]) -> Itera
     judged = [fit.adequacy for fit in fits if fit.adequacy is not None]
     if not judged:
         return
-    several = " (the least of those of all outputs and of each one, times their number)"
-    yield (
-        "A law is not contradicted by the tests where its chi-square, against noise that was stated or estimated "
-        f"without the law, has a probability of at least {100 * SIGNIFICANCE:g} %"
-        f"{several if any(len(one.outputs) > 1 for one in judged) else ''}, the rates of tests scatter by less than a "
-        f"factor of {number(math.exp(LARGEST_SCATTER), 2)}, and nothing else explains that scatter six times better: a "
-        "stress exponent that changes with stress, an activation energy that changes with temperature, one test, or "
-        "two groups of tests. Degrees of freedom are the readings less the unknowns that they determine."
-    )
+    noise = "noise that was stated or estimated without it"
+    yield f"Tests contradict a law whose chi-square against {noise} has a probability below {100 * SIGNIFICANCE:g} %."
+    if any(len(one.outputs) > 1 for one in judged):
+        yield "It is the least of those of all outputs and of each one, times their number."
+    largest = number(math.exp(LARGEST_RATE_SCATTER), 2)
+    yield f"They contradict it, too, where rates of tests scatter by more than a factor of {largest}."
+    yield "So do they where a changing exponent or energy, one test, or two groups explain scatter six times better."
     if any(output.noise_source == "estimated" for one in judged for output in one.outputs):
-        yield (
-            "Noise that no test states is estimated from the third differences of neighbouring readings, with "
-            f"{FREEDOM_PER_FRAME:g} degrees of freedom for each of them; chi-square over its degrees of freedom then "
-            "has the F distribution for one test, and for several that of a scaled chi-square with the same mean and "
-            f"variance{cite('satterthwaite')}."
-        )
+        freedom = f"{FREEDOM_PER_FRAME:g} degrees of freedom each"
+        yield f"Noise that no test states is estimated from third differences of neighbouring readings, with {freedom}."
+        distribution = f"an F distribution, or one of the mean and variance of several{cite('satterthwaite')}"
+        yield f"Chi-square over its degrees of freedom then has {distribution}."
 
 
 # ---- other stages ----------------------------------------------------------------------------------------------------
@@ -343,10 +316,11 @@ def _stages(contents: ReportContents, cite: Callable[..., str]) -> Iterator[list
             f"as random effects, were assessed by {listed(cited)}."
         ]
     for forecast in [*contents.forecasts.values()][:1]:
-        drawn = f"; they come from {forecast.draws} draws in each test" if forecast.draws else ""
+        level, drawn = f"{100 * forecast.level:g} %", f"They come from {forecast.draws} draws in each test."
         yield [
-            f"Forecasts have bands of {100 * forecast.level:g} % that contain the uncertainty of the parameters and of "
-            f"the choice of the law, the scatter between tests, dimensions, noise and numerical error{drawn}."
+            f"Bands of {level} contain the uncertainty of the parameters and of the choice of the law.",
+            "They contain the scatter between tests, dimensions, noise and numerical error as well.",
+            drawn if forecast.draws else "",
         ]
     for design in [*contents.design.values()][:1]:
         information = f"Expected information of further tests was computed{cite('lindley')}"

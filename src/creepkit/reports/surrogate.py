@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from creepkit.dataset.dataset import Dataset
     from creepkit.surrogates.surrogate import Surrogate
-    from creepkit.surrogates.training import SizeStudyResult
 
 
 MOST_POINTS = 4000
@@ -113,17 +112,17 @@ def write_surrogate_figures(surrogate: Surrogate, data: Dataset, folder: Path, n
     return paths
 
 
-def size_study_rows(results: Sequence[SizeStudyResult]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def size_study_rows(trainings: Sequence[Mapping[str, Any]]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """The heads and rows of a table, the best first."""
-    outputs = list(results[0].outputs) if results else []
-    sizes_and_losses = ("hidden", "layers", "samples", "weights", "loss (Eq. 4)", "training", "epochs", "best")
-    heads = (*sizes_and_losses, *(f"RSE {name}" for name in outputs))
+    results = sorted(trainings, key=lambda one: one["loss"])
+    outputs = list(results[0]["outputs"]) if results else []
+    heads = ("hidden", "layers", "samples", "weights", "loss (Eq. 4)", "training", "epochs", "best")
     rows = [
         (
-            *map(str, (one.hidden, one.layers, one.samples, one.weight_count)),
-            *(f"{one.loss:.4g}", f"{one.training:.4g}", str(one.epochs), str(one.best_epoch)),
-            *(f"{one.outputs[name]:.3g}" for name in outputs),
+            *(str(one[name]) for name in ("hidden", "layers", "samples", "weight_count")),
+            *(f"{one['loss']:.4g}", f"{one['training']:.4g}", str(one["epochs"]), str(one["best_epoch"])),
+            *(f"{one['outputs'][name]:.3g}" for name in outputs),
         )
-        for one in sorted(results, key=lambda one: one.loss)
+        for one in results
     ]
-    return heads, rows
+    return (*heads, *(f"RSE {name}" for name in outputs)), rows

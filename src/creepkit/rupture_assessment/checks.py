@@ -108,38 +108,29 @@ def physical_realism(
     times = np.array([fit.location(Conditions.isotherm(stress, float(t), tensile)) for t in T])
     inside = (times >= np.log10(CHECKED_HOURS[0])) & (times <= np.log10(CHECKED_HOURS[1]))
     slopes = -np.diff(times, axis=1) / np.diff(np.log10(stress))
-    both = inside[:, 1:] & inside[:, :-1]
-    slopes = np.where(both, slopes, np.inf)
-    row, column = np.unravel_index(int(np.argmin(slopes)), slopes.shape)
-    least, where = float(slopes[row, column]), f"{celsius_text(float(T[row]))}, {stress[column]:.3g} MPa"
+    slopes = np.where(inside[:, 1:] & inside[:, :-1], slopes, np.inf)
+    least, where = _least(slopes, T, stress)
+    found = f"the least -d log t / d log s is {least:.2f}, at {where}"
     checks = [
-        AssessmentCheck(
-            "isotherms do not turn back",
-            bool(least > 0),
-            f"the least -d log t / d log s is {least:.2f}, at {where} (allowed: above 0)",
-            "isotherms turn back",
-        ),
+        AssessmentCheck("isotherms do not turn back", least > 0, f"{found} (allowed: above 0)", "isotherms turn back"),
         AssessmentCheck(
             "isotherms are steep enough",
-            bool(least >= LEAST_SLOPE),
-            f"the least -d log t / d log s is {least:.2f}, at {where} (allowed: {LEAST_SLOPE} and more)",
+            least >= LEAST_SLOPE,
+            f"{found} (allowed: {LEAST_SLOPE} and more)",
             "isotherms are too flat",
         ),
     ]
     if T.size > 1:
-        gaps = np.where(inside[1:] & inside[:-1], times[:-1] - times[1:], np.inf)
-        row, column = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
-        factor = power_of_ten(float(gaps[row, column]))
-        text = f"a step of {ISOTHERM_STEP:g} K shortens the time by a factor of at least {factor:.3g}"
-        checks.append(
-            AssessmentCheck(
-                "isotherms do not cross",
-                bool(gaps[row, column] > 0),
-                f"{text}, at {celsius_text(float(T[row]))}, {stress[column]:.3g} MPa",
-                "isotherms cross",
-            )
-        )
+        gap, where = _least(np.where(inside[1:] & inside[:-1], times[:-1] - times[1:], np.inf), T, stress)
+        text = f"a step of {ISOTHERM_STEP:g} K shortens the time by a factor of at least {power_of_ten(gap):.3g}"
+        checks.append(AssessmentCheck("isotherms do not cross", gap > 0, f"{text}, at {where}", "isotherms cross"))
     return checks
+
+
+def _least(values: Floats, temperatures: Floats, stress: Floats) -> tuple[float, str]:
+    """The least of values (temperatures, points), and where; temperatures : K. stress : (points and more,) MPa."""
+    row, column = np.unravel_index(int(np.argmin(values)), values.shape)
+    return float(values[row, column]), f"{celsius_text(float(temperatures[row]))}, {stress[column]:.3g} MPa"
 
 
 def effectiveness(fit: RuptureFit, tests: RuptureTests, at: Conditions) -> list[AssessmentCheck]:

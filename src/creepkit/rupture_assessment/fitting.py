@@ -29,6 +29,7 @@ from scipy.special import log_ndtr, logsumexp, stdtrit
 
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import FitError
+from creepkit.inverse.uncertainty.quantities import gradient
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.rupture_assessment.methods import MINIMUM_RATE, MONKMAN_GRANT, Basis, Centre, Conditions, RuptureMethod
 from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
@@ -434,21 +435,11 @@ def _with_half_widths(
 
     point : (estimates,) of location. covariance : of all, those first.
     """
-
-    def values(p: Floats) -> Floats:
-        return np.array([*constants(p).values()])
-
     part = covariance[: point.size, : point.size]
     spread = np.sqrt(np.maximum(np.diag(part), 0.0))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         at = constants(point)
-        steps = [1e-3 * s * e for s, e in zip(spread, np.eye(point.size), strict=True)]
-        jacobian = np.array(
-            [
-                (values(point + h) - values(point - h)) / (2e-3 * max(s, 1e-300))
-                for h, s in zip(steps, spread, strict=True)
-            ]
-        ).T
+        jacobian = gradient(lambda p: np.array([*constants(p).values()]), point, spread, 1e-3)
         variance = np.einsum("mi,ij,mj->m", jacobian, part, jacobian)
         half = stdtrit(freedom.of(jacobian), 0.5 + 0.5 * level) * np.sqrt(np.maximum(variance, 0.0))
     return {name: (value, float(h)) for (name, value), h in zip(at.items(), half, strict=True)}

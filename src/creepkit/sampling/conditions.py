@@ -150,16 +150,6 @@ def planned_loading(specimen: Predictor, load: Load, levels: tuple[float, float]
     return RecordedLoading(program, load.name)
 
 
-def own_names(specimen: Predictor, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Conditions {name: (...)} by the names of the specimen's data sets, where some have the general ones."""
-    own: Mapping[str, str] = record_of(specimen).dataset_names
-    renamed = {own.get(name, name): value for name, value in given.items()}
-    if len(renamed) < len(given):
-        twice = next(name for name in given if name in own and own[name] in given)
-        raise DatasetError(f"the conditions '{twice}' and '{own[twice]}' are the same one; keep one of them")
-    return renamed
-
-
 @dataclass(frozen=True)
 class CreepOutput:
     """The output of a specimen by which its creep is judged.
@@ -290,7 +280,7 @@ ROOM_TEMPERATURE = ZERO_CELSIUS + 20.0
 
 def planned_test(specimen: Predictor, conditions: Mapping[str, float], grid: TimeGrid, name: str = "sample") -> History:
     """Return the test that conditions describe, without outputs: all times of the grid up to its end."""
-    known, conditions = specimen_conditions(specimen), own_names(specimen, conditions)
+    known = specimen_conditions(specimen)
     known.check_names(conditions)
     for required in known.required:
         if required not in conditions:
@@ -399,7 +389,7 @@ def condition_ranges(
     needs_temperature : whether the law depends on temperature, whose range must then be given.
     """
     known = specimen_conditions(specimen)
-    given = _both_levels(known, own_names(specimen, given))
+    given = _both_levels(known, given)
     known.check_names(given)
     drawn = {**dict(known.defaults), **given}
     if needs_temperature and TEMPERATURE not in drawn:

@@ -491,7 +491,7 @@ def sampling_design(
     domain : "conditioned", whose samples creep visibly, for laws whose terms have rate coefficients (else
         DatasetError), or "paper", uniform in the law's bounds.
     every : s between frames. grid : in its place, other times.
-    ranges : of conditions, (low, high) or a number, by the names of the specimen's data sets or the general ones:
+    ranges : of conditions, (low, high) or a number, by the names of the specimen's data sets:
         force_1=(5, 20), span=(40, 60), end_time=3600, or force=(5, 20) of both levels of the load.
     """
     if domain not in ("conditioned", "paper"):

@@ -25,20 +25,12 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import CODEC as FIT_CODEC
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
 from creepkit.inverse.selection import CREDIBLE_WEIGHT
+from creepkit.inverse.selection.ranking import RankedLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor
 from creepkit.screening.alloys import UNKNOWN_CLASS, Alloy, Compositions
 
 """{output: (frames,) mm or strain} of one test."""
-
-
-@dataclass(frozen=True, eq=False)
-class WeightedLaw:
-    """An identified law of an alloy: its BIC less that of the best law, and its weight."""
-
-    fit: Identification
-    bic_difference: float
-    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +48,7 @@ class AlloyResult:
 
     alloy: str
     fingerprint: str = ""
-    laws: tuple[WeightedLaw, ...] = ()
+    laws: tuple[RankedLaw, ...] = ()
     failed_laws: Mapping[str, str] = field(default_factory=dict)
     verdict: str = ""
     equivalents: tuple[str, ...] = ()
@@ -191,7 +183,7 @@ ALLOY_RESULT = DocumentFormat(
 
 
 CODEC = RecordCodec(
-    ranges={ConfirmedOutput: {"rms_difference": ANY_NUMBER}, **FIT_CODEC.ranges},
+    ranges={RankedLaw: {"chi_square": ANY_NUMBER}, ConfirmedOutput: {"rms_difference": ANY_NUMBER}, **FIT_CODEC.ranges},
     values={Identification: ValueCodec(identification_to_json, identification_from_json)},
 )
 """Of the result of an alloy; its identifications are documents of their own inside it."""

@@ -48,7 +48,7 @@ from creepkit.screening.alloys import (
     limitations,
     resolve_compositions,
 )
-from creepkit.screening.results import AlloyResult, ScreeningResult, WeightedLaw, read_result, write_result
+from creepkit.screening.results import AlloyResult, ScreeningResult, read_result, write_result
 
 
 def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
@@ -72,7 +72,7 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
     confirmation = _confirm_best(job, best, alloy, notes)
     return AlloyResult(
         alloy.name,
-        laws=tuple(WeightedLaw(r.fit, r.excess, r.weight) for r in ranking.laws),
+        laws=ranking.laws,
         failed_laws=dict(ranking.failed),
         verdict=ranking.verdict,
         decisive=ranking.decisive,

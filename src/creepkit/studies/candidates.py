@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 def by_likelihood(asked: SearchOptions, changes: Mapping[str, Any]) -> bool:
-    """Whether laws are compared by their likelihood: no search, penalty, weights or loss asks for something else.
+    """Whether laws are compared by their likelihood: no search, penalty or weights ask for something else.
 
     changes : fields of the settings that are stated.
     """
-    linear, weights = changes.get("loss", "linear") == "linear", changes.get("weights", "automatic")
-    return asked.global_search is None and asked.penalty is None and linear and weights in ("automatic", "likelihood")
+    by_likelihood = changes.get("weights", "automatic") in ("automatic", "likelihood")
+    return asked.global_search is None and asked.penalty is None and by_likelihood
 
 
 def ranked_candidates(

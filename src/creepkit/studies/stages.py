@@ -144,7 +144,7 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
     asked = SearchOptions().changed({**values_of_table(SearchOptions, part), **how})
     changes = values_of_table(IdentificationSettings, part) | {"nuisances": None}  # which the settings have
     if selection is not None and not by_likelihood(asked, changes):
-        what = "compares laws by their likelihood: leave out weights, loss, search and penalty"
+        what = "compares laws by their likelihood: leave out weights, search and penalty"
         raise study.file.error(("selection",), what)
 
     def make(results: Results, tick: Tick) -> Ranking:

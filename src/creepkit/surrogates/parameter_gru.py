@@ -471,19 +471,6 @@ class SurrogateMetadata:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    @classmethod
-    def from_dataset(cls, data: Dataset, **fields: Any) -> SurrogateMetadata:
-        """The metadata of a data set; fields : the other fields."""
-        return cls(
-            law=data.law,
-            specimen=data.specimen,
-            outputs=data.outputs,
-            grid=data.grid,
-            parameters=data.parameter_names,
-            conditions=data.condition_names,
-            **fields,
-        )
-
 
 @checked
 @dataclass(frozen=True)
@@ -541,7 +528,8 @@ class ParameterGru(Options, title="settings of a network", error=SurrogateError,
         constant = ", ".join(n for n, column in columns if _is_constant(column) and not n.endswith(" is off"))
         notes = (f"constant in training, so that nothing is known beyond: {constant}",) if constant else ()
         domain = ApplicabilityDomain.from_rows(domain_names, samples["domain"][train].numpy())
-        return SurrogateMetadata.from_dataset(data, scaling=scaling, domain=domain, notes=notes)
+        columns_of_data = data.outputs, data.grid, data.parameter_names, data.condition_names
+        return SurrogateMetadata(data.law, data.specimen, *columns_of_data, domain, scaling, notes=notes)
 
     def network(self, weights: Weights, metadata: SurrogateMetadata) -> ParameterNetwork:
         """The trained network; SurrogateError where the weights are not those of this recipe."""

@@ -7,7 +7,7 @@ resumed from a checkpoint gives the same result.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -328,28 +328,6 @@ def _device(name: str) -> torch.device:
     return torch.device(name)
 
 
-@dataclass(frozen=True)
-class SizeStudyResult:
-    """One training of a sweep.
-
-    hidden, layers, samples : what was varied; samples are those learnt from.
-    weight_count : numbers that were fitted. loss : Eq. (4) of the validation rows at the best epoch.
-    training : the loss of the training rows in that epoch. outputs : {output: its RSE}. losses : Eq. (4) of each epoch.
-    """
-
-    hidden: int
-    layers: int
-    samples: int
-    weight_count: int
-    loss: float
-    training: float
-    epochs: int
-    best_epoch: int
-    outputs: dict[str, float]
-    losses: tuple[float, ...]
-    file: str
-
-
 def size_study(
     data: Dataset,
     recipe: ParameterGru,
@@ -359,8 +337,8 @@ def size_study(
     seed: int = 0,
     device: str = "auto",
     progress: ProgressCallback | None = None,
-) -> list[SizeStudyResult]:
-    """Train every combination, each to a file of its own in the folder `to`; those that are there already are read.
+) -> dict[str, Surrogate]:
+    """{file: network} of every combination, each trained to a file in the folder `to`; those that are there are read.
 
     Every training is evaluated on the same rows, a share of the whole data set that none of them learns from.
     """
@@ -372,15 +350,14 @@ def size_study(
     folder.mkdir(parents=True, exist_ok=True)
     widths = sizes.layers or (recipe.layers,), sizes.hidden or (recipe.hidden,)
     combinations = list(product(*widths, counts))
-    results = []
+    models = {}
     for k, (layers, hidden, count) in enumerate(combinations):
         training = replace(recipe.training, samples=count)
         variant = replace(recipe, layers=layers, hidden=hidden, training=training)
         path = folder / f"gru-{hidden}x{layers}-{count}.safetensors"
         named_progress = _with_task_name(progress, f"{k + 1} of {len(combinations)}, {path.stem}")
-        model = train(data, variant, to=path, seed=seed, device=device, progress=named_progress)
-        results.append(_study_result(model, variant, count, path))
-    return results
+        models[path.name] = train(data, variant, to=path, seed=seed, device=device, progress=named_progress)
+    return models
 
 
 def _with_task_name(progress: ProgressCallback | None, name: str) -> ProgressCallback | None:
@@ -389,19 +366,22 @@ def _with_task_name(progress: ProgressCallback | None, name: str) -> ProgressCal
     return lambda task, done, total, note: progress(f"{name}, {task}", done, total, note)
 
 
-def _study_result(model: Surrogate, recipe: ParameterGru, count: int, path: Path) -> SizeStudyResult:
-    metadata, provenance = model.metadata, model.metadata.provenance
-    best = int(provenance["best_epoch"])
-    return SizeStudyResult(
-        hidden=recipe.hidden,
-        layers=recipe.layers,
-        samples=count,
-        weight_count=model.weight_count,
-        loss=float(metadata.metrics["loss"]),
-        training=float(metadata.curves["loss"][best - 1]),
-        epochs=int(provenance["epochs"]),
-        best_epoch=best,
-        outputs={name: float(errors["rse"]) for name, errors in metadata.metrics["outputs"].items()},
-        losses=tuple(metadata.curves["rse"]),
-        file=path.name,
-    )
+def size_study_to_json(models: Mapping[str, Surrogate]) -> list[dict[str, Any]]:
+    """Of each training its sizes, Eq. (4) of the validation rows at the best epoch and all others, and its file."""
+    rows = []
+    for file, model in models.items():
+        metadata, source = model.metadata, model.metadata.provenance
+        rows.append({
+            "hidden": model.recipe.hidden,
+            "layers": model.recipe.layers,
+            "samples": source["training_rows"],
+            "weight_count": model.weight_count,
+            "loss": metadata.metrics["loss"],
+            "training": metadata.curves["loss"][source["best_epoch"] - 1],
+            "epochs": source["epochs"],
+            "best_epoch": source["best_epoch"],
+            "outputs": {name: errors["rse"] for name, errors in metadata.metrics["outputs"].items()},
+            "losses": metadata.curves["rse"],
+            "file": file,
+        })  # fmt: skip
+    return rows

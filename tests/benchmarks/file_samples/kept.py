@@ -21,11 +21,11 @@ from creepkit.files.safetensors_files import HEADER_KEY
 from creepkit.files.writing import write_bytes
 from creepkit.inverse.identification_document import load
 from creepkit.inverse.kept_fits import KEPT_FIT, FitFolder, kept_to_json
-from creepkit.inverse.selection.ranking import Ranking
+from creepkit.inverse.selection.ranking import RankedLaw, Ranking
 from creepkit.reports.attachments import embed
 from creepkit.reports.contents import Attachment
 from creepkit.rupture_assessment.assessment import load_rupture_assessment
-from creepkit.screening.results import AlloyResult, WeightedLaw, read_result, write_result
+from creepkit.screening.results import AlloyResult, read_result, write_result
 from creepkit.studies.execution import Execution, Stage
 from creepkit.studies.kept_results import ResultFolder
 from creepkit.studies.lock import STUDY_LOCK, read_lock
@@ -143,7 +143,7 @@ def samples() -> Iterator[ReaderSample]:
     fit = load(FORMATS / "identification.json")
     kept = json_text({**KEPT_FIT.heading, **kept_to_json(fit)}).encode()
     yield document("kept fit", "x.json", kept, read_kept_fit, '"linearised" "identification"')
-    result = AlloyResult("A", laws=(WeightedLaw(fit, 0.0, 1.0),))
+    result = AlloyResult("A", laws=(RankedLaw(fit, 0.0, 1.0),))
     alloy = written(lambda path: write_result(result, path), "x.json")
     yield document("alloy result", "x.json", alloy, read_result, '"laws" "verdict" "weight"')
     stage = StageResult()

@@ -60,14 +60,14 @@ def test_a_sweep_is_a_table_and_is_not_redone(file: Path, tmp_path: Path) -> Non
 
 def test_a_sweep_judges_every_number_of_samples_by_the_same_rows(tmp_path: Path) -> None:
     data, recipe = bars(60), ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
-    entries = sweeping.size_study(data, recipe, NetworkSizes(samples=(10, 20, 48)), to=tmp_path)
-    judged = [evaluate(ck.surrogate(tmp_path / e.file), data) for e in entries]
-    for entry, one in zip(entries, judged, strict=True):
+    models = sweeping.size_study(data, recipe, NetworkSizes(samples=(10, 20, 48)), to=tmp_path)
+    judged = [evaluate(ck.surrogate(tmp_path / file), data) for file in models]
+    for samples, model, one in zip((10, 20, 48), models.values(), judged, strict=True):
         assert one.comparison.index.tolist() == judged[0].comparison.index.tolist()
-        assert entry.loss == one.metrics["loss"]
-        learnt = training_split(len(data), ck.Training(samples=entry.samples), 0)[0].tolist()
-        assert (len(learnt), set(learnt) & set(one.comparison.index)) == (entry.samples, set())
-    assert len({e.loss for e in entries}) == 3
+        assert model.metadata.metrics["loss"] == one.metrics["loss"]
+        learnt = training_split(len(data), ck.Training(samples=samples), 0)[0].tolist()
+        assert (len(learnt), set(learnt) & set(one.comparison.index)) == (samples, set())
+    assert len({one.metrics["loss"] for one in judged}) == 3
 
 
 def test_what_cannot_be_is_one_line(file: Path, tmp_path: Path) -> None:

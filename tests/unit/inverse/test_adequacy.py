@@ -10,7 +10,6 @@ import creepkit as ck
 from creepkit.inverse.confirmation import Confirmation, ConfirmedTest, _confirmed_output, confirm, outside_domain
 from creepkit.inverse.frame_noise import frame_noise
 from creepkit.inverse.identify import identify
-from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.judging import Judge
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, KnownNoise, chance_of_larger
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
@@ -41,7 +40,7 @@ def at_the_truth(tests):
     """The problem of Norton's law, and its linear form at the planted values."""
     problem = LeastSquaresProblem.from_histories(NORTON, tests, PREDICTOR, SETTINGS)
     u = problem.coordinates.u(NORTON.to_internal(VALUES)[0])
-    return problem, linearised(problem, u, problem.residuals(u))
+    return problem, problem.linearised(u)
 
 
 def judged(tests, problem, linear, values=None, **noise_model):

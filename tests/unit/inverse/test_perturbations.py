@@ -7,7 +7,6 @@ import pytest
 
 import creepkit as ck
 from creepkit.inverse.identify import identify
-from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.perturbation import DRIFT
@@ -61,7 +60,7 @@ def bars(law, loadings=(HELD,), temperature=1040.0, seed=0):
 def at_the_truth(law, tests, predictor=BAR, settings=SETTINGS):
     problem = LeastSquaresProblem.from_histories(law, tests, predictor, settings)
     x = problem.coordinates.u(theta(law))
-    return problem, x, linearised(problem, x, problem.residuals(x))
+    return problem, x, problem.linearised(x)
 
 
 def effects_of(law, tests, predictor=BAR, settings=SETTINGS):

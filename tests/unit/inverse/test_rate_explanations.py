@@ -119,11 +119,9 @@ def test_the_evidence_is_that_of_the_dense_covariance():
     """Against -ln p of one Gaussian with covariance C + J P^-1 J' + (w d) v (w d)', averaged over scatters."""
     from dataclasses import replace
 
-    from creepkit.inverse.iterative_estimation import linearised
-
     fit = fitted(bars(power_law(5.0, 4e5), factor={2: 2.0})[:6])
     problem, x = fit.least_squares_problem, fit.x
-    linear = linearised(problem, x, problem.residuals(x))
+    linear = problem.linearised(x)
     noise = fit.noise_model
     scatter, scatters = rate_scatter(problem, linear, noise), np.geomspace(1e-3, 1.0, 25)
     prior = log_prior(scatters[:, None], ("test",))

@@ -78,8 +78,6 @@ def lengths_of_one(tests, fit):
 
 MISTAKES = [
     (settings(starts=0), "starts is 0"),
-    (settings(loss="cubic"), "loss 'cubic'"),
-    (settings(loss="huber", weights="likelihood"), "loss 'huber' does not go with weights 'likelihood'"),
     (settings(weights={"amplitude": -1.0}), "weights must be numbers above zero"),
     (settings(weights="none"), 'weights is "none"'),
     (settings(test_loss="robust"), "test_loss 'robust' is not known"),

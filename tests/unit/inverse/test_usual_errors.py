@@ -173,3 +173,17 @@ def test_tests_together_are_known_no_worse_than_the_best_of_them_alone():
                        for param, e in zip(NORTON.table.values(), fit.estimates, strict=True)])  # fmt: skip
     *alone, together = widths
     assert (np.array(together) < np.min(alone, axis=0)).all(), widths
+
+
+def test_values_profiles_and_samples_are_one_estimate_whatever_errors_are_included():
+    """Of nine planted curves, within 0.2 standard deviations; errors that vanish move nothing."""
+    curves, law = ck.read_histories(ck.example_data("planted creep curves")), ck.law("strain-hardening")
+    none, vanishing, usual = (
+        ck.identify(law.times(ck.arrhenius(T_ref=1073.15)), curves, weights="likelihood", starts=1, usual_errors=errors)
+        for errors in ("none", {"temperature": 1e-6}, "usual")
+    )
+    sampled = usual.sample(draws=1000).u.mean(axis=0)
+    shifts = [100.0 * (vanishing.u - none.u), usual.u - none.u, sampled - usual.u] / np.sqrt(np.diag(none.covariance))
+    for one in usual.by_tests_alone.estimates[1:3]:
+        shifts = np.append(shifts, (usual.profile(one.name).best - one.value) / (one.high - one.low) * 3.92)
+    assert np.abs(shifts).max() < 0.2

@@ -13,7 +13,7 @@ from creepkit.errors import DatasetError
 from creepkit.language import temperature
 from creepkit.records import Status
 from creepkit.sampling.coefficients import term_groups
-from creepkit.sampling.conditions import TimeGrid, creep_output, hold_times, planned_test, specimen_conditions
+from creepkit.sampling.conditions import creep_output, hold_times, planned_test, specimen_conditions
 from creepkit.sampling.domains import (
     DrawCriterion,
     OutcomeCriterion,
@@ -185,22 +185,12 @@ def test_conditions_are_those_of_the_record() -> None:
     assert [relaxation.unit(name) for name in relaxation.names] == ["MPa", "", "", "s", "s", "K"]
 
 
-def test_general_names_are_those_of_a_specimen_with_names_of_its_own() -> None:
+def test_the_range_of_the_load_is_that_of_both_its_levels() -> None:
     dimple = ck.specimen("bulge")
-    own, general = {"P1": 8.0, "P2": 9.0, "Tj": 7200.0}, {"pressure_1": 8.0, "pressure_2": 9.0, "jump_time": 7200.0}
-    grid = TimeGrid.every()
-    assert (
-        planned_test(dimple, {"modulus": 1e5, **general}, grid).loading
-        == planned_test(dimple, {"modulus": 1e5, **own}, grid).loading
-    )
-    designs = [sampling_design(NORTON, dimple, **{name: (3, 20)}) for name in ("P1", "pressure_1")]
-    assert designs[0] == designs[1]
     both = sampling_design(NORTON, dimple, pressure=(5, 20))
     assert both == sampling_design(NORTON, dimple, P1=(5, 20), P2=(5, 20))
     with pytest.raises(DatasetError, match="the range of pressure is that of both its levels, and P2 has one as well"):
         sampling_design(NORTON, dimple, pressure=(5, 20), P2=20)
-    with pytest.raises(DatasetError, match="'pressure_1' and 'P1' are the same one"):
-        sampling_design(NORTON, dimple, P1=5, pressure_1=5)
 
 
 def test_rates_of_a_beam_lie_where_its_deflection_is_visible_and_the_test_lasts() -> None:

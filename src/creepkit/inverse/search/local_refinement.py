@@ -1,4 +1,4 @@
-"""Local refinement: bounded least squares from one start, robust losses, and the record of a minimum.
+"""Local refinement: bounded least squares from one start, a robust loss, and the record of a minimum.
 
 The trust region reflective method of scipy, with analytic Jacobians.
 """
@@ -63,7 +63,7 @@ def bounded_least_squares(
     tolerances: Tolerances,
     *,
     fixed: Mapping[int, float],
-    loss: str,
+    robust: bool,
 ) -> Minimum:
     """Bounded least squares by the trust region reflective method of scipy.
 
@@ -93,7 +93,7 @@ def bounded_least_squares(
         jac=lambda part: evaluate(part)[1],
         bounds=(bounds.lower[free], bounds.upper[free]),
         x_scale=scale[free],
-        loss=loss,
+        loss="soft_l1" if robust else "linear",
         max_nfev=tolerances.max_steps,
         ftol=tolerances.tolerance,
         xtol=10 * tolerances.tolerance,
@@ -102,12 +102,6 @@ def bounded_least_squares(
     return Minimum(at(np.asarray(result.x)), float(result.cost), bool(result.status > 0), int(result.nfev), result.fun)
 
 
-def robust_loss(squared: Floats, loss: str) -> Floats:
-    """(...,) - the losses of scipy; squared : (...,) squares of whitened residuals."""
-    if loss == "linear":
-        return squared
-    if loss == "soft_l1":
-        return np.asarray(2.0 * (np.sqrt(1.0 + squared) - 1.0))
-    if loss == "huber":
-        return np.where(squared <= 1.0, squared, 2.0 * np.sqrt(np.maximum(squared, 1.0)) - 1.0)
-    return np.asarray(np.log1p(squared) if loss == "cauchy" else np.arctan(squared))
+def robust_loss(squared: Floats) -> Floats:
+    """(...,) - the loss "soft_l1" of scipy; squared : (...,) squares of whitened residuals."""
+    return np.asarray(2.0 * (np.sqrt(1.0 + squared) - 1.0))

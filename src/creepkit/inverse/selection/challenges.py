@@ -20,7 +20,7 @@ import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import sympy
@@ -259,11 +259,13 @@ def _comparison_text(excess: float) -> str:
 
 
 def _of_law(single: LeastSquaresProblem, law: CreepLaw) -> LeastSquaresProblem:
-    """The problem of another law under the same covariance, with the same nuisances and correction."""
+    """The problem of another law under the same covariance, with the same nuisances, correction and rates of tests."""
     problem = LeastSquaresProblem.from_histories(
         law, single.histories, single.predictor, single.settings, single.coordinates.reference
     )
-    same = {name: getattr(single, name) for name in ("covariance_factor", "histories", "observations")}
+    names = ["covariance_factor", "histories", "observations"]
+    names += ["log_factors", "rate_shift"] if problem.coordinates.every_rate_has_coefficient else []
+    same: dict[str, Any] = {name: getattr(single, name) for name in names}
     problem = replace(problem, **same)
     return problem.with_nuisances(single.nuisance_parameters).with_correction(single.correction)
 

@@ -25,7 +25,6 @@ from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import bic_penalty
-from creepkit.inverse.iterative_estimation import linearised
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import Residuals, autocorrelated_components
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
@@ -53,7 +52,7 @@ class CommonCovarianceFits:
 
 def under_common_covariance(fits: Sequence[Identification]) -> CommonCovarianceFits:
     """All laws under the covariance of the one that explains best with its own."""
-    problems = [linearised_problem(fit) for fit in fits]
+    problems = [fit.linear_problem for fit in fits]
     own_scores = [_score_under_own_covariance(fit, linear) for fit, linear in zip(fits, problems, strict=True)]
     reference_law = int(np.argmin(own_scores))
     noise_model, reference_residuals = fits[reference_law].noise_model, problems[reference_law].residuals
@@ -87,14 +86,6 @@ def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
         log_rate_sensitivity=rate_effect,
         test_weights=reference.test_weights,
     )
-
-
-def linearised_problem(fit: Identification) -> LinearisedProblem:
-    """The problem of an identification made linear at its values; of one from a file predicted again."""
-    if fit.linearised is not None:
-        return fit.linearised
-    problem = fit.least_squares_problem
-    return linearised(problem, fit.x, problem.residuals(fit.x))
 
 
 def _score_under_own_covariance(fit: Identification, linearised: LinearisedProblem) -> float:

@@ -28,7 +28,6 @@ from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.selection.discrimination import (
     DISTINGUISHABLE_CHI_SQUARE,
-    linearised_problem,
     under_common_covariance,
     with_covariance_of,
 )
@@ -78,7 +77,7 @@ class Trial:
         """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
         perturbed = [
             p.with_effects([replace(e, common=scope == "all")])
-            for p, e in zip([linearised_problem(fit) for fit in fits], effects, strict=True)
+            for p, e in zip([fit.linear_problem for fit in fits], effects, strict=True)
         ]
         scores, noise_model = _scores(fits, perturbed)
         return cls(scope, effects, scores, criterion_weights(scores)[1], noise_model)
@@ -91,7 +90,7 @@ class Trial:
     def sizes(self, fits: Sequence[Identification], law: int) -> Floats:
         """(1,) of all tests or (tests,) sizes of the perturbation by a law, in standard deviations."""
         return sizes_of_effect(
-            linearised_problem(fits[law]), self.effects[law], self.noise_model, common=self.scope == "all"
+            fits[law].linear_problem, self.effects[law], self.noise_model, common=self.scope == "all"
         )
 
     def description(self, fits: Sequence[Identification], law: int) -> str:
@@ -102,7 +101,7 @@ class Trial:
 def _scores(fits: Sequence[Identification], problems: Sequence[LinearisedProblem]) -> tuple[Floats, NoiseModel]:
     """(laws,) -2 ln of the evidence by BIC of these linear problems of the laws, and the noise model it is under."""
     common = under_common_covariance([replace(f, linearised=p) for f, p in zip(fits, problems, strict=True)])
-    noise_model, unperturbed = fits[common.reference_law].noise_model, [linearised_problem(fit) for fit in fits]
+    noise_model, unperturbed = fits[common.reference_law].noise_model, [fit.linear_problem for fit in fits]
     reference = unperturbed[common.reference_law].residuals
 
     def log_determinant(linear: LinearisedProblem) -> float:
@@ -177,7 +176,7 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
     if not trials:
         return ()
     rejected = fits[0].adequacy is not None and fits[0].adequacy.rejects
-    as_stated, _ = _scores(fits, [linearised_problem(fit) for fit in fits])
+    as_stated, _ = _scores(fits, [fit.linear_problem for fit in fits])
     raised = [
         (float(trial.scores[law]), law, trial)
         for trial in trials

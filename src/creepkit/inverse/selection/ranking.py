@@ -222,7 +222,7 @@ def rank(
         raise FitError(f"rank(by={criterion!r}) is not known: identifications are ranked by 'bic' or 'aicc'")
     if len({fit.provenance.get("data") for fit in fits}) > 1:
         raise FitError(
-            "the identifications were made from different histories, frames, losses, nuisances or rupture times and "
+            "the identifications were made from different histories, frames, nuisances or rupture times and "
             "cannot be ranked; make them alike (rupture_times='use' or 'ignore' for all laws)"
         )
     common = under_common_covariance(fits)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.special import softmax
@@ -38,9 +38,6 @@ from creepkit.inverse.uncertainty.quantities import (
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import Predictor
-
-if TYPE_CHECKING:
-    pass
 
 ROUNDS, MOST_ROUNDS = 4, 12
 """Of proposals: at least, and where the samples are still worth too few."""
@@ -163,13 +160,6 @@ def _first_shape(fit: Identification, posterior: Posterior) -> Floats:
     """(parameters, parameters) covariance of the first proposal."""
     covariance = fit.by_tests_alone.covariance
     return shortened_covariance(posterior, fit.u, covariance + 1e-12 * np.diag(np.diag(covariance)))
-
-
-def covariance_root(covariance: Floats) -> Floats:
-    """A square root (unknowns, unknowns) of covariance (unknowns, unknowns)."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape: Floats, seed: int) -> Floats | None:

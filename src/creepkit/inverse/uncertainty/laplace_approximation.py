@@ -22,6 +22,8 @@ from creepkit.inverse.noise_model import (
     Residuals,
     components_fixed_by_priors,
 )
+from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM
+from creepkit.inverse.uncertainty.quantities import gradient
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, scaled_inverse
 from creepkit.language import CreepLaw, Param
 from creepkit.records import Nuisance
@@ -174,22 +176,25 @@ class Estimate:
     verdict: str
 
 
-NORMAL_QUANTILE, NORMAL_FREEDOM = float(norm.ppf(0.975)), 1e9
-"""Half width of a 95 % interval in standard deviations; degrees of freedom of a variance that is known."""
+NORMAL_QUANTILE = float(norm.ppf(0.975))
+"""Half width of a 95 % interval in standard deviations."""
 
 
-def positive_semidefinite(covariance: Floats) -> Floats:
-    """The nearest covariance (unknowns, unknowns), in units of its standard deviations, without negative eigenvalues.
+def covariance_root(covariance: Floats, scale: Floats | None = None) -> Floats:
+    """A square root (n, n) of a covariance (n, n), without negative eigenvalues.
 
-    Rounding makes some where the data hardly determine a combination of unknowns.
+    Rounding makes some where the data hardly determine a combination of unknowns. scale : (n,) in units of which they
+    are taken, by default its standard deviations.
     """
-    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    covariance = 0.5 * (covariance + covariance.T)
-    values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
-    if values[0] >= 0.0:
-        return covariance
-    repaired = (vectors * np.maximum(values, 0.0)) @ vectors.T
-    return np.asarray(repaired * np.outer(sd, sd))
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300)) if scale is None else scale
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T) / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def positive_semidefinite(covariance: Floats, scale: Floats | None = None) -> Floats:
+    """The nearest covariance (n, n) without negative eigenvalues; scale : (n,) as of covariance_root()."""
+    root = covariance_root(covariance, scale)
+    return np.asarray(root @ root.T)
 
 
 def covariance_of_values(
@@ -322,11 +327,5 @@ def delta_method(
     function : u (parameters,) -> (...,). point : (parameters,) u. covariance : (parameters, parameters) of u.
     Returns (...,) values and (...,) standard deviations.
     """
-    sd = np.sqrt(np.diag(covariance))
-    columns = []
-    for k in range(point.size):
-        step_vector = np.zeros(point.size)
-        step_vector[k] = step * max(sd[k], 1e-8)
-        columns.append((function(point + step_vector) - function(point - step_vector)) / (2 * step_vector[k]))
-    derivatives = np.stack(columns, axis=-1)
+    derivatives = gradient(function, point, np.sqrt(np.diag(covariance)), step)
     return function(point), np.sqrt(np.einsum("...i,ij,...j->...", derivatives, covariance, derivatives))

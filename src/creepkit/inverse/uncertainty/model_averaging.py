@@ -29,26 +29,12 @@ from creepkit.presentation import Presentable, present
 from creepkit.records import History
 
 
-class WeightedFit(Protocol):
-    """One law of a ranking: its identification and its weight."""
-
-    @property
-    def fit(self) -> Identification:
-        """The identification."""
-        ...
-
-    @property
-    def weight(self) -> float:
-        """Its weight."""
-        ...
-
-
 class WeightedLaws(Protocol):
     """A ranking."""
 
     @property
-    def laws(self) -> Sequence[WeightedFit]:
-        """Its laws."""
+    def laws(self) -> Sequence[Any]:
+        """Its laws, each with `fit`, its identification, and `weight`."""
         ...
 
 

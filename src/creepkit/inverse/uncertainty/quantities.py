@@ -262,6 +262,5 @@ def quantity_of(coordinates: Coordinates, quantity_or_name: str | DerivedQuantit
 
 def gradient(function: CoordinateFunction, u: Floats, scale: Floats, step: float = 1e-4) -> Floats:
     """(..., parameters) derivatives at one u (parameters,); central differences of step times scale (parameters,)."""
-    h = np.diag(step * np.maximum(scale, 1e-8))
-    change = function(u + h) - function(u - h)
-    return np.moveaxis(change, 0, -1) / (2 * np.diag(h))
+    steps = np.diag(step * np.maximum(scale, 1e-8))
+    return np.stack([(function(u + h) - function(u - h)) / (2 * h.sum()) for h in steps], axis=-1)

@@ -35,7 +35,7 @@ from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel, Residuals
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_condition
-from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
+from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, scaled_inverse
 from creepkit.records import History, Nuisance
 
 USUAL_SD = {"test": ASSUMED_RATE_SD, "heat": 0.5, "laboratory": 0.3}
@@ -233,7 +233,7 @@ class RateScatter:
         _, optimum, covariance = self.solved(sd)
         size = self.design.shape[1]
         shift, own = optimum[:size], covariance[:size, :size]
-        gain = _scaled_solve(own, covariance[:size, size:]).T if size else np.zeros((len(self.groups), 0))
+        gain = covariance[size:, :size] @ scaled_inverse(own)
         about = own + np.outer(shift, shift) + (0.0 if self.errors is None else self.errors)
         mean = np.concatenate([np.zeros(size), optimum[size:] - gain @ shift])
         cross, effects = about @ gain.T, covariance[size:, size:] + gain @ np.outer(shift, shift) @ gain.T
@@ -455,10 +455,3 @@ def _known_sd(nuisances: Sequence[Nuisance]) -> float | None:
         if nuisance.kind == "rate":
             return nuisance.sd
     return 0.0
-
-
-def _scaled_solve(matrix: Floats, right: Floats) -> Floats:
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = right / (scale if right.ndim == 1 else scale[:, None])
-    solution = np.linalg.solve(matrix / np.outer(scale, scale), scaled)
-    return np.asarray(solution / (scale if right.ndim == 1 else scale[:, None]))

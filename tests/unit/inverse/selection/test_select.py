@@ -357,7 +357,7 @@ def law(seed, size=1.0, **changes):
     free, room = np.ones(1, bool), np.array([[-9.0], [9.0]])
     linear = LinearisedProblem(replace(r, **changes), np.full(1, 1e-9), np.zeros(1), free, room)
     return SimpleNamespace(
-        linearised=linear, noise_model=NoiseModel({"strain": OutputNoise(1.0)}, rate=0.5), u=np.zeros(1)
+        linear_problem=linear, noise_model=NoiseModel({"strain": OutputNoise(1.0)}, rate=0.5), u=np.zeros(1)
     )
 
 
@@ -373,8 +373,8 @@ def test_chi_square_between_laws_is_that_of_their_difference_under_the_covarianc
     one, other = law(0), law(0)
     step = np.zeros((TESTS, ENTRIES))
     step[0, :6], step[0, 6:] = 1.0, -1.0
-    residuals = replace(other.linearised.residuals, values=other.linearised.residuals.values + step)
-    other.linearised = replace(other.linearised, residuals=residuals)
+    residuals = replace(other.linear_problem.residuals, values=other.linear_problem.residuals.values + step)
+    other.linear_problem = replace(other.linear_problem, residuals=residuals)
     white = under_common_covariance([one, other]).whitened
     assert ((white[0] - white[1]) ** 2).sum() == pytest.approx(12.0, rel=1e-9)
 
