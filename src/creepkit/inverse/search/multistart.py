@@ -79,8 +79,8 @@ def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int)
 def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
     """The centre, and the best draws after a shift of all rates to that of the data: (parameters,) each.
 
-    Once shifted they can be compared: the worse half of them is left out from shift to shift. The last shift is not
-    simulated, as the first step of a refinement does that.
+    Once shifted they can be compared. The last shift is not simulated, as the first step of a refinement does that; but
+    a law with internal variables needs several of all draws, and a comparison where these end.
     """
     observations, bounds, seed = problem.observations, problem.bounds, problem.settings.seed
     sobol = qmc.Sobol(bounds.lower.size, seed=seed).random(draws)
@@ -94,15 +94,14 @@ def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) ->
         points[:, rates] = middle[rates[0]] + np.log(np.maximum(fractions, 1e-4))
         positions = np.concatenate([np.full((1, len(internal_rates)), 0.5), sobol[:, internal_rates]])
         points[:, internal_rates] = middle[internal_rates] + np.interp(positions, (0, 1), INTERNAL_RATE_RANGE)
-    points, shifts = bounds.clip(points), (1 + 3 * min(len(internal_rates), 1)) if rates else 0
+    points, shifts = bounds.clip(points), (5 if internal_rates else 1) if rates else 0
     for shift in range(shifts + 1):
         residuals = problem.candidate_residuals(points)
-        score = (np.arcsinh(residuals[:, observations.present]) ** 2).mean(axis=1)
-        if shift or not shifts:
-            best = 1 + np.argsort(score[1:], kind="stable")
-            kept = [0, *best[: max(starts - 1, 0 if shift == shifts else len(points) // 2)]]
+        if shift == shifts:
+            score = (np.arcsinh(residuals[:, observations.present]) ** 2).mean(axis=1)
+            kept = [0, *(1 + np.argsort(score[1:], kind="stable"))[: max(starts - 1, 0)]]
             points, residuals, score = points[kept], residuals[kept], score[kept]
-        if rates:
+        if rates and not (internal_rates and shift == shifts):
             points[:, rates] -= np.clip(median_log_rate_excess(observations, residuals), -6, 6)[:, None]
             points[:, internal_rates] -= np.clip(median_log_rupture_excess(observations, residuals), -6, 6)[:, None]
             points = bounds.clip(points)

@@ -32,7 +32,7 @@ from creepkit.inverse.information_criteria import (
     criterion_weights,
     determined_parameters,
 )
-from creepkit.inverse.selection.discrimination import linearised_problem, under_common_covariance
+from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
@@ -229,7 +229,7 @@ def rank(
     independent_frames, chi_square = common.independent_frames, common.chi_square
     penalty = bic_penalty if criterion == "bic" else aicc_penalty
     score = chi_square + common.log_determinant
-    counts = [determined_parameters(linearised_problem(fit).residuals, fit.u.size) for fit in fits]
+    counts = [determined_parameters(fit.linear_problem.residuals, fit.u.size) for fit in fits]
     score = score + [penalty(count, independent_frames) for count in counts]
     ranking = ranking_from_scores(
         fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed

@@ -312,15 +312,19 @@ class TermContributions:
         """Those of the law of a problem over its tests."""
         return cls(problem.coordinates, problem.histories, problem.predictor)
 
-    def values(self, u: Floats) -> Floats:
-        """(terms,) c."""
+    def log_rates(self, u: Floats) -> Floats:
+        """(points, terms) ln of the rate of each term."""
         theta = self.coordinates.theta(u[: len(self.law.params)])
         log_rates = np.empty((self.weight.size, len(self.terms)))
         for k, (term, kernel) in enumerate(self.terms):
             states = [state.initial for state in term.states.values()]
             columns = [theta[self.law.names.index(name)] for name in term.names]
             log_rates[:, k] = kernel.internal_log_rate(*self.point, *states, *columns)
-        shares = softmax(np.maximum(np.nan_to_num(log_rates, nan=LOG_ZERO_RATE), LOG_ZERO_RATE), axis=1)
+        return log_rates
+
+    def values(self, u: Floats) -> Floats:
+        """(terms,) c."""
+        shares = softmax(np.maximum(np.nan_to_num(self.log_rates(u), nan=LOG_ZERO_RATE), LOG_ZERO_RATE), axis=1)
         return np.asarray(np.sqrt(self.weight @ shares**2))
 
     def by_term(self, u: Floats) -> dict[str, float]:
