@@ -24,12 +24,12 @@ BUDGET = {
     "experiments": 1322,
     "exporters": 2613,
     "extraction": 1291,
-    "fem": 1415,
+    "fem": 1414,
     "files": 1351,
     "forecasts": 1290,
     "instruments": 1222,
     "integration": 758,
-    "inverse": 10227,
+    "inverse": 10266,
     "jobs": 251,
     "kernels": 1703,
     "language": 1480,
@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 5838,
     "records": 2185,
     "registry": 612,
-    "reports": 5385,
+    "reports": 5384,
     "rupture_assessment": 1669,
     "sampling": 994,
     "screening": 571,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29447
+TESTS = 29467
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

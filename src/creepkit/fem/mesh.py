@@ -263,7 +263,8 @@ def strip_mesh(inner: Floats, outer: Floats, breaks: Floats) -> StripMesh:
     breaks : (layers + 1,) rising from 0 on the inner side to 1 on the outer side.
     With `layers` layers the half-bandwidth of a matrix of two unknowns a node is 6 layers + 9.
     """
-    return StripMesh(strip_nodes(inner, outer, breaks), *_strip_numbers(len(inner) // 2, len(breaks) - 1))
+    numbers = _strip_numbers(len(inner) // 2, len(breaks) - 1)  # first, for this refuses what memory cannot hold
+    return StripMesh(strip_nodes(inner, outer, breaks), *numbers)
 
 
 @lru_cache(maxsize=64)

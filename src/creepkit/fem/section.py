@@ -77,8 +77,13 @@ class Section:
         along = _with_middles(_breaks(columns))
         lower = np.stack([r + (far_r - r) * along, np.full(along.size, z)], axis=1)
         upper = np.stack([r + (far_r - r) * along, np.full(along.size, far_z)], axis=1)
-        names = {"inner": "bottom", "outer": "top", "first": "left", "last": "right"}
-        return cls.strip(lower, upper, layers)._renamed(names)
+        names = {
+            "inner": "bottom", "outer": "top", "first": "left", "last": "right", "inner_first": "bottom_left",
+            "inner_last": "bottom_right", "outer_first": "top_left", "outer_last": "top_right",
+        }  # fmt: skip
+        made = cls.strip(lower, upper, layers)
+        sides = {names[name]: edges for name, edges in made.sides.items()}
+        return replace(made, sides=sides, points={names[name]: node for name, node in made.points.items()})
 
     @classmethod
     def strip(cls, inner: ArrayLike, outer: ArrayLike, layers: int | ArrayLike) -> Self:
@@ -142,15 +147,6 @@ class Section:
                 f"r = {self.nodes[node, 0]:g} mm, z = {self.nodes[node, 1]:g} mm"
             )
         return replace(self, points={**self.points, name: node})
-
-    def _renamed(self, names: Mapping[str, str]) -> Self:
-        """Sides, and the parts of the names of points, by other names."""
-        corners = {
-            "inner_first": "bottom_left", "inner_last": "bottom_right", "outer_first": "top_left",
-            "outer_last": "top_right",
-        }  # fmt: skip
-        sides = {names[name]: edges for name, edges in self.sides.items()}
-        return replace(self, sides=sides, points={corners[name]: node for name, node in self.points.items()})
 
     # ---- supports and loads ---------------------------------------------------------------------------------------
 

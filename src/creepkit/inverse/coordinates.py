@@ -198,6 +198,19 @@ class Coordinates:
             u[..., k] = self._log_rate(kernel, theta[..., positions])
         return u
 
+    def within_bounds(self, u: Floats) -> Floats:
+        """(parameters,) u itself, or where values lie beyond their bounds the nearest ones within, at the rates of u.
+
+        Coefficients follow from the rates, so that no value moves by itself: what u says and what the values say agree.
+        """
+        low, high = self.law.internal_bounds
+        theta = self.theta(u)
+        if ((theta >= low) & (theta <= high)).all() or not np.isfinite(theta).all():
+            return u
+        within = self.u(np.clip(theta, low, high))
+        within[list(self.coefficients)] = u[list(self.coefficients)]
+        return self.u(np.clip(self.theta(within), low, high))
+
     def jacobian(self, u: Floats) -> Floats:
         """d theta / d u at u (..., parameters): (..., parameters, parameters)."""
         theta = self.theta(u)

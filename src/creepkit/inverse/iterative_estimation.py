@@ -145,11 +145,11 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         errors = errors_of_tests(problem, linear.x, linear, noise)
         solution = linear.solve(CovarianceFactor.of_residuals(with_errors(linear, errors).residuals, noise))
         found = replace(found, problem=problem, linear=linear, errors=errors)
-        if (np.abs(solution.step) <= LAST_STEP * np.sqrt(np.diag(solution.covariance))).all():
+        target = linear.x.copy()
+        target[free] += solution.step
+        x = problem.constrained(linear.x, target, free, solution.covariance)
+        if (np.abs(x - linear.x)[free] <= LAST_STEP * np.sqrt(np.diag(solution.covariance))).all():
             break
-        x = linear.x.copy()
-        x[free] += solution.step
-        x = problem.bounds.clip(x)
         moved = problem.residuals(x).with_test_weights(residuals.test_weights)
         if not is_finite(moved):
             break

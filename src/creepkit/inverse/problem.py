@@ -59,6 +59,10 @@ FAILED_COST = 1e12
 """Cost of a candidate that cannot be predicted at all."""
 
 
+HARD_BOUNDS = 100.0
+"""By what penalties of bounds weigh more where no prediction is needed, and steps may be short."""
+
+
 PRIOR_STRENGTH = 1e-4
 """Weak prior of each unknown about the middle of its bounds, in standard deviations of data per width of the bounds.
 
@@ -390,7 +394,46 @@ class LeastSquaresProblem:
             system, inside, self.bounds, scale, tolerances or Tolerances(), fixed=fixed, robust=self.robust
         )
         assert minimum.whitened_residuals is not None
-        return replace(minimum, whitened_residuals=minimum.whitened_residuals[: self.observations.count])
+        x = minimum.x if fixed else self.within_bounds(minimum.x)
+        return replace(minimum, x=x, whitened_residuals=minimum.whitened_residuals[: self.observations.count])
+
+    def within_bounds(self, x: Floats) -> Floats:
+        """x (unknowns,) or the nearest point whose values lie within the bounds of the law (see Coordinates)."""
+        u = self.coordinates.within_bounds(x[: self.parameter_count])
+        return self.bounds.clip(np.concatenate([u, x[self.parameter_count :]]))
+
+    def constrained(self, start: Floats, target: Floats, free: Bools, covariance: Floats) -> Floats:
+        """The point within the bounds and constraints of the law that is least far from another.
+
+        start, target : (unknowns,) from within, and what distances are taken from. free : (unknowns,) what may move;
+        covariance : (free, free) of its estimate, by which distances are measured. It costs no prediction.
+        """
+        whitening = np.linalg.inv(np.linalg.cholesky(covariance))
+        rows = np.zeros((len(whitening), target.size))
+        rows[:, free] = whitening
+        count = target.size - self.parameter_count  # of the priors of nuisance parameters, which the target knows
+
+        def system(x: Floats) -> tuple[Floats, Floats]:
+            penalties = self.bound_penalties
+            values, derivatives = penalties.residuals(x), penalties.jacobian(x)
+            end = len(values) - count
+            return (
+                np.concatenate([rows @ (x - target), HARD_BOUNDS * values[:end]]),
+                np.concatenate([rows, HARD_BOUNDS * derivatives[:end]]),
+            )
+
+        if np.array_equal(self.within_bounds(target), target) and not system(target)[0].any():
+            return target
+        held = {int(k): float(target[k]) for k in np.flatnonzero(~free)}
+        margin = 1e-9 * self.bounds.width
+        start = np.clip(start, self.bounds.lower + margin, self.bounds.upper - margin)
+        start[list(held)] = list(held.values())
+        scale = np.where(free, 1.0, self.bounds.width)
+        scale[free] = np.sqrt(np.diag(covariance))
+        minimum = bounded_least_squares(
+            system, start, self.bounds, scale, Tolerances(100, 1e-10), fixed=held, robust=False
+        )
+        return self.within_bounds(minimum.x)
 
     def _system(self, x: Floats, additional: AdditionalResiduals | None) -> tuple[Floats, Floats]:
         """All residuals at x, (rows,), and their derivatives, (rows, unknowns)."""

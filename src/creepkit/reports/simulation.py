@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
-from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline
+from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, outline
 from creepkit.records import Status
 from creepkit.records.units import time_text
 from creepkit.reports.figures import panels_of, save_figure
@@ -46,8 +46,7 @@ def section_figure(run: BulgeRun, time: float | None, name: str, path: str | Pat
     field, body = run.field(name, time), run.test.model
     moved = body.nodes + run._at(run.simulation.displacements, time)
     values = _at_nodes(field.values.reshape(-1, 4), body.elements, len(moved))
-    triangles, free = body.elements[:, TRIANGLES].reshape(-1, 3), outline(body.elements)
-    sides = body.elements[free[:, 0, None], SIDES[free[:, 1]]]
+    triangles, sides = body.elements[:, TRIANGLES].reshape(-1, 3), outline(body.elements)
     sides = sides[(body.nodes[sides][:, :, 0] > 1e-9).any(axis=1)]  # without those on the axis
     figure, axes = panels_of(9.0, 3.1)
     for half in ([1.0, 1.0], [-1.0, 1.0]):

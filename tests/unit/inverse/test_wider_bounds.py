@@ -1,5 +1,6 @@
 """Values beyond the bounds that a law begins with are found; bounds that a user states are kept."""
 
+import numpy as np
 import pytest
 
 import creepkit as ck
@@ -21,3 +22,25 @@ def test_a_search_goes_on_beyond_bounds_that_nobody_stated(truth, stresses):
     assert any(note.startswith("n was searched from 1 to 14.2") for note in fit.notes)
     kept = identify(NORTON.with_bounds(n=(1, 8), A=(1e-40, 1e-5)), tests, BAR, settings=QUICK)
     assert kept.values["n"] < 8.0 + 1e-6
+
+
+def test_values_at_a_bound_and_rates_are_of_one_point(tmp_path):
+    """Rates over a threshold stress, and of an exponential law, hold the exponent of a sine at either of its bounds."""
+    stresses = np.geomspace(50.0, 130.0, 9)
+    shapes = {"above a threshold": 1e-15 * (stresses - 44.0) ** 4.0, "exponential": 1e-12 * np.exp(stresses / 9.0)}
+    scatter = np.exp(0.08 * np.random.default_rng(3).standard_normal(9))
+    wrong = {}
+    for shape, rates in shapes.items():
+        tests = [
+            ck.History(f"m{s:.0f}", np.array([1e6]), {}, ck.constant_stress(s), 900.0, minimum_rate=rate)
+            for s, rate in zip(stresses, rates * scatter, strict=True)
+        ]
+        fit = ck.identify("hyperbolic-sine", tests, weights="likelihood")
+        formula = fit.values["A"] * np.sinh(stresses / fit.values["B"]) ** fit.values["n"]
+        loaded = ck.load(fit.save(tmp_path / "fit.json"))
+        stated = [one.rate(stresses, warn=False)[0] for one in (fit, loaded)]
+        held = min(abs(fit.values["n"] - 1.0), abs(fit.values["n"] - 8.0)) < 0.01
+        near = np.abs(np.log(stated[0] / rates)).max() < 2.0
+        if not (held and near and np.allclose(stated, formula, rtol=1e-9)):
+            wrong[shape] = (fit.values, stated[0] / formula, stated[0] / rates)
+    assert not wrong

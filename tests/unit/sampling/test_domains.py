@@ -123,7 +123,7 @@ def test_a_test_takes_a_share_of_the_life_of_a_law_with_damage(name, exponent):
 
 @pytest.mark.parametrize("name", sorted(registry.default_registry().laws()))
 def test_every_registered_law_has_a_box_or_says_why_not(name):
-    """Coble's rates, in its bounds, hardly reach the highest ones wanted."""
+    """Rates of diffusion creep, in the bounds of its laws, hardly reach the highest ones wanted."""
     law = ck.law(name)
     warm = {"temperature": (1000.0, 1100.0)} if law.uses(temperature) else {}
     if name == "norton-bailey-strain":
@@ -134,7 +134,7 @@ def test_every_registered_law_has_a_box_or_says_why_not(name):
     draws = design.draw(0, 64, seed=1)
     assert np.isfinite(draws.parameters).all()
     met = [c.passes(law, draws) for c in design.criteria if isinstance(c, DrawCriterion)]
-    assert np.all(met, axis=0).mean() >= (0.65 if name == "coble" else 0.85)
+    assert np.all(met, axis=0).mean() >= {"coble": 0.65, "nabarro-herring": 0.8}.get(name, 0.85)
 
 
 def test_terms_that_share_a_coefficient_are_one_part():
