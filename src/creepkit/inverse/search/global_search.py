@@ -90,11 +90,10 @@ def refined(
             progress("start", k + 1, len(starts))
     ends.sort(key=lambda end: end.cost)
     for k, end in enumerate(ends[:CONTINUED]):
-        if curved:
-            ends[k] = end if end.converged else problem.minimise(end.x)
-            continue
-        ends[k] = _continued(problem, end, ends[:k])
-        if k and sum(other is min(ends, key=lambda one: one.cost) for other in ends[: k + 1]) >= CONFIRMED:
+        whole = curved and not end.converged
+        ends[k] = problem.minimise(end.x) if whole else _continued(problem, end, ends[:k])
+        best = min(ends, key=lambda one: one.cost)
+        if k and not curved and sum(other is best for other in ends[: k + 1]) >= CONFIRMED:
             break
     return sorted(ends, key=lambda end: end.cost)
 

@@ -343,7 +343,7 @@ class ContributionNorm:
         return np.asarray(np.sqrt(2 * L2_STRENGTH) * self.contributions.values(x))
 
     def jacobian(self, x: Floats) -> Floats:
-        """(terms, unknowns) derivatives, by central differences."""
+        """(terms, unknowns) derivatives at x (unknowns,), by central differences."""
         steps = DIFFERENCE_STEP * np.eye(x.size)[: len(self.contributions.law.params)]
         columns = [(self.residuals(x + step) - self.residuals(x - step)) / (2 * DIFFERENCE_STEP) for step in steps]
         return np.pad(np.array(columns).T, ((0, 0), (0, x.size - len(steps))))
