@@ -213,7 +213,7 @@ def forecast_figure(forecast: Forecast, path: str | Path | None = None) -> Figur
     drawn = [
         (test, one) for test in tests[:MOST_DRAWN] for one in [*test.outputs.values()][: None if len(tests) == 1 else 1]
     ]
-    figure, panels = panel_grid(len(drawn), COLUMNS, 4.4, 3.6)
+    figure, panels = panel_grid(len(drawn), COLUMNS, max(4.4, 6.6 / len(drawn)), 3.6)  # as wide as the legend at least
     for axes, (test, one) in zip(panels, drawn, strict=True):
         _draw_curve(axes, test, one)
         axes.set_title(wrapped(f"{test.name}: {test.history.condition}", 4.4, 11.0), fontsize=8)
