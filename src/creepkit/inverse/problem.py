@@ -71,7 +71,7 @@ in tension, leaves the Jacobian short of its rank, and scipy's steps are then al
 """
 
 
-NOTEWORTHY_FACTOR = 0.03
+NOTEWORTHY_FACTOR = 0.005
 """Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
 
 
