@@ -276,7 +276,7 @@ def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> La
     if not np.isfinite(chi_squares).all():
         chi_squares = np.array([law.chi_square for law in outcomes.laws[: len(task.laws)]])
     excess = np.array([r.excess for r in ranked])
-    altered = [(k, one.excess, one.penalty) for k, one in task.altered]
+    altered = [(k, one.excess) for k, one in task.altered]
     return LawCriterion(outcomes, task.weights, excess, chi_squares, ranking.independent_frames, altered, seed)
 
 

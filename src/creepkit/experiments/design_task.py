@@ -143,7 +143,7 @@ def _altered(laws: Sequence[Identification], ranking: Ranking) -> list[tuple[int
         for k, fit in enumerate(laws[:CHALLENGED_LAWS])
         for altered in altered_laws([fit, *(r.fit for r in ranking.laws if r.fit is not fit)], NEARLY_EXCLUDED)
     ]
-    is_settled = len(laws) == 1 and not any(one.excess + one.penalty <= NOT_EXCLUDED for _, one in found)
+    is_settled = len(laws) == 1 and not any(one.excess <= NOT_EXCLUDED for _, one in found)
     return [] if is_settled else found
 
 

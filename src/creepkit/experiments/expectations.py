@@ -181,7 +181,7 @@ class LawCriterion:
 
     weights : (laws,) -. excess : (laws,) of the criterion of the ranking. chi_squares : (laws,) of the tests that were
     made. frames : how many of them are independent. altered : of the further laws, the position of the law that each
-    alters, its chi-square above that one's, and the penalty of its further parameters.
+    alters, and its chi-square above that one's.
     """
 
     outcomes: PlannedOutcomes
@@ -189,7 +189,7 @@ class LawCriterion:
     excess: Floats
     chi_squares: Floats
     frames: float
-    altered: Sequence[tuple[int, float, float]] = ()
+    altered: Sequence[tuple[int, float]] = ()
     seed: int = 0
     _deviations: dict[int, Floats] = field(default_factory=dict)
     _expansions: dict[int, Expansion] = field(default_factory=dict)
@@ -204,7 +204,7 @@ class LawCriterion:
     def expectation(self, histories: Sequence[History], *, at_draws: bool = False) -> Expectation:
         """Information, probability of a right verdict and chi-squares of every direction, with these tests.
 
-        An altered law counts, for the information, as another law.
+        An altered law counts, for the information, as another law of as many parameters.
         """
         weight, count = self.weights, len(self.weights)
         penalty = self._penalties(histories)
@@ -212,7 +212,7 @@ class LawCriterion:
         for a, name in enumerate(self.names):
             Q = self._increments(a, histories, at_draws)
             score = (self.excess + penalty + Q[:count].T).T
-            own = [(count + k, excess + added) for k, (law, excess, added) in enumerate(self.altered) if law == a]
+            own = [(count + k, excess) for k, (law, excess) in enumerate(self.altered) if law == a]
             more = np.array([beyond + Q[k] - Q[a] for k, beyond in own]).reshape(-1, Q.shape[1])
             before = _shares(np.append(self.excess, [self.excess[a] + beyond for _, beyond in own])[:, None])
             after = _shares(np.concatenate([score, score[a] + more]))
@@ -220,7 +220,7 @@ class LawCriterion:
             decided = _shares(score) > DECISIVE_WEIGHT
             right += weight[a] * float((decided[a] & (more > NOT_EXCLUDED).all(axis=0)).mean())
             wrong += weight[a] * float(np.delete(decided, a, axis=0).any(axis=0).mean())
-            current = [*(self.chi_squares - self.chi_squares[a]).tolist(), *(excess for _, excess, _ in self.altered)]
+            current = [*(self.chi_squares - self.chi_squares[a]).tolist(), *(excess for _, excess in self.altered)]
             for b in (b for b in self._compared(a) if b != a):
                 expected, other = current[b] + float(np.median(Q[b] - Q[a])), self.outcomes.laws[b].fit.law.name
                 chi_squares.append(ExpectedChiSquare(name, other, current[b], expected))

@@ -33,7 +33,7 @@ def identify(
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
     search: GlobalSearch | None = None,
-    penalty: Literal["subsets"] | None = None,
+    penalty: Literal["l2", "subsets"] | None = None,
     through: Predictor | Literal["auto"] | None = "auto",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
@@ -44,8 +44,8 @@ def identify(
     law : a law or its name; using : a specimen (or its name) or any predictor, or {specimen: predictor}; by default
         the specimens that the histories name.
     search : how to begin: by default least squares from screened starts; ParticleSwarm() as in the paper.
-    penalty : "subsets" fits the sets of terms of a sum and keeps the one of lowest BIC: terms that are left out
-        stand in `sparsity` of the result, and its law is the one that remains.
+    penalty : which terms of a sum are kept: "subsets", the set of lowest BIC, or "l2", the paper's norm of their
+        contributions. Those left out stand in `sparsity` of the result, and its law is the one that remains.
     through : a cheaper predictor in which the minima of the search are refined before `using` (finite elements) gives
         values and intervals; "auto" takes the reduced-order model of `using` where that states its own error.
         A surrogate that does not know the class of the law is replaced by its specimen, and a note says so.
@@ -61,8 +61,10 @@ def identify(
     if through == "auto":
         surrogate = through_for_law(surrogate, law)
     how: dict[str, Any] = {"settings": settings, "search": search, "through": surrogate, "progress": progress}
-    run = identify_law if penalty is None else identify_sparse
-    fit = run(law, histories, predictor, **how)
+    if penalty is None:
+        fit = identify_law(law, histories, predictor, **how)
+    else:
+        fit = identify_sparse(law, histories, predictor, penalty=penalty, **how)
     return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 
@@ -75,7 +77,7 @@ def select(
     *,
     through: Predictor | Literal["auto"] | None = "auto",
     sums: bool | None = None,
-    by: Literal["bic", "aicc", "hold-out"] = "bic",
+    by: Literal["bic", "aicc"] = "bic",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     **changes: Any,

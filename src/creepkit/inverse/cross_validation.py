@@ -1,21 +1,11 @@
-"""Cross-validation: tests, conditions or the end of every history are predicted from a fit to the rest.
-
-The predictive likelihood of the end of a history, given its beginning, is with C the covariance of all observations and
-C_1 its part of the beginning
-
-    -2 ln p(end | beginning) = (r' C^-1 r + ln|C|) - (r_1' C_1^-1 r_1 + ln|C_1|)
-
-but for a constant, r the residuals at the values that the beginning alone gave.
-"""
+"""Cross-validation: tests, conditions or the end of every history are predicted from a fit to the rest."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
-
-import numpy as np
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
@@ -24,8 +14,6 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.goodness_of_fit import OutputErrors, errors_of_output, relative_squared_error
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
-from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.single_values import SingleValue
 from creepkit.presentation import Presentable
@@ -107,20 +95,6 @@ class CrossValidation(Presentable, text="reports.inference:cross_validation_text
                     predicted.append(fold.prediction.of(k)[used, column])
         return relative_squared_error(measured, predicted)
 
-    def predictive_deviance(self, noise_model: NoiseModel, fitted_fraction: float = FITTED_FRACTION) -> float:
-        """-2 ln of the predictive likelihood of what comes after the fitted part; of cross-validation by time."""
-        if self.by != "time":
-            raise FitError(f"the predictive likelihood is that of cross-validation by time, and this is by {self.by}")
-        (fold,) = self.folds
-        problem = self.fit.least_squares_problem
-        residuals = problem.residuals(fold.fit.x)
-        ends = np.array([[h.times[-1] if h.outputs else np.inf] for h in self.fit.histories])
-        is_early = problem.observations.times <= fitted_fraction * ends
-        beginning = replace(
-            residuals, present=residuals.present & is_early, values=np.where(is_early, residuals.values, 0.0)
-        )
-        return _deviance(residuals, noise_model) - _deviance(beginning, noise_model)
-
 
 @checked
 def cross_validate(
@@ -172,9 +146,3 @@ def _first_part(history: History, fitted_fraction: float) -> History:
         return history
     used = history.used & (history.times <= fitted_fraction * float(history.times[-1]))
     return history.replace(used=used, rupture_time=None, unruptured=False)
-
-
-def _deviance(residuals: Residuals, noise_model: NoiseModel) -> float:
-    """r' C^-1 r + ln|C|."""
-    factor = CovarianceFactor.of_residuals(residuals, noise_model)
-    return float((factor.whiten(residuals.values) ** 2).sum() + factor.log_determinant)

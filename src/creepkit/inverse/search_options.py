@@ -21,9 +21,9 @@ class SearchOptions(Options, title="options of a search", error=FitError):
     """
 
     search: Literal["multi-start", "swarm"] = option("multi-start", "How to begin.")
-    penalty: Literal["subsets"] | None = option(None, "Keep those terms of a sum that the tests need.")
+    penalty: Literal["l2", "subsets"] | None = option(None, "Keep those terms of a sum that the tests need.")
     sums: bool | None = option(None, "Whether sums of two laws are tried; by default where no law explains the tests.")
-    by: Literal["bic", "aicc", "hold-out"] = option("bic", "Of a comparison of laws.", flag="criterion")
+    by: Literal["bic", "aicc"] = option("bic", "Of a comparison of laws.", flag="criterion")
 
     @property
     def global_search(self) -> GlobalSearch | None:

@@ -267,13 +267,10 @@ def _comparison(found: GroupFindings, cite: Callable[..., str]) -> Iterator[str]
     """How the laws of a material were compared."""
     if found.ranking is None:
         return
-    if found.ranking.criterion in CRITERIA:
-        name, penalty = CRITERIA[found.ranking.criterion]
-        yield f"The laws were compared by the {name}{cite(found.ranking.criterion)}: chi-square, plus {penalty}."
-        yield "Chi-square is that under the covariance of the best law, with nuisance parameters integrated out."
-        yield "K counts the parameters that the tests determine, n the readings that autocorrelation leaves apart."
-    else:
-        yield "The laws were compared by the error of tests that were held out."
+    name, penalty = CRITERIA[found.ranking.criterion]
+    yield f"The laws were compared by the {name}{cite(found.ranking.criterion)}: chi-square, plus {penalty}."
+    yield "Chi-square is that under the covariance of the best law, with nuisance parameters integrated out."
+    yield "K counts the parameters that the tests determine, n the readings that autocorrelation leaves apart."
     yield f"The weight of a law is exp(-difference / 2) over the sum of all; it is credible above {CREDIBLE_WEIGHT:g}."
     yield f"It is decisive above {DECISIVE_WEIGHT:g} if it was asked for and the tests do not contradict it."
     yield "Nor may a share of another law, or an effect that was not modelled, change that."

@@ -140,7 +140,7 @@ def _misfit(fit: Identification) -> tuple[str, str]:
 
 def separating_test(ranking: Ranking) -> list[str]:
     """The test that speaks most for the best law against the second, and by how much the second is worse in all."""
-    if len(ranking.laws) < 2 or ranking.criterion == "hold-out" or len(ranking.best.tests) < 2:
+    if len(ranking.laws) < 2 or len(ranking.best.tests) < 2:
         return []
     fits, second = [one.fit for one in ranking.laws], ranking.laws[1]
     if any(fit.linearised is None for fit in fits):

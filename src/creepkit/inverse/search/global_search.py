@@ -79,16 +79,21 @@ SAME_POINT = 0.02
 def refined(
     problem: LeastSquaresProblem, starts: Sequence[Floats], progress: IterationCallback | None = None
 ) -> list[Minimum]:
-    """The ends that starts (parameters,) of least squares lead to, best first; far worse ones after few steps."""
-    ends = []
+    """The ends that starts (parameters,) of least squares lead to, best first; far worse ones after few steps.
+
+    A law with internal variables, whose valleys are long and curved, takes each of the best to its end.
+    """
+    ends, curved = [], bool(problem.coordinates.state_rates)
     for k, u in enumerate(starts):
         ends.append(problem.minimise(u, tolerances=FIRST_STEPS))
         if progress is not None:
             progress("start", k + 1, len(starts))
     ends.sort(key=lambda end: end.cost)
     for k, end in enumerate(ends[:CONTINUED]):
-        ends[k] = _continued(problem, end, ends[:k])
-        if k and sum(other is min(ends, key=lambda one: one.cost) for other in ends[: k + 1]) >= CONFIRMED:
+        whole = curved and not end.converged
+        ends[k] = problem.minimise(end.x) if whole else _continued(problem, end, ends[:k])
+        best = min(ends, key=lambda one: one.cost)
+        if k and not curved and sum(other is best for other in ends[: k + 1]) >= CONFIRMED:
             break
     return sorted(ends, key=lambda end: end.cost)
 

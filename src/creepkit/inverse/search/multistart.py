@@ -44,9 +44,9 @@ class MultiStart(Options, title="multi-start", error=FitError, prefix="multi-sta
         share = {0: 8, 1: 8, 2: 4}.get(shapes, 1)  # rates are not drawn: they are shifted to those of the data
         starts = self.starts or min(settings.starts, max(2 * settings.starts // share, 2))
         draws = self.draws or max(settings.sobol_points // share, 1)
-        screened = screened_starts(problem, starts=starts, draws=draws)
-        initial_points = [*single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2), *screened]
-        return SearchResult(tuple(refined(problem, initial_points, progress)))
+        of_terms = single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2)
+        points = [*of_terms, *screened_starts(problem, starts=starts, draws=draws)]
+        return SearchResult(tuple(refined(problem, points, progress)))
 
 
 def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
@@ -79,8 +79,8 @@ def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int)
 def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
     """The centre, and the best draws after a shift of all rates to that of the data: (parameters,) each.
 
-    Once shifted they can be compared: the worse half of them is left out from shift to shift. The last shift is not
-    simulated, as the first step of a refinement does that.
+    Once shifted they can be compared. The last shift is not simulated, as the first step of a refinement does that; but
+    a law with internal variables needs several of all draws, and a comparison where these end.
     """
     observations, bounds, seed = problem.observations, problem.bounds, problem.settings.seed
     sobol = qmc.Sobol(bounds.lower.size, seed=seed).random(draws)
@@ -90,19 +90,18 @@ def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) ->
     if rates:
         middle = bounds.centre - 0.5 * sum(LOG_RATE_BOUNDS)
         fractions = np.random.default_rng(seed).dirichlet(np.full(len(rates), 0.7), size=len(points))
-        fractions[0] = unequal_fractions(len(rates))
+        fractions[0] = 0.5 ** np.arange(len(rates))  # equal ones are a stationary point from which no search escapes
         points[:, rates] = middle[rates[0]] + np.log(np.maximum(fractions, 1e-4))
         positions = np.concatenate([np.full((1, len(internal_rates)), 0.5), sobol[:, internal_rates]])
         points[:, internal_rates] = middle[internal_rates] + np.interp(positions, (0, 1), INTERNAL_RATE_RANGE)
-    points, shifts = bounds.clip(points), (1 + 3 * min(len(internal_rates), 1)) if rates else 0
+    points, shifts = bounds.clip(points), (5 if internal_rates else 1) if rates else 0
     for shift in range(shifts + 1):
         residuals = problem.candidate_residuals(points)
-        score = (np.arcsinh(residuals[:, observations.present]) ** 2).mean(axis=1)
-        if shift or not shifts:
-            best = 1 + np.argsort(score[1:], kind="stable")
-            kept = [0, *best[: max(starts - 1, 0 if shift == shifts else len(points) // 2)]]
+        if shift == shifts:
+            score = (np.arcsinh(residuals[:, observations.present]) ** 2).mean(axis=1)
+            kept = [0, *(1 + np.argsort(score[1:], kind="stable"))[: max(starts - 1, 0)]]
             points, residuals, score = points[kept], residuals[kept], score[kept]
-        if rates:
+        if rates and not (internal_rates and shift == shifts):
             points[:, rates] -= np.clip(median_log_rate_excess(observations, residuals), -6, 6)[:, None]
             points[:, internal_rates] -= np.clip(median_log_rupture_excess(observations, residuals), -6, 6)[:, None]
             points = bounds.clip(points)
@@ -175,9 +174,3 @@ def _same(a: Minimum, b: Minimum, bounds: Bounds, equal_predictions: float, tole
     if a.whitened_residuals is None or b.whitened_residuals is None:
         return False
     return bool(np.mean((a.whitened_residuals - b.whitened_residuals) ** 2) < (equal_predictions / WORKING_ERROR) ** 2)
-
-
-def unequal_fractions(count: int) -> Floats:
-    """(count,) - fractions 0.7, 0.2, 0.1 and so on: equal ones are a stationary point from which no search escapes."""
-    fractions = np.array([0.7, *(0.3 * 0.67**k for k in range(1, count))])
-    return np.asarray(fractions / fractions.sum())

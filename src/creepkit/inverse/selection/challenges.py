@@ -1,17 +1,16 @@
 """Challenges of a verdict: what the tests allow beside the law that has nearly all the weight of those tried.
 
-A weight is relative to the laws tried. Three questions are therefore asked before an answer is called decisive:
+A weight is relative to the laws tried, and an information criterion prefers the simplest of equals. Three questions
+are therefore asked before an answer is called decisive:
 
 1. May a share of the rate come from another law? The best law and each other law tried are added, the second carrying
-   SHARE of the rate at the reference point, and the sum is fitted.
+   SHARE of the rate at the reference point, and the sum is fitted: where its chi-square is not larger by more than
+   3.84 (95 %, one degree of freedom), the tests do not exclude it; where it is smaller by more, it fits better. Both
+   are the least under the covariance of the best law's identification.
 2. May there be a threshold? The stress s in the terms of the best law is replaced by s - s_0, with s_0 THRESHOLD of
-   the reference stress.
+   the reference stress, and judged likewise.
 3. Does the answer rest on something nobody measured? The laws are ranked again with each unmodelled effect (see
    selection.perturbation_trials).
-
-A law with more parameters never fits worse, so that altered laws are judged as laws are ranked, by BIC: with the least
-chi-square under the covariance of the best law's identification, and ln n for each of their further parameters, n the
-independent frames. The tests exclude what has less than a twentieth of the weight beside the best law.
 """
 
 from __future__ import annotations
@@ -25,16 +24,16 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import sympy
 from scipy.special import logsumexp, softmax
+from scipy.stats import chi2
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.defect_correction import difference_of_predictors
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import bic_penalty
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances
-from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE
 from creepkit.inverse.selection.perturbation_trials import Challenge, decisive_effects
+from creepkit.inverse.sparsity.term_selection import TermContributions
 from creepkit.language import CreepLaw, Param, stress
 
 SHARE = 0.3
@@ -45,12 +44,8 @@ THRESHOLD = 0.2
 """Of the reference stress, a threshold stress that must be excluded."""
 
 
-NOT_EXCLUDED = DISTINGUISHABLE_CHI_SQUARE
-"""BIC above that of the best law, up to which an altered law is not excluded: a weight of 0.05 beside it."""
-
-
-SURELY_EXCLUDED = 4.0
-"""How much further above that a law is by the corrected reduced-order model, that finite elements need not judge."""
+NOT_EXCLUDED = float(chi2.ppf(0.95, 1))
+"""Increase of chi-square up to which a sum is not excluded."""
 
 
 SMALLEST_SHOWN = 0.05
@@ -68,6 +63,10 @@ APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3)
 LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6)
 
 
+SAME_FUNCTION = 0.05
+"""Range of ln of the ratio of two rates over all conditions, within which they are one function."""
+
+
 def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     """The challenges of the first of some identifications, best first; the first law that is found ends the search."""
     laws = (_challenge(*alteration) for alteration in _alterations(fits))
@@ -76,42 +75,43 @@ def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
 
 
 def altered_laws(fits: Sequence[Identification], limit: float = NOT_EXCLUDED) -> list[AlteredLaw]:
-    """Every alteration of the first of some identifications whose BIC is higher by no more than a limit.
+    """Every alteration of the first of some identifications whose chi-square is higher by no more than a limit.
 
     What cannot be fitted is left out.
     """
     results = []
-    for _, _, fitted in _alterations(fits, limit):
+    for _, _, fitted in _alterations(fits):
         with contextlib.suppress(CreepkitError):
             found = fitted()
-            results += [found] if found.excess + found.penalty <= limit else []
+            results += [found] if found is not None and found.excess <= limit else []
     return results
 
 
 Kind: TypeAlias = Literal["sum", "threshold"]
 
 
-def _alterations(
-    fits: Sequence[Identification], limit: float = NOT_EXCLUDED
-) -> Iterator[tuple[Kind, str, Callable[[], AlteredLaw]]]:
+def _alterations(fits: Sequence[Identification]) -> Iterator[tuple[Kind, str, Callable[[], AlteredLaw | None]]]:
     """What may be altered in the first law: kind, name, and what fits it.
 
     No sum with a law that shares a summand: one that holds a law twice is never excluded.
     """
     best, summands = FittedLaw.at_least_chi_square(fits[0]), set(fits[0].law.name.split("+"))
-    best = replace(best, largest=limit + SURELY_EXCLUDED)
     for fit in fits[1:]:
         if summands.isdisjoint(fit.law.name.split("+")):
-            yield "sum", f"a sum with {fit.law.name}", partial(sum_with_share, best, FittedLaw.of(fit))
+            yield (
+                "sum",
+                f"a sum with {fit.law.name}",
+                partial(sum_with_share, best, FittedLaw(fit.least_squares_problem, fit.x)),
+            )
     yield "threshold", f"{best.law.name} above a threshold", partial(above_threshold, best)
 
 
-def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw]) -> Challenge | None:
+def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -> Challenge | None:
     try:
         found = fitted()
     except CreepkitError:
         return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
-    if found.excess + found.penalty > NOT_EXCLUDED:
+    if found is None or found.excess > NOT_EXCLUDED:
         return None
     return Challenge(kind, found.problem.law.name, f"{found.description} {_comparison_text(found.excess)}")
 
@@ -146,21 +146,10 @@ class ShareResidual:
 
 @dataclass(frozen=True, eq=False)
 class FittedLaw:
-    """A problem and the values of its law: x (unknowns,), the coordinates u first.
-
-    frames : independent ones of its tests, by which further parameters are judged. largest : BIC of an altered law
-    above its own from which on that is not worth a refinement by the predictor itself.
-    """
+    """A problem and the values of its law: x (unknowns,), the coordinates u first."""
 
     problem: LeastSquaresProblem
     x: Floats
-    frames: float = 1.0
-    largest: float = np.inf
-
-    @classmethod
-    def of(cls, fit: Identification) -> FittedLaw:
-        """That of an identification, at its values."""
-        return cls(fit.least_squares_problem, fit.x)
 
     @classmethod
     def at_least_chi_square(cls, fit: Identification) -> FittedLaw:
@@ -169,13 +158,12 @@ class FittedLaw:
         Values by other weights, or under errors of tests, are not there: whatever is fitted under that noise would seem
         better than the law itself.
         """
-        problem, x, frames = fit.least_squares_problem, fit.x, fit.effective_frames
-        if fit.settings.weights == "likelihood" and not fit.settings.included_errors:
-            return cls(problem, x, frames)
-        with contextlib.suppress(CreepkitError):
-            refined = problem.minimise(x, tolerances=LAST_STEPS).x
-            x = min(x, refined, key=lambda one: _chi_square(problem, one))
-        return cls(problem, x, frames)
+        problem, x = fit.least_squares_problem, fit.x
+        if fit.settings.weights != "likelihood" or fit.settings.included_errors:
+            with contextlib.suppress(CreepkitError):
+                refined = problem.minimise(x, tolerances=LAST_STEPS).x
+                x = min(x, refined, key=lambda one: _chi_square(problem, one))
+        return cls(problem, x)
 
     @property
     def law(self) -> CreepLaw:
@@ -200,8 +188,7 @@ class FittedLaw:
 class AlteredLaw:
     """The best law altered as a challenge says, fitted to the same tests under the same covariance.
 
-    x : (unknowns,) its values. excess : its chi-square above that of the best law. penalty : ln n of each of its
-    further parameters, by BIC.
+    x : (unknowns,) its values. excess : its chi-square above that of the best law.
     constraints : (rows, unknowns) derivatives over tolerances of what was held, such as the share of a second law.
     description : what it is, for people.
     """
@@ -210,27 +197,28 @@ class AlteredLaw:
     problem: LeastSquaresProblem
     x: Floats
     excess: float
-    penalty: float
     constraints: Floats
     description: str
 
 
-def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw:
-    """The sum of the best law and another one that carries SHARE of the rate.
+def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
+    """The sum of the best law and another one that carries SHARE of the rate; None where it is the best law itself.
 
     FitError where one of them has no rate at the reference point of its own, or where it cannot be fitted.
     """
     start, own_terms = best.log_rate - other.log_rate, len(best.problem.coordinates.term_rates)
-    problem = _of_law(best.problem, best.law + other.law)
+    law = best.law + other.law
+    problem = _of_law(best.problem, law)
     own_rates, further_rates = (list(part) for part in np.split(problem.coordinates.term_rates, [own_terms]))
     x = np.concatenate([best.u, other.u, best.x[best.u.size :]])
     x[own_rates] += np.log(1.0 - SHARE)
     x[further_rates] += np.log(SHARE) + start
     share = ShareResidual(own_rates, further_rates, float(np.log(SHARE / (1.0 - SHARE))))
-    penalty = bic_penalty(other.u.size, best.frames)
-    excess, x = _least_excess(best, problem, x, penalty, share=share)
+    excess, x = _least_excess(best, problem, x, share=share)
+    if _are_one_function(problem, x, own_terms):
+        return None
     description = f"its sum with {other.law.name}, tried with {100 * SHARE:.0f} % of the rate carried by it,"
-    return AlteredLaw("sum", problem, x, excess, penalty, share.jacobian(x), description)
+    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), description)
 
 
 def above_threshold(best: FittedLaw) -> AlteredLaw:
@@ -243,12 +231,12 @@ def above_threshold(best: FittedLaw) -> AlteredLaw:
         best.law, name=f"{best.law.name} above a threshold", terms=terms, params={**best.law.params, s_0: param}
     )
     problem = _of_law(best.problem, law)
-    position, penalty = best.u.size, bic_penalty(1, best.frames)
+    position = best.u.size
     x = np.concatenate([best.u, [threshold], best.x[position:]])
-    excess, x = _least_excess(best, problem, x, penalty, fixed={position: threshold})
+    excess, x = _least_excess(best, problem, x, fixed={position: threshold})
     held = np.zeros((1, x.size))
     held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
-    return AlteredLaw("threshold", problem, x, excess, penalty, held, f"{law.name} of {threshold:.3g} MPa")
+    return AlteredLaw("threshold", problem, x, excess, held, f"{law.name} of {threshold:.3g} MPa")
 
 
 def _comparison_text(excess: float) -> str:
@@ -258,6 +246,18 @@ def _comparison_text(excess: float) -> str:
     if abs(excess) < SMALLEST_SHOWN:
         return "explains them as well (its chi-square is the same)"
     return f"explains them as well (its chi-square is {abs(excess):.1f} {'higher' if excess > 0 else 'lower'})"
+
+
+def _are_one_function(problem: LeastSquaresProblem, x: Floats, own_terms: int) -> bool:
+    """Whether the further terms of a sum are, at x (unknowns,), multiples of the first ones in all tests.
+
+    A power law with a hardening exponent of zero is a power law: its sum with another says nothing new.
+    """
+    with np.errstate(all="ignore"):
+        log_rates = TermContributions.of_problem(problem).log_rates(x)
+    own, further = (np.logaddexp.reduce(part, axis=1) for part in np.split(log_rates, [own_terms], axis=1))
+    difference = own - further
+    return bool(np.isfinite(difference).all() and np.ptp(difference) < SAME_FUNCTION)
 
 
 def _of_law(single: LeastSquaresProblem, law: CreepLaw) -> LeastSquaresProblem:
@@ -276,23 +276,19 @@ def _least_excess(
     best: FittedLaw,
     problem: LeastSquaresProblem,
     x: Floats,
-    penalty: float,
     *,
     share: ShareResidual | None = None,
     fixed: Mapping[int, float] | None = None,
 ) -> tuple[float, Floats]:
     """The least chi-square from x (unknowns,) above that of the best law, and where.
 
-    It is sought by the reduced-order model, corrected where the best law is, then by the predictor itself.
+    It is sought by the reduced-order model, then by the predictor itself.
     """
     reduced = problem.predictor.reduced_order_model()
     if reduced is not None:
         difference = difference_of_predictors(best.problem, best.x, reduced)
         cheap = problem.with_predictor(reduced).with_correction(difference)
         x = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS).x
-        excess = _chi_square(cheap, x) - _chi_square(best.problem, best.x)
-        if excess + penalty > best.largest:
-            return excess, x
     x = problem.minimise(x, additional=share, fixed=fixed, tolerances=LAST_STEPS).x
     return _chi_square(problem, x) - _chi_square(best.problem, best.x), x
 

@@ -30,6 +30,7 @@ from creepkit.inverse.information_criteria import (
     aicc_penalty,
     bic_penalty,
     criterion_weights,
+    determined_parameters,
 )
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.presentation import Presentable, present
@@ -45,17 +46,12 @@ if TYPE_CHECKING:
     from creepkit.records import History, LawWithValues
 
 
-CRITERIA = ("bic", "aicc", "hold-out")
-
-
-Criterion = Literal["bic", "aicc", "hold-out"]
+Criterion = Literal["bic", "aicc"]
 
 
 @dataclass(frozen=True)
 class RankedLaw:
-    """One law in a ranking: criterion less the best, its weight, and its chi-square under the covariance
-    of the best (NaN where laws were compared by held out data).
-    """
+    """One law in a ranking: criterion less the best, weight, and chi-square under the covariance of the best."""
 
     fit: Identification
     excess: float
@@ -233,7 +229,8 @@ def rank(
     independent_frames, chi_square = common.independent_frames, common.chi_square
     penalty = bic_penalty if criterion == "bic" else aicc_penalty
     score = chi_square + common.log_determinant
-    score = score + [penalty(determined_parameter_count(fit), independent_frames) for fit in fits]
+    counts = [determined_parameters(fit.linear_problem.residuals, fit.u.size) for fit in fits]
+    score = score + [penalty(count, independent_frames) for count in counts]
     ranking = ranking_from_scores(
         fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed
     )
@@ -277,15 +274,3 @@ def ranking_from_scores(
     order = np.argsort(excess, kind="stable")
     laws = tuple(RankedLaw(fits[k], float(excess[k]), float(weight[k]), float(chi_squares[k])) for k in order)
     return Ranking(laws, criterion, float(independent_frames), MappingProxyType(dict(failed or {})))
-
-
-def determined_parameter_count(fit: Identification) -> int:
-    """How many parameters the data determine: the others have the variance of their bounds, uncorrelated."""
-    covariance = fit.by_tests_alone.covariance
-    variances = np.diag(covariance)
-    is_uncorrelated = (covariance != 0).sum(axis=1) == 1
-    return int(
-        (
-            ~(is_uncorrelated & np.isclose(variances, np.ptp(fit.law.internal_bounds, axis=0) ** 2 / 12.0, rtol=1e-6))
-        ).sum()
-    )

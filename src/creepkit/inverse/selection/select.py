@@ -1,7 +1,6 @@
 """select: several laws are identified from the same histories and ranked.
 
-Candidates are laws and sums of two of them. Criteria are BIC, AICc and the predictive likelihood of the
-end of every history, given a fit to its beginning, under the covariance of the best law (see inverse.cross_validation).
+Candidates are laws and sums of two of them.
 """
 
 from __future__ import annotations
@@ -10,19 +9,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-import numpy as np
-
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
-from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import describing, identify
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
-from creepkit.inverse.selection.discrimination import under_common_covariance
-from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, challenged, rank, ranking_from_scores
+from creepkit.inverse.selection.ranking import Criterion, Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Predictor
@@ -56,13 +51,11 @@ def select(
 
     sums : also sums of two candidates: True, False, or None for sums of the best law where it does not explain the
         tests to their noise, and then richer registered laws, at most settings.further_laws of both together.
-    by : "bic", "aicc", or "hold-out" (the last 30 % of each history predicted from a refit to the first 70 %).
+    by : "bic" or "aicc".
     A law that cannot be identified is named in `failed`; FitError if none can.
     """
     asked = settings or IdentificationSettings()
     settings = replace(asked, weights="likelihood")
-    if by not in CRITERIA:
-        raise FitError(f"select(by={by!r}) is not known; allowed are {', '.join(CRITERIA)}")
     if not candidates:
         raise FitError("there are no candidate laws; give at least one, such as ck.law('norton')")
     settings = common_rupture_times(candidates, settings)
@@ -79,13 +72,7 @@ def select(
     if not fits:
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
-    if by == "hold-out":
-        noise_model = fits[under_common_covariance(fits).reference_law].noise_model
-        scores = [cross_validate(fit, by="time").predictive_deviance(noise_model) for fit in fits]
-        ranking = ranking_from_scores(fits, np.array(scores), by, independent_frames=float("nan"), failed=failed)
-        ranking = challenged(ranking)
-    else:
-        ranking = rank(fits, by, failed)
+    ranking = rank(fits, by, failed)
     if asked.weights != "likelihood":
         shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
         laws = tuple(replace(one, fit=describing(one.fit)) if id(one) in shown else one for one in ranking.laws)

@@ -29,13 +29,15 @@ class FitStatistics:
 class Sparsity(Presentable, text="reports.inference:sparsity_text"):
     """How a sum was reduced; the terms are those of `law`, the sum.
 
-    kept_terms, dropped_terms : of the sum; exponents_off : exponents switched off, where BIC did not rise by it.
+    penalty : "l2" or "subsets". kept_terms, dropped_terms : of the sum.
+    exponents_off : exponents switched off, where BIC did not rise by it.
     contributions, contributions_after_refit : {term: contribution} of the whole sum, and of what was kept.
     full, reduced : statistics of the sum and of the reduced law under one covariance.
     observations : measured values, N of BIC.
     """
 
     law: str
+    penalty: str
     kept_terms: TermNames
     dropped_terms: TermNames
     exponents_off: tuple[str, ...]

@@ -1,8 +1,14 @@
-"""Term selection: sets of terms of a sum are fitted to the same tests, and the one of lowest BIC is kept.
+"""Term selection: which terms of a sum the tests need, by BIC among its subsets or by the L2 norm of contributions.
 
-All are compared under the covariance of the whole sum, so that chi-squares can be subtracted. That covariance contains
-the correlation between frames; each frame then counts as one in BIC. Exponents that can be off are switched off where
-BIC does not rise by it.
+"subsets" fits the sets of terms and keeps the one of lowest BIC. "l2" is the sparsity of the paper: L2_STRENGTH times
+the sum of c_i^2 is added to half the chi-square, with c_i the contribution of term i; terms that contribute less than
+LEAST_CONTRIBUTION at the minimum are dropped, and come back, the largest first, until BIC is not above that of the
+sum. As contributions add up to about one, their squares are least at equal shares: it makes the values of a sum
+determinate, and draws a term that the data leave free to the size of the others.
+
+All laws are compared under the covariance of the whole sum, so that chi-squares can be subtracted. That covariance
+contains the correlation between frames; each frame then counts as one in BIC. Exponents that can be off are switched
+off where BIC does not rise by it.
 
 How much a term matters is its contribution over the stresses, strains and times of the tests,
 
@@ -19,6 +25,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 from scipy.special import softmax
@@ -55,11 +62,20 @@ INITIAL_FRACTION = 0.05
 """Share of the rate with which a further term begins beside fitted ones."""
 
 
+L2_STRENGTH = 24.0
+"""Of the L2 norm: half the 48 frames of a bulge test of 12 h; a norm larger by one costs a chi-square of 48."""
+
+
+LEAST_CONTRIBUTION = 0.05
+"""A term that contributes less is dropped."""
+
+
 def identify_sparse(
     law: CreepLaw,
     histories: Sequence[History],
     using: Predictor | Mapping[str, Predictor],
     *,
+    penalty: Literal["l2", "subsets"] = "subsets",
     search: GlobalSearch | None = None,
     through: Predictor | None = None,
     settings: IdentificationSettings | None = None,
@@ -78,20 +94,23 @@ def identify_sparse(
     full = identify(law, histories, using, search=search, through=through, **how)  # type: ignore[arg-type]
     problem, screening = full.least_squares_problem, through_for_law(through, law)
     terms = TermSets(problem if screening is None else problem.with_predictor(screening), full.x)
-    chosen, count = terms.lowest_bic(), full.u.size
+    chosen = terms.lowest_bic() if penalty == "subsets" else terms.of_least_norm()
     u, e = np.split(chosen.minimum.x, [chosen.problem.parameter_count])
     nuisances = [replace(n, value=float(value)) for n, value in zip(full.nuisances, e, strict=True)]
     start = StartingEstimate(u, nuisances, full.reference)
     assert full.predictor is not None
-    fit = identify(chosen.law, full.histories, full.predictor, settings=full.settings, start=start, progress=progress)
+    fit = identify(
+        chosen.problem.law, full.histories, full.predictor, settings=full.settings, start=start, progress=progress
+    )
     whole = terms.whole(chosen)
     record = Sparsity(
         law=law.name,
+        penalty=penalty,
         kept_terms=chosen.kept_terms,
         dropped_terms=tuple(label for label in law.terms if label not in chosen.kept_terms),
         exponents_off=chosen.exponents_off,
-        contributions=contributions(whole.problem, whole.minimum.x[:count]),
-        contributions_after_refit=contributions(chosen.problem, u),
+        contributions=TermContributions.of_problem(whole.problem).by_term(whole.minimum.x),
+        contributions_after_refit=TermContributions.of_problem(chosen.problem).by_term(chosen.minimum.x),
         full=whole.statistics(full),
         reduced=chosen.statistics(fit),
         observations=problem.observations.count,
@@ -108,14 +127,9 @@ class FittedTerms:
     exponents_off: tuple[str, ...] = ()
 
     @property
-    def law(self) -> CreepLaw:
-        """The law."""
-        return self.problem.law
-
-    @property
     def kept_terms(self) -> TermNames:
         """Its terms, in the order of the sum."""
-        return tuple(self.law.terms)
+        return tuple(self.problem.law.terms)
 
     @cached_property
     def parameter_count(self) -> int:
@@ -133,8 +147,7 @@ class FittedTerms:
 
     def without(self, exponent: str, off: float) -> FittedTerms:
         """The same with an exponent off, fitted from here."""
-        law = self.law.fix(**{exponent: off})
-        problem, x = _of_terms(self.problem, law, self.minimum.x)
+        problem, x = _of_terms(self.problem, self.problem.law.fix(**{exponent: off}), self.minimum.x)
         return FittedTerms(problem, problem.minimise(x, tolerances=TOLERANCES), (*self.exponents_off, exponent))
 
 
@@ -150,7 +163,8 @@ class TermSets:
         if terms not in self._fitted:
             best = self._best_of(terms, [self.fitted((label,)) for label in terms] if len(terms) > 1 else [])
             while True:
-                simpler = [best.without(best.law.names[k], off) for k, off in switchable_exponents(best.law)]
+                law = best.problem.law
+                simpler = [best.without(law.names[k], off) for k, off in switchable_exponents(law)]
                 lowest = min(simpler, key=lambda one: one.bic, default=best)
                 if lowest is best or lowest.bic > best.bic:
                     break
@@ -177,34 +191,51 @@ class TermSets:
                 return best
             best = lowest
 
+    def of_least_norm(self) -> FittedTerms:
+        """The terms that L2 leaves; those come back, the largest first, without which BIC is above that of the sum."""
+        single = [self.fitted((label,)) for label in self.terms]
+        norm = ContributionNorm(TermContributions.of_problem(self.problem))
+        starts = self._starts(self.problem, self.x, single)
+        ends = [self.problem.minimise(start, additional=norm, tolerances=TOLERANCES) for start in starts]
+        contributions = norm.contributions.by_term(min(ends, key=lambda end: end.cost).x)
+        ordered = sorted(self.terms, key=lambda label: -contributions[label])
+        count = max(sum(share >= LEAST_CONTRIBUTION for share in contributions.values()), 1)
+        while True:
+            kept = self.fitted(tuple(label for label in self.terms if label in ordered[:count]))
+            if count == len(self.terms) or kept.bic <= self.whole(kept).bic:
+                return kept
+            count += 1
+
     def _penalty(self, terms: TermNames) -> float:
         """Of BIC, on these terms with all exponents off."""
-        law = self._law(terms)
+        law = self.problem.law.only(*terms)
         return bic_penalty(len(law.params) - len(switchable_exponents(law)), self.problem.observations.count)
-
-    def _law(self, terms: TermNames) -> CreepLaw:
-        return self.problem.law if terms == self.terms else self.problem.law.only(*terms)
 
     def _best_of(self, terms: TermNames, parts: Sequence[FittedTerms]) -> FittedTerms:
         """The lowest minimum of these terms: from what the whole sum says of them, and from laws of some of them.
 
         Of one term the middle of its bounds is a start too, with the rate of the whole sum.
         """
-        problem, x = _of_terms(self.problem, self._law(terms), self.x)
-        starts, rates, law = [x], list(problem.coordinates.term_rates), problem.law
+        problem, x = _of_terms(self.problem, self.problem.law.only(*terms), self.x)
+        starts = self._starts(problem, x, parts)
         if len(terms) == 1:
             centre = np.concatenate([problem.bounds.centre[: problem.parameter_count], x[problem.parameter_count :]])
             starts.append(_with_total_rate(problem, centre, _log_total_rate(problem, x)))
+        minima = (problem.minimise(start, tolerances=TOLERANCES) for start in starts)
+        return FittedTerms(problem, min(minima, key=lambda minimum: minimum.cost))
+
+    def _starts(self, problem: LeastSquaresProblem, x: Floats, parts: Sequence[FittedTerms]) -> list[Floats]:
+        """x (unknowns,), and where laws of some of the terms end, the others beside them with a small share."""
+        starts, rates, law = [x], list(problem.coordinates.term_rates), problem.law
         for part in parts:
             u, e = np.split(np.array(part.minimum.x), [part.problem.parameter_count])
             start = np.concatenate([x[: problem.parameter_count], e])
             start[rates] = _log_total_rate(part.problem, part.minimum.x) + np.log(INITIAL_FRACTION)
             for k, off in switchable_exponents(law):
                 start[k] = off
-            start[[law.names.index(name) for name in part.law.names]] = u
+            start[[law.names.index(name) for name in part.problem.law.names]] = u
             starts.append(problem.bounds.clip(start))
-        minima = (problem.minimise(start, tolerances=TOLERANCES) for start in starts)
-        return FittedTerms(problem, min(minima, key=lambda minimum: minimum.cost))
+        return starts
 
 
 def switchable_exponents(law: CreepLaw) -> list[tuple[int, float]]:
@@ -254,31 +285,68 @@ LOG_ZERO_RATE = -1e30
 """ln of a rate of zero."""
 
 
-def contributions(problem: LeastSquaresProblem, u: Floats) -> dict[str, float]:
-    """{term: contribution} of the law of a problem over its tests, at u (parameters,)."""
-    return term_contributions(problem.coordinates, u, problem.histories, problem.predictor)
+DIFFERENCE_STEP = 1e-6
+"""Of differences, in conditioned coordinates: the ln of rates is smooth in them."""
 
 
-def term_contributions(
-    coordinates: Coordinates, u: Floats, histories: Sequence[History], predictor: Predictor | None = None
-) -> dict[str, float]:
-    """{term: contribution} of a law at u (parameters,), conditioned coordinates; tests weigh alike, whatever frames."""
-    tests = [_points_of_test(history, predictor) for history in histories]
-    loaded = [points for points in tests if points.shape[1]]
-    if not loaded:
-        raise FitError("no test is ever under load: terms of a law cannot be weighed against one another")
-    weight = np.concatenate([np.full(p.shape[1], 1.0 / (len(loaded) * p.shape[1])) for p in loaded])
-    stress, strain, time, temperature = np.concatenate(loaded, axis=1)
-    law, theta = coordinates.law, coordinates.theta(u)
-    log_rates = np.empty((stress.size, len(law.terms)))
-    for k, label in enumerate(law.terms):
-        term = law.only(label)
-        states = [state.initial for state in term.states.values()]
-        columns = [theta[law.names.index(name)] for name in term.names]
-        point = (stress, strain, time, temperature, stress, stress / 3.0)
-        log_rates[:, k] = lower(term, "numpy").internal_log_rate(*point, *states, *columns)
-    shares = softmax(np.maximum(np.nan_to_num(log_rates, nan=LOG_ZERO_RATE), LOG_ZERO_RATE), axis=1)
-    return dict(zip(law.terms, np.sqrt(weight @ shares**2).tolist(), strict=True))
+class TermContributions:
+    """Contributions of the terms of a law, by its coordinates, over tests, which weigh alike whatever frames they have.
+
+    u : (parameters or more,) conditioned coordinates, in all methods.
+    """
+
+    def __init__(
+        self, coordinates: Coordinates, histories: Sequence[History], predictor: Predictor | None = None
+    ) -> None:
+        self.coordinates, self.law = coordinates, coordinates.law
+        loaded = [p for history in histories if (p := _points_of_test(history, predictor)).shape[1]]
+        if not loaded:
+            raise FitError("no test is ever under load: terms of a law cannot be weighed against one another")
+        self.weight = np.concatenate([np.full(p.shape[1], 1.0 / (len(loaded) * p.shape[1])) for p in loaded])
+        stress, *others = np.concatenate(loaded, axis=1)
+        self.point = (stress, *others, stress, stress / 3.0)
+        self.terms = [(law, lower(law, "numpy")) for law in map(self.law.only, self.law.terms)]
+
+    @classmethod
+    def of_problem(cls, problem: LeastSquaresProblem) -> TermContributions:
+        """Those of the law of a problem over its tests."""
+        return cls(problem.coordinates, problem.histories, problem.predictor)
+
+    def log_rates(self, u: Floats) -> Floats:
+        """(points, terms) ln of the rate of each term."""
+        theta = self.coordinates.theta(u[: len(self.law.params)])
+        log_rates = np.empty((self.weight.size, len(self.terms)))
+        for k, (term, kernel) in enumerate(self.terms):
+            states = [state.initial for state in term.states.values()]
+            columns = [theta[self.law.names.index(name)] for name in term.names]
+            log_rates[:, k] = kernel.internal_log_rate(*self.point, *states, *columns)
+        return log_rates
+
+    def values(self, u: Floats) -> Floats:
+        """(terms,) c."""
+        shares = softmax(np.maximum(np.nan_to_num(self.log_rates(u), nan=LOG_ZERO_RATE), LOG_ZERO_RATE), axis=1)
+        return np.asarray(np.sqrt(self.weight @ shares**2))
+
+    def by_term(self, u: Floats) -> dict[str, float]:
+        """{term: c}."""
+        return dict(zip(self.law.terms, self.values(u).tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class ContributionNorm:
+    """L2_STRENGTH x sum c_i^2 as residuals, half the sum of their squares; see search.AdditionalResiduals."""
+
+    contributions: TermContributions
+
+    def residuals(self, x: Floats) -> Floats:
+        """(terms,) at x (unknowns,)."""
+        return np.asarray(np.sqrt(2 * L2_STRENGTH) * self.contributions.values(x))
+
+    def jacobian(self, x: Floats) -> Floats:
+        """(terms, unknowns) derivatives at x (unknowns,), by central differences."""
+        steps = DIFFERENCE_STEP * np.eye(x.size)[: len(self.contributions.law.params)]
+        columns = [(self.residuals(x + step) - self.residuals(x - step)) / (2 * DIFFERENCE_STEP) for step in steps]
+        return np.pad(np.array(columns).T, ((0, 0), (0, x.size - len(steps))))
 
 
 def _points_of_test(history: History, predictor: Predictor | None) -> Floats:

@@ -8,8 +8,8 @@ from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.identify import identify
 from creepkit.inverse.initial_search import search_problem
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.global_search import SearchTrace, refined
-from creepkit.inverse.search.multistart import MultiStart, distinct, screened_starts
+from creepkit.inverse.search.global_search import refined
+from creepkit.inverse.search.multistart import screened_starts
 from creepkit.inverse.search.particle_swarm import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import History
@@ -46,13 +46,6 @@ def test_least_squares_finishes_what_the_swarm_leaves():
     assert fine.trace.refined_cost == fine.minima[0].cost
 
 
-def test_refined_minima_differ_and_come_best_first():
-    found = ParticleSwarm(refined_candidates=4).minima(Known(rastrigin, cube(3, 5.12))).minima
-    assert [m.cost for m in found] == sorted(m.cost for m in found)
-    assert len(found) == 4
-    assert len(np.unique(np.array([m.x for m in found]).round(2), axis=0)) > 1
-
-
 def test_an_iteration_is_one_prediction_and_a_seed_gives_the_same_answer_twice():
     runs, search = [], ParticleSwarm(12, 25)
     for seed in (7, 7, 8):
@@ -81,23 +74,6 @@ def test_no_step_of_a_particle_is_longer_than_the_limit(velocity):
     x = (np.array(landscape.seen) - landscape.bounds.lower) / landscape.bounds.width
     steps = np.abs(np.diff(x, axis=0))
     assert 0.9 * velocity < steps.max() <= velocity * (1 + 1e-12)
-
-
-def test_the_swarm_starts_from_a_sobol_set():
-    """One point in each of 64 equal boxes of a plane: balance of a scrambled Sobol set."""
-    landscape = Known(quadratic, cube(2))
-    ParticleSwarm(particles=64, iterations=1, refined_candidates=0).minima(landscape)
-    counts, *_ = np.histogram2d(*landscape.seen[0].T, bins=8, range=[[-5, 5], [-5, 5]])
-    assert (counts == 1).all()
-
-
-def test_a_trace_keeps_the_lowest_so_far_what_was_asked_and_the_quartiles():
-    costs = [np.array([9.0, 5.0, 7.0]), np.array([6.0, 8.0, 10.0]), np.array([3.0, 4.0, 5.0, 6.0, 7.0])]
-    trace = SearchTrace.from_costs("search", costs)
-    np.testing.assert_array_equal(trace.best_cost, [5, 5, 3])
-    np.testing.assert_array_equal(trace.evaluations, [3, 6, 11])
-    np.testing.assert_array_equal(trace.quartiles, [[6, 7, 8], [7, 8, 9], [4, 5, 6]])
-    assert len(trace) == 3
 
 
 # ---- multi-start -----------------------------------------------------------------------------------------------------
@@ -143,12 +119,6 @@ def test_one_prediction_for_all_starts_is_as_good_as_one_each():
         alone = view.residuals(u)
         assert values[k] == pytest.approx(alone.values, rel=1e-6, abs=1e-9)
         assert jacobian[k] == pytest.approx(alone.jacobian, rel=1e-4, abs=1e-6)
-
-
-def test_minima_that_predict_the_same_are_one():
-    view = landscape(ck.law("hyperbolic-sine"), {"A": 2e-9, "n": 1.7, "B": 45.0})
-    found = MultiStart().minima(view).minima
-    assert len(distinct(found, view.bounds)) <= 2
 
 
 # ---- bulge -----------------------------------------------------------------------------------------------------------

@@ -11,10 +11,12 @@ from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.result import Sparsity
 from creepkit.inverse.sparsity.term_selection import (
+    L2_STRENGTH,
     STRESS_FACTORS,
+    ContributionNorm,
+    TermContributions,
     identify_sparse,
     switchable_exponents,
-    term_contributions,
 )
 from creepkit.language import arrhenius
 from creepkit.laws.combined import COMBINED
@@ -36,7 +38,7 @@ def shares(law, tests, **values):
     """Contributions of the terms of a law."""
     coordinates = Coordinates(law, ReferencePoint.from_histories(tests))
     theta = np.array([p.to_internal(values[name]) for name, p in law.table.items()])
-    return [*term_contributions(coordinates, coordinates.u(theta), tests).values()]
+    return TermContributions(coordinates, tests).values(coordinates.u(theta))
 
 
 def test_contributions_have_closed_forms():
@@ -63,6 +65,24 @@ def test_contributions_have_closed_forms():
 
     extreme = {**COMBINED.center(), "A_1": 1e-5, "n_1": 8.0, "B": 1.0}
     assert shares(COMBINED, [bar(400.0)], **extreme) == pytest.approx([1.0, 0.0, 0.0], abs=1e-12)
+
+
+def test_the_norm_is_what_least_squares_see_with_the_derivatives_of_a_closed_form():
+    """d share_i / d ln A_j = share_i (delta_ij - share_j); A_j moves with its log rate at the reference."""
+    law, tests = NORTON + NORTON, [bar(40.0)]
+    coordinates = Coordinates(law, ReferencePoint.from_histories(tests))
+    values = {"A_1": 2e-13, "n_1": 3.0, "A_2": 1e-16, "n_2": 5.0}
+    x = np.append(coordinates.u(np.array([p.to_internal(values[name]) for name, p in law.table.items()])), 0.02)
+    norm, stress = ContributionNorm(TermContributions(coordinates, tests)), 40.0 * np.array(STRESS_FACTORS)
+    rates = np.stack([2e-13 * stress**3, 1e-16 * stress**5])
+    share = rates / rates.sum(axis=0)
+    c = np.sqrt((share**2).mean(axis=1))
+    assert 0.5 * (norm.residuals(x) ** 2).sum() == pytest.approx(L2_STRENGTH * (c**2).sum(), rel=1e-12)
+    slopes = share[:, None] * (np.eye(2)[:, :, None] - share[None])
+    wanted = (share[:, None] * slopes).mean(axis=2) / c[:, None]
+    found = norm.jacobian(x)[:, [law.names.index("A_1"), law.names.index("A_2")]]
+    assert found == pytest.approx(np.sqrt(2 * L2_STRENGTH) * wanted, abs=1e-6)
+    assert (norm.jacobian(x)[:, -1] == 0).all()
 
 
 def test_exponents_that_can_be_off_are_those_of_memory():
@@ -97,6 +117,14 @@ def test_a_planted_single_law_is_found(reduced):
         assert estimate.value == pytest.approx(truth, abs=4 * (estimate.high - estimate.low) / 3.92)
     assert reduced.sparsity.bic_difference < 0
     assert reduced.sparsity.p_value > 0.01
+
+
+def test_the_norm_of_the_paper_leaves_the_terms_of_a_planted_law(reduced):
+    """Where terms come back until BIC is not above that of the sum, the planted one is among them."""
+    fit = identify_sparse(COMBINED, reduced.histories, EXACT, penalty="l2", settings=QUICK)
+    assert STRAIN in fit.sparsity.kept_terms
+    assert fit.sparsity.bic_difference <= 0
+    assert fit.values["n_2"] == pytest.approx(3.5, abs=0.5)
 
 
 def test_memory_that_is_not_there_is_switched_off():
