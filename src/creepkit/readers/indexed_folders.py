@@ -1,7 +1,8 @@
 """Folders with an index, one line a test, beside the frames: in one file for all tests, or in one file a test.
 
-A laboratory's layout is a declaration of IndexedFolderReader; INDEXED_TABLE and INDEXED_FILES are two of them. Columns of
-the index that are no condition known by name become labels, as they stand; one that is nearly such a name is an error.
+A laboratory's layout is a declaration of IndexedFolderReader; INDEXED_TABLE and INDEXED_FILES are two of them. Columns
+of the index that are no condition known by name become labels, as they stand; one that is nearly such a name is an
+error.
 """
 
 from __future__ import annotations
