@@ -92,7 +92,8 @@ class CovarianceFactor:
     def roots(self) -> Floats:
         """(tests, observations, observations) R of each test, with B = R R'."""
         tests, count = self.series.shape
-        return np.linalg.inv(self._transformed(np.tile(np.eye(count), (tests, 1, 1)), inverse=False)[0])
+        whitening = self._transformed(np.tile(np.eye(count), (tests, 1, 1)), inverse=False)[0]
+        return np.asarray(np.linalg.inv(whitening), float)
 
     def _transformed(self, values: Floats, *, inverse: bool) -> tuple[Floats, float]:
         series, rows = self.series, self.series.rows(values)
