@@ -113,6 +113,7 @@ class Adequacy:
         many frames it has, where these are too few to show the noise.
     unpredicted : tests of which nothing, or not every reading, is predicted: a law is never judged to explain them.
     contradicting : minimum rates and rupture times that contradict one another by the law, beyond their own scatter.
+    outlying : one test alone that the others did not lead to expect, where nothing rejects the law: a caution.
     """
 
     verdict: AdequacyVerdict
@@ -133,6 +134,7 @@ class Adequacy:
     smallest_p_value: float = float("nan")
     unpredicted: tuple[str, ...] = ()
     contradicting: ContradictingValues | None = None
+    outlying: Explanation | None = None
 
     @property
     def scatters_too_much(self) -> bool:
@@ -161,6 +163,11 @@ class Adequacy:
     def lies_in_tests(self) -> bool:
         """Whether what is left is explained by one test or by two groups of tests, and not by another law."""
         return self.is_explained and not self.explanations[0].is_of_law
+
+    @property
+    def in_tests(self) -> Explanation | None:
+        """What lies in the tests and is to be checked: the likeliest explanation, or the test that stands out."""
+        return self.explanations[0] if self.lies_in_tests else self.outlying
 
     @property
     def is_explained(self) -> bool:
@@ -226,12 +233,8 @@ class Adequacy:
         count = len(self.outputs) + 1
         if count == 2:
             return p_value_text(self.p_value)
-        adjusted = f"{p_value_text(self.p_value)} adjusted for {count} comparisons (Bonferroni)"
-        return (
-            adjusted
-            if np.isnan(self.smallest_p_value)
-            else f"smallest {p_value_text(self.smallest_p_value)}, {adjusted}"
-        )
+        smallest = "" if np.isnan(self.smallest_p_value) else f"smallest {p_value_text(self.smallest_p_value)}, "
+        return f"{smallest}{p_value_text(self.p_value)} adjusted for {count} comparisons (Bonferroni)"
 
     @property
     def verdict_text(self) -> str:

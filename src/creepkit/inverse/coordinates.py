@@ -199,7 +199,7 @@ class Coordinates:
         return u
 
     def within_bounds(self, u: Floats) -> Floats:
-        """(parameters,) u itself, or where values lie beyond their bounds the nearest ones within, at the rates of u.
+        """u (parameters,) itself, or where values lie beyond their bounds the nearest ones within, at the rates of u.
 
         Coefficients follow from the rates, so that no value moves by itself: what u says and what the values say agree.
         """

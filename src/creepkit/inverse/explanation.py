@@ -40,13 +40,15 @@ class Explanation:
 
     kind : what changes. tests : names of the tests that it concerns; of two groups those of the smaller.
     size, sd : of ln of the factor on their rates, or what the stress exponent, or the activation energy in J/mol,
-        changes by over the tests, and its standard deviation. odds : ln of the odds against the law as it is.
+        changes by over the tests, and its standard deviation. odds : ln of the odds against the law as it is; 0 of a
+        test that stands out and is no explanation.
     ends : the exponent at the lowest and the highest stress, or the energy in J/mol at the lowest and the highest
         temperature; at : these stresses, MPa, or temperatures, K.
     errors : of one test, errors of what is stated of it, any one of which would make it: {"load", "strain", "time":
         true value over that stated, "temperature": true less stated, K}.
     factors : on the rates of the single tests. near : others that explain nearly as much as the last of them.
-    condition, temperature : of the one test, in words and in K. label : by which groups differ, such as "heat B".
+    condition, temperature : of the one test, in words and in K. label, beside : of groups that the tests state, what
+        the tests of the one are, such as "heat B", and those of the other, such as "heat A", "" where of several.
     without : {parameter: (value, low, high)}, 95 % intervals in the law's units of the tests without the one.
     """
 
@@ -63,6 +65,7 @@ class Explanation:
     condition: str = ""
     temperature: float = 0.0
     label: str = ""
+    beside: str = ""
     without: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
     @property
@@ -77,7 +80,7 @@ class Explanation:
             verb = "do" if len(self.tests) > 1 else "does"
             return f"{self._named_tests} {verb} not agree with the others"
         if self.kind == "two groups":
-            return "the tests are of two groups"
+            return self._stated_groups or "the tests are of two groups"
         return f"the {self.kind} {self._change}"
 
     @property
@@ -89,8 +92,9 @@ class Explanation:
         if self.kind == "two groups":
             named = ", ".join(self.tests[:MOST_NAMED])
             more = f" and {len(self.tests) - MOST_NAMED} more" if len(self.tests) > MOST_NAMED else ""
-            whose, question = (f"tests of {self.label}", "") if self.label else ("tests", ": are they of one material?")
-            return f"{whose} ({named}{more}) creep {speed} as the others at equal conditions{question}"
+            if self.label:
+                return f"{self._stated_groups} at equal conditions ({self.label}: {named}{more})"
+            return f"tests ({named}{more}) creep {speed} as the others at equal conditions: are they of one material?"
         if len(self.tests) > 1:
             factors = " and ".join(f"{factor:.3g}" for factor in self.factors)
             return f"{self._named_tests} creep {factors} times as fast as the others say{self._values_without}"
@@ -99,6 +103,40 @@ class Explanation:
         near = f" (or '{self.near[0]}' is to blame)" if self.near else ""
         found = f"{self._named_tests} ({self.condition}) creeps {speed} as the others say{near}"
         return f"{found}{cause}{self._values_without}"
+
+    @property
+    def caution(self) -> str:
+        """Of one test that stands out, its size as a rate and as what would make it, without a full stop."""
+        found = f"{self.tests[0]} creeps {np.exp(self.size):.2g} times as fast as the others lead to expect"
+        kelvin = self.errors.get("temperature", 0.0)
+        error = f"; {abs(kelvin):.2g} K {'less' if kelvin < 0 else 'more'} than stated would do it"
+        return found + error * self.may_be_temperature
+
+    @property
+    def may_be_temperature(self) -> bool:
+        """Whether an error of temperature of a usual size would make it."""
+        return abs(self.errors.get("temperature", np.inf)) <= LARGEST_KELVIN
+
+    @property
+    def next_step(self) -> str:
+        """What to do about it where it lies in the tests, without a full stop."""
+        if self.label:
+            key, _, value = self.label.partition(" ")
+            return f'identify each {key} apart (group_by = "{key}" in a study, or --only "{key}={value}")'
+        if self.kind == "one test" and not self.odds > 0.0:
+            return f"check the {'temperature' if self.may_be_temperature else 'record'} of {self.tests[0]}"
+        what = "the two groups apart" if self.kind == "two groups" else f"{self._named_tests} again"
+        return f"check {what} (label, unit, thermocouple), then identify without"
+
+    @property
+    def _stated_groups(self) -> str:
+        """How one group that the tests state creeps beside the other, the faster first; "" of others."""
+        if not self.label:
+            return ""
+        factor, first, other = float(np.exp(self.size)), self.label, self.beside or "the others"
+        if factor < 1.0 and self.beside:
+            factor, first, other = 1.0 / factor, other, first
+        return f"{first} creeps {factor:.2g} times as fast as {other}" + ("" if self.beside else " do")
 
     @property
     def _named_tests(self) -> str:

@@ -118,6 +118,8 @@ def identify(
             return fit
         if automatic and misses_shape(fit):
             return describing(fit)
+        if settings.weights == "noise" and start is None:
+            fit = _with_rates_of_tests(fit)
         fit = with_samples(fit, through_for_law(through, law)) if needs_samples(fit) else fit
     return _without_one_test(fit)
 
@@ -141,6 +143,22 @@ def describing(fit: Identification) -> Identification:
     values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
     notes = dict.fromkeys((*values.notes, *(note for note in fit.notes if "were not used" in note)))
     return replace(values, notes=tuple(notes), provenance={**fit.provenance, **values.provenance})
+
+
+def _with_rates_of_tests(fit: Identification) -> Identification:
+    """An identification by noise that misses the shape of curves, by likelihood where the tests explain that.
+
+    Least squares bend the curves of a law towards tests that creep at rates of their own; the likelihood knows these.
+    """
+    adequacy = fit.adequacy
+    if adequacy is None or not adequacy.explanations or adequacy.explanations[0].is_of_law or adequacy.is_explained:
+        return fit
+    start, settings = StartingEstimate.from_identification(fit, values_only=True), fit.settings
+    settings, predictor = replace(settings, weights="likelihood"), fit.least_squares_problem.predictor
+    again = identify(fit.law, fit.histories, predictor, settings=settings, start=start)
+    search = {key: value for key, value in fit.provenance.items() if key.startswith("search")}
+    explained = again.adequacy is not None and again.adequacy.lies_in_tests
+    return replace(again, provenance={**again.provenance, **search}) if explained else fit
 
 
 def _without_one_test(fit: Identification) -> Identification:
@@ -337,6 +355,7 @@ def _reported(
     judge = Judge(problem, noise_model, estimator.predictor_errors, histories)
     adequacy = judge.adequacy_with_remedies(judged, unmodelled, rates.found).with_unpredicted(unpredicted)
     adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
+    outlying = None if adequacy.rejects else rates.outlying
     estimates = parameter_estimates(law, coordinates, u, law_covariance)
     return Identification(
         law=law,
@@ -360,7 +379,7 @@ def _reported(
         error_covariance=error_covariance if problem.settings.included_errors else None,
         nuisances=nuisance_estimates,
         converged=best.converged,
-        adequacy=replace(adequacy, implausible=implausible),
+        adequacy=replace(adequacy, implausible=implausible, outlying=outlying),
         numerical_error=numerical_error,
         unmodelled=unmodelled,
         left_out=rates.left_out,

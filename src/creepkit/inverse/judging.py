@@ -201,12 +201,8 @@ class Judge:
 
     def _largest_deviation(self, judged: JudgedResiduals) -> LargestDeviation | None:
         """Where the deviation is largest over the known noise."""
-        observations, known, deviation, histories = (
-            self.problem.observations,
-            judged.known,
-            judged.deviation,
-            self.histories,
-        )
+        observations, histories = self.problem.observations, self.histories
+        known, deviation = judged.known, judged.deviation
         series = [
             (test, name, index)
             for test in range(len(histories))

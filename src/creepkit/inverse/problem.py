@@ -403,7 +403,7 @@ class LeastSquaresProblem:
         return self.bounds.clip(np.concatenate([u, x[self.parameter_count :]]))
 
     def constrained(self, start: Floats, target: Floats, free: Bools, covariance: Floats) -> Floats:
-        """The point within the bounds and constraints of the law that is least far from another.
+        """(unknowns,) the point within the bounds and constraints of the law that is least far from another.
 
         start, target : (unknowns,) from within, and what distances are taken from. free : (unknowns,) what may move;
         covariance : (free, free) of its estimate, by which distances are measured. It costs no prediction.

@@ -14,6 +14,9 @@ all explanations of twelve tests cost a few hundredths of a second and no simula
 
 Occam's factor is in the evidence: a wide prior that the tests do not need costs. What an explanation was chosen from is
 counted too: one of n tests by ln n, a split into two groups by the ln of how many splits there are.
+
+A changing activation energy has to show beside usual errors of temperature, the same in all tests of one temperature.
+One test alone that the others do not lead to expect, by Student's t, is a caution where no explanation has the odds.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_condition
+from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
 from creepkit.inverse.uncertainty.rate_scatter import SMALLEST_FACTOR, Evidence, rate_scatter, redundant_rates
 from creepkit.inverse.variance_components import LinearisedProblem
@@ -50,6 +54,14 @@ DECISIVE_ODDS = float(np.log(6.0))
 
 ENERGY_ODDS = float(np.log(0.3))
 """ln of the odds of a changing activation energy before the tests were seen: stress exponents change more often."""
+
+
+LARGEST_CHANCE = 0.003
+"""That scatter and usual errors of temperature make a change of the activation energy that is stated."""
+
+
+OUTLYING_CHANCE = 0.05
+"""That of any of the tests standing out so far by scatter (Bonferroni), below which one is a caution."""
 
 
 STEP = 0.01
@@ -116,6 +128,17 @@ class RateExplanations:
         return tuple(sorted((e for e in found if e.odds > DECISIVE_ODDS), key=lambda e: -e.odds))
 
     @cached_property
+    def outlying(self) -> Explanation | None:
+        """The one test alone that the others do not lead to expect, where nothing explains the rates."""
+        if self.redundant < FEWEST_CONTRASTS or self.found:
+            return None
+        chance = len(self._alone) * np.array([one.p_value[0] for one in self._alone])
+        far = np.flatnonzero(chance < OUTLYING_CHANCE)
+        if far.size != 1 or abs(self._alone[far[0]].mean[0]) < SMALLEST_FACTOR:
+            return None
+        return self._one_test(int(far[0]), self._alone[far[0]], 0.0)
+
+    @cached_property
     def left_out(self) -> tuple[LeftOut, ...]:
         """Each test beside all others; none of fewer tests than FEWEST_TESTS."""
         if not self.possible:
@@ -164,7 +187,10 @@ class RateExplanations:
         scaled = over / np.ptp(over)
         forms = [(scaled, 0.5 * scaled * over)]
         forms += [(np.exp(over) - 1.0, np.exp(over) - over)] if kind == "stress exponent" else []
-        tried = [(self._evidence([w], [prior_sd / float(np.ptp(slope))]), slope, w) for slope, w in forms]
+        errors, error_sd = self._temperature_errors if kind == "activation energy" else ([], [])
+        tried = [
+            (self._evidence([w, *errors], [prior_sd / float(np.ptp(slope)), *error_sd]), slope, w) for slope, w in forms
+        ]
         evidence, slope, primitive = max(tried, key=lambda one: one[0].log)
         straight = np.stack([np.ones_like(over), over], axis=1)
         bend = primitive - straight @ np.linalg.lstsq(straight, primitive, rcond=None)[0]
@@ -182,10 +208,24 @@ class RateExplanations:
         low, high = (value + float(evidence.mean[0] * slope[k]) for value, k in zip(own, (first, last), strict=True))
         if abs(high - low) < SMALLEST_CHANGE[kind] or abs(evidence.mean[0]) * span < SMALLEST_CHANGE[kind]:
             return
-        before = ENERGY_ODDS if kind == "activation energy" else 0.0
-        odds = evidence.log - self._as_it_is - float(np.log(len(tried))) + before
+        before = 0.0
+        if kind == "activation energy":
+            before = ENERGY_ODDS if evidence.p_value[0] < LARGEST_CHANCE else -np.inf
+        odds = evidence.log - self._evidence(errors, error_sd).log - float(np.log(len(tried))) + before
         change, sd = float(evidence.mean[0]) * span, float(evidence.sd[0]) * span
         yield Explanation(kind, (), change, sd, odds, (low, high), at)
+
+    @cached_property
+    def _temperature_errors(self) -> tuple[list[Floats], list[float]]:
+        """What the usual error of temperature does to ln rates, the same in all tests of one temperature.
+
+        Returns columns (tests,) and standard deviations, one for each temperature.
+        """
+        temperatures, stress = self.conditions.temperatures.round(), self.problem.coordinates.reference.stress
+        u, levels = self.x[: self.problem.parameter_count], np.unique(temperatures)
+        slopes = [log_rate_per_kelvin(self.problem, u, stress, float(T)) for T in levels]
+        columns = [np.asarray(temperatures == T, float) for T in levels]
+        return columns, [USUAL_ERRORS["temperature"] * abs(one) for one in slopes]
 
     # ---- single tests ------------------------------------------------------------------------------------------------
 
@@ -208,14 +248,10 @@ class RateExplanations:
             base, total = evidence.log, total + odds
             best = evidence, tuple(self.problem.histories[k].name for k in near)
         if best is not None:
-            yield self._explanation_of(kept, best[0], total, best[1])
-
-    def _explanation_of(
-        self, tests: Sequence[int], evidence: Evidence, odds: float, near: tuple[str, ...]
-    ) -> Explanation:
-        first = self._one_test(tests[0], replace(evidence, mean=evidence.mean[:1], sd=evidence.sd[:1]), odds)
-        names = tuple(self.problem.histories[k].name for k in tests)
-        return replace(first, tests=names, factors=tuple(map(float, np.exp(evidence.mean))), near=near)
+            evidence, others = best
+            first = self._one_test(kept[0], replace(evidence, mean=evidence.mean[:1], sd=evidence.sd[:1]), total)
+            names = tuple(self.problem.histories[k].name for k in kept)
+            yield replace(first, tests=names, factors=tuple(map(float, np.exp(evidence.mean))), near=others)
 
     def _one_test(self, test: int, evidence: Evidence, odds: float) -> Explanation:
         history, u = self.problem.histories[test], self._moved(evidence)
@@ -230,16 +266,8 @@ class RateExplanations:
         inverse = 1.0 / T - GAS_CONSTANT * size / energy if energy > 0 else 0.0
         if inverse > 0:
             errors["temperature"] = 1.0 / inverse - T
-        return Explanation(
-            "one test",
-            (history.name,),
-            size,
-            float(evidence.sd[-1]),
-            odds,
-            errors=errors,
-            condition=history.condition,
-            temperature=T,
-        )
+        found = Explanation("one test", (history.name,), size, float(evidence.sd[-1]), odds, errors=errors)
+        return replace(found, condition=history.condition, temperature=T)
 
     def _rate_exponents(self, u: Floats, stress: float, T: float) -> dict[str, float]:
         """{quantity: exponent of its true over its stated value in the factor on the rate that it seems to make}.
@@ -265,33 +293,39 @@ class RateExplanations:
         """Two groups of tests, of two materials or rigs: rates that differ by a factor, or in exponent and energy."""
         count = len(self.problem.histories)
         stated = self._stated_groups()
-        tried = [(self._of_split(group), group, label, float(np.log(len(stated)))) for label, group in stated.items()]
+        tried = [(self._of_split(group), group, names, float(np.log(len(stated)))) for names, group in stated.items()]
         order = np.argsort([evidence.mean[0] for evidence in self._alone])
         starts = [np.isin(np.arange(count), order[:size]) for size in range(2, count - 1)]
         if starts:
             evidence, group = self._exchanged(max(starts, key=lambda one: self._of_split(one).log))
             splits = 2.0 ** (count - 1) - count - 1.0
-            tried.append((evidence, group, "", float(np.log(max(splits, 1.0)))))
+            tried.append((evidence, group, ("", ""), float(np.log(max(splits, 1.0)))))
         if not tried:
             return
-        _, group, label, choice = max(tried, key=lambda one: one[0].log - one[3])
+        _, group, (label, beside), choice = max(tried, key=lambda one: one[0].log - one[3])
         smaller = group if label or group.sum() <= count / 2 else ~group
         evidence = self._of_split(smaller)
         odds = evidence.log - self._as_it_is - choice - float(np.log(2.0))  # of a factor alone and of more
         if abs(evidence.mean[0]) > SMALLEST_FACTOR or evidence.mean.size > 1:
             names = tuple(self.problem.histories[k].name for k in np.flatnonzero(smaller))
-            yield Explanation("two groups", names, float(evidence.mean[0]), float(evidence.sd[0]), odds, label=label)
+            size, sd = float(evidence.mean[0]), float(evidence.sd[0])
+            yield Explanation("two groups", names, size, sd, odds, label=label, beside=beside)
 
-    def _stated_groups(self) -> dict[str, Bools]:
-        """{what they have in common: which tests}, of groups that the tests themselves state: alloy, heat, rig."""
-        histories, groups = self.problem.histories, dict[str, Bools]()
+    def _stated_groups(self) -> dict[tuple[str, str], Bools]:
+        """{(what they are, what the others are): which tests}, of groups that the tests state: alloy, heat, rig.
+
+        The others are "" where they are of several or not all of them state it.
+        """
+        histories, groups = self.problem.histories, dict[tuple[str, str], Bools]()
         for key in dict.fromkeys(["alloy", *(key for h in histories for key in h.labels)]):
             entries = [h.alloy if key == "alloy" else h.labels.get(key, "") for h in histories]
             for entry in dict.fromkeys(entries):
                 group = np.array([one == entry for one in entries])
                 known = any((group == other).all() or (group != other).all() for other in groups.values())
                 if entry and 2 <= group.sum() <= len(histories) - 2 and not known:
-                    groups[f"{key} {entry}"] = group
+                    others = {one for one in entries if one != entry}
+                    beside = f"{key} {others.pop()}" if len(others) == 1 and all(others) else ""
+                    groups[f"{key} {entry}", beside] = group
         return groups
 
     def _of_split(self, group: Bools) -> Evidence:

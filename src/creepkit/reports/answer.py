@@ -218,6 +218,8 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         yield "minimum rates and rupture times of the tests contradict one another by this law"
     if adequacy.is_explained:
         yield adequacy.explanations[0].headline
+    if adequacy.outlying is not None:
+        yield adequacy.outlying.caution
     if adequacy.rejects and adequacy.discrepancy_in_noises > SHAPE_MISFIT and adequacy.largest is not None:
         worst = adequacy.largest
         percent = is_logarithmic(worst.output)
@@ -284,10 +286,8 @@ def _named(names: Sequence[str], noun: str, *, quoted: bool = True) -> str:
 def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
     """What to do now, in one sentence without a full stop."""
     adequacy = fit.adequacy
-    if adequacy is not None and adequacy.lies_in_tests:
-        first = adequacy.explanations[0]
-        what = "the two groups apart" if first.kind == "two groups" else f"{_named(first.tests, 'test')} again"
-        return f"check {what} (label, unit, thermocouple), then identify without"
+    if adequacy is not None and adequacy.in_tests is not None:
+        return adequacy.in_tests.next_step
     if adequacy is not None and (adequacy.rejects or adequacy.verdict == "cannot be judged"):
         if ranking is None or len(ranking.laws) < 2:
             return "compare it with other laws that suit the tests (creepkit init)"

@@ -154,11 +154,11 @@ def _left_out(fit: Identification) -> list[str]:
         return []
     low, high = min(fit.left_out, key=lambda one: one.exponent), max(fit.left_out, key=lambda one: one.exponent)
     far = max(fit.left_out, key=lambda one: abs(one.log_factor) / one.sd)
-    factor, sd = math.exp(far.log_factor), far.sd
+    factor = math.exp(far.log_factor)
     return [
         f"leaving one test out: stress exponent {low.exponent:.3g} (without '{low.test}') to {high.exponent:.3g} "
         f"(without '{high.test}'); farthest from the others: '{far.test}', {factor:.3g} times their rate "
-        f"[{factor * math.exp(-1.96 * sd):.3g}, {factor * math.exp(1.96 * sd):.3g}]"
+        f"[{factor * math.exp(-1.96 * far.sd):.3g}, {factor * math.exp(1.96 * far.sd):.3g}]"
     ]
 
 

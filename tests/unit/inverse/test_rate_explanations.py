@@ -42,8 +42,18 @@ def bars(rate, conditions=STEEL, scatter=0.08, kelvin=None, factor=None, strain=
     return tests
 
 
-def fitted(tests, law="norton", T_ref=T_REF):
-    return ck.identify(ck.law(law).times(ck.arrhenius(T_ref=T_ref)), tests, starts=1)
+def with_primary(steady_tests, seed):
+    tests = []
+    for k, history in enumerate(steady_tests):
+        noise = 1e-5 * np.random.default_rng([seed, k]).standard_normal(history.times.size)
+        steady = history.outputs["strain"][-1] / history.times[-1] * history.times
+        strain = 0.002 * np.log(11.0 * np.exp(steady / 0.002) - 10.0) + noise
+        tests.append(history.replace(outputs={"strain": strain}))
+    return tests
+
+
+def fitted(tests, law="norton", T_ref=T_REF, starts=1):
+    return ck.identify(ck.law(law).times(ck.arrhenius(T_ref=T_ref)), tests, starts=starts)
 
 
 def test_a_temperature_that_is_15_K_too_high_is_named_with_its_size_and_what_the_others_say():
@@ -82,6 +92,41 @@ def test_two_materials_are_told_by_their_rates():
     assert np.exp(first.size) == pytest.approx(4.0, rel=0.2)
 
 
+def test_a_label_that_splits_the_tests_as_their_rates_do_is_named_with_the_factor():
+    heats = ["B" if k % 2 else "A" for k in range(len(STEEL))]
+    faster = {k: 3.0 for k, heat in enumerate(heats) if heat == "B"}
+    fit = fitted(bars(power_law(5.0, 4e5), factor=faster, labels=heats))
+    first = fit.adequacy.explanations[0]
+    assert (first.kind, {first.label, first.beside}) == ("two groups", {"heat A", "heat B"})
+    assert np.exp(abs(first.size)) == pytest.approx(3.0, rel=0.15)
+    assert first.headline.startswith("heat B creeps ")
+    assert "identify each heat apart" in str(fit)
+
+
+def test_two_groups_are_found_where_least_squares_bend_the_primary_creep_of_the_law_towards_them():
+    other = (0, 3, 5, 6, 9)
+    fit = fitted(with_primary(bars(power_law(5.0, 4e5), factor=dict.fromkeys(other, 4.0)), 1), "norton*primary")
+    assert fit.adequacy.lies_in_tests
+    assert set(fit.adequacy.explanations[0].tests) == {f"test_{k}" for k in other}
+    assert fit.values["e_p"] == pytest.approx(0.002, rel=0.05)
+
+
+def test_one_test_that_stands_out_is_a_caution_and_no_verdict_and_the_others_are_then_accused_of_nothing():
+    """Seven bars that scatter by 6 %, at three temperatures; one is 12 K hotter than stated."""
+    conditions = [(180, 625), (210, 625), (130, 650), (150, 650), (175, 650), (120, 675), (145, 675)]
+    planted = power_law(6.2, 4e5, 923.15, 150.0, 1e-9)
+    noise = dict(enumerate((1.01, 0.99, 0.93, 0.9, 0.95, 1.09, 1.08)))
+    tests = bars(planted, conditions, scatter=0.0, kelvin={4: 12.0}, factor=noise)
+    fit = fitted(tests, T_ref=923.15)
+    assert fit.adequacy.explains
+    assert fit.adequacy.outlying.tests == ("test_4",)
+    assert fit.adequacy.outlying.errors["temperature"] == pytest.approx(12.0, abs=3.0)
+    assert "test_4 creeps 1.8 times as fast as the others lead to expect" in str(fit)
+    assert "check the temperature of test_4" in str(fit)
+    others = fitted(tests[:4] + tests[5:], T_ref=923.15).adequacy
+    assert (others.explanations, others.outlying) == ((), None)
+
+
 def test_an_exponent_that_rises_is_the_law_s_fault_and_not_that_of_the_test_at_the_lowest_stress():
     fit = fitted(bars(sinh_law))
     first = fit.adequacy.explanations[0]
@@ -96,14 +141,8 @@ def test_an_exponent_that_rises_is_the_law_s_fault_and_not_that_of_the_test_at_t
 def test_the_right_law_is_not_rejected_where_rates_scatter_and_readings_are_exact():
     """With primary creep a rate that is 15 % higher is no multiple of its derivative, as 1e-5 of strain shows."""
     for seed in (3, 4):
-        tests = []
-        for k, history in enumerate(bars(power_law(5.0, 4e5), scatter=0.15, seed=seed)):
-            noise = 1e-5 * np.random.default_rng([seed, k]).standard_normal(history.times.size)
-            steady = history.outputs["strain"][-1] / history.times[-1] * history.times
-            strain = 0.002 * np.log(11.0 * np.exp(steady / 0.002) - 10.0) + noise
-            tests.append(history.replace(outputs={"strain": strain}))
-        law = ck.law("norton*primary").times(ck.arrhenius(T_ref=T_REF))
-        fit = ck.identify(law, tests, starts=2)
+        tests = with_primary(bars(power_law(5.0, 4e5), scatter=0.15, seed=seed), seed)
+        fit = fitted(tests, "norton*primary", starts=2)
         assert fit.noise_model.rate > 0.08
         assert not fit.adequacy.rejects, str(fit.adequacy)
 

@@ -27,7 +27,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, ndtr
 
 from creepkit.arrays import Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor
@@ -88,12 +88,15 @@ class Evidence:
     """What tests say of further effects on their rates, averaged over the scatter between single tests.
 
     log : ln of the marginal likelihood, but for a constant of the tests. mean, sd : (effects,). step : (unknowns,) dx.
+    p_value : (effects,) of one as far from zero by chance: of Student's t, a mean of normal ones over the scatter;
+        its degrees of freedom are those of the tests and of the prior of the scatter.
     """
 
     log: float
     mean: Floats
     sd: Floats
     step: Floats
+    p_value: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,8 +224,11 @@ class RateScatter:
         logs, means, covariances = self.over_scatter(columns, prior_sd)
         share, unknowns = np.exp(logs - logsumexp(logs)), self.joint_design.shape[1]
         mean = share @ means
-        sd = np.sqrt(share @ (np.diagonal(covariances, axis1=1, axis2=2) + (means - mean) ** 2))
-        return Evidence(float(logsumexp(logs)), mean[unknowns:], sd[unknowns:], mean[: self.design.shape[1]])
+        variances = np.diagonal(covariances, axis1=1, axis2=2)
+        sd = np.sqrt(share @ (variances + (means - mean) ** 2))
+        p_value = share @ (2.0 * ndtr(-np.abs(means) / np.sqrt(variances)))
+        step = mean[: self.design.shape[1]]
+        return Evidence(float(logsumexp(logs)), mean[unknowns:], sd[unknowns:], step, p_value[unknowns:])
 
     def joint(self, sd: Floats) -> tuple[Floats, Floats]:
         """Mean (unknowns + effects,) and covariance of (dx, c) about the estimate, given sd (levels,) of the effects.
