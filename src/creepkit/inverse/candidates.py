@@ -38,9 +38,9 @@ def candidates(histories: Sequence[History]) -> list[CreepLaw]:
     """Laws that suit tests, the simplest first; those of plugins that are not installed are left out.
 
     Laws of steady creep are Norton's and, where three stresses or more differ by half, Garofalo's sine, or a threshold
-    stress where the exponent falls as the stress rises; with primary creep where a third of the curves show it or
-    relax, else beside hardening by strain and by time. Where a third of the curves show tertiary creep, or where a
-    table states rupture times, laws with damage are added.
+    stress where the exponent falls as the stress rises; with primary creep where a third of the curves show it, with
+    and without where a third relax, else beside hardening by strain and by time. Where a third of the curves show
+    tertiary creep, or where a table states rupture times, laws with damage are added.
     """
     tests = [h for h in histories if h.outputs or h.minimum_rate is not None]
     if not tests:
@@ -55,7 +55,9 @@ def candidates(histories: Sequence[History]) -> list[CreepLaw]:
         names = [*steady, *(["kachanov-rabotnov", *(["sinh-damage"] if several else [])] if ruptures else [])]
     elif _share(curves, shows_tertiary_creep) > SHARE:
         names = [*steady[:1], *steady[2:], "mpc-omega", "kachanov-rabotnov", *(["sinh-damage"] if several else [])]
-    elif _share(curves, _relaxes) > SHARE or _share(_strained(curves), shows_primary_creep) > SHARE:
+    elif _share(curves, _relaxes) > SHARE:
+        names = [*steady, *(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening"]
+    elif _share(_strained(curves), shows_primary_creep) > SHARE:
         names = [*(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening"]
     else:
         names = ["norton", "strain-hardening", "time-hardening", *steady[1:]]
@@ -100,7 +102,7 @@ def _stresses(history: History) -> list[float]:
 
 
 def _relaxes(history: History) -> bool:
-    """Whether strain is held: the first stress falls by primary creep, which such a curve cannot show by itself."""
+    """Whether strain is held: such a curve does not show whether its first fall is primary creep."""
     return history.loading.quantity == "strain"
 
 

@@ -308,9 +308,9 @@ class Identification(
         tests, shape = constant_stress_tests(stress, T, self.ranges["time"][1], control)
         if warn:
             warn_of_extrapolation(self.stated_laws, self.ranges, {"stress": stress, "temperature": temperature})
-            if RUPTURE_OUTPUT not in self.noise_model.outputs:
-                warnings.warn(UNSEEN_RUPTURE, FitWarning, stacklevel=3)
         time, low, high = self.rupture_times(tests, test_scatter=test_scatter, using=using)
+        if warn and RUPTURE_OUTPUT not in self.noise_model.outputs:
+            warnings.warn(UNSEEN_RUPTURE, FitWarning, stacklevel=3)
         return time.reshape(shape), low.reshape(shape), high.reshape(shape)
 
     @checked

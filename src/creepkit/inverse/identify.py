@@ -42,6 +42,7 @@ from creepkit.inverse.iterative_estimation import (
     estimate_iteratively,
     judged_at,
     starting_point,
+    within_bounds,
 )
 from creepkit.inverse.judging import Judge
 from creepkit.inverse.kept_fits import kept_where_asked
@@ -309,7 +310,7 @@ def _reported(
 ) -> Identification:
     """Noise model, intervals, judgement and goodness of fit, all at the reported values."""
     estimator = _working_estimator(found.problem, numerical_error)
-    best = at_reported_values(found) if estimator.by_likelihood else found
+    best = within_bounds(at_reported_values(found) if estimator.by_likelihood else found)
     problem, linear, x = best.problem, best.linear, best.x
     noise_model = estimator.final(linear, best.noise)
     law, coordinates, count, residuals = problem.law, problem.coordinates, problem.parameter_count, linear.residuals

@@ -157,6 +157,15 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
     return found
 
 
+def within_bounds(found: EstimationResult) -> EstimationResult:
+    """An estimate whose values lie within the bounds of the law, which penalties hold them to but for a little."""
+    problem, x = found.problem, found.problem.within_bounds(found.x)
+    if np.array_equal(x, found.x):
+        return found
+    residuals = problem.residuals(x).with_test_weights(found.linear.residuals.test_weights)
+    return replace(found, linear=problem.linearised(x, residuals)) if is_finite(residuals) else found
+
+
 def is_finite(residuals: Residuals) -> bool:
     """Whether residuals and their derivatives are numbers."""
     jacobian = residuals.jacobian

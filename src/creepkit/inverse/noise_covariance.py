@@ -86,9 +86,14 @@ class CovarianceFactor:
     @cached_property
     def blocks(self) -> Floats:
         """(tests, observations, observations) B of each test: 1 on the diagonal for observations without data."""
+        return np.asarray(self.roots @ np.swapaxes(self.roots, 1, 2))
+
+    @cached_property
+    def roots(self) -> Floats:
+        """(tests, observations, observations) R of each test, with B = R R'."""
         tests, count = self.series.shape
-        root = np.linalg.inv(self._transformed(np.tile(np.eye(count), (tests, 1, 1)), inverse=False)[0])
-        return np.asarray(root @ np.swapaxes(root, 1, 2))
+        whitening = self._transformed(np.tile(np.eye(count), (tests, 1, 1)), inverse=False)[0]
+        return np.asarray(np.linalg.inv(whitening), float)
 
     def _transformed(self, values: Floats, *, inverse: bool) -> tuple[Floats, float]:
         series, rows = self.series, self.series.rows(values)

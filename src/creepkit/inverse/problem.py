@@ -394,8 +394,7 @@ class LeastSquaresProblem:
             system, inside, self.bounds, scale, tolerances or Tolerances(), fixed=fixed, robust=self.robust
         )
         assert minimum.whitened_residuals is not None
-        x = minimum.x if fixed else self.within_bounds(minimum.x)
-        return replace(minimum, x=x, whitened_residuals=minimum.whitened_residuals[: self.observations.count])
+        return replace(minimum, whitened_residuals=minimum.whitened_residuals[: self.observations.count])
 
     def within_bounds(self, x: Floats) -> Floats:
         """x (unknowns,) or the nearest point whose values lie within the bounds of the law (see Coordinates)."""

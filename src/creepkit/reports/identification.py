@@ -357,12 +357,13 @@ def noise_blocks(fit: Identification) -> list[Block]:
             "the law leaves of all readings, with the relative squared error"
         )
         blocks.append(Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6)))
+    unknown = {n.kind for n in fit.settings.nuisances if n.sd is None}
     nuisances = [
         (
             n.key,
             n.owner or "all",
             f"{number(n.value)} +- {number(n.sd, 2)}",
-            f"{number(n.prior_mean)} +- {number(n.prior_sd, 2)}",
+            f"{number(n.prior_mean)} +- {number(n.prior_sd, 2)}{', spread estimated' if n.kind in unknown else ''}",
             _nuisance_unit(n, fit),
             number((n.value - n.prior_mean) / n.prior_sd, 2) if n.prior_sd > 0 else "–",
         )

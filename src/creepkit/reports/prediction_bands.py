@@ -145,10 +145,15 @@ class TestCurve:
 
     @property
     def band(self) -> tuple[Floats, Floats]:
-        """Lower and upper end of the 95 % band, (frames,) each."""
+        """Lower and upper end of the 95 % band, (frames,) each.
+
+        Quantiles of curves that never fall do not fall: near a rupture, whose time is uncertain, only a linear
+        approximation of the lower end would.
+        """
         if self.logarithmic:
             factor = np.exp(np.minimum(self.half_width, 50.0))
-            return self.identified / factor, self.identified * factor
+            low, grows = self.identified / factor, not (np.diff(self.identified) < 0).any()
+            return np.fmax.accumulate(low) if grows else low, self.identified * factor
         return self.identified - self.half_width, self.identified + self.half_width
 
 

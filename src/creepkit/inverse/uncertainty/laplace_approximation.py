@@ -211,13 +211,13 @@ def covariance_of_values(
         return free.solve(CovarianceFactor.of_residuals(residuals, noise_model)).covariance
     plain = replace(residuals, random_effect_sensitivities=None, common_effects=None)
     solution = free.solve(CovarianceFactor.of_residuals(plain, working_noise))
-    weighted = solution.weighted_jacobian
-    blocks = CovarianceFactor.of_residuals(residuals, noise_model).blocks
-    meat = np.einsum("tfp,tfg,tgq->pq", weighted, blocks, weighted, optimize=True)
+    weighted, roots = solution.weighted_jacobian, CovarianceFactor.of_residuals(residuals, noise_model).roots
+    pulls = [np.einsum("tfp,tfg->ptg", weighted, roots).reshape(weighted.shape[-1], -1)]
     if residuals.common_effects is not None:
-        pull = np.einsum("tfp,tfk->pk", weighted, residuals.common_effects)
-        meat += pull @ pull.T
-    return np.asarray(solution.covariance @ (meat + np.diag(linearised.precision)) @ solution.covariance)
+        pulls.append(np.einsum("tfp,tfk->pk", weighted, residuals.common_effects))
+    # squared last: of pulls by common effects that nearly cancel in the values the squares would be rounding
+    moved = solution.covariance @ np.concatenate([*pulls, np.diag(np.sqrt(linearised.precision))], axis=1)
+    return np.asarray(moved @ moved.T)
 
 
 def parameter_estimates(law: CreepLaw, coordinates: Coordinates, u: Floats, covariance: Floats) -> tuple[Estimate, ...]:
