@@ -166,22 +166,14 @@ def options_of(record: type[Any]) -> tuple[Option, ...]:
     return tuple(options)
 
 
-def takes_options(*records: type[Options], **defaults: Any) -> Callable[[Function], Function]:
-    """The function, which has `**changes`, with the fields of records as keyword arguments in its signature.
-
-    defaults : those that the function has in the place of a record's, {field: value}.
-    """
+def takes_options(*records: type[Options]) -> Callable[[Function], Function]:
+    """The function, which has `**changes`, with the fields of records as keyword arguments in its signature."""
 
     def decorate(function: Function) -> Function:
         signature = inspect.signature(function)
         own = [one for one in signature.parameters.values() if one.kind is not inspect.Parameter.VAR_KEYWORD]
         further = [
-            inspect.Parameter(
-                one.name,
-                inspect.Parameter.KEYWORD_ONLY,
-                default=defaults.get(one.name, one.default),
-                annotation=one.type,
-            )
+            inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=one.default, annotation=one.type)
             for record in records
             for one in options_of(record)
             if one.name not in signature.parameters

@@ -94,8 +94,7 @@ def test_public_functions_show_their_options_with_defaults() -> None:
         parameters = inspect.signature(function).parameters
         assert "changes" not in parameters
         for one in fields(ck.IdentificationSettings):
-            expected = "automatic" if (function, one.name) == (ck.select, "weights") else one.default
-            assert parameters[one.name].default == expected, one.name
+            assert parameters[one.name].default == one.default, one.name
 
 
 def test_a_misspelt_option_is_answered_by_the_nearest() -> None:

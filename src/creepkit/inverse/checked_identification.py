@@ -68,7 +68,7 @@ def identify(
     return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 
-@takes_options(IdentificationSettings, weights="automatic")
+@takes_options(IdentificationSettings)
 @checked
 def select(
     laws: Sequence[CreepLaw | str],
@@ -92,11 +92,7 @@ def select(
     """
     predictor = resolve_predictors(using, histories)
     settings = (settings or IdentificationSettings()).changed(changes, predictor)
-    if changes.get("weights") not in (None, "automatic", "likelihood"):
-        raise FitError(
-            f"select() compares laws by their likelihood, found weights={changes['weights']!r}; leave weights out, or "
-            "identify each law with them and rank() the results"
-        )
+    settings.check_by_likelihood("select()")
     histories, left_out = sound_tests(list(histories), settings)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     ranking = select_law(

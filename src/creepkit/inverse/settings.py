@@ -56,11 +56,10 @@ class IdentificationSettings(Options, title="settings of an identification", err
         both estimated.
     weights : of the values; noise, intervals and ranking are by one likelihood, with white noise and autocorrelation of
         every output (see inverse.variance_components). "likelihood": the values too, under the usual errors. "noise":
-        least squares of frames of equal weight, which describe tests best where no law explains them. "automatic", as
-        of select() and screen(): by likelihood, by which laws are compared, and where a law misses the shape of curves
-        values by "noise" (see inverse.identify.describing). {output: weight}: the sum of weight times relative squared
-        error (see inverse.goodness_of_fit); "equal" weights are Eq. (4) of the paper, "paper" its Eq. (S3) for measured
-        histories, 0.99 on D_amp.
+        least squares of frames of equal weight, which describe tests best where no law explains them. "automatic",
+        the default: "likelihood", but "noise" where a law misses the shape of curves (see inverse.identify.describing).
+        {output: weight}: the sum of weight times relative squared error (see inverse.goodness_of_fit); "equal" weights
+        are Eq. (4) of the paper, "paper" its Eq. (S3) for measured histories, 0.99 on D_amp.
     test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its weight.
     further_laws : that select() tries at most where no candidate explains the tests: sums, and registered laws.
     suspect_frames : "exclude": frames that unload, fall or lie apart (see quality.exclude_suspect_frames) are left out
@@ -84,7 +83,7 @@ class IdentificationSettings(Options, title="settings of an identification", err
         example="thickness=0.4935:0.027",
     )
     weights: OutputWeights = option(
-        "noise", "Of outputs; equal: Eq. (4), paper: Eq. (S3).", example="amplitude=0.99,width=0.005"
+        "automatic", "Of outputs; equal: Eq. (4), paper: Eq. (S3).", example="amplitude=0.99,width=0.005"
     )
     test_loss: Literal["gaussian", "student"] = option(
         "gaussian", "Of whole tests; with student one far from its replicates weighs less."
@@ -114,6 +113,19 @@ class IdentificationSettings(Options, title="settings of an identification", err
                     f"nuisance '{first.key}' is given twice; give one, with the scope that matters most, or name the "
                     "tests of each by tests="
                 )
+
+    @property
+    def by_likelihood(self) -> bool:
+        """Whether laws can be compared by their likelihood under these weights."""
+        return self.weights in ("automatic", "likelihood")
+
+    def check_by_likelihood(self, verb: str) -> None:
+        """Raise FitError where `verb`, such as select(), cannot compare laws under these weights."""
+        if not self.by_likelihood:
+            raise FitError(
+                f"{verb} compares laws by their likelihood, found weights={self.weights!r}; leave weights out, or "
+                "identify each law with them and rank() the results"
+            )
 
     @property
     def included_errors(self) -> Mapping[str, float]:

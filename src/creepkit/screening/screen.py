@@ -178,7 +178,7 @@ _log = logging.getLogger("creepkit.screening")
 class ScreeningOptions:
     """How the alloys of a plate are identified.
 
-    settings : of every identification; weights are "automatic" whatever they say.
+    settings : of every identification; weights are "automatic" or "likelihood".
     through : a surrogate in which laws of several terms are searched before the predictor gives values (see
         identify()).
     dense : the law whose misfit without sparsity is compared with the best one's (Fig. 7b), None for none.
@@ -194,6 +194,7 @@ class ScreeningOptions:
     def __post_init__(self) -> None:
         if self.confirm not in (True, False, "when in doubt"):
             raise FitError(f'confirm is {self.confirm!r}; allowed are True, False and "when in doubt"')
+        self.settings.check_by_likelihood("screen()")
 
 
 @checked
@@ -234,7 +235,7 @@ def screen(
             laws=_distinct_laws(CANDIDATE_LAWS if laws is None else laws),
             predictor=CompositePredictor.of(predictors),
             surrogate=options.through,
-            settings=replace(options.settings, weights="automatic"),
+            settings=options.settings,
             dense_law=None if options.dense is None else resolve_law(options.dense),
             confirm=options.confirm,
             folder=folder,

@@ -18,8 +18,10 @@ def by_likelihood(asked: SearchOptions, changes: Mapping[str, Any]) -> bool:
 
     changes : fields of the settings that are stated.
     """
-    by_likelihood = changes.get("weights", "automatic") in ("automatic", "likelihood")
-    return asked.global_search is None and asked.penalty is None and by_likelihood
+    from creepkit.inverse.settings import IdentificationSettings
+
+    weights = IdentificationSettings().changed({"weights": changes.get("weights")})
+    return asked.global_search is None and asked.penalty is None and weights.by_likelihood
 
 
 def ranked_candidates(

@@ -88,6 +88,9 @@ def test_weights_that_select_does_not_take_are_an_error() -> None:
     tests = ck.read_histories(ck.example_data("planted creep curves"))
     with pytest.raises(FitError, match="compares laws by their likelihood, found weights='equal'"):
         ck.select(["norton", "strain-hardening"], tests, weights="equal")
+    for of_settings in (lambda s: ck.select(["norton"], tests, settings=s), lambda s: ck.ScreeningOptions(settings=s)):
+        with pytest.raises(FitError, match="compares laws by their likelihood, found weights='paper'"):
+            of_settings(ck.IdentificationSettings(weights="paper"))
 
 
 def test_options_for_measured_tests_are_refused_with_identifications() -> None:

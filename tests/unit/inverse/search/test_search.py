@@ -123,7 +123,7 @@ def test_one_prediction_for_all_starts_is_as_good_as_one_each():
 
 # ---- bulge -----------------------------------------------------------------------------------------------------------
 
-# The swarm on the real landscape: a planted bulge test through the stand-in of one degree of freedom.
+# The swarm on the real landscape: a planted bulge test through the reduced-order model.
 
 
 TRUTH = {"A": 2e-16, "n": 4.5}
@@ -139,8 +139,9 @@ def stand_in():
 
 
 @pytest.fixture(scope="module")
-def test(stand_in):
-    run = ck.simulate(NORTON, stand_in, TRUTH, elastic=ELASTIC, loading=LOADING, times=FRAMES)
+def test():
+    """By finite elements, to which an identification through the stand-in is corrected."""
+    run = ck.simulate(NORTON, ck.specimen("bulge"), TRUTH, elastic=ELASTIC, loading=LOADING, times=FRAMES)
     rng = np.random.default_rng(1)
     sizes = {"amplitude": 1.5e-3, "width": 0.02, "shape": 0.02}
     noisy = {name: run.outputs[name] + sd * rng.standard_normal(FRAMES.size) for name, sd in sizes.items()}
