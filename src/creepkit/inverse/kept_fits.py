@@ -178,6 +178,7 @@ def kept_where_asked(identify: Identify) -> Identify:
 def _key(law: Any, histories: Any, predictor: Predictor, how: Mapping[str, Any]) -> str:
     """Hash of all that decides an identification."""
     start, through = how.get("start"), how.get("through")
+    others = {name: value for name, value in how.items() if name not in ("start", "through", "progress")}
     parts = {
         "versions": {name: version(name) for name in COMPUTING},
         "code": code_fingerprint(),
@@ -185,8 +186,7 @@ def _key(law: Any, histories: Any, predictor: Predictor, how: Mapping[str, Any])
         "histories": [history_digest(history) for history in histories],
         "predictor": predictor_fingerprint(predictor),
         "through": None if through is None else predictor_fingerprint(through),
-        "settings": repr(how.get("settings")),
-        "search": repr(how.get("search")),
+        "others": repr(sorted(others.items())),
         "start": None
         if start is None
         else [

@@ -162,7 +162,7 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
     described = {
         "laws": [[law.name, law.fingerprint, [[n, *p.bounds, p.off] for n, p in law.table.items()]] for law in laws],
         "settings": record_to_json(asdict(settings)),
-        "how": [asked.search, asked.penalty, None if selection is None else selection.model_dump()],
+        "how": [record_to_json(asdict(asked)), None if selection is None else selection.model_dump()],
         "using": study.using_fingerprint,
         "tests": _digests(tests),
     }
