@@ -93,6 +93,7 @@ def identify(
     search: GlobalSearch | None = None,
     through: Predictor | None = None,
     start: StartingEstimate | None = None,
+    sampled: bool = True,
     progress: IterationCallback | None = None,
 ) -> Identification:
     """Identify the parameters of `law` from `histories` by a global search, then by their likelihood.
@@ -104,6 +105,7 @@ def identify(
         values and intervals are those of `using`.
     A surrogate that does not know this class of laws is replaced by its specimen, or left out; a note says so.
     start : an estimate to begin from instead of a global search.
+    sampled : whether the posterior is sampled where values are at bounds or not determined.
     """
     settings = settings or IdentificationSettings()
     automatic = settings.weights == "automatic"
@@ -121,7 +123,7 @@ def identify(
             return describing(fit)
         if settings.weights == "noise" and start is None:
             fit = _with_rates_of_tests(fit)
-        fit = with_samples(fit, through_for_law(through, law)) if needs_samples(fit) else fit
+        fit = with_samples(fit, through_for_law(through, law)) if sampled and needs_samples(fit) else fit
     return _without_one_test(fit)
 
 

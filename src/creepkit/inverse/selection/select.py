@@ -19,6 +19,7 @@ from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.ranking import Criterion, Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Predictor
 from creepkit.registry import default_registry
@@ -73,11 +74,17 @@ def select(
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
     ranking = rank(fits, by, failed)
-    if asked.weights != "likelihood":
-        shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
-        laws = tuple(replace(one, fit=describing(one.fit)) if id(one) in shown else one for one in ranking.laws)
-        ranking = replace(ranking, laws=laws)
-    return replace(ranking, further=tried_further)
+    shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
+    laws = [replace(one, fit=_as_shown(one.fit, asked, through)) if id(one) in shown else one for one in ranking.laws]
+    return replace(ranking, laws=tuple(laws), further=tried_further)
+
+
+def _as_shown(fit: Identification, asked: IdentificationSettings, through: Predictor | None) -> Identification:
+    """What is shown of a law that may be the one: values that describe the tests, and samples where they are needed."""
+    fit = describing(fit) if asked.weights != "likelihood" else fit
+    if fit.samples is None and needs_samples(fit):
+        fit = with_samples(fit, through_for_law(through, fit.law))
+    return fit
 
 
 def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLaw]:
@@ -138,7 +145,9 @@ def _identify_all(
         if progress is not None:
             progress(task, k, len(laws))
         try:
-            fits.append(identify(law, histories, using, settings=settings, through=through_for_law(through, law)))
+            fits.append(
+                identify(law, histories, using, settings=settings, through=through_for_law(through, law), sampled=False)
+            )
         except CreepkitError as error:
             failed[law.name] = str(error)
         if progress is not None:
