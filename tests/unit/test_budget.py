@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1300,
     "instruments": 1250,
     "integration": 800,
-    "inverse": 10350,
+    "inverse": 10400,
     "jobs": 300,
     "kernels": 1750,
     "language": 1500,

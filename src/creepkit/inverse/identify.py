@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -93,7 +94,6 @@ def identify(
     search: GlobalSearch | None = None,
     through: Predictor | None = None,
     start: StartingEstimate | None = None,
-    sampled: bool = True,
     progress: IterationCallback | None = None,
 ) -> Identification:
     """Identify the parameters of `law` from `histories` by a global search, then by their likelihood.
@@ -105,8 +105,33 @@ def identify(
         values and intervals are those of `using`.
     A surrogate that does not know this class of laws is replaced by its specimen, or left out; a note says so.
     start : an estimate to begin from instead of a global search.
-    sampled : whether the posterior is sampled where values are at bounds or not determined.
     """
+    how: dict[str, Any] = {"settings": settings, "search": search, "through": through, "start": start}
+    fit = identify_unsampled(law, histories, using, progress=progress, **how)
+    return fit if start is not None and start.values_only else sampled_where_needed(fit, through)
+
+
+def sampled_where_needed(fit: Identification, through: Predictor | None) -> Identification:
+    """With samples of the posterior where values are at bounds or not determined; through : as of identify()."""
+    if fit.samples is not None or not needs_samples(fit):
+        return fit
+    with single_threaded_blas():
+        return with_samples(fit, through_for_law(through, fit.law))
+
+
+@kept_where_asked
+def identify_unsampled(
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: Predictor | Mapping[str, Predictor],
+    *,
+    settings: IdentificationSettings | None = None,
+    search: GlobalSearch | None = None,
+    through: Predictor | None = None,
+    start: StartingEstimate | None = None,
+    progress: IterationCallback | None = None,
+) -> Identification:
+    """As identify(), without samples of the posterior, which select() draws of laws that may be the one."""
     settings = settings or IdentificationSettings()
     automatic = settings.weights == "automatic"
     if automatic:
@@ -123,7 +148,6 @@ def identify(
             return describing(fit)
         if settings.weights == "noise" and start is None:
             fit = _with_rates_of_tests(fit)
-        fit = with_samples(fit, through_for_law(through, law)) if sampled and needs_samples(fit) else fit
     return _without_one_test(fit)
 
 

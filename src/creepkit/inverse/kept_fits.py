@@ -158,7 +158,7 @@ def kept_where_asked(identify: Identify) -> Identify:
         if kept is None:
             return identify(law, histories, using, **how)
         predictor, through, _ = predictors_for_law(law, using, how.get("through"))
-        key = _key(law, histories, predictor, {**how, "through": through})
+        key = _key(law, histories, predictor, {**how, "through": through, "by": identify.__name__})
         fit = kept.load(key, histories, predictor)
         if fit is not None:
             kept.read += 1

@@ -14,12 +14,11 @@ from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import describing, identify
+from creepkit.inverse.identify import describing, identify_unsampled, sampled_where_needed
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.ranking import Criterion, Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Predictor
 from creepkit.registry import default_registry
@@ -82,9 +81,7 @@ def select(
 def _as_shown(fit: Identification, asked: IdentificationSettings, through: Predictor | None) -> Identification:
     """What is shown of a law that may be the one: values that describe the tests, and samples where they are needed."""
     fit = describing(fit) if asked.weights != "likelihood" else fit
-    if fit.samples is None and needs_samples(fit):
-        fit = with_samples(fit, through_for_law(through, fit.law))
-    return fit
+    return sampled_where_needed(fit, through)
 
 
 def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLaw]:
@@ -146,7 +143,7 @@ def _identify_all(
             progress(task, k, len(laws))
         try:
             fits.append(
-                identify(law, histories, using, settings=settings, through=through_for_law(through, law), sampled=False)
+                identify_unsampled(law, histories, using, settings=settings, through=through_for_law(through, law))
             )
         except CreepkitError as error:
             failed[law.name] = str(error)
