@@ -49,7 +49,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
-from creepkit.records import History, NuisanceValues, Prediction, Predictor, concatenated_tests
+from creepkit.records import History, NuisanceValues, Prediction, Predictor
 
 CACHED_EVALUATIONS = 4
 """Points whose residuals are cached: a search ends at one that it has evaluated, and the next begins there."""
@@ -291,19 +291,10 @@ class LeastSquaresProblem:
         return self._predicted(u, nuisances, jacobian)
 
     def _predicted(self, u: Floats, nuisances: NuisanceValues, sensitivities: bool) -> Prediction:
-        if self.log_factors is None:
-            return self._predicted_tests(u, nuisances, self.histories, sensitivities)
-        groups, rates = [], list(self.coordinates.coefficients)
-        for k, history in enumerate(self.histories):
-            moved, own = u.copy(), {key: values[:, [k]] for key, values in nuisances.items()}
-            moved[:, rates] += self.log_factors[k]
-            groups.append(([k], self._predicted_tests(moved, own, [history], sensitivities)))
-        return concatenated_tests(groups, self.histories)
-
-    def _predicted_tests(
-        self, u: Floats, nuisances: NuisanceValues, histories: Sequence[History], sensitivities: bool
-    ) -> Prediction:
-        tests = (self.law, self.coordinates.theta(u), histories)
+        if self.log_factors is not None:  # each test at its own rate
+            u = np.repeat(u[:, None], len(self.histories), axis=1)
+            u[..., list(self.coordinates.coefficients)] += self.log_factors[:, None]
+        tests = (self.law, self.coordinates.theta(u), self.histories)
         if self.observations.followed_to_rupture.any():
             prediction = self.predictor.predict_to_rupture(*tests, sensitivities=sensitivities)
         else:
