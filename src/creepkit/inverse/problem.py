@@ -31,7 +31,12 @@ from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters, check_nuisance_law
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
 from creepkit.inverse.prediction_failures import PredictionFailures
-from creepkit.inverse.reference_conditions import ReferencePoint, median_log_inverse_duration, median_log_strain_rate
+from creepkit.inverse.reference_conditions import (
+    ReferencePoint,
+    median_log_inverse_duration,
+    median_log_strain_rate,
+    reference_condition,
+)
 from creepkit.inverse.residuals import (
     candidate_residuals,
     candidate_residuals_and_jacobian,
@@ -106,6 +111,7 @@ class LeastSquaresProblem:
     histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
     bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. robust : whether a single
         residual far off counts less, as in a search.
+    conditions : (2, tests) MPa and K, the reference stress and the temperature of each test.
     correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
         against a more exact one (see inverse.defect_correction), or None.
     log_factors : (tests,) ln of the factors on the rates of tests about which residuals are taken, None for the law's
@@ -123,6 +129,7 @@ class LeastSquaresProblem:
     bounds: Bounds
     settings: IdentificationSettings
     covariance_factor: CovarianceFactor
+    conditions: Floats
     robust: bool = False
     correction: Floats | None = None
     log_factors: Floats | None = None
@@ -159,7 +166,9 @@ class LeastSquaresProblem:
         covariance_factor = CovarianceFactor.of_residuals(
             residuals_at_measured_values(observations), with_single_value_weight(noise, observations)
         )
-        return cls(tuple(tests), predictor, coordinates, observations, nuisances, bounds, settings, covariance_factor)
+        conditions = np.array([reference_condition(test, predictor) for test in tests]).T
+        posed = (coordinates, observations, nuisances, bounds, settings, covariance_factor, conditions)
+        return cls(tuple(tests), predictor, *posed)
 
     # ---- variants ------------------------------------------------------------------------------------------------
 
