@@ -106,9 +106,7 @@ class CompositePredictor(Predictor):
 
         def of_group(one: Predictor, group: list[History], tests: list[int]) -> Prediction:
             own = {key: values[:, tests] for key, values in nuisances.items() if one.follows(key)}
-            return one.predict(
-                law, values_of_tests(theta, tests), group, nuisances=own, sensitivities=sensitivities
-            )
+            return one.predict(law, values_of_tests(theta, tests), group, nuisances=own, sensitivities=sensitivities)
 
         return self._of_groups(histories, of_group)
 

@@ -309,7 +309,7 @@ def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, stress: ArrayLi
     """
     T = np.asarray(T, float)
     if not problem.law.uses(temperature):
-        return USUAL_ACTIVATION_ENERGY / (GAS_CONSTANT * np.maximum(T, LOWEST_USUAL_TEMPERATURE) ** 2)
+        return np.asarray(USUAL_ACTIVATION_ENERGY / (GAS_CONSTANT * np.maximum(T, LOWEST_USUAL_TEMPERATURE) ** 2))
     u = x[: problem.parameter_count]
     up, down = (log_rate(problem.coordinates, stress, T + step)(u) for step in (1.0, -1.0))
     return np.asarray(0.5 * (up - down))
