@@ -103,7 +103,6 @@ def identify(
     through: Predictor | None = None,
     start: StartingEstimate | None = None,
     progress: IterationCallback | None = None,
-    samples: bool = True,
 ) -> Identification:
     """Identify the parameters of `law` from `histories` by a global search, then by their likelihood.
 
@@ -114,32 +113,29 @@ def identify(
         values and intervals are those of `using`.
     A surrogate that does not know this class of laws is replaced by its specimen, or left out; a note says so.
     start : an estimate to begin from instead of a global search.
-    samples : whether the posterior is sampled where values are at bounds or not determined.
+    The posterior is not sampled; see sampled_where_needed().
     """
     settings = settings or IdentificationSettings()
-    automatic = settings.weights == "automatic"
-    if automatic:
-        settings = replace(settings, weights="likelihood")
     using, through, notes = predictors_for_law(law, using, through)
     histories, left_out = compared_tests(law, histories, settings)
     with single_threaded_blas():
-        best, outcome, numerical_error = _estimated(
-            law, histories, using, settings, search, through, start, progress, describes=automatic
-        )
+        best, outcome, numerical_error = _estimated(law, histories, using, settings, search, through, start, progress)
         fit = _reported(histories, best, outcome, numerical_error)
         fit = replace(fit, notes=(*left_out, *fit.notes, *widened_notes(law, fit.law), *notes))
         if start is not None and start.values_only:
             return fit
-        if automatic and misses_shape(fit):
+        if settings.weights == "automatic" and misses_shape(fit):
             fit = describing(fit)
         elif settings.weights == "noise" and start is None:
             fit = _with_rates_of_tests(fit)
-    fit = _without_one_test(fit)
-    return sampled_where_needed(fit, through) if samples else fit
+    return _without_one_test(fit)
 
 
-def sampled_where_needed(fit: Identification, through: Predictor | None) -> Identification:
-    """With samples of the posterior where values are at bounds or not determined; through : as of identify()."""
+def sampled_where_needed(fit: Identification, through: Predictor | None = None) -> Identification:
+    """With samples of the posterior where values are at bounds or not determined.
+
+    through : a cheaper predictor that samples are drawn through, as of identify().
+    """
     if fit.samples is not None or not needs_samples(fit):
         return fit
     with single_threaded_blas():
@@ -160,7 +156,7 @@ def describing(fit: Identification) -> Identification:
     if not misses_shape(fit) or fit.predictor is None:
         return fit
     start, settings = StartingEstimate.from_identification(fit), replace(fit.settings, weights="noise")
-    values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start, samples=False)
+    values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
     notes = dict.fromkeys((*values.notes, *(note for note in fit.notes if "were not used" in note)))
     return replace(values, notes=tuple(notes), provenance={**fit.provenance, **values.provenance})
 
@@ -222,13 +218,13 @@ def _estimated(
     through: Predictor | None,
     start: StartingEstimate | None,
     progress: IterationCallback | None,
-    *,
-    describes: bool,
 ) -> tuple[EstimationResult, SearchOutcome, NumericalError | None]:
     """The best estimate, where it began, and the error of the predictor there; within bounds as wide as it needs.
 
-    describes : whether values are those of frames of equal weight where a first estimate by likelihood misses curves.
+    With automatic weights it is by likelihood, unless a first one clearly misses the shape of curves.
     """
+    judged = histories if settings.weights == "automatic" else None
+    settings = settings if judged is None else replace(settings, weights="likelihood")
     count, start, noise = len(law.params), start or StartingEstimate(None), None
     problem = LeastSquaresProblem.from_histories(law, histories, using, settings, start.reference)
     if start.u is None:
@@ -241,7 +237,7 @@ def _estimated(
     stages = [partial(_last_estimate, is_near=start.u is not None, through=through)]
     if through is not None and start.u is None:
         stages.insert(0, partial(_cheaper_estimate, through=through))
-    widenings, judged = MOST_WIDENINGS, histories if describes else None
+    widenings = MOST_WIDENINGS
     for stage in stages:
         best, numerical_error = stage(problem, starts, noise, judged, progress)
         while widenings and (wider := _wider_law(best)) is not None:
@@ -482,4 +478,4 @@ def refit(fit: Identification, histories: Sequence[History]) -> Identification:
     if fit.predictor is None:
         raise FitError("cannot refit an identification that was loaded from a file without its specimen")
     start = StartingEstimate.from_identification(fit)
-    return identify(fit.law, histories, fit.predictor, settings=fit.settings, start=start)
+    return sampled_where_needed(identify(fit.law, histories, fit.predictor, settings=fit.settings, start=start))

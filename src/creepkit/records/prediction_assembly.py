@@ -27,8 +27,8 @@ def broadcast_candidates(
 
 
 def values_of_tests(theta: Floats, tests: Sequence[int]) -> Floats:
-    """The internal values (candidates[, tests], parameters) of some of the tests."""
-    return theta if theta.ndim == 2 else np.asarray(theta[:, tests])
+    """(candidates[, tests], parameters) theta of some of the tests; theta : (candidates[, tests], parameters)."""
+    return theta if theta.ndim == 2 else theta[:, tests]
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,12 +27,7 @@ from creepkit.records.prediction import (
     is_length_nuisance,
     kind_and_start,
 )
-from creepkit.records.prediction_assembly import (
-    broadcast_candidates,
-    concatenated_candidates,
-    concatenated_tests,
-    values_of_tests,
-)
+from creepkit.records.prediction_assembly import broadcast_candidates, concatenated_candidates, concatenated_tests
 from creepkit.records.specimen_lookup import outputs_of_tests
 
 if TYPE_CHECKING:

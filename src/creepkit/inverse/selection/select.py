@@ -143,7 +143,7 @@ def _identify_all(
             progress(task, k, len(laws))
         try:
             known = through_for_law(through, law)
-            fits.append(identify(law, histories, using, settings=settings, through=known, samples=False))
+            fits.append(identify(law, histories, using, settings=settings, through=known))
         except CreepkitError as error:
             failed[law.name] = str(error)
         if progress is not None:
