@@ -9,7 +9,12 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
-from typing import Any, ClassVar, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Result = TypeVar("Result")
 
@@ -41,6 +46,31 @@ class Presentable:
     def _repr_html_(self) -> str:
         """For notebooks."""
         return present("reports.html.notebook:notebook_html", self)
+
+
+class Plotted:
+    """A record with a picture: its class names the function of the whole figure, and that of its leading panel.
+
+    figure : "module:function" that takes the record and returns a Figure. panel : "module:function" that takes
+    matplotlib axes and the record, and draws into them.
+    """
+
+    __slots__ = ()
+    _figure: ClassVar[str]
+    _panel: ClassVar[str]
+
+    def __init_subclass__(cls, figure: str = "", panel: str = "", **further: Any) -> None:
+        """Figure, panel : the functions; those of the base class if none are named."""
+        super().__init_subclass__(**further)
+        cls._figure, cls._panel = figure or cls._figure, panel or cls._panel
+
+    def plot(self, path: str | Path | None = None, *, ax: Axes | None = None) -> Figure:
+        """The Figure, drawn and written to `path` where one is given; its panels are `.axes`.
+
+        ax : axes of matplotlib into which the leading panel alone is drawn; what is returned is their figure.
+        ReportError for a path that cannot be written and for what is no axes.
+        """
+        return present("reports.figures:plotted", self, (self._figure, self._panel), path, ax)
 
 
 def present(name: str, record: object, /, *arguments: Any, **options: Any) -> Result:  # type: ignore[type-var]

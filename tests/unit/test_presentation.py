@@ -27,8 +27,9 @@ def named_functions() -> Iterator[tuple[str, str, Callable[..., Any], str]]:
             one for one in ast.walk(source_tree.tree(module)) if isinstance(one, ast.ClassDef) and one.name == name
         )
         for keyword in tree.keywords:
-            if keyword.arg == "text" and isinstance(keyword.value, ast.Constant):
-                yield name, "str", function_named(keyword.value.value), keyword.value.value
+            declared = {"text": "str", "details": "str", "figure": "Figure", "panel": "None"}.get(keyword.arg or "")
+            if declared and isinstance(keyword.value, ast.Constant):
+                yield name, declared, function_named(keyword.value.value), keyword.value.value
         for method in (one for one in tree.body if isinstance(one, ast.FunctionDef)):
             for call in (one for one in ast.walk(method) if isinstance(one, ast.Call)):
                 first = call.args[0] if call.args else None
@@ -67,3 +68,6 @@ def test_records_print_as_text() -> None:
     texts = [str(record) for record in (*RECORDS, fit, ranking, ranking.model_average, fit.correlation())]
     assert [text for text in texts if not text.strip() or "object at" in text] == []
     assert fit.undetermined() == ()
+    samples = fit.sample(draws=20)
+    assert repr(samples).startswith("<PosteriorSamples of norton: 20 draws, medians A = ")
+    np.testing.assert_array_equal(samples.to_dataframe()["n"], samples.values["n"])

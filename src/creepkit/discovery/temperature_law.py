@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -61,11 +61,8 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, interval_ends, verdict_of_interval
 from creepkit.inverse.uncertainty.mixture_distribution import MixtureDistribution
 from creepkit.language import CreepLaw
-from creepkit.presentation import Presentable, present
+from creepkit.presentation import Plotted, Presentable
 from creepkit.records import History, LawWithValues, Predictor
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 TEMPERATURE_LAW = DocumentFormat(
     "creepkit-temperature-law",
@@ -124,7 +121,13 @@ NOTED_OVERDISPERSION = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_text"):
+class TemperatureLaw(
+    Presentable,
+    Plotted,
+    text="reports.temperature_law:temperature_law_text",
+    figure="reports.temperature_law:temperature_law_figure",
+    panel="reports.temperature_law:draw_parameter",
+):
     """The result of discover() and of refit().
 
     law : an ordinary law with temperature in it, printed and exported like any other; `valued` has its numbers.
@@ -197,10 +200,6 @@ class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_
     def save(self, path: str | Path) -> Path:
         """Write the result as JSON (to a temporary name, then renamed)."""
         return write_json(temperature_law_to_json(self), Path(path), TEMPERATURE_LAW.kind)
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Parameters against temperature, with intervals and the curves of the forms that remain."""
-        return present("reports.temperature_law:plot_temperature_law", self, path)
 
 
 def temperature_law_from_combinations(

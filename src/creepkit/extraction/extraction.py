@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints, frozen
 from creepkit.errors import HistoryError
 from creepkit.extraction.noise import NoiseEstimate
-from creepkit.presentation import Presentable, present
+from creepkit.presentation import Plotted, Presentable
 from creepkit.quality.flags import QualityFlag, frame_ranges_text
 from creepkit.records import History, Loading, Program, SurfaceRegion, constant_load, known_specimens, loads_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 TURNED = "z of the frames points away from the cameras, for the surface moves along -z; heights are counted against it"
 """What is assumed of frames in which the surface falls."""
@@ -50,7 +46,13 @@ class FieldMap(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Extraction(Presentable, text="reports.extraction:extraction_text"):
+class Extraction(
+    Presentable,
+    Plotted,
+    text="reports.extraction:extraction_text",
+    figure="reports.extraction:extraction_figure",
+    panel="reports.extraction:draw_extraction",
+):
     """The measured outputs of one test piece, and how they came about.
 
     name : D1, D2 ... or as given. source : the frames. specimen, operator : what was observed, and how.
@@ -100,10 +102,6 @@ class Extraction(Presentable, text="reports.extraction:extraction_text"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         object.__setattr__(self, "used", frozen(self.used, dtype=bool))
         object.__setattr__(self, "clamped", frozen(self.clamped, dtype=bool))
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """A contact sheet: fields, residuals, points that were used, outputs with bands, rigid motion, residuals."""
-        return present("reports.extraction:extraction_figure", self, path)
 
     def history_under(
         self, loading: Loading | float, temperature: float | Program, *, time_zero: float | None = None

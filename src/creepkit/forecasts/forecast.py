@@ -5,7 +5,6 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,12 +21,11 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
 from creepkit.language import temperature
-from creepkit.presentation import Presentable, present
+from creepkit.presentation import Plotted, Presentable, present
 from creepkit.records import History, Predictor, outputs_of
 from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
 
 DRAWS, COSTLY_DRAWS = 4000, 800
@@ -44,7 +42,13 @@ DEFAULT_TARGETS: Mapping[str, Sequence[float] | float] = {"strain": (0.01,)}
 
 @checked
 @dataclass(frozen=True, eq=False)
-class Forecast(Presentable, text="reports.forecast:forecast_text"):
+class Forecast(
+    Presentable,
+    Plotted,
+    text="reports.forecast:forecast_text",
+    figure="reports.forecast:forecast_figure",
+    panel="reports.forecast:draw_forecast",
+):
     """What tests will show: the result of forecast().
 
     laws : {law: weight}; left_out : how many laws of a ranking have too little weight to count.
@@ -74,10 +78,6 @@ class Forecast(Presentable, text="reports.forecast:forecast_text"):
         if test not in known:
             raise FitError(f"there is no forecast of a test '{test}'; there are those of {', '.join(known)}")
         return known[test]
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Curves with bands, measured points over them, times on the axis, and what the bands are made of."""
-        return present("reports.forecast:forecast_figure", self, path)
 
 
 @checked

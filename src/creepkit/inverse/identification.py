@@ -49,12 +49,11 @@ from creepkit.inverse.uncertainty.quantities import (
 )
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.language import CreepLaw
-from creepkit.presentation import Presentable, present
+from creepkit.presentation import Plotted, Presentable, present
 from creepkit.records import History, LawWithValues, Nuisance, Prediction, Predictor
 from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
 
     from creepkit.inverse.search.global_search import SearchTrace
@@ -68,7 +67,13 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 @dataclass(frozen=True, eq=False)
 class Identification(
-    RateStatements, Presentable, text="reports.answer:answer_text", details="reports.identification:identification_text"
+    RateStatements,
+    Presentable,
+    Plotted,
+    text="reports.answer:answer_text",
+    details="reports.identification:identification_text",
+    figure="reports.identification_plot:identification_figure",
+    panel="reports.identification_plot:draw_identification",
 ):
     """The result of identify().
 
@@ -462,7 +467,3 @@ class Identification(
     def save(self, path: str | Path) -> Path:
         """Write the identification as JSON (to a temporary name, then renamed)."""
         return present("inverse.identification_document:write_identification", self, Path(path))
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Measured against identified, and residuals; written to `path` when given."""
-        return present("reports.identification_plot:identification_figure", self, path)

@@ -14,7 +14,7 @@ from creepkit.arrays import Bools, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, quoted
 from creepkit.limits import HOTTEST
-from creepkit.presentation import present
+from creepkit.presentation import Plotted, present
 from creepkit.records.loading import Loading, Program, loading_text
 from creepkit.records.specimen_lookup import load_unit
 from creepkit.records.units import celsius_text
@@ -59,7 +59,7 @@ EVERY_FRAME: Bools = frozen([], dtype=bool)
 
 @checked
 @dataclass(frozen=True, eq=False)
-class History:
+class History(Plotted, figure="reports.histories:history_figure", panel="reports.histories:draw_history"):
     """One measured (or planned) test: outputs over time, and everything known about how it was made.
 
     times : (frames,) s, strictly increasing.
@@ -216,6 +216,17 @@ class History:
     def __repr__(self) -> str:
         return f"<History '{self.name}': {self.specimen}, {self.condition}, {self.times.size} readings>"
 
+    @classmethod
+    def from_dataframe(cls, frame: DataFrame, /, **conditions: Any) -> History:
+        """One test from a table of pandas: columns and conditions named with units, as in test files.
+
+        frame : one row a reading, with columns such as time_h and strain_pct; those of to_dataframe() are read back.
+        conditions : what stands in the head of a file: stress_MPa=120, temperature_C=750, name="bar 12".
+
+        >>> ck.History.from_dataframe(frame, stress_MPa=120, temperature_C=750)  # doctest: +SKIP
+        """
+        return present("reports.dataframes:history_from_dataframe", frame, conditions)
+
     def to_dataframe(self) -> DataFrame:
         """(frames,) rows of pandas: time_s, the outputs with their units, and whether a frame is used."""
         return present("reports.dataframes:to_dataframe", self)
@@ -296,3 +307,15 @@ class History:
         if np.ptp(kelvin) < 0.5:
             ends = (kelvin[0], kelvin[0])
         return f"{celsius_text(*ends, digits=0)}, {loading_text(self.loading, load_unit(self))}"
+
+
+class Histories(list[History], Plotted, figure="reports.histories:tests_figure", panel="reports.histories:draw_tests"):
+    """A list of tests, which notebooks show as a table."""
+
+    def to_dataframe(self) -> DataFrame:
+        """(frames of all,) rows of pandas: the test, and what its own table has."""
+        return present("reports.dataframes:to_dataframe", self)
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        return present("reports.html.notebook:notebook_html", self)

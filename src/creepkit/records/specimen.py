@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from creepkit.errors import SolveError
+from creepkit.presentation import present
 from creepkit.records.predictor import Predictor
 
 if TYPE_CHECKING:
@@ -40,6 +41,10 @@ class Specimen(Predictor):
     def planned_loading(self, levels: tuple[float, float], jump_time: float) -> Loading | None:
         """The loading of a test with two levels, the second from `jump_time`, s, on; None where it does not say."""
         return None
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        return present("reports.html.notebook:notebook_html", self)
 
     @property
     def surface_region(self) -> SurfaceRegion:

@@ -21,7 +21,7 @@ from creepkit.files.record_codec import ANY_NUMBER, NumberRange, RecordCodec, Re
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.limits import PROBABILITY, SEED, Limits, numbers
 from creepkit.options import CELSIUS, Options, option
-from creepkit.presentation import Presentable, present
+from creepkit.presentation import Plotted, Presentable, present
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.checks import AssessmentCheck
@@ -40,7 +40,7 @@ from creepkit.rupture_assessment.strength import (
 )
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 AVERAGE = "average"
 """Name of the average over all ranked methods by their weights."""
@@ -123,7 +123,13 @@ class RankedRuptureFit:
 
 
 @dataclass(frozen=True, eq=False)
-class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
+class RuptureAssessment(
+    Presentable,
+    Plotted,
+    text="reports.rupture:rupture_text",
+    figure="reports.rupture:rupture_figure",
+    panel="reports.rupture:draw_isotherms",
+):
     """The result of rupture().
 
     ranked : methods, each with every degree that was tried, the highest weight first. rejected : {method: why it is
@@ -279,9 +285,9 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
         median, low, high = (SECONDS_PER_HOUR * power_of_ten(curve[0]) for curve in curves)
         return median, low, high
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Isotherms with tests and bounds, the master curve, and predicted against measured times."""
-        return present("reports.rupture:rupture_figure", self, path)
+    def to_dataframe(self) -> DataFrame:
+        """(strengths,) rows of pandas: time, temperature, method, strength and ends of its bounds, MPa."""
+        return present("reports.dataframes:to_dataframe", self)
 
     def save(self, path: str | Path) -> Path:
         """Write the assessment to a JSON file."""

@@ -21,7 +21,7 @@ _RunType = TypeVar("_RunType", bound="Run")
 
 
 @dataclass(frozen=True, eq=False)
-class Run(Presentable, History, text="reports.simulation:run_text"):
+class Run(Presentable, History, text="reports.simulation:run_text", figure="reports.histories:run_figure"):
     """A simulated test up to where it ended: the times asked for that were reached, and the outputs there.
 
     status : how it ended; end_time : s, where; reason : why, in words (empty when complete).

@@ -12,6 +12,7 @@ from creepkit.checked_arguments import checked
 from creepkit.files.json_documents import json_text
 from creepkit.files.reading import read_bytes
 from creepkit.files.writing import hashed_stem
+from creepkit.presentation import present
 from creepkit.reports.attachments import problem_of_names
 from creepkit.reports.contents import (
     Attachment,
@@ -81,6 +82,10 @@ class StudyResult:
         states = ", ".join(f"{count} {state}" for state, count in Counter(one.state for one in self.stages).items())
         tests = f"{len(self.histories)} tests; stages: {states or 'none'}"
         return f"StudyResult '{self.title}': {tests}; report: {self.report or 'none'}"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the answers, as its report has them."""
+        return present("reports.html.notebook:notebook_html", self.report_contents())
 
     @property
     def title(self) -> str:

@@ -33,10 +33,9 @@ from creepkit.inverse.information_criteria import (
     determined_parameters,
 )
 from creepkit.inverse.selection.discrimination import under_common_covariance
-from creepkit.presentation import Presentable, present
+from creepkit.presentation import Plotted, Presentable, present
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
 
     from creepkit.inverse.adequacy import Adequacy
@@ -60,7 +59,14 @@ class RankedLaw:
 
 
 @dataclass(frozen=True)
-class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="reports.ranking:ranking_text"):
+class Ranking(
+    Presentable,
+    Plotted,
+    text="reports.answer:ranking_answer_text",
+    details="reports.ranking:ranking_text",
+    figure="reports.ranking:ranking_figure",
+    panel="reports.ranking:draw_misfits",
+):
     """Identified laws, best first.
 
     criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.
@@ -149,10 +155,6 @@ class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="r
     def save(self, path: str | Path) -> Path:
         """Write the ranking as JSON, and each law's identification as LAW.json beside it; load_ranking() reads them."""
         return present("inverse.ranking_document:write_ranking", self, Path(path))
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Misfits and weights of the laws, and the curves of the credible ones; written to `path` when given."""
-        return present("reports.ranking:ranking_figure", self, path)
 
 
 def verdict_of(ranking: Ranking) -> str:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import softmax
@@ -38,6 +38,9 @@ from creepkit.inverse.uncertainty.quantities import (
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import Predictor
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 ROUNDS, MOST_ROUNDS = 4, 12
 """Of proposals: at least, and where the samples are still worth too few."""
@@ -130,6 +133,14 @@ class PosteriorSamples(RateStatements, Presentable, text="reports.inference:post
         draws = quantity(self.coordinates, **point)(self.u)
         median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
         return median, low, high
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} = {np.median(draws):.4g}" for name, draws in self.values.items())
+        return f"<PosteriorSamples of {self.coordinates.law.name}: {len(self.u)} draws, medians {values}>"
+
+    def to_dataframe(self) -> DataFrame:
+        """(draws,) rows of pandas: the values of the parameters, in their units."""
+        return present("reports.dataframes:to_dataframe", self)
 
     def to_arviz(self) -> Any:
         """An xarray Dataset for arviz, whose plots and summaries take it: one chain, with units of the parameters."""

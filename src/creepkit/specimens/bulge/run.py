@@ -36,10 +36,6 @@ class BulgeRun(FiniteElementRun):
         """A picture of the deformed section, coloured by a field (see `field`), at a time; by default the last."""
         return present("reports.simulation:section_figure", self, time, name, path)
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """A picture of what is observed, and of the pressure, over time."""
-        return present("reports.histories:run_figure", self, path)
-
     @property
     def _profiles(self) -> Floats:
         """(steps, top nodes) mm."""
