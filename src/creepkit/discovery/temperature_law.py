@@ -61,8 +61,8 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, interval_ends, verdict_of_interval
 from creepkit.inverse.uncertainty.mixture_distribution import MixtureDistribution
 from creepkit.language import CreepLaw
-from creepkit.presentation import Presentable, present
 from creepkit.records import History, LawWithValues, Predictor
+from creepkit.records.presentable import Presentable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,6 +75,10 @@ TEMPERATURE_LAW = DocumentFormat(
 )
 
 
+FIELDS_WRITTEN: tuple[str, ...] = ("law", "isothermal_law", "T_ref", "temperature_range", "criterion_data")
+FIELDS_WRITTEN += ("estimates", "plausible_forms", "fit", "notes")
+
+
 MAX_COMBINATIONS_WRITTEN = 20
 """Combinations that are written, best first."""
 
@@ -84,15 +88,7 @@ def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
     estimates = temperature_law.isothermal_estimates
     content: dict[str, Any] = {
         "creepkit": version("creepkit"),
-        "law": temperature_law.law,
-        "isothermal_law": temperature_law.isothermal_law,
-        "T_ref": temperature_law.T_ref,
-        "temperature_range": temperature_law.temperature_range,
-        "criterion_data": temperature_law.criterion_data,
-        "estimates": temperature_law.estimates,
-        "plausible_forms": temperature_law.plausible_forms,
-        "fit": temperature_law.fit,
-        "notes": temperature_law.notes,
+        **{name: getattr(temperature_law, name) for name in FIELDS_WRITTEN},
         "candidates": [
             {
                 "forms": candidate.forms,
@@ -124,7 +120,7 @@ NOTED_OVERDISPERSION = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_text"):
+class TemperatureLaw(Presentable):
     """The result of discover() and of refit().
 
     law : an ordinary law with temperature in it, printed and exported like any other; `valued` has its numbers.
@@ -200,7 +196,14 @@ class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Parameters against temperature, with intervals and the curves of the forms that remain."""
-        return present("reports.temperature_law:plot_temperature_law", self, path)
+        from creepkit.reports.temperature_law import plot_temperature_law
+
+        return plot_temperature_law(self, path)
+
+    def __str__(self) -> str:
+        from creepkit.reports.temperature_law import temperature_law_text
+
+        return temperature_law_text(self)
 
 
 def temperature_law_from_combinations(

@@ -12,7 +12,7 @@ import numpy as np
 from creepkit.errors import FitError
 from creepkit.experiments.expectations import Expectation
 from creepkit.experiments.rig import CandidateTest
-from creepkit.presentation import Presentable, present
+from creepkit.records.presentable import Presentable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +55,7 @@ class PlannedTest(CandidateTest):
 
 
 @dataclass(frozen=True)
-class Design(Presentable, text="reports.design:design_text"):
+class Design(Presentable):
     """The next tests, the best first.
 
     goal : "parameters", "law", or the name of a quantity. laws, weights : that remain, the best first.
@@ -94,11 +94,20 @@ class Design(Presentable, text="reports.design:design_text"):
 
     def to_json(self) -> dict[str, object]:
         """Laws, advice, plan and every test considered, as JSON-able data."""
-        return present("reports.design:design_to_json", self)
+        from creepkit.reports.design import design_to_json
+
+        return design_to_json(self)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Map of what each candidate tells for an hour of machine time, over load and duration; written to `path`."""
-        return present("reports.design:design_figure", self, path)
+        from creepkit.reports.design import design_figure
+
+        return design_figure(self, path)
+
+    def __str__(self) -> str:
+        from creepkit.reports.design import design_text
+
+        return design_text(self)
 
 
 def machine_time_text(hours: float) -> str:

@@ -13,9 +13,9 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints, frozen
 from creepkit.errors import HistoryError
 from creepkit.extraction.noise import NoiseEstimate
-from creepkit.presentation import Presentable, present
 from creepkit.quality.flags import QualityFlag, frame_ranges_text
 from creepkit.records import History, Loading, Program, SurfaceRegion, constant_load, known_specimens, loads_of
+from creepkit.records.presentable import Presentable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,7 +50,7 @@ class FieldMap(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Extraction(Presentable, text="reports.extraction:extraction_text"):
+class Extraction(Presentable):
     """The measured outputs of one test piece, and how they came about.
 
     name : D1, D2 ... or as given. source : the frames. specimen, operator : what was observed, and how.
@@ -103,7 +103,9 @@ class Extraction(Presentable, text="reports.extraction:extraction_text"):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """A contact sheet: fields, residuals, points that were used, outputs with bands, rigid motion, residuals."""
-        return present("reports.extraction:extraction_figure", self, path)
+        from creepkit.reports.extraction import extraction_figure
+
+        return extraction_figure(self, path)
 
     def history_under(
         self, loading: Loading | float, temperature: float | Program, *, time_zero: float | None = None
@@ -168,6 +170,11 @@ class Extraction(Presentable, text="reports.extraction:extraction_text"):
     def replace(self, **changes: object) -> Extraction:
         """The same extraction with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+    def __str__(self) -> str:
+        from creepkit.reports.extraction import extraction_text
+
+        return extraction_text(self)
 
 
 def _label(extraction: Extraction) -> str:

@@ -22,8 +22,8 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
 from creepkit.language import temperature
-from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor, outputs_of
+from creepkit.records.presentable import Presentable
 from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ DEFAULT_TARGETS: Mapping[str, Sequence[float] | float] = {"strain": (0.01,)}
 
 @checked
 @dataclass(frozen=True, eq=False)
-class Forecast(Presentable, text="reports.forecast:forecast_text"):
+class Forecast(Presentable):
     """What tests will show: the result of forecast().
 
     laws : {law: weight}; left_out : how many laws of a ranking have too little weight to count.
@@ -66,7 +66,9 @@ class Forecast(Presentable, text="reports.forecast:forecast_text"):
 
     def to_dataframe(self) -> DataFrame:
         """(tests, outputs, times) rows of pandas: value and ends of the band, in s and units of the outputs."""
-        return present("reports.dataframes:to_dataframe", self)
+        from creepkit.reports.dataframes import to_dataframe
+
+        return to_dataframe(self)
 
     def __getitem__(self, test: str) -> TestForecast:
         """The forecast of one test, by name."""
@@ -77,7 +79,14 @@ class Forecast(Presentable, text="reports.forecast:forecast_text"):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Curves with bands, measured points over them, times on the axis, and what the bands are made of."""
-        return present("reports.forecast:forecast_figure", self, path)
+        from creepkit.reports.forecast import forecast_figure
+
+        return forecast_figure(self, path)
+
+    def __str__(self) -> str:
+        from creepkit.reports.forecast import forecast_text
+
+        return forecast_text(self)
 
 
 @checked

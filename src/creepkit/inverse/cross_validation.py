@@ -16,8 +16,8 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.single_values import SingleValue
-from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction
+from creepkit.records.presentable import Presentable
 
 FITTED_FRACTION = 0.7
 """Of the duration of each history: the part that is fitted in cross-validation by time."""
@@ -64,7 +64,7 @@ class Fold:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CrossValidation(Presentable, text="reports.inference:cross_validation_text"):
+class CrossValidation(Presentable):
     """The result of cross_validate(): the fit to all histories, and its folds."""
 
     fit: Identification = field(repr=False)
@@ -94,6 +94,11 @@ class CrossValidation(Presentable, text="reports.inference:cross_validation_text
                     measured.append(history.outputs[output][used])
                     predicted.append(fold.prediction.of(k)[used, column])
         return relative_squared_error(measured, predicted)
+
+    def __str__(self) -> str:
+        from creepkit.reports.inference import cross_validation_text
+
+        return cross_validation_text(self)
 
 
 @checked

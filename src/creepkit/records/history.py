@@ -14,7 +14,6 @@ from creepkit.arrays import Bools, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, quoted
 from creepkit.limits import HOTTEST
-from creepkit.presentation import present
 from creepkit.records.loading import Loading, Program, loading_text
 from creepkit.records.specimen_lookup import load_unit
 from creepkit.records.units import celsius_text
@@ -218,11 +217,15 @@ class History:
 
     def to_dataframe(self) -> DataFrame:
         """(frames,) rows of pandas: time_s, the outputs with their units, and whether a frame is used."""
-        return present("reports.dataframes:to_dataframe", self)
+        from creepkit.reports.dataframes import to_dataframe
+
+        return to_dataframe(self)
 
     def _repr_html_(self) -> str:
         """For notebooks."""
-        return present("reports.html.notebook:notebook_html", self)
+        from creepkit.reports.html.notebook import notebook_html
+
+        return notebook_html(self)
 
     def replace(self, **changes: Any) -> History:
         """The same history with some fields changed.

@@ -13,8 +13,8 @@ import numpy as np
 from creepkit.arrays import Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest
-from creepkit.presentation import Presentable, present
 from creepkit.records.loading import Program
+from creepkit.records.presentable import Presentable
 from creepkit.records.recorded_programs import recorded_program
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class Channel:
 
 @checked
 @dataclass(frozen=True, eq=False)
-class InstrumentRecord(Presentable, text="reports.instrument_records:record_text"):
+class InstrumentRecord(Presentable):
     """Channels that one instrument recorded over one clock.
 
     times : (rows,) s, strictly increasing, from the record's own zero. channels : {name: channel}.
@@ -133,4 +133,11 @@ class InstrumentRecord(Presentable, text="reports.instrument_records:record_text
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Every channel over time, one panel for each quantity; written to a file if a path is given."""
-        return present("reports.instrument_records:record_figure", self, path)
+        from creepkit.reports.instrument_records import record_figure
+
+        return record_figure(self, path)
+
+    def __str__(self) -> str:
+        from creepkit.reports.instrument_records import record_text
+
+        return record_text(self)

@@ -21,8 +21,8 @@ from creepkit.files.record_codec import ANY_NUMBER, NumberRange, RecordCodec, Re
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.limits import PROBABILITY, SEED, Limits, numbers
 from creepkit.options import CELSIUS, Options, option
-from creepkit.presentation import Presentable, present
 from creepkit.records import SECONDS_PER_HOUR
+from creepkit.records.presentable import Presentable
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.checks import AssessmentCheck
 from creepkit.rupture_assessment.fitting import MinimumRateRelation
@@ -123,7 +123,7 @@ class RankedRuptureFit:
 
 
 @dataclass(frozen=True, eq=False)
-class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
+class RuptureAssessment(Presentable):
     """The result of rupture().
 
     ranked : methods, each with every degree that was tried, the highest weight first. rejected : {method: why it is
@@ -281,11 +281,18 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Isotherms with tests and bounds, the master curve, and predicted against measured times."""
-        return present("reports.rupture:rupture_figure", self, path)
+        from creepkit.reports.rupture import rupture_figure
+
+        return rupture_figure(self, path)
 
     def save(self, path: str | Path) -> Path:
         """Write the assessment to a JSON file."""
-        return present("rupture_assessment.assessment:write_assessment", self, path)
+        return write_assessment(self, path)
+
+    def __str__(self) -> str:
+        from creepkit.reports.rupture import rupture_text
+
+        return rupture_text(self)
 
 
 ISOTHERMAL_TOLERANCE = 5.0

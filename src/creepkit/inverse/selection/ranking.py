@@ -33,7 +33,7 @@ from creepkit.inverse.information_criteria import (
     determined_parameters,
 )
 from creepkit.inverse.selection.discrimination import under_common_covariance
-from creepkit.presentation import Presentable, present
+from creepkit.records.presentable import Presentable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,7 +60,7 @@ class RankedLaw:
 
 
 @dataclass(frozen=True)
-class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="reports.ranking:ranking_text"):
+class Ranking(Presentable):
     """Identified laws, best first.
 
     criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.
@@ -80,7 +80,9 @@ class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="r
 
     def to_dataframe(self) -> DataFrame:
         """(laws,) rows of pandas: weight, criterion less that of the best, chi-square and verdict."""
-        return present("reports.dataframes:to_dataframe", self)
+        from creepkit.reports.dataframes import to_dataframe
+
+        return to_dataframe(self)
 
     @property
     def best(self) -> Identification:
@@ -140,19 +142,38 @@ class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="r
 
     def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:
         """What tests will show, over all laws by their weights; as creepkit.forecast()."""
-        return present("forecasts.forecast:forecast", self, tests, level=level, **options)
+        from creepkit.forecasts.forecast import forecast
+
+        return forecast(self, tests, level=level, **options)
 
     def further_tests(self) -> Any:
         """A Design: tests like those that were made, by how well they would separate the remaining laws."""
-        return present("experiments.design:design", self, goal="law")
+        from creepkit.experiments.design import design
+
+        return design(self, goal="law")
 
     def save(self, path: str | Path) -> Path:
         """Write the ranking as JSON, and each law's identification as LAW.json beside it; load_ranking() reads them."""
-        return present("inverse.ranking_document:write_ranking", self, Path(path))
+        from creepkit.inverse.ranking_document import write_ranking
+
+        return write_ranking(self, Path(path))
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Misfits and weights of the laws, and the curves of the credible ones; written to `path` when given."""
-        return present("reports.ranking:ranking_figure", self, path)
+        from creepkit.reports.ranking import ranking_figure
+
+        return ranking_figure(self, path)
+
+    def __str__(self) -> str:
+        from creepkit.reports.answer import ranking_answer_text
+
+        return ranking_answer_text(self)
+
+    def details(self) -> str:
+        """Everything that there is to say, as text."""
+        from creepkit.reports.ranking import ranking_text
+
+        return ranking_text(self)
 
 
 def verdict_of(ranking: Ranking) -> str:
