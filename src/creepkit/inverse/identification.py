@@ -390,14 +390,8 @@ class Identification(RateStatements, Presentable):
         if missing:
             raise FitError(f"this identification was made from '{missing[0]}', which is not among the histories given")
         tests = tuple(by_name[m.name] for m in self.tests)
-        if using is None and (self.predictor is not None or self.predictor_documents):
-            predictor = self._predictor_or(None)
-        elif using is None or isinstance(using, str | Mapping):
-            predictor = CompositePredictor.of(resolve_predictors(using, tests))
-        elif isinstance(using, Predictor):
-            predictor = using
-        else:
-            raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
+        stated = using is None and (self.predictor is not None or self.predictor_documents)
+        predictor = self._predictor_or(None) if stated else CompositePredictor.of(resolve_predictors(using, tests))
         from creepkit.inverse.identification_notes import with_attached
 
         return with_attached(self, tests, predictor)
@@ -424,14 +418,13 @@ class Identification(RateStatements, Presentable):
         if self.error_covariance is None:
             return self
         covariance = positive_semidefinite(self.covariance - self.error_covariance)
-        scatter = None if self.rate_scatter is None else replace(self.rate_scatter, errors=None)
         return replace(
             self,
             settings=replace(self.settings, usual_errors="none"),
             covariance=covariance,
             error_covariance=None,
             estimates=parameter_estimates(self.law, self.coordinates, self.u, covariance),
-            rate_scatter=scatter,
+            rate_scatter=self.rate_scatter and replace(self.rate_scatter, errors=None),
         )
 
     def __getstate__(self) -> dict[str, Any]:
