@@ -37,7 +37,7 @@ BUDGET = {
     "modules": 800,
     "quality": 1300,
     "readers": 5850,
-    "records": 2200,
+    "records": 2250,
     "registry": 650,
     "reports": 5500,
     "rupture_assessment": 1700,

@@ -6,16 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints, frozen
 from creepkit.errors import HistoryError
 from creepkit.extraction.noise import NoiseEstimate
-from creepkit.presentation import Plotted, Presentable
 from creepkit.quality.flags import QualityFlag, frame_ranges_text
 from creepkit.records import History, Loading, Program, SurfaceRegion, constant_load, known_specimens, loads_of
+from creepkit.records.presentable import Plotted, Presentable
 
 TURNED = "z of the frames points away from the cameras, for the surface moves along -z; heights are counted against it"
 """What is assumed of frames in which the surface falls."""
@@ -46,13 +46,7 @@ class FieldMap(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Extraction(
-    Presentable,
-    Plotted,
-    text="reports.extraction:extraction_text",
-    figure="reports.extraction:extraction_figure",
-    panel="reports.extraction:draw_extraction",
-):
+class Extraction(Presentable, Plotted):
     """The measured outputs of one test piece, and how they came about.
 
     name : D1, D2 ... or as given. source : the frames. specimen, operator : what was observed, and how.
@@ -102,6 +96,11 @@ class Extraction(
             object.__setattr__(self, name, frozen(getattr(self, name)))
         object.__setattr__(self, "used", frozen(self.used, dtype=bool))
         object.__setattr__(self, "clamped", frozen(self.clamped, dtype=bool))
+
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.extraction import draw_extraction, extraction_figure
+
+        return extraction_figure, draw_extraction
 
     def history_under(
         self, loading: Loading | float, temperature: float | Program, *, time_zero: float | None = None
@@ -166,6 +165,11 @@ class Extraction(
     def replace(self, **changes: object) -> Extraction:
         """The same extraction with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+    def __str__(self) -> str:
+        from creepkit.reports.extraction import extraction_text
+
+        return extraction_text(self)
 
 
 def _label(extraction: Extraction) -> str:

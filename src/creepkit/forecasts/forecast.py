@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -21,12 +21,9 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
 from creepkit.language import temperature
-from creepkit.presentation import Plotted, Presentable, present
 from creepkit.records import History, Predictor, outputs_of
+from creepkit.records.presentable import Plotted, Presentable, Tabulated
 from creepkit.registry.arguments import resolve_predictors
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 DRAWS, COSTLY_DRAWS = 4000, 800
 """Of the law, of each test's own rate, and of its dimensions; and where each is a simulation by finite elements."""
@@ -42,13 +39,7 @@ DEFAULT_TARGETS: Mapping[str, Sequence[float] | float] = {"strain": (0.01,)}
 
 @checked
 @dataclass(frozen=True, eq=False)
-class Forecast(
-    Presentable,
-    Plotted,
-    text="reports.forecast:forecast_text",
-    figure="reports.forecast:forecast_figure",
-    panel="reports.forecast:draw_forecast",
-):
+class Forecast(Presentable, Plotted, Tabulated):
     """What tests will show: the result of forecast().
 
     laws : {law: weight}; left_out : how many laws of a ranking have too little weight to count.
@@ -68,16 +59,22 @@ class Forecast(
     def __repr__(self) -> str:
         return f"<Forecast of {', '.join(test.name for test in self.tests)} by {', '.join(self.laws)}>"
 
-    def to_dataframe(self) -> DataFrame:
-        """(tests, outputs, times) rows of pandas: value and ends of the band, in s and units of the outputs."""
-        return present("reports.dataframes:to_dataframe", self)
-
     def __getitem__(self, test: str) -> TestForecast:
         """The forecast of one test, by name."""
         known = {one.name: one for one in self.tests}
         if test not in known:
             raise FitError(f"there is no forecast of a test '{test}'; there are those of {', '.join(known)}")
         return known[test]
+
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.forecast import draw_forecast, forecast_figure
+
+        return forecast_figure, draw_forecast
+
+    def __str__(self) -> str:
+        from creepkit.reports.forecast import forecast_text
+
+        return forecast_text(self)
 
 
 @checked

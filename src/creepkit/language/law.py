@@ -11,7 +11,6 @@ from creepkit.language import algebra
 from creepkit.language.algebra import times
 from creepkit.language.law_record import LawRecord
 from creepkit.language.printing import LatexLawPrinter, latex_equations, law_text
-from creepkit.presentation import present
 
 
 @checked
@@ -92,7 +91,9 @@ class CreepLaw(LawRecord):
 
         Values enter by name, law.expr.subs(fit.values).
         """
-        return present("reports.law_names:law_expression", self)
+        from creepkit.reports.law_names import law_expression
+
+        return law_expression(self)
 
     def latex(self) -> str:
         """The law as LaTeX equations: of its rate with one summand a term, then of its internal variables."""
@@ -107,4 +108,6 @@ class CreepLaw(LawRecord):
 
     def _repr_html_(self) -> str:
         """For notebooks."""
-        return present("reports.html.notebook:notebook_html", self)
+        from creepkit.reports.html.notebook import notebook_html
+
+        return notebook_html(self)

@@ -14,8 +14,8 @@ from creepkit.arrays import Bools, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, quoted
 from creepkit.limits import HOTTEST
-from creepkit.presentation import Plotted, present
 from creepkit.records.loading import Loading, Program, loading_text
+from creepkit.records.presentable import NotebookCell, Plotted, Tabulated
 from creepkit.records.specimen_lookup import load_unit
 from creepkit.records.units import celsius_text
 
@@ -59,7 +59,7 @@ EVERY_FRAME: Bools = frozen([], dtype=bool)
 
 @checked
 @dataclass(frozen=True, eq=False)
-class History(Plotted, figure="reports.histories:history_figure", panel="reports.histories:draw_history"):
+class History(NotebookCell, Plotted, Tabulated):
     """One measured (or planned) test: outputs over time, and everything known about how it was made.
 
     times : (frames,) s, strictly increasing.
@@ -225,15 +225,14 @@ class History(Plotted, figure="reports.histories:history_figure", panel="reports
 
         >>> ck.History.from_dataframe(frame, stress_MPa=120, temperature_C=750)  # doctest: +SKIP
         """
-        return present("reports.dataframes:history_from_dataframe", frame, conditions)
+        from creepkit.reports.dataframes import history_from_dataframe
 
-    def to_dataframe(self) -> DataFrame:
-        """(frames,) rows of pandas: time_s, the outputs with their units, and whether a frame is used."""
-        return present("reports.dataframes:to_dataframe", self)
+        return history_from_dataframe(frame, conditions)
 
-    def _repr_html_(self) -> str:
-        """For notebooks."""
-        return present("reports.html.notebook:notebook_html", self)
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.histories import draw_history, history_figure
+
+        return history_figure, draw_history
 
     def replace(self, **changes: Any) -> History:
         """The same history with some fields changed.
@@ -309,13 +308,10 @@ class History(Plotted, figure="reports.histories:history_figure", panel="reports
         return f"{celsius_text(*ends, digits=0)}, {loading_text(self.loading, load_unit(self))}"
 
 
-class Histories(list[History], Plotted, figure="reports.histories:tests_figure", panel="reports.histories:draw_tests"):
+class Histories(list[History], NotebookCell, Plotted, Tabulated):
     """A list of tests, which notebooks show as a table."""
 
-    def to_dataframe(self) -> DataFrame:
-        """(frames of all,) rows of pandas: the test, and what its own table has."""
-        return present("reports.dataframes:to_dataframe", self)
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.histories import draw_tests, tests_figure
 
-    def _repr_html_(self) -> str:
-        """For notebooks."""
-        return present("reports.html.notebook:notebook_html", self)
+        return tests_figure, draw_tests

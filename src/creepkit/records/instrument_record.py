@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest
-from creepkit.presentation import Plotted, Presentable
 from creepkit.records.loading import Program
+from creepkit.records.presentable import Plotted, Presentable
 from creepkit.records.recorded_programs import recorded_program
 
 GAP_FACTOR = 5.0
@@ -50,13 +51,7 @@ class Channel:
 
 @checked
 @dataclass(frozen=True, eq=False)
-class InstrumentRecord(
-    Presentable,
-    Plotted,
-    text="reports.instrument_records:record_text",
-    figure="reports.instrument_records:record_figure",
-    panel="reports.instrument_records:draw_record",
-):
+class InstrumentRecord(Presentable, Plotted):
     """Channels that one instrument recorded over one clock.
 
     times : (rows,) s, strictly increasing, from the record's own zero. channels : {name: channel}.
@@ -131,3 +126,13 @@ class InstrumentRecord(
         if not later.any():
             raise HistoryError(f"{self.origin}: channel '{channel}' holds no reading after time zero")
         return recorded_program(times[later], values[later], tolerance)
+
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.instrument_records import draw_record, record_figure
+
+        return record_figure, draw_record
+
+    def __str__(self) -> str:
+        from creepkit.reports.instrument_records import record_text
+
+        return record_text(self)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from creepkit.errors import SolveError
-from creepkit.presentation import present
 from creepkit.records.predictor import Predictor
+from creepkit.records.presentable import NotebookCell
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from creepkit.records.loading import Loading
 
 
-class Specimen(Predictor):
+class Specimen(Predictor, NotebookCell):
     """A frozen record of a test piece: which outputs are observed, and how to predict them.
 
     dataset_names : {general name of a condition: its own}. surrogate_name : of its
@@ -41,10 +41,6 @@ class Specimen(Predictor):
     def planned_loading(self, levels: tuple[float, float], jump_time: float) -> Loading | None:
         """The loading of a test with two levels, the second from `jump_time`, s, on; None where it does not say."""
         return None
-
-    def _repr_html_(self) -> str:
-        """For notebooks."""
-        return present("reports.html.notebook:notebook_html", self)
 
     @property
     def surface_region(self) -> SurfaceRegion:

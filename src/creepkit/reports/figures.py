@@ -13,7 +13,6 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import ReportError
 from creepkit.files.writing import replace_on_success
-from creepkit.presentation import function_named
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +37,7 @@ def empty_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def plotted(record: object, functions: tuple[str, str], path: Any, axes: Any) -> Figure:
+def plotted(record: object, figure: Any, panel: Any, path: Any, axes: Any) -> Figure:
     """The figure of a record by the first of two functions, or by the second its leading panel within axes."""
     from matplotlib.axes import Axes
 
@@ -49,8 +48,8 @@ def plotted(record: object, functions: tuple[str, str], path: Any, axes: Any) ->
                 f"{name} of plot() is {kind}; write plot('fit.png'), or plot(ax=ax) with matplotlib's axes"
             )
     if axes is None:
-        return save_figure(function_named(functions[0])(record), path)
-    function_named(functions[1])(axes, record)
+        return save_figure(figure(record), path)
+    panel(axes, record)
     return save_figure(axes.get_figure(root=True), path, axes)
 
 

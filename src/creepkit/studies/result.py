@@ -12,7 +12,6 @@ from creepkit.checked_arguments import checked
 from creepkit.files.json_documents import json_text
 from creepkit.files.reading import read_bytes
 from creepkit.files.writing import hashed_stem
-from creepkit.presentation import present
 from creepkit.reports.attachments import problem_of_names
 from creepkit.reports.contents import (
     Attachment,
@@ -85,7 +84,9 @@ class StudyResult:
 
     def _repr_html_(self) -> str:
         """For notebooks: the answers, as its report has them."""
-        return present("reports.html.notebook:notebook_html", self.report_contents())
+        from creepkit.reports.html.notebook import notebook_html
+
+        return notebook_html(self.report_contents())
 
     @property
     def title(self) -> str:
