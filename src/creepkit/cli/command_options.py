@@ -49,7 +49,7 @@ class OutputPath:
         if self.kind == "picture":
             from creepkit.reports.figures import check_picture_format
 
-            check_picture_format(path, CreepkitError)
+            check_picture_format(path)
 
 
 FORCE = Annotated[bool, typer.Option("--force", help="Overwrite files that creepkit did not write.")]

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -62,10 +62,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import Estimate, interva
 from creepkit.inverse.uncertainty.mixture_distribution import MixtureDistribution
 from creepkit.language import CreepLaw
 from creepkit.records import History, LawWithValues, Predictor
-from creepkit.records.presentable import Presentable
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from creepkit.records.presentable import Plotted, Presentable
 
 TEMPERATURE_LAW = DocumentFormat(
     "creepkit-temperature-law",
@@ -120,7 +117,7 @@ NOTED_OVERDISPERSION = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class TemperatureLaw(Presentable):
+class TemperatureLaw(Presentable, Plotted):
     """The result of discover() and of refit().
 
     law : an ordinary law with temperature in it, printed and exported like any other; `valued` has its numbers.
@@ -194,11 +191,10 @@ class TemperatureLaw(Presentable):
         """Write the result as JSON (to a temporary name, then renamed)."""
         return write_json(temperature_law_to_json(self), Path(path), TEMPERATURE_LAW.kind)
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Parameters against temperature, with intervals and the curves of the forms that remain."""
-        from creepkit.reports.temperature_law import plot_temperature_law
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.temperature_law import draw_parameter, temperature_law_figure
 
-        return plot_temperature_law(self, path)
+        return temperature_law_figure, draw_parameter
 
     def __str__(self) -> str:
         from creepkit.reports.temperature_law import temperature_law_text

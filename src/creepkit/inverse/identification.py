@@ -50,13 +50,10 @@ from creepkit.inverse.uncertainty.quantities import (
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.language import CreepLaw
 from creepkit.records import History, LawWithValues, Nuisance, Prediction, Predictor
-from creepkit.records.presentable import Presentable
+from creepkit.records.presentable import Plotted, Presentable, Tabulated
 from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from pandas import DataFrame
-
     from creepkit.inverse.search.global_search import SearchTrace
     from creepkit.inverse.sparsity.result import Sparsity
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit, LawMisfits
@@ -67,7 +64,7 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 
 @dataclass(frozen=True, eq=False)
-class Identification(RateStatements, Presentable):
+class Identification(RateStatements, Presentable, Plotted, Tabulated):
     """The result of identify().
 
     estimates : one Estimate for each parameter, in the order of the law.
@@ -135,12 +132,6 @@ class Identification(RateStatements, Presentable):
     def __repr__(self) -> str:
         values = ", ".join(f"{name} = {value:.4g}" for name, value in self.values.items())
         return f"<Identification of {self.law.name} from {len(self.tests)} tests: {values}>"
-
-    def to_dataframe(self) -> DataFrame:
-        """(parameters,) rows of pandas: value, ends of the 95 % interval, unit and verdict."""
-        from creepkit.reports.dataframes import to_dataframe
-
-        return to_dataframe(self)
 
     def to_arviz(self, *, draws: int = 1000, seed: int = 0) -> Any:
         """Draws from the posterior as an xarray Dataset, which arviz takes: one chain, with units of the parameters."""
@@ -472,11 +463,10 @@ class Identification(RateStatements, Presentable):
 
         return write_identification(self, Path(path))
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Measured against identified, and residuals; written to `path` when given."""
-        from creepkit.reports.identification_plot import identification_figure
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.identification_plot import draw_identification, identification_figure
 
-        return identification_figure(self, path)
+        return identification_figure, draw_identification
 
     def __str__(self) -> str:
         from creepkit.reports.answer import answer_text

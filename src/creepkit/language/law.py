@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -85,11 +85,15 @@ class CreepLaw(LawRecord):
         """The law at one temperature, in K; parameters that no longer matter there are dropped."""
         return algebra.at(self, temperature)
 
-    def expression(self, values: Mapping[Any, float] | None = None) -> Any:
-        """The rate for sympy with values in it, by name or symbol; R and T_ref of Arrhenius factors stay symbols."""
+    @property
+    def expr(self) -> Any:
+        """The rate for sympy as it is written: R and T_ref of Arrhenius factors are symbols.
+
+        Values enter by name, law.expr.subs(fit.values).
+        """
         from creepkit.reports.law_names import law_expression
 
-        return law_expression(self, values or {})
+        return law_expression(self)
 
     def latex(self) -> str:
         """The law as LaTeX equations: of its rate with one summand a term, then of its internal variables."""

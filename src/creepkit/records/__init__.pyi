@@ -9,6 +9,7 @@ from .camera_frames import SurfaceRegion as SurfaceRegion
 from .clock_alignment import ClockAlignment as ClockAlignment
 from .history import EVERY_FRAME as EVERY_FRAME
 from .history import UNKNOWN_DURATION as UNKNOWN_DURATION
+from .history import Histories as Histories
 from .history import History as History
 from .instrument_format import InstrumentFormat as InstrumentFormat
 from .instrument_record import Channel as Channel

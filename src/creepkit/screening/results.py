@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from creepkit.inverse.identification_document import identification_from_json, i
 from creepkit.inverse.selection import CREDIBLE_WEIGHT
 from creepkit.inverse.selection.ranking import RankedLaw
 from creepkit.records import History, Predictor
-from creepkit.records.presentable import Presentable
+from creepkit.records.presentable import Plotted, Presentable
 from creepkit.screening.alloys import UNKNOWN_CLASS, Alloy, Compositions
 
 """{output: (frames,) mm or strain} of one test."""
@@ -94,7 +95,7 @@ def mean_chi_square(fit: Identification) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class ScreeningResult(Presentable):
+class ScreeningResult(Presentable, Plotted):
     """The result of screen().
 
     results : one for each alloy, in the order of their first tests. histories : {alloy: its tests}.
@@ -169,11 +170,10 @@ class ScreeningResult(Presentable):
         """Write one row an alloy: class, law, weight, values with intervals, rate, misfits, notes."""
         return write_csv(self, Path(path))
 
-    def plot(self, folder: str | Path) -> list[Path]:
-        """Draw the share of each law by class, and the rate of each alloy by its law; the paths of the pictures."""
-        from creepkit.reports.screening import plot_screening
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.screening import draw_rates_of_alloys, screening_figure
 
-        return plot_screening(self, Path(folder))
+        return screening_figure, draw_rates_of_alloys
 
     def __str__(self) -> str:
         from creepkit.reports.screening import screening_text

@@ -32,6 +32,11 @@ class Run(Presentable, History):
     end_time: float = 0.0
     reason: str = ""
 
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.histories import draw_history, run_figure
+
+        return run_figure, draw_history
+
     def __str__(self) -> str:
         from creepkit.reports.simulation import run_text
 

@@ -278,7 +278,7 @@ def _forecast_stage(study: StageInputs, number: int) -> Stage:
     """The forecast of this number in the study file."""
     from creepkit.forecasts.forecast import Forecast
 
-    file, place, measured = study.file, ("forecast", number), []
+    file, place, measured = study.file, ("forecast", number), list[History]()
     part = file.model.forecast[number]
     check_forecast(file, number)
     groups = study.groups_of(place, part.group)

@@ -33,12 +33,9 @@ from creepkit.inverse.information_criteria import (
     determined_parameters,
 )
 from creepkit.inverse.selection.discrimination import under_common_covariance
-from creepkit.records.presentable import Presentable
+from creepkit.records.presentable import Plotted, Presentable, Tabulated
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from pandas import DataFrame
-
     from creepkit.inverse.adequacy import Adequacy
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.selection.perturbation_trials import Challenge
@@ -60,7 +57,7 @@ class RankedLaw:
 
 
 @dataclass(frozen=True)
-class Ranking(Presentable):
+class Ranking(Presentable, Plotted, Tabulated):
     """Identified laws, best first.
 
     criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.
@@ -77,12 +74,6 @@ class Ranking(Presentable):
 
     def __repr__(self) -> str:
         return f"<Ranking: {', '.join(f'{one.fit.law.name} {one.weight:.3f}' for one in self.laws)}>"
-
-    def to_dataframe(self) -> DataFrame:
-        """(laws,) rows of pandas: weight, criterion less that of the best, chi-square and verdict."""
-        from creepkit.reports.dataframes import to_dataframe
-
-        return to_dataframe(self)
 
     @property
     def best(self) -> Identification:
@@ -158,11 +149,10 @@ class Ranking(Presentable):
 
         return write_ranking(self, Path(path))
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Misfits and weights of the laws, and the curves of the credible ones; written to `path` when given."""
-        from creepkit.reports.ranking import ranking_figure
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.ranking import draw_misfits, ranking_figure
 
-        return ranking_figure(self, path)
+        return ranking_figure, draw_misfits
 
     def __str__(self) -> str:
         from creepkit.reports.answer import ranking_answer_text

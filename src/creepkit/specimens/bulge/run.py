@@ -37,12 +37,6 @@ class BulgeRun(FiniteElementRun):
 
         return section_figure(self, time, name, path)
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """A picture of what is observed, and of the pressure, over time."""
-        from creepkit.reports.histories import run_figure
-
-        return run_figure(self, path)
-
     @property
     def _profiles(self) -> Floats:
         """(steps, top nodes) mm."""
