@@ -218,7 +218,7 @@ SENSELESS = [
     (f"{DIMPLE} --pressure -8", "--pressure: the first pressure starts at 0 s, none is negative, and each"),
     (f"{DIMPLE} --pressure 8 --pressure 2:9", "comes 5 s or more after the one before"),
     (f"{DIMPLE} --pressure high", "--pressure high is not known; write [S:]NUMBER"),
-    (f"{DIMPLE} --load force=8", "there is no option --load force; --specimen bulge takes --pressure, --apex-thickness"),
+    (f"{DIMPLE} --load force=8", "there is no option --load force; --specimen bulge takes --pressure, --apex"),
     (f"{DIMPLE} --pressure 8 --apex-thickness thick", "--apex-thickness thick is not known; write [S:]NUMBER"),
     (
         f"{DIMPLE} --pressure 8 --every 60 --points 9",
