@@ -11,17 +11,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, make_dataclass
 from typing import TYPE_CHECKING
 
-from creepkit.api.options import PlannedTestOptions, elastic_of
 from creepkit.cli.command_options import Levels
 from creepkit.cli.shared import DEFAULT_SPECIMEN
 from creepkit.errors import SolveError
 from creepkit.forecasts.planned_tests import (
     COMPONENTS,
+    PlannedTestOptions,
     load_of_components,
     needs_modulus,
     planned_history,
     stepped_load,
 )
+from creepkit.language import elastic_of
 from creepkit.options import Options, option
 from creepkit.records import (
     ZERO_CELSIUS,

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.api.options import ForecastOptions, PlannedTestOptions
 from creepkit.cli.command_options import Levels, OutputPath
 from creepkit.cli.planned_test import described_test, loads_and_lengths
 from creepkit.cli.shared import Json, Tests, show
 from creepkit.errors import FitError
+from creepkit.forecasts.planned_tests import ForecastOptions, PlannedTestOptions
 from creepkit.options import Option
 from creepkit.reports.terminal import ProgressBar
 

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.api.options import PlannedTestOptions, elastic_of
 from creepkit.cli.command_options import Levels, OutputPath
 from creepkit.cli.planned_test import described_test, loads_and_lengths
 from creepkit.cli.shared import Law, Values, law_source, merged_values
 from creepkit.errors import SolveError
+from creepkit.forecasts.planned_tests import PlannedTestOptions
+from creepkit.language import elastic_of
 from creepkit.limits import SECONDS, SIMULATED_FRAMES
 from creepkit.options import Option
 from creepkit.reports.terminal import put, tell, tell_written
