@@ -52,6 +52,7 @@ def command(
     import creepkit as ck
     from creepkit.quality import remark_flags
     from creepkit.readers.questions import merged
+    from creepkit.records import Histories
     from creepkit.reports import histories as report
 
     if len(files) == 1 and files[0].suffix.lower() in (".h5", ".hdf5") and reader is None:
@@ -86,7 +87,7 @@ def command(
         for path in _write(found, to):
             tell_written(path, err=as_json)
     if plot is not None:
-        report.histories_figure(found, plot)
+        Histories(found).plot(plot)
         tell_written(plot, err=as_json)
     for error in merged(unread):
         tell(f"not read: {error}", err=True)
@@ -138,7 +139,7 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
                 check_folder_target(folder, HistoryError, (path.name,))
                 history_text(history)
                 if write:
-                    make_folder(folder, HistoryError)
+                    make_folder(folder)
                     ck.write_history(history, path)
     return paths
 
@@ -158,9 +159,9 @@ def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
     """
     import creepkit as ck
     from creepkit.instruments.record_tables import find_head
-    from creepkit.registry import default_registry
+    from creepkit.registry import default_registry, kinds
 
-    formats = [entry.value for entry in default_registry().instruments().values()]
+    formats = default_registry().values(kinds.INSTRUMENTS)
     if reader is not None and reader in [one.name for one in formats]:
         return [ck.read_record(path, reader) for path in files]
     if reader is not None or not all(path.is_file() for path in files):
