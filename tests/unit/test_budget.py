@@ -14,10 +14,10 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 350,
+    "api": 300,
     "app": 650,
     "cameras": 850,
-    "cli": 2300,
+    "cli": 2250,
     "core": 100,
     "dataset": 750,
     "discovery": 1400,
@@ -26,7 +26,7 @@ BUDGET = {
     "extraction": 1300,
     "fem": 1450,
     "files": 1400,
-    "forecasts": 1300,
+    "forecasts": 1350,
     "instruments": 1250,
     "integration": 800,
     "inverse": 10400,
@@ -34,7 +34,7 @@ BUDGET = {
     "kernels": 1750,
     "language": 1500,
     "laws": 150,
-    "modules": 800,
+    "modules": 750,
     "quality": 1300,
     "readers": 5850,
     "records": 2250,

@@ -50,7 +50,7 @@ def command(
     A record of an instrument is shown with its channels, units, gaps and clock.
     """
     import creepkit as ck
-    from creepkit.quality import remark_flags
+    from creepkit.quality import ACTIVATION_ENERGY, remark_flags
     from creepkit.readers.questions import merged
     from creepkit.records import Histories
     from creepkit.reports import histories as report
@@ -72,7 +72,8 @@ def command(
             tell_written(path)
     found, unread = _readable_tests(files, reader, ignored)
     framed = [history for history in found if history.outputs]
-    quality = ck.check_data_quality(framed, activation_energy=activation_energy)
+    energy = ACTIVATION_ENERGY if activation_energy is None else activation_energy
+    quality = ck.check_data_quality(framed, activation_energy=energy)
     remarked = tuple(remark_flags([history for history in found if not history.outputs]))
     quality = replace(quality, flags=(*quality.flags, *remarked), tests=len(found if remarked else framed))
     if as_json:
