@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import sympy
@@ -13,9 +13,6 @@ import sympy
 from creepkit.errors import FitError
 from creepkit.records import ZERO_CELSIUS
 from creepkit.rupture_assessment.methods import LN10, METHODS, Conditions
-
-if TYPE_CHECKING:
-    from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 STRESSES = 25
 """Rows of a table at each temperature, over the stresses tested."""
@@ -29,8 +26,11 @@ class _Variable(sympy.Symbol):  # type: ignore[misc]  # sympy has no types
         return sympy.log(self) / LN10
 
 
-def written_times(assessment: RuptureAssessment, suffix: str) -> str:
-    """The text of a file of this suffix: .c or .f90 for the best method, .csv for the average with its bounds."""
+def written_times(assessment: Any, suffix: str) -> str:
+    """The text of a file of this suffix: .c or .f90 for the best method, .csv for the average with its bounds.
+
+    assessment : a RuptureAssessment, whose module imports this one.
+    """
     if suffix == ".csv":
         return _table(assessment)
     fit, tests = assessment.best, assessment.tests
@@ -59,7 +59,7 @@ def written_times(assessment: RuptureAssessment, suffix: str) -> str:
     return "\n".join([*(f"! {line}" for line in said), *declared, code, "end function", ""])
 
 
-def _table(assessment: RuptureAssessment) -> str:
+def _table(assessment: Any) -> str:
     """Times at stresses tested, a block a temperature; bounds of the mean, of a new heat and of one test of it."""
     file, tests = io.StringIO(), assessment.tests
     kinds = ("mean", "new_heat", "one_test")
