@@ -40,7 +40,7 @@ BUDGET = {
     "records": 2250,
     "registry": 650,
     "reports": 5500,
-    "rupture_assessment": 1700,
+    "rupture_assessment": 1800,
     "sampling": 1000,
     "screening": 600,
     "specimens": 3200,

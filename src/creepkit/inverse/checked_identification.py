@@ -12,6 +12,7 @@ from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify as identify_law
+from creepkit.inverse.identify import sampled_where_needed
 from creepkit.inverse.nuisance_parameters import check_nuisance_tests
 from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.selection import Ranking
@@ -68,6 +69,7 @@ def identify(
         fit = identify_law(law, histories, predictor, **how)
     else:
         fit = identify_sparse(law, histories, predictor, penalty=penalty, **how)
+    fit = sampled_where_needed(fit, surrogate)
     return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 
