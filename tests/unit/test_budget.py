@@ -22,7 +22,7 @@ BUDGET = {
     "dataset": 750,
     "discovery": 1400,
     "experiments": 1350,
-    "exporters": 2650,
+    "exporters": 2700,
     "extraction": 1300,
     "fem": 1450,
     "files": 1400,
