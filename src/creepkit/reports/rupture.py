@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,8 +10,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
-from creepkit.reports.figures import draw_parity, empty_figure, save_figure, span, wrapped
-from creepkit.reports.json_values import fields_to_json
+from creepkit.reports.figures import draw_parity, empty_figure, span, wrapped
+from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
 from creepkit.rupture_assessment.methods import METHODS, THERMAL, Conditions
@@ -57,7 +57,33 @@ def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
     )
     table, note = _strengths(assessment)
     said = [Paragraph(note, "note")] if note else []
-    return [Paragraph(assessment.verdict, "lead"), Paragraph(head), table, *said]
+    lives = [_lives(assessment)] if assessment.lives else []
+    return [Paragraph(assessment.verdict, "lead"), Paragraph(head), *lives, table, *said]
+
+
+def _lives(assessment: RuptureAssessment) -> Table:
+    """The times to rupture of the average method."""
+    rows = [
+        (
+            f"{one.stress:g}",
+            celsius_text(one.temperature),
+            f"{one.hours:.4g}",
+            *(f"[{a:.3g}, {b:.3g}]" for a, b in (one.bounds_of_mean, one.bounds_of_heat, one.bounds_of_test)),
+            one.extrapolation and f"extrapolated: {one.extrapolation}",
+        )
+        for one in assessment.lives
+    ]
+    level = f"{100 * assessment.settings.level:g} %"
+    columns = (
+        "stress, MPa",
+        "temperature",
+        "median, h",
+        f"{level} of the mean",
+        "of a new heat",
+        "of one test",
+        "remarks",
+    )
+    return Table("times to rupture in h, with bounds in brackets", columns, rows, numeric=(0, 2))
 
 
 def rupture_blocks(assessment: RuptureAssessment, figures: PageFigures | None = None, of: str = "") -> list[Block]:
@@ -181,18 +207,15 @@ def _pair(ends: tuple[float | None, float | None]) -> str:
 
 def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
     """The assessment as JSON-able data, without the tests and covariances that its file holds."""
+    relation = assessment.relation
     return {
         "verdict": assessment.verdict,
         "decisive": assessment.decisive,
         "tests": len(assessment.tests),
         "run_outs": int(assessment.tests.censored.sum()),
-        "methods": [
-            {**_fit_to_json(one.fit), "bic_excess": one.excess, "weight": one.weight} for one in assessment.ranked
-        ],
+        "methods": [{**_fit_to_json(r.fit), "bic_excess": r.excess, "weight": r.weight} for r in assessment.ranked],
         "rejected": dict(assessment.rejected),
-        "relation": None
-        if assessment.relation is None
-        else [_fit_to_json(assessment.relation.times), _fit_to_json(assessment.relation.rates)],
+        "relation": relation and [_fit_to_json(relation.times), _fit_to_json(relation.rates)],
         "strengths": [
             {
                 "strength": one.value,
@@ -201,6 +224,7 @@ def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
             }
             for one in assessment.strengths
         ],
+        "lives": finite([asdict(one) for one in assessment.lives]),
         "checks": [fields_to_json(one, "name passed found fault") for one in assessment.checks],
         "level": assessment.settings.level,
         "notes": list(assessment.notes),
@@ -232,7 +256,7 @@ LONGEST_HOURS = 1e5
 """Up to which isotherms are drawn at least."""
 
 
-def rupture_figure(assessment: RuptureAssessment, path: str | Path | None = None) -> Figure:
+def rupture_figure(assessment: RuptureAssessment) -> Figure:
     """Isotherms of the average of methods beside its best method's master curve and predicted times.
 
     Broken lines are beyond the stresses tested, the shaded part of the time axis beyond three times the longest test.
@@ -245,13 +269,13 @@ def rupture_figure(assessment: RuptureAssessment, path: str | Path | None = None
         figure.add_subplot(grid[1, 1]),
     )
     colours = _colours(assessment)
-    _draw_isotherms(isotherms, assessment, colours)
+    draw_isotherms(isotherms, assessment)
     _draw_master_curve(master, assessment, colours)
     _draw_predicted(compared, assessment, colours)
     handles, labels = isotherms.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 6), fontsize=8)
     figure.suptitle(wrapped(assessment.verdict, 12.5), fontsize=10)
-    return save_figure(figure, path)
+    return figure
 
 
 def _colours(assessment: RuptureAssessment) -> dict[float, Any]:
@@ -270,8 +294,9 @@ def _draw_tests(axes: Axes, tests: RuptureTests, x: Floats, y: Floats, colours: 
         axes.plot(x[k], y[k], ls="", marker=marker, ms=ms, color=colours[T], mec=edge, mew=0.4, zorder=5)
 
 
-def _draw_isotherms(axes: Axes, assessment: RuptureAssessment, colours: dict[float, Any]) -> None:
-    tests = assessment.tests
+def draw_isotherms(axes: Axes, assessment: RuptureAssessment) -> None:
+    """Isotherms with their bounds, and the tests."""
+    colours, tests = _colours(assessment), assessment.tests
     longest = 10.0 ** float(tests.log_time.max())
     hours = 10.0 ** float(tests.log_time.min()) / 2.0, max(3.0 * LONGEST_EXTRAPOLATION * longest, LONGEST_HOURS)
     stresses = 0.6 * float(tests.stress.min()), 1.3 * float(tests.stress.max())

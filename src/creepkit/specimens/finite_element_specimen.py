@@ -56,6 +56,8 @@ class FiniteElementSpecimen(TestPiece):
     )
     """What is allowed of each setting."""
 
+    takes_values_of_tests: ClassVar[bool] = True
+
     first_step: ClassVar[float] = 10.0
     """s, the longest first step after a change of load; less where high stresses relax in less."""
 

@@ -14,14 +14,14 @@ from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import describing, identify_unsampled, sampled_where_needed
+from creepkit.inverse.identify import describing, identify, sampled_where_needed
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.ranking import Criterion, Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Predictor
-from creepkit.registry import default_registry
+from creepkit.registry import default_registry, kinds
 
 
 def sums_of_two(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
@@ -112,7 +112,7 @@ def _registered_laws(tried: Sequence[CreepLaw], histories: Sequence[History]) ->
         return law.uses(strain), law.uses(time), bool(law.states)
 
     known = {memory(law) for law in tried}
-    laws = [one.value for one in default_registry().laws().values() if not one.value.uses(temperature)]
+    laws = [law for law in default_registry().values(kinds.LAWS) if not law.uses(temperature)]
     laws = [_with_temperature_of(tried, law, histories) for law in laws]
     return sorted(laws, key=lambda law: (memory(law) in known, len(law.params), law.name))
 
@@ -142,9 +142,8 @@ def _identify_all(
         if progress is not None:
             progress(task, k, len(laws))
         try:
-            fits.append(
-                identify_unsampled(law, histories, using, settings=settings, through=through_for_law(through, law))
-            )
+            known = through_for_law(through, law)
+            fits.append(identify(law, histories, using, settings=settings, through=known))
         except CreepkitError as error:
             failed[law.name] = str(error)
         if progress is not None:

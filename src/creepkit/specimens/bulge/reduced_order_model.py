@@ -73,6 +73,7 @@ class BulgeReducedOrderModel(Predictor):
     points: int | None = None
     searching: bool = False
     is_trained: ClassVar[bool] = True
+    takes_values_of_tests: ClassVar[bool] = True
     name: ClassVar[str] = "bulge, reduced-order model"
     title: ClassVar[str] = "Bulge test in a reduced-order model, for searches"
     optional_outputs: ClassVar[tuple[Output, ...]] = (*OBSERVED, *RING_OUTPUTS)
