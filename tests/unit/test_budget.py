@@ -17,7 +17,7 @@ BUDGET = {
     "api": 300,
     "app": 650,
     "cameras": 850,
-    "cli": 2250,
+    "cli": 2200,
     "core": 100,
     "dataset": 750,
     "discovery": 1400,
