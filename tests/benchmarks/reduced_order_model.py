@@ -3,7 +3,7 @@
     python tests/benchmarks/reduced_order_model.py [--cases 90] [--seed 3] [--write]
 
 Tests of six laws drawn over the paper's bounds, 12 h with 288 frames, by the reduced-order model and by finite
-elements of the same mesh, at the same tolerance of their steps. The error is the largest difference of the displacement
+elements of the same mesh, each in the steps of its own. The error is the largest difference of the displacement
 of the top over all frames and nodes, in % of the largest that the finite elements reach: median, 90 % and largest of
 the cases. Where a test ruptures, its frames before the first of both ruptures count; beside stands the difference of
 the times at which the middle has risen by 2.4 mm. CPU times are of the simulation alone, on one thread.
@@ -14,6 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from bulge_cases import FILLET, TIMES, TRUE, Case, drawn_cases
+from core_speed import CASES as SPEED_CASES
+from core_speed import Case as SpeedCase
+from core_speed import least
 from measured import Page, arguments
 from public_calls import predict
 
@@ -22,7 +25,6 @@ from creepkit import kernels
 from creepkit.arrays import Floats
 from creepkit.fem.reduced_order_model import ReducedBasis, ReducedOrderModel
 from creepkit.fem.simulation import Simulation, simulate
-from creepkit.fem.solver import SolverSettings
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw, Param, State, parameters, principal_stress, states, stress
 from creepkit.records import History, Status
@@ -43,7 +45,6 @@ class Reference:
     setup: FiniteElementTest
     kernel: CompiledLaw
     theta: Floats
-    settings: SolverSettings
     run: Simulation
     cpu: float
 
@@ -66,7 +67,7 @@ def references(specimen: Bulge, thicknesses: tuple[float, ...], count: int, seed
             lambda k=kernel, x=theta, s=setup, o=settings: simulate(k, x, s.model, s.load_history, settings=o)
         )
         if run.end_time >= SHORTEST and run.displacements[:, setup.model.top, 1].max() >= LEAST:
-            result.append(Reference(case, setup, kernel, theta, settings, run, cpu))
+            result.append(Reference(case, setup, kernel, theta, run, cpu))
         if len(result) == count:
             return result
     return result
@@ -85,7 +86,7 @@ def timed(function, repeats: int = 3):
 def errors_of(reference: Reference, basis: ReducedBasis) -> tuple[float, float, float]:
     """Error in %, difference of the end in %, and CPU time in s."""
     model = ReducedOrderModel(reference.setup.model, basis)
-    history, settings = reference.setup.load_history, reference.settings
+    history, settings = reference.setup.load_history, BulgeReducedOrderModel(reference.setup.piece).settings(False)
     cpu, run = timed(lambda: simulate(reference.kernel, reference.theta, model, history, settings=settings))
     top = reference.setup.model.top
     exact, found = (each.at(each.displacements[:, top, 1], TIMES) for each in (reference.run, run))
@@ -141,6 +142,38 @@ def default_table(page: Page, cases: list[Reference], count: int, seed: int) -> 
         own = default_basis(specimen, others[0])
         page_label = f"{label}: {own.points.size} of {others[0].setup.model.weights.size} points, finite elements "
         row(page, page_label + f"{1e3 * np.mean([e.cpu for e in others]):.1f} ms", others, own)
+
+
+def costs_table(page: Page) -> None:
+    """Where the time of the six laws of core_speed.py goes."""
+    page.heading("Where the time goes")
+    page.paragraph(
+        "Means of the six laws of [core_speed](core_speed.md). Passes are equilibrium iterations, with a new tangent "
+        "and without; a prediction adds Python, the Gaussian fits and the interpolation in time to the simulation."
+    )
+    page.table("model", "steps", "passes with tangent", "without", "simulation, CPU ms", "prediction, CPU ms")
+    rows: dict[str, list[list[float]]] = {}
+    for each in map(SpeedCase, SPEED_CASES):
+        reduced = each.specimen.reduced_order_model()
+        for label, predictor in (
+            ("finite elements", None),
+            ("reduced", reduced),
+            ("in searches", reduced.for_search()),
+        ):
+            settings = solver_settings(each.specimen) if predictor is None else predictor.settings(False)
+            model = each.setup.model if predictor is None else predictor.reduced_model_of(each.setup.piece)
+
+            def run(each=each, settings=settings, model=model):
+                return each.setup.simulate(each.law, each.theta, settings, model)
+
+            def predicted(setup=each.setup, run=run):
+                return setup.response(run())
+
+            found = [*run().iterations[[0, 2, 3]], least(run, 10), least(predicted, 10)]
+            rows.setdefault(label, []).append(found)
+    for label, found in rows.items():
+        steps, stiff, light, *times = np.mean(found, axis=0)
+        page.row(label, f"{steps:.0f}", f"{stiff:.0f}", f"{light:.0f}", *(f"{time:.2f}" for time in times))
 
 
 def default_basis(specimen: Bulge, reference: Reference) -> ReducedBasis:
@@ -224,6 +257,7 @@ def main() -> None:
     page = Page("reduced_order_model", __doc__)
     cases = references(TRUE, (), options.cases, options.seed)
     default_table(page, cases, options.cases, options.seed)
+    costs_table(page)
     sensitivities_table(page)
     if options.write:
         page.write()

@@ -79,6 +79,7 @@ class AbaqusCards(CodeInput):
     """Material cards with one of Abaqus' own creep laws."""
 
     code, program = "Abaqus' *CREEP", "Abaqus"
+    has_steady_arrhenius = True
     alternative = "export it as 'abaqus', a CREEP subroutine"
     marker = "**"
     name: str = "abaqus-cards"
@@ -126,22 +127,22 @@ class AbaqusCards(CodeInput):
             raise self._unsupported(
                 source, f"{form.label}: Abaqus asks for n > 0 and -1 < m <= 0 (n = {form.n:g}, m = {m:g})"
             )
-        if not form.Q:
-            return _power_law(source, form, m, {None: form.log_coefficient}, [])
-        rows, note = self._rows(source, form)
-        return _power_law(source, form, m, rows, [note])
+        rows, notes = self._rows(source, form)
+        return _power_law(source, form, m, rows, notes)
 
-    def _rows(self, source: LawWithValues, form: CreepForm) -> tuple[dict[float | None, float], str]:
-        """{K: ln of the coefficient} of the rows of a table, and the note on it."""
+    def _rows(self, source: LawWithValues, form: CreepForm) -> tuple[dict[float | None, float], list[str]]:
+        """{K, or None: ln of the coefficient} of the rows, and the note on a table of them."""
         temperatures = self._temperatures(source, [form])
+        if not temperatures:
+            return {None: form.log_coefficient}, []
         low, high, step = temperatures[0], temperatures[-1], _temperature_step(form, temperatures[0])
         note = f"Table from {low:g} to {high:g} K in steps of {step:g} K: {self.program} interpolates linearly between "
         note += f"rows, which is within {_INTERPOLATION_TOLERANCE:.1%}, and keeps the end values outside."
-        return {T: form.log_coefficient_at(T) for T in temperatures}, note
+        return {T: form.log_coefficient_at(T) for T in temperatures}, [note]
 
     def _temperatures(self, source: LawWithValues, forms: Sequence[CreepForm]) -> list[float]:
-        """K, of the rows of a power law that hardens and depends on temperature; none of what needs no table."""
-        if len(forms) > 1 or not forms[0].Q or forms[0].is_steady:
+        """K, of the rows of a power law that depends on temperature; none of what needs no table."""
+        if len(forms) > 1 or not forms[0].Q or (forms[0].is_steady and self.has_steady_arrhenius):
             return []
         low, high = temperature_span(source)
         return temperature_grid(low, high, _temperature_step(forms[0], low))
@@ -152,6 +153,7 @@ class CalculixCards(AbaqusCards):
     """Material cards with the creep law that CalculiX has built in, of stress and time."""
 
     code, program = "CalculiX' *CREEP, LAW=NORTON", "CalculiX"
+    has_steady_arrhenius = False
     alternative = "export it as 'calculix', a CREEP subroutine"
     name: str = "calculix-cards"
     title: str = "CalculiX material cards with its own creep law (*CREEP, LAW=NORTON)"
@@ -161,21 +163,16 @@ class CalculixCards(AbaqusCards):
         if len(forms) > 1 or form.stress_function != "power" or form.strain_exponent:
             terms = " + ".join(one.label for one in forms)
             raise self.refusal(source, f" is not rate = A q^n t^m, the creep law that CalculiX has ({terms})")
-        rows, note = self._rows(source, form) if form.Q else ({None: form.log_coefficient}, "")
+        rows, notes = self._rows(source, form)
         least = min(rows.values())
         if least < math.log(_CALCULIX_LEAST):
             found = f"1e{least / math.log(10):.0f}, and CalculiX creeps by {_CALCULIX_LEAST:g} where less is written"
             remedy = "a model in GPa and h has larger ones: units={'stress': 'GPa', 'time': 'h'}"
             raise self.refusal(source, f": A would be as small as {found} ({remedy})")
         data = [_data_line(exp_in_range(ln, "A", source), form.n, form.time_exponent, T) for T, ln in rows.items()]
-        comment = (
-            "LAW=NORTON: rate = A q^n t^m, of equivalent stress q and total time t, which must start with the load."
-        )
-        return [f"{comment} A, n, m.", *[note] * bool(note)], ["*CREEP, LAW=NORTON", *data]
-
-    def _temperatures(self, source: LawWithValues, forms: Sequence[CreepForm]) -> list[float]:
-        low, high = temperature_span(source)
-        return temperature_grid(low, high, _temperature_step(forms[0], low)) if forms[0].Q else []
+        formula = "rate = A q^n t^m, of equivalent stress q and total time t, which must start with the load. A, n, m."
+        steps = "CETOL of 1e-2 and 1e-4 give the same increments: state small ones where the rate falls with time."
+        return [f"LAW=NORTON: {formula}", *notes, steps], ["*CREEP, LAW=NORTON", *data]
 
 
 def _power_law(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
@@ -25,6 +25,9 @@ from creepkit.records import History, Predictor
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictors
 
+if TYPE_CHECKING:
+    from creepkit.option_keywords import IdentificationSettingsKeywords
+
 
 @takes_options(IdentificationSettings)
 @checked
@@ -38,7 +41,7 @@ def identify(
     through: Predictor | Literal["auto"] | None = "auto",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    **changes: Any,
+    **changes: Unpack[IdentificationSettingsKeywords],
 ) -> Identification:
     """Identify the parameters of a law from all histories at once, with 95 % intervals.
 
@@ -82,7 +85,7 @@ def select(
     by: Literal["bic", "aicc"] = "bic",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    **changes: Any,
+    **changes: Unpack[IdentificationSettingsKeywords],
 ) -> Ranking:
     """Identify several laws from the same histories by likelihood, and rank them by how well they explain these.
 
