@@ -37,12 +37,7 @@ from creepkit.inverse.reference_conditions import (
     median_log_strain_rate,
     reference_condition,
 )
-from creepkit.inverse.residuals import (
-    candidate_residuals,
-    candidate_residuals_and_jacobian,
-    residuals_at_measured_values,
-    residuals_of_prediction,
-)
+from creepkit.inverse.residuals import candidate_residuals, residuals_at_measured_values, residuals_of_prediction
 from creepkit.inverse.search.local_refinement import (
     AdditionalResiduals,
     Minimum,
@@ -249,7 +244,7 @@ class LeastSquaresProblem:
     def candidate_residuals(self, u: Floats) -> Floats:
         """(candidates, tests, observations) - of u (candidates, parameters), nuisance parameters at their means."""
         prediction = self._counted(u, jacobian=False)
-        values = candidate_residuals(self.observations, prediction, self.correction)
+        values = candidate_residuals(self.observations, prediction, self.correction)[0]
         return self._about_rates(values, self.observations.present)
 
     def candidate_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
@@ -263,7 +258,8 @@ class LeastSquaresProblem:
             jacobians = [r.jacobian for r in evaluated if r.jacobian is not None]
             return np.stack([r.values for r in evaluated]), np.stack(jacobians)
         prediction = self._counted(u, jacobian=True)
-        values, internal_jacobian = candidate_residuals_and_jacobian(self.observations, prediction, self.correction)
+        values, internal_jacobian = candidate_residuals(self.observations, prediction, self.correction)
+        assert internal_jacobian is not None
         jacobian = np.einsum("ctep,cpq->cteq", internal_jacobian, self.coordinates.jacobian(u))
         present = self.observations.present
         return self._about_rates(values, present), np.where(present[..., None], jacobian, 0.0)

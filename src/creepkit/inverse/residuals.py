@@ -84,27 +84,18 @@ def residuals_at_measured_values(observations: ObservationVector) -> Residuals:
 
 def candidate_residuals(
     observations: ObservationVector, prediction: Prediction, correction: Floats | None = None
-) -> Floats:
-    """(candidates, tests, observations) - residuals of all candidates; zero where there are no data.
+) -> tuple[Floats, Floats | None]:
+    """Residuals of all candidates, zero where there are no data; with derivatives to internal parameters.
 
-    correction : (tests, observations) in the output's unit, what is added to predictions.
+    correction : (tests, observations) in the output's unit, what is added to predictions. Returns residuals
+    (candidates, tests, observations), and derivatives (candidates, tests, observations, parameters) for tests that are
+    not followed to rupture, None of a prediction without them.
     """
-    distance = _distance(observations, _predicted_values(observations, prediction, correction), prediction)
-    return np.where(observations.present, distance.values, 0.0)
-
-
-def candidate_residuals_and_jacobian(
-    observations: ObservationVector, prediction: Prediction, correction: Floats | None = None
-) -> tuple[Floats, Floats]:
-    """Residuals of all candidates, with derivatives to internal parameters, for tests that are not followed to rupture.
-
-    correction : (tests, observations) in the output's unit. Returns residuals (candidates, tests, observations) and
-    derivatives (candidates, tests, observations, parameters).
-    """
-    assert prediction.jacobian is not None
     predicted = _predicted_values(observations, prediction, correction)
-    jacobian = observations.select_outputs(prediction.jacobian, prediction)
     values = np.where(observations.present, _distance(observations, predicted, prediction).values, 0.0)
+    if prediction.jacobian is None:
+        return values, None
+    jacobian = observations.select_outputs(prediction.jacobian, prediction)
     return values, _transformed_jacobian(observations, predicted, jacobian)
 
 

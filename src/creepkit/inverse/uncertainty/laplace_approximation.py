@@ -55,9 +55,8 @@ def restricted_covariance(
     components = [component for component in _estimated_components(noise_model, nuisances) if component not in fixed]
     if not components:
         return solution.covariance, np.full(len(solution.covariance), NORMAL_FREEDOM)
-    covariance_derivatives = [
-        _covariance_derivative(linearised.residuals, noise_model, factor.blocks, *one) for one in components
-    ]
+    known = (linearised.residuals, noise_model, factor.blocks)
+    covariance_derivatives = [_covariance_derivative(*known, *one) for one in components]
     projected = [
         np.einsum("tep,tef,tfq->pq", solution.weighted_jacobian, s, solution.weighted_jacobian, optimize=True)
         for s in covariance_derivatives
