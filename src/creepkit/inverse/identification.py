@@ -199,6 +199,7 @@ class Identification(
         log_factors = np.log([m.rate_factor for m in self.tests])
         if self.settings.weights == "likelihood" and np.abs(log_factors).max() > NOTEWORTHY_FACTOR:
             problem = problem.about_rates(self.x, log_factors)
+        problem = problem.about_stopped_tests(self.x, self.noise_model)
         return problem.with_covariance(CovarianceFactor.of_residuals(self.residuals_of(problem), self.noise_model))
 
     @property

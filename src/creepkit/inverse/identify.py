@@ -370,7 +370,7 @@ def _reported(
     used = compares_rupture_times(law, problem.settings)
     single_values = values_of_tests.compared(histories, without_curves=used)
     random_effects = predicted_random_effects(residuals, noise_model)
-    by_law = problem.about_rates(x, None).residuals(x).with_test_weights(residuals.test_weights)
+    by_law = replace(problem.about_rates(x, None), stopped=None).residuals(x).with_test_weights(residuals.test_weights)
     tests = test_fits(problem, by_law, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance + of_errors))[count:]
@@ -382,7 +382,7 @@ def _reported(
     judge = Judge(problem, noise_model, estimator.predictor_errors, histories)
     adequacy = judge.adequacy_with_remedies(judged, unmodelled, rates.found).with_unpredicted(unpredicted)
     adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
-    outlying = None if adequacy.rejects else rates.outlying
+    mentioned = None if adequacy.rejects else adequacy.mentioned or rates.outlying
     estimates = parameter_estimates(law, coordinates, u, law_covariance)
     return Identification(
         law=law,
@@ -406,7 +406,7 @@ def _reported(
         error_covariance=error_covariance if problem.settings.included_errors else None,
         nuisances=nuisance_estimates,
         converged=best.converged,
-        adequacy=replace(adequacy, implausible=implausible, outlying=outlying),
+        adequacy=replace(adequacy, implausible=implausible, mentioned=mentioned),
         numerical_error=numerical_error,
         unmodelled=unmodelled,
         left_out=rates.left_out,

@@ -107,6 +107,7 @@ def estimate_iteratively(
             residuals = residuals.with_test_weights(robust_test_weights(residuals, noise))
         if by_likelihood and best is not None:
             problem, residuals = about_own_rates(problem, x, residuals, noise)
+        problem, residuals = about_stopped_tests(problem, x, residuals, noise)
         linear = problem.linearised(x, residuals)
         noise = estimator.estimate(residuals, noise, linear)
         if by_likelihood and best is not None and _expected_gain(linear, noise) < CONVERGED_GAIN:
@@ -122,8 +123,10 @@ def estimate_iteratively(
         if progress is not None:
             progress("round", round_index + 1, limits.rounds)
         gain = np.inf if best is None else current.log_likelihood - best.log_likelihood
-        # a likelihood about other rates of tests is another approximation
-        moved = best is not None and best.problem.log_factors is not problem.log_factors
+        # a likelihood about other rates or ends of tests is another approximation
+        moved = best is not None and (
+            best.problem.log_factors is not problem.log_factors or best.problem.stopped is not problem.stopped
+        )
         best = current if best is None or gain > 0 or robust or moved else best
         if abs(gain) < CONVERGED_GAIN and np.abs(weights - previous_weights).max() < CONVERGED_GAIN:
             break
@@ -141,6 +144,7 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
     free = linear.free
     for _ in range(MOST_LAST_STEPS):
         problem, residuals = about_own_rates(problem, linear.x, linear.residuals, noise)
+        problem, residuals = about_stopped_tests(problem, linear.x, residuals, noise)
         linear = replace(problem.linearised(linear.x, residuals), free=free)
         errors = errors_of_tests(problem, linear.x, linear, noise)
         solution = linear.solve(CovarianceFactor.of_residuals(with_errors(linear, errors).residuals, noise))
@@ -198,13 +202,20 @@ def about_own_rates(
     return problem, residuals
 
 
+def about_stopped_tests(
+    problem: LeastSquaresProblem, x: Floats, residuals: Residuals, noise: NoiseModel
+) -> tuple[LeastSquaresProblem, Residuals]:
+    """The problem about what its stopped tests say at x (unknowns,), and its residuals there; as it is without any."""
+    moved = problem.about_stopped_tests(x, noise)
+    return moved, residuals if moved is problem else moved.residuals(x).with_test_weights(residuals.test_weights)
+
+
 def _covariance_factor(
     problem: LeastSquaresProblem, residuals: Residuals, noise: NoiseModel, estimator: WorkingNoiseEstimator
 ) -> CovarianceFactor:
     """The covariance under which the values of a round are found."""
     fitting_noise = noise if estimator.by_likelihood else with_single_value_weight(noise, problem.observations)
-    # A stopped test that says nothing here may say something a step further.
-    return CovarianceFactor.of_residuals(replace(residuals, present=problem.observations.present), fitting_noise)
+    return CovarianceFactor.of_residuals(residuals, fitting_noise)
 
 
 def _expected_gain(linear: LinearisedProblem, noise: NoiseModel) -> float:
@@ -219,7 +230,8 @@ def _log_likelihood(problem: LeastSquaresProblem, linear: LinearisedProblem, noi
     # The optimum under weights is none of the noise model: that it is flat in the law's parameters says nothing for it.
     by_likelihood = problem.settings.weights == "likelihood"
     integrated = np.arange(linear.x.size) >= (0 if by_likelihood else problem.parameter_count)
-    return restricted_log_likelihood(linear, noise, integrated)
+    of_stopped_tests = 0.0 if problem.stopped is None else problem.stopped.log_likelihood
+    return restricted_log_likelihood(linear, noise, integrated) + of_stopped_tests
 
 
 def _with_priors_found(

@@ -40,6 +40,7 @@ class Residuals:
     discrepancy_unit : (tests, observations) -, what a model discrepancy of one is in the transformed output: the stated
         or estimated noise of the frame; 1 % where the transform is logarithmic; 0 where there can be none.
     shared_noise : how the noise of the outputs of a frame is correlated; None where it is not.
+    end_sd : (tests, observations) -, standard deviation of the ends of stopped tests beyond the noise model, or None.
     """
 
     values: Floats
@@ -55,6 +56,7 @@ class Residuals:
     common_effects: Floats | None = None
     discrepancy_unit: Floats | None = None
     shared_noise: SharedNoise | None = None
+    end_sd: Floats | None = None
 
     def with_test_weights(self, test_weights: Floats) -> Residuals:
         """The same with other weights of tests."""
@@ -105,7 +107,8 @@ class Residuals:
             self.log_rate_sensitivity,
         ]
         stacked = np.stack(effects, axis=-1)
-        stacked = stacked if further is None else np.concatenate([stacked, further], axis=-1)
+        more = [*([] if further is None else [further]), *([] if self.end_sd is None else [self.end_sd[..., None]])]
+        stacked = np.concatenate([stacked, *more], axis=-1)
         return ObservationSeries.of_observations(
             self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights, self.shared_noise
         )

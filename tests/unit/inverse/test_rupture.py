@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 import creepkit as ck
 from creepkit.errors import FitError, FitWarning
@@ -137,6 +138,26 @@ def test_ruptures_count_in_ln_time_and_stopped_tests_only_where_they_outlasted()
         assert residuals.values[1, last[1]] == pytest.approx(max(outlasted, 0.0), abs=0.01)
         assert residuals.present[1, last[1]] == (outlasted > 0)
     np.testing.assert_allclose(residuals.log_rate_sensitivity[last], 1.0, atol=0.01)
+
+
+def test_run_outs_count_by_the_probability_that_they_last_and_bias_no_life():
+    """Lives of one condition, half of them stopped at the median: the score of the likelihood of Tobit vanishes."""
+    law, values = PLANTED["Kachanov-Rabotnov"]
+    law = law.fix(**{name: value for name, value in {**values, "A": 1e-20}.items() if name != "B"})
+    life, tests = 1 / (5 * 1e-15 * 80.0**3.5), []
+    log_lives = np.minimum(0.3 * np.random.default_rng(4).standard_normal(16), 0.0)
+    for k, log_life in enumerate(log_lives):
+        time, loading = life * np.exp(log_life), constant_stress(80.0, "stress")
+        known = {"unruptured": True} if log_life == 0.0 else {"rupture_time": time}
+        tests.append(History(f"t{k}", np.array([time]), {}, loading, 1000.0, **known))
+    fit = ck.identify(law, tests, using=BAR, starts=1, usual_errors="none")
+    s = np.hypot(fit.noise_model.rate, fit.noise_model[RUPTURE_OUTPUT].misfit)
+    z = (log_lives + np.log(fit.values["B"] / 1e-15)) / s
+    score = np.where(log_lives == 0.0, norm.pdf(z) / norm.sf(z), z)
+    assert 4 < (log_lives == 0.0).sum() < 12
+    assert score.mean() == pytest.approx(0.0, abs=0.02)
+    assert fit.estimates[0].low < 1e-15 < fit.estimates[0].high
+    assert s == pytest.approx(0.3, rel=0.5)
 
 
 def test_a_coordinate_is_the_log_of_the_rate_of_damage():
