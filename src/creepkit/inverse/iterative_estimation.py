@@ -230,7 +230,8 @@ def _log_likelihood(problem: LeastSquaresProblem, linear: LinearisedProblem, noi
     # The optimum under weights is none of the noise model: that it is flat in the law's parameters says nothing for it.
     by_likelihood = problem.settings.weights == "likelihood"
     integrated = np.arange(linear.x.size) >= (0 if by_likelihood else problem.parameter_count)
-    of_stopped_tests = 0.0 if problem.stopped is None else problem.stopped.log_likelihood
+    stopped = linear.residuals.stopped
+    of_stopped_tests = 0.0 if stopped is None else stopped.log_likelihood
     return restricted_log_likelihood(linear, noise, integrated) + of_stopped_tests
 
 

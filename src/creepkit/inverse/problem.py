@@ -27,7 +27,7 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import check_creep, check_explicit_nuisances, check_histories
 from creepkit.inverse.minimum_rates import check_minimum_rates, with_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, Residuals
+from creepkit.inverse.noise_model import NoiseModel, Residuals, StoppedTests
 from creepkit.inverse.nuisance_parameters import NuisanceParameters, check_nuisance_law
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
 from creepkit.inverse.prediction_failures import PredictionFailures
@@ -46,7 +46,7 @@ from creepkit.inverse.search.local_refinement import (
     robust_loss,
 )
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.stopped_tests import StoppedTests
+from creepkit.inverse.stopped_tests import stopped_tests
 from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
@@ -201,7 +201,7 @@ class LeastSquaresProblem:
         stopped = self.observations.stopped_ends
         if not stopped.any():
             return self
-        return replace(self, stopped=StoppedTests.of_residuals(self._residuals(x), noise_model, stopped))
+        return replace(self, stopped=stopped_tests(self._residuals(x), noise_model, stopped))
 
     def with_covariance(self, covariance_factor: CovarianceFactor) -> LeastSquaresProblem:
         """The same under another covariance."""
@@ -245,7 +245,7 @@ class LeastSquaresProblem:
         """Residuals of one x (unknowns,), with exact derivatives to x; the last few are cached."""
         residuals = self._residuals(x)
         if self.stopped is not None:
-            return self.stopped.added_to(residuals)
+            return replace(residuals, values=residuals.values + self.stopped.shift, stopped=self.stopped)
         return residuals.where(self._outlasted(residuals.values))
 
     def _residuals(self, x: Floats) -> Residuals:

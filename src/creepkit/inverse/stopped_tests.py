@@ -12,14 +12,12 @@ Source: J. Tobin (1958), Econometrica 26, 24; J. Schmee and G. Hahn (1979), Tech
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from scipy.special import log_ndtr
 
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, Residuals
+from creepkit.inverse.noise_model import NoiseModel, Residuals, StoppedTests
 
 HALF_LOG_TAU = 0.5 * float(np.log(2.0 * np.pi))
 
@@ -35,43 +33,19 @@ def log_survival(z: Floats) -> tuple[Floats, Floats]:
     return lasting, np.minimum(np.exp(exponent), np.maximum(z, 0.0) + 1.0)  # of which it never has more: rounding
 
 
-@dataclass(frozen=True, eq=False)
-class StoppedTests:
-    """What stopped tests say, as Gaussian observations about one point.
+def stopped_tests(residuals: Residuals, noise_model: NoiseModel, stopped: Bools) -> StoppedTests:
+    """What stopped tests say about a point; residuals : there, as if these had broken at their ends.
 
-    shift, sd : (tests, observations) -, what is added to the residuals of their ends, and the standard deviation that
-    these have beyond the noise model. chi_square, log_variance : -2 ln S, and ln of the variance given the other
-    readings, over those of the Gaussian observations, summed over the tests.
+    stopped : (tests, observations) which these ends are.
     """
-
-    shift: Floats
-    sd: Floats
-    chi_square: float
-    log_variance: float
-
-    @classmethod
-    def of_residuals(cls, residuals: Residuals, noise_model: NoiseModel, stopped: Bools) -> StoppedTests:
-        """About a point; residuals : there, ln of the time a test lasted over that predicted at stopped ends.
-
-        stopped : (tests, observations) which these are.
-        """
-        columns = np.stack([residuals.values, stopped.astype(float)], axis=-1)
-        weighted = CovarianceFactor.of_residuals(residuals, noise_model).inverse_times(columns)[stopped]
-        late, s = weighted[:, 0] / weighted[:, 1], weighted[:, 1] ** -0.5
-        z = np.maximum(late / s, LEAST_CERTAIN)
-        lasting, hazard = log_survival(z)
-        gap = hazard - z
-        shift, sd = np.zeros((2, *stopped.shape))
-        shift[stopped] = s / gap - late
-        sd[stopped] = s * np.sqrt(np.maximum(1.0 / (hazard * gap) - 1.0, 0.0))
-        chi_square = float((-2.0 * lasting - hazard / gap).sum())
-        return cls(shift, sd, chi_square, float(np.log(hazard * gap / s**2).sum()))
-
-    @property
-    def log_likelihood(self) -> float:
-        """What is to be added to that of the Gaussian observations."""
-        return -0.5 * (self.chi_square + self.log_variance)
-
-    def added_to(self, residuals: Residuals) -> Residuals:
-        """The residuals with the Gaussian observations at the stopped ends."""
-        return replace(residuals, values=residuals.values + self.shift, end_sd=self.sd)
+    columns = np.stack([residuals.values, stopped.astype(float)], axis=-1)
+    weighted = CovarianceFactor.of_residuals(residuals, noise_model).inverse_times(columns)[stopped]
+    late, s = weighted[:, 0] / weighted[:, 1], weighted[:, 1] ** -0.5
+    z = np.maximum(late / s, LEAST_CERTAIN)
+    lasting, hazard = log_survival(z)
+    gap = hazard - z
+    shift, sd = np.zeros((2, *stopped.shape))
+    shift[stopped] = s / gap - late
+    sd[stopped] = s * np.sqrt(np.maximum(1.0 / (hazard * gap) - 1.0, 0.0))
+    chi_square = float((-2.0 * lasting - hazard / gap).sum())
+    return StoppedTests(shift, sd, chi_square, float(np.log(hazard * gap / s**2).sum()))

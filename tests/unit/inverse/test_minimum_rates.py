@@ -153,7 +153,7 @@ def test_a_run_out_moves_nothing_that_it_does_not_contradict(whole_life):
     residuals = problem.residuals(whole_life[1].x)
     ends = problem.observations.stopped_ends
     assert ends.sum() == 2
-    assert (np.abs(residuals.values[ends]) < 1e-3 * residuals.end_sd[ends]).all()
+    assert (np.abs(residuals.values[ends]) < 1e-3 * residuals.stopped.sd[ends]).all()
 
 
 def curve(stress, factor=1.0):
