@@ -9,6 +9,8 @@ import re
 import traceback
 from collections.abc import Iterable
 
+import pluggy
+
 LONGEST_QUOTE, LONGEST_MESSAGE = 40, 2000
 """Characters of a text of a file that a message quotes, and of a whole message."""
 
@@ -123,7 +125,10 @@ POWER_REMEDY = "write ** for powers"
 """For ^, which sympy takes for the exclusive or."""
 
 
-_OURS = (os.path.dirname(__file__) + os.sep, os.path.dirname(importlib.__file__), "<frozen importlib")
+_OURS = (
+    *(os.path.dirname(one) + os.sep for one in (__file__, importlib.__file__, pluggy.__file__)),
+    "<frozen importlib",
+)
 """Where files begin that are none of a plugin."""
 
 

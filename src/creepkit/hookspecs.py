@@ -1,4 +1,7 @@
-"""The hooks: everything a plugin can add, one typed function and one sentence each."""
+"""The hooks: everything a plugin can add, one typed function and one sentence each.
+
+A new kind of plugin is a function here and a row in registry/kinds.py.
+"""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ import numpy as np
 from creepkit.language import stress
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import LawWithValues
-from creepkit.registry import default_registry
+from creepkit.registry import default_registry, kinds
 from helpers.compiled_fortran import compile_fortran, pointer
 from helpers.compilers import compiler_or_skip, shared_library
 from helpers.export_cases import renamed
@@ -38,7 +38,7 @@ async function main(points) {
 
 def program_text(name: str, source: LawWithValues) -> str:
     """The text of an exporter."""
-    return str(default_registry().exporter(name).text(source))
+    return str(default_registry().one(kinds.EXPORTERS, name).text(source))
 
 
 def rates(language: str, folder: Path, source: LawWithValues, points: Points) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit import registry
 from creepkit.checked_arguments import checked
-from creepkit.errors import HistoryError, PluginError, nearest
+from creepkit.errors import HistoryError, nearest
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
@@ -34,12 +34,9 @@ def specimen(name: str) -> Specimen:
 def available(kind: str) -> dict[str, Any]:
     """Return all that is registered of a kind, {name: value}.
 
-    kind : "laws", "specimens", "exporters", "readers", "cameras" or "instruments".
+    kind : "laws", "specimens", "readers", "cameras", "instruments", "exporters" or "temperature-forms".
     """
-    kinds = ("laws", "specimens", "exporters", "readers", "cameras", "instruments")
-    if kind not in kinds:
-        raise PluginError(f"'{kind}' is no kind of plugin; choose one of {', '.join(kinds)}")
-    return {name: entry.value for name, entry in getattr(registry.default_registry(), kind)().items()}
+    return {name: entry.value for name, entry in registry.default_registry().all(registry.kinds.kind(kind)).items()}
 
 
 @checked

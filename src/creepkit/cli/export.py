@@ -25,13 +25,13 @@ def command(
 ) -> None:
     """Intervals and the range of validity are written as comments."""
     import creepkit as ck
-    from creepkit.registry import default_registry
+    from creepkit.registry import default_registry, kinds
 
     if to == "list":
         for target in ck.available("exporters").values():
             tell(f"{target.name:16} {target.suffix:8} {target.title}")
         return
-    default_registry().exporter(to)  # a target that is misspelt is said first
+    default_registry().one(kinds.EXPORTERS, to)  # a target that is misspelt is said first
     chosen = law_source(source)
     text = ExportOptions().changed(options).text(chosen, to, merged_values(chosen, value), output)
     if output is None:

@@ -15,40 +15,34 @@ import typer
 from creepkit.errors import PluginError, nearest
 from creepkit.files.writing import write_text
 from creepkit.options import Option
+from creepkit.registry import default_registry, kinds
 from creepkit.reports.terminal import tell
 
 NAME_PATTERN = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 """Names of packages: they become modules and classes as well."""
 
 
-KINDS = {
-    "law": ("its terms and params", "creepkit list laws $name"),
-    "specimen": ("its lengths, outputs and one()", "creepkit list specimens"),
-    "reader": ("the names of files and columns", "creepkit identify FOLDER --law norton"),
-    "exporter": ("text()", "creepkit export norton --to $name --set A=1e-16 --set n=5"),
-}
-"""{kind: what its author edits first, and a command that uses it}. Its texts are those of the folder new_plugin."""
+KINDS = {one.label: one for one in kinds.KINDS if one.edit}
+"""{kind: its row}. Its texts are those of the folder new_plugin."""
 
 
 def command(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="law, specimen, reader or exporter.")],
+    kind: Annotated[str, typer.Argument(metavar="KIND", help=f"One of {', '.join(KINDS)}.")],
     name: Annotated[str, typer.Argument(metavar="NAME", help="Its name, such as 'my-law'.")],
     *,
     file: Annotated[bool, Option(help="One file, for --plugin and CREEPKIT_PLUGINS.")] = False,
 ) -> None:
     """A package that can be installed, with a test; what exists is left as it is."""
-    from creepkit.registry import default_registry
-
     if kind not in KINDS:
         raise PluginError(f"'{kind}' is no kind of plugin; {nearest(kind, KINDS)}")
     if not NAME_PATTERN.fullmatch(name):
         raise typer.BadParameter(
             f"'{name}' is not a {kind}'s name: use lower-case words joined by '-', such as my-{kind}"
         )
-    if name in getattr(default_registry(), f"{kind}s")():
-        every = "targets" if kind == "exporter" else f"{kind}s"
+    row, words = KINDS[kind], name.split("-")
+    if name in default_registry().all(row):
+        every = row.listed or row.plural
         raise PluginError(f"there is a {kind} '{name}' already; choose another, see creepkit list {every}")
-    (edit, use), words = KINDS[kind], name.split("-")
     known = {
         "name": name,
         "noun": kind,
@@ -57,7 +51,7 @@ def command(
         "class_name": "".join(word.capitalize() for word in words),
         "module": f"creepkit_{'_'.join(words)}",
         "package": f"creepkit-{name}",
-        "use": Template(use).substitute(name=name),
+        "use": Template(row.use).substitute(name=name),
     }
     place = Path(f"{'_'.join(words)}.py") if file else Path(name)
     if os.path.lexists(place):  # it is left as it is
@@ -73,7 +67,8 @@ def command(
         (place / "tests").mkdir(parents=True)
     for path, text in written.items():
         write_text(Template(text.read_text("utf-8")).substitute(known), path, PluginError, internal=True)
-    tell(f"wrote {', '.join(map(str, written))}\nnext: edit {edit} in {module}, run 'creepkit check {module}', then")
+    tell(f"wrote {', '.join(map(str, written))}")
+    tell(f"next: edit {row.edit} in {module}, run 'creepkit check {module}', then")
     if file:
         tell(f"'creepkit --plugin {module}' before any other command")
     else:

@@ -158,9 +158,9 @@ def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
     """
     import creepkit as ck
     from creepkit.instruments.record_tables import find_head
-    from creepkit.registry import default_registry
+    from creepkit.registry import default_registry, kinds
 
-    formats = [entry.value for entry in default_registry().instruments().values()]
+    formats = default_registry().values(kinds.INSTRUMENTS)
     if reader is not None and reader in [one.name for one in formats]:
         return [ck.read_record(path, reader) for path in files]
     if reader is not None or not all(path.is_file() for path in files):

@@ -294,7 +294,7 @@ def candidate_forms(
 
 def _forms_by_name(law: CreepLaw, parameter: str, T_ref: float, forms: Sequence[Any] | None) -> dict[str, Any]:
     """{name: form about T_ref} of those wanted of a parameter, without expressions that name another parameter."""
-    registered = registry.default_registry().temperature_forms()
+    registered = registry.default_registry().all(registry.kinds.TEMPERATURE_FORMS)
     wanted: dict[str, Any] = {}
     for form in [CONSTANT, *registered] if forms is None else forms:
         if isinstance(form, str):
@@ -367,7 +367,7 @@ def _is_duplicate(candidate: CandidateForm, accepted: Sequence[CandidateForm], T
 
 def check_form_names(names: Iterable[str]) -> None:
     """FitError for a name of no temperature form that is registered."""
-    known = [CONSTANT, *registry.default_registry().temperature_forms()]
+    known = [CONSTANT, *registry.default_registry().all(registry.kinds.TEMPERATURE_FORMS)]
     for name in names:
         if name not in known:
             raise FitError(f"there is no temperature form '{name}': {nearest(name, known)}")

@@ -12,7 +12,7 @@ from creepkit.files.writing import write_text
 from creepkit.language import CreepLaw, Elastic
 from creepkit.records import Exporter, LawWithValues, Units
 from creepkit.records.plugin_calls import call_of_plugin
-from creepkit.registry import default_registry, resolve_law
+from creepkit.registry import default_registry, kinds, resolve_law
 
 
 @runtime_checkable
@@ -48,7 +48,7 @@ def export(
 
     ExportError, with the reason, when the target cannot express the law.
     """
-    exporter = default_registry().exporter(target) if isinstance(target, str) else target
+    exporter = default_registry().one(kinds.EXPORTERS, target) if isinstance(target, str) else target
     record = law_with_values(source, values, name=name)
     if units is not None:
         record = record.replace(units=_units(units))

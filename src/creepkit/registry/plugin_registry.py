@@ -10,30 +10,35 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import pluggy
 
 from creepkit import hookspecs
-from creepkit.errors import LawError, PluginError, nearest
-from creepkit.registry import contributions, plugin_sources
-from creepkit.registry.contributions import ContributionKind
+from creepkit.errors import LawError, PluginError, nearest, raised_text
+from creepkit.registry import kinds, plugin_sources
+from creepkit.registry.kinds import PluginKind, group_of
 from creepkit.registry.plugin_sources import PluginFile, Provenance, Source, name_key
 
 if TYPE_CHECKING:
     import typer
 
     from creepkit.language.law import CreepLaw
-    from creepkit.records import CameraFormat, Exporter, InstrumentFormat, Reader, Specimen
+    from creepkit.records import Specimen
 
 
 MORE_LAWS = 'plugins bring more: pip install "creepkit[plugins]"'
 """The end of the sentence about a law that is not installed."""
+
+
+COMMANDS = "creepkit_commands"
+"""The hook by which plugins add commands."""
 
 
 _T = TypeVar("_T")
@@ -51,8 +56,7 @@ class Registered(Generic[_T]):
 class Plugin:
     """One plugin: where it came from, and what it offers or why it cannot be used.
 
-    contributions : {kind: {name: object}} with the kinds "law", "specimen", "reader", "camera format",
-        "instrument format", "exporter", "temperature form".
+    contributions : {kind: {name: object}}, by the labels of registry.kinds.
     commands : whether it adds commands to the command line.
     problem : one sentence when the plugin is broken, else empty.
     """
@@ -89,9 +93,7 @@ class Registry:
     def conflicts(self) -> tuple[str, ...]:
         """One sentence for each name that two plugins offer."""
         plugins = self.plugins()
-        return tuple(
-            conflict for kind in contributions.CONTRIBUTION_KINDS for conflict in _merged(kind, plugins)[1].values()
-        )
+        return tuple(conflict for kind in kinds.KINDS for conflict in _merged(kind, plugins)[1].values())
 
     def replaced(self, plugin: Plugin) -> tuple[str, ...]:
         """One sentence for each name that a plugin file offers in the place of an installed plugin."""
@@ -103,33 +105,34 @@ class Registry:
             if name in other.contributions.get(kind, {}) and _replaces(plugin, other)
         )
 
+    def all(self, kind: PluginKind[_T]) -> dict[str, Registered[_T]]:
+        """{name: what is registered of a kind}."""
+        if (kind.label, None) not in self._found:
+            self._load(self._offering(kind))
+            self._found[kind.label, None] = _merged(kind, self._loaded())[0]
+        return dict(self._found[kind.label, None])
+
+    def values(self, kind: PluginKind[_T]) -> list[_T]:
+        """All that is registered of a kind."""
+        return [entry.value for entry in self.all(kind).values()]
+
+    def one(self, kind: PluginKind[_T], name: str) -> _T:
+        """What is registered under a name, whatever its capitals and hyphens, or under an alias of it.
+
+        The error of its kind, with the nearest name or those that serve this word, where there is none.
+        """
+        if (kind.label, name) not in self._found:
+            self._found[kind.label, name] = self._looked_up(kind, name)
+        result: _T = self._found[kind.label, name]
+        return result
+
     def laws(self) -> dict[str, Registered[CreepLaw]]:
         """{name: registered law}."""
-        return self._all(contributions.LAW)
+        return self.all(kinds.LAWS)
 
     def specimens(self) -> dict[str, Registered[Specimen]]:
         """{name: registered specimen}."""
-        return self._all(contributions.SPECIMEN)
-
-    def readers(self) -> dict[str, Registered[Reader]]:
-        """{name: registered reader}."""
-        return self._all(contributions.READER)
-
-    def cameras(self) -> dict[str, Registered[CameraFormat]]:
-        """{name: registered camera format}."""
-        return self._all(contributions.CAMERA_FORMAT)
-
-    def exporters(self) -> dict[str, Registered[Exporter]]:
-        """{name: registered exporter}."""
-        return self._all(contributions.EXPORTER)
-
-    def instruments(self) -> dict[str, Registered[InstrumentFormat]]:
-        """{name: registered instrument format}."""
-        return self._all(contributions.INSTRUMENT)
-
-    def temperature_forms(self) -> dict[str, Registered[Callable[..., Any]]]:
-        """{name: registered function of T_ref that gives a form or a factor}."""
-        return self._all(contributions.TEMPERATURE_FORM)
+        return self.all(kinds.SPECIMENS)
 
     def law(self, name: str) -> CreepLaw:
         """The law of a name, a sum as "norton+strain-hardening", or "hyperbolic-sine*primary"; LawError without one."""
@@ -138,28 +141,11 @@ class Registry:
             return sum(others, start=first)
         if name.endswith("*primary"):
             return self.law(name.removesuffix("*primary")).with_primary()
-        law: CreepLaw = self._one(contributions.LAW, name)
-        return law
+        return self.one(kinds.LAWS, name)
 
     def specimen(self, name: str) -> Specimen:
         """The specimen of a name; SolveError with the nearest name when there is none."""
-        specimen: Specimen = self._one(contributions.SPECIMEN, name)
-        return specimen
-
-    def reader(self, name: str) -> Reader:
-        """The reader of a name; HistoryError with the nearest name when there is none."""
-        reader: Reader = self._one(contributions.READER, name)
-        return reader
-
-    def camera(self, name: str) -> CameraFormat:
-        """The camera format of a name; HistoryError with the nearest name when there is none."""
-        camera: CameraFormat = self._one(contributions.CAMERA_FORMAT, name)
-        return camera
-
-    def exporter(self, name: str) -> Exporter:
-        """The exporter of a name; ExportError with the nearest name, or those that serve this word, without one."""
-        exporter: Exporter = self._one(contributions.EXPORTER, name)
-        return exporter
+        return self.one(kinds.SPECIMENS, name)
 
     def distributions_of(self, law: CreepLaw) -> str:
         """Return the distributions, with versions, of the laws that a law's name says it was made of.
@@ -167,8 +153,8 @@ class Registry:
         'creepkit-damage 0.1.0' of 'kachanov-rabotnov*arrhenius'; empty when no plugin has them.
         """
         parts = set(re.split(r"[^a-z0-9-]+", law.name))
-        self._load(self._named(contributions.LAW, parts))
-        known, _ = _merged(contributions.LAW, self._loaded())
+        self._load(self._offering(kinds.LAWS, parts))
+        known, _ = _merged(kinds.LAWS, self._loaded())
         return ", ".join(sorted({one.provenance.origin for name, one in known.items() if name in parts}))
 
     def broken_hint(self) -> str:
@@ -176,22 +162,10 @@ class Registry:
         broken = sum(bool(plugin.problem) for plugin in self._loaded())
         return f"; {broken} plugin(s) could not be loaded, see 'creepkit list plugins'" if broken else ""
 
-    def _all(self, kind: ContributionKind) -> dict[str, Registered[Any]]:
-        if (kind.label, None) not in self._found:
-            self._load(source for source in self._sources if source.offers(kind.group))
-            self._found[kind.label, None] = _merged(kind, self._loaded())[0]
-        return dict(self._found[kind.label, None])
-
-    def _one(self, kind: ContributionKind, name: str) -> Any:
-        """What is registered under a name, whatever its capitals and hyphens, or under an alias of it; kept."""
-        if (kind.label, name) not in self._found:
-            self._found[kind.label, name] = self._looked_up(kind, name)
-        return self._found[kind.label, name]
-
-    def _looked_up(self, kind: ContributionKind, name: str) -> Any:
-        """As _one(), loading the plugins that may have it."""
-        named = self._named(kind, {name})
-        for sources in (named, [source for source in self._sources if source.offers(kind.group)]):
+    def _looked_up(self, kind: PluginKind[Any], name: str) -> Any:
+        """As one(), loading the plugins that may have it: first those that name it by an entry point."""
+        named = self._offering(kind, {name})
+        for sources in (named, self._offering(kind)):
             self._load(sources)
             known, clashes = _merged(kind, self._loaded())
             by_key = {name_key(one): one for one in (*clashes, *known)}
@@ -211,16 +185,16 @@ class Registry:
             raise kind.error(
                 f"there is no {kind.label} '{name}'; choose one of those that serve it: {', '.join(serving)}"
             )
-        more = f"; {MORE_LAWS}" if kind is contributions.LAW and all(one.is_own for one in self._sources) else ""
+        more = f"; {MORE_LAWS}" if kind is kinds.LAWS and all(one.is_own for one in self._sources) else ""
         near = nearest(name, known)
-        if kind is contributions.LAW and not near.startswith("did you mean"):
+        if kind is kinds.LAWS and not near.startswith("did you mean"):
             more += "; that of a file: creepkit --plugin FILE.py before the command, or ck.load_plugin"
         raise kind.error(f"there is no {kind.label} '{name}': {near}{more}{self.broken_hint()}")
 
-    def _named(self, kind: ContributionKind, names: Iterable[str]) -> list[Source]:
-        """The sources that may have an object of one of these names: by their entry points, and all files."""
-        keys = {name_key(name) for name in names}
-        return [source for source in self._sources if source.offers(kind.group, keys)]
+    def _offering(self, kind: PluginKind[Any], names: Iterable[str] | None = None) -> list[Source]:
+        """The sources that may have something of a kind, or of one of these names: by entry points, and all files."""
+        keys = None if names is None else {name_key(name) for name in names}
+        return [source for source in self._sources if source.offers(group_of(kind.hook), keys)]
 
     # ---- where it comes from ---------------------------------------------------------------------------------------
 
@@ -250,25 +224,20 @@ class Registry:
         """[(plugin, a command line with its commands)]; that of a plugin that is broken is empty."""
         import typer
 
-        group = contributions.group_of(contributions.COMMANDS_HOOK)
+        group = group_of(COMMANDS)
         self._load(source for source in self._sources if source.offers(group))
         results = []
-        for plugin in self._loaded():
-            if plugin.source.offers(group) and (plugin.commands or plugin.problem):
-                app = typer.Typer()
-                self._add_commands(plugin, app)
-                results.append((self._plugins[plugin.source.place], app))
+        for place, plugin in [(one.source.place, one) for one in self._loaded() if one.source.offers(group)]:
+            app = typer.Typer()
+            try:
+                if plugin.commands:
+                    self._called(plugin.source, COMMANDS, app=app)
+            except PluginError as error:
+                app.registered_commands.clear()
+                self._plugins[place] = replace(plugin, problem=str(error))
+            if plugin.commands or plugin.problem:
+                results.append((self._plugins[place], app))
         return results
-
-    def _add_commands(self, plugin: Plugin, app: typer.Typer) -> None:
-        """Let one plugin add its commands, if it has any; it is broken from then on when it raises."""
-        for implementation in self._manager.hook.creepkit_commands.get_hookimpls():
-            if implementation.plugin_name == plugin.source.place:
-                try:
-                    contributions.call_hook(plugin.provenance, implementation, app=app)
-                except PluginError as error:
-                    app.registered_commands.clear()
-                    self._plugins[plugin.source.place] = replace(plugin, problem=str(error))
 
     def _load(self, sources: Iterable[Source]) -> None:
         """Import these plugins, each once; of one that cannot be used the reason is kept.
@@ -291,30 +260,47 @@ class Registry:
         """Import a plugin and enter it whole or not at all: its hooks must exist and return what they promise."""
         self._found.clear()
         module, provenance = source.load(), source.provenance
-        contributions.check_hooks(provenance, module)
+        _check_hooks(provenance, module)
+        if self._manager.has_plugin(source.place):  # as it was before the file was mended
+            self._manager.unregister(name=source.place)
         try:
             self._manager.register(module, source.place)
+            hooks = {caller.name for caller in self._manager.get_hookcallers(module) or ()}
+            for group in sorted(group_of(hook) for hook in hooks):
+                if not source.offers(group):
+                    raise PluginError(
+                        f"{provenance} has the hook {group.replace('.', '_')}, but no entry point in the group "
+                        f"'{group}' names its module; add one"
+                    )
+            offered = {kind.label: self._offered(kind, source) for kind in kinds.KINDS if kind.hook in hooks}
         except pluggy.PluginValidationError as error:
             description = " ".join(str(error).split())
             raise PluginError(f"{provenance} does not fit the hooks of creepkit: {description}") from error
-        try:
-            callers = self._manager.get_hookcallers(module) or ()
-            hooks = {c.name: impl for c in callers for impl in c.get_hookimpls() if impl.plugin is module}
-            for hook in hooks:
-                if not source.offers(contributions.group_of(hook)):
-                    raise PluginError(
-                        f"{provenance} has the hook {hook}, but no entry point in the group "
-                        f"'{contributions.group_of(hook)}' names its module; add one"
-                    )
-            offered = {
-                kind.label: contributions.contributions_of(kind, provenance, hooks[kind.hook])
-                for kind in contributions.CONTRIBUTION_KINDS
-                if kind.hook in hooks
-            }
         except PluginError:
             self._manager.unregister(module)
             raise
-        return Plugin(source, offered, commands=contributions.COMMANDS_HOOK in hooks)
+        return Plugin(source, offered, commands=COMMANDS in hooks)
+
+    def _offered(self, kind: PluginKind[_T], source: Source) -> dict[str, _T]:
+        """{name: object} of a kind that one plugin offers; PluginError when that is not what the hook promises."""
+        returned = self._called(source, kind.hook)
+        try:
+            return kind.named(returned)
+        except Exception as error:
+            place = _location(getattr(self._manager.get_plugin(source.place), kind.hook))
+            if isinstance(error, PluginError):
+                raise PluginError(f"{source.provenance}: {kind.hook} {error}{place}") from None
+            problem = f"returned a record that cannot be asked its name: {raised_text(error)}"
+            raise PluginError(f"{source.provenance}: {kind.hook} {problem}{place}") from error
+
+    def _called(self, source: Source, hook: str, **arguments: Any) -> Any:
+        """What a hook of one plugin returns; PluginError when it raises."""
+        others = self._manager.get_plugins() - {self._manager.get_plugin(source.place)}
+        try:
+            results = self._manager.subset_hook_caller(hook, others)(**arguments)
+        except (Exception, SystemExit) as error:
+            raise PluginError(f"{source.provenance}: {hook} raised {raised_text(error)}") from error
+        return results[0] if results else None
 
 
 @cache
@@ -346,12 +332,33 @@ def load_plugin_file(path: str) -> None:
         default_registry().load_file(path)
 
 
+def _check_hooks(provenance: Provenance, module: ModuleType) -> None:
+    """PluginError for a module with no hook, or with one that pluggy would pass over."""
+    known = [name for name in vars(hookspecs) if name.startswith("creepkit_")]
+    hooks = [name for name in vars(module) if name.startswith("creepkit_") and callable(getattr(module, name))]
+    if not hooks:
+        raise PluginError(f"{provenance} offers nothing; mark one of its functions @hookimpl ({', '.join(known)})")
+    for name in hooks:
+        function = getattr(module, name)
+        if not hasattr(function, f"{hookspecs.PROJECT}_impl"):
+            problem = f"has a function '{name}' without @hookimpl; add the decorator"
+            raise PluginError(f"{provenance} {problem}{_location(function)}")
+        if name not in known:
+            raise PluginError(f"{provenance} has an unknown hook '{name}': {nearest(name, known)}{_location(function)}")
+
+
+def _location(function: Any) -> str:
+    """Where a function of a plugin is written, as the end of a sentence; "" where that is not known."""
+    code = getattr(function, "__code__", None)
+    return f" ({code.co_filename}, line {code.co_firstlineno})" if code is not None else ""
+
+
 def _replaces(plugin: Plugin, other: Plugin) -> bool:
     """Whether a file that the user names stands in for an installed plugin, which is not creepkit's own."""
     return plugin.source.is_file and not other.source.is_file and not other.source.is_own
 
 
-def _merged(kind: ContributionKind, plugins: Iterable[Plugin]) -> tuple[dict[str, Registered[Any]], dict[str, str]]:
+def _merged(kind: PluginKind[Any], plugins: Iterable[Plugin]) -> tuple[dict[str, Registered[Any]], dict[str, str]]:
     """Return {name: registered} over plugins, and {name: a sentence} for each that two offer, which is left out."""
     offers: dict[str, list[Plugin]] = {}
     for plugin in plugins:

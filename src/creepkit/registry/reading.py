@@ -15,6 +15,7 @@ from creepkit.instruments.reading_options import RecordOptions
 from creepkit.options import takes_options
 from creepkit.readers import reading
 from creepkit.records import Frames, History, InstrumentRecord
+from creepkit.registry import kinds
 from creepkit.registry.plugin_registry import default_registry
 
 
@@ -25,7 +26,7 @@ def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: 
     reader : name of the reader; by default the one that accepts the file.
     ignore : columns that nobody needs, such as ["load_kN", "date"]; they are left out wherever they stand.
     """
-    readers = [entry.value for entry in default_registry().readers().values()]
+    readers = default_registry().values(kinds.READERS)
     return reading.read_histories(paths, readers, reader, ignore)
 
 
@@ -34,7 +35,7 @@ def read_those_that_can_be(
 ) -> tuple[list[Path], list[History], list[CreepkitError]]:
     """The files that hold tests, these tests, and the error of each other file; each file is read by itself."""
     read, tests, errors = list[Path](), list[History](), list[CreepkitError]()
-    readers = [one.value for name, one in default_registry().readers().items() if reader in (None, name)]
+    readers = [one for one in default_registry().values(kinds.READERS) if reader in (None, one.name)]
     for file in (one for path in files for one in reading.readable_paths(path, readers)):
         try:
             tests += read_histories([file], reader, ignore)
@@ -62,13 +63,13 @@ def read_frames(
     times : (frames,) s, increasing, or a file with a column of them, in s or as "time [ms]"; by default as the files
         say, and NaN where they do not.
     """
-    formats = [entry.value for entry in default_registry().cameras().values()]
+    formats = default_registry().values(kinds.CAMERAS)
     return camera_reading.read_frames(path, formats, format, times)
 
 
 def frame_files(path: camera_reading.FramePath, format: camera_reading.FormatLike = None) -> list[Path]:
     """The files that read_frames reads of a folder, a file, a pattern or a list, in order."""
-    formats = [entry.value for entry in default_registry().cameras().values()]
+    formats = default_registry().values(kinds.CAMERAS)
     return camera_reading.frame_files(path, formats, format)
 
 
@@ -85,5 +86,5 @@ def read_record(path: str | Path, format: str | None = None, **options: Any) -> 
     ambient_pressure=None : MPa, to be taken off absolute pressures. missing=() : texts in the place of a reading,
     beside the usual ones.
     """
-    formats = [entry.value for entry in default_registry().instruments().values()]
+    formats = default_registry().values(kinds.INSTRUMENTS)
     return instrument_files.read_record(path, formats, format, options)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from creepkit.registry import kinds
 from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.terminal import print_table, tell
 
@@ -14,18 +15,20 @@ if TYPE_CHECKING:
     from creepkit.registry import Plugin, Registered
 
 
-DETAILS = {"laws": ("parameters", "names"), "specimens": ("outputs", "outputs")}
+DETAILS = {kinds.LAWS: ("parameters", "names"), kinds.SPECIMENS: ("outputs", "outputs")}
 """{kind: what a list of it names of each, and where that stands}."""
 
 
-def print_registered(kind: str, found: Mapping[str, Registered[Any]], conflicts: Sequence[str]) -> None:
+def print_registered(
+    kind: kinds.PluginKind[Any], found: Mapping[str, Registered[Any]], conflicts: Sequence[str]
+) -> None:
     """Print one row each, and on stderr what was left out because two plugins offer it."""
     head, parts = DETAILS.get(kind, ("from", ""))
     rows = [
         (name, getattr(one.value, "title", ""), " ".join(getattr(one.value, parts)) if parts else str(one.provenance))
         for name, one in found.items()
     ]
-    print_table(f"{len(rows)} {kind}", ("name", "title", head), rows)
+    print_table(f"{len(rows)} {kind.listed or kind.plural}", ("name", "title", head), rows)
     for sentence in conflicts:
         tell(f"left out: {sentence}", err=True)
 

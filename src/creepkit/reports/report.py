@@ -27,7 +27,7 @@ from creepkit.inverse.selection import Ranking, rank
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.quality import check_data_quality
 from creepkit.records import History
-from creepkit.registry import default_registry
+from creepkit.registry import default_registry, kinds
 from creepkit.reports.contents import (
     Exclusion,
     ExportedFile,
@@ -216,7 +216,7 @@ def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], t
             document = json_text(identification_to_json(one.fit))
             files.append(ExportedFile(f"{stem}_identification.json", "identification, read by ck.load", document))
         for target in EXPORT_TARGETS:
-            exporter = default_registry().exporter(target)
+            exporter = default_registry().one(kinds.EXPORTERS, target)
             try:
                 text = export(one.ranking or one.fit, target)
             except CreepkitError as error:

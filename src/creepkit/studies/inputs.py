@@ -20,7 +20,7 @@ from creepkit.readers.reading import answered_readers
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History
 from creepkit.records.history_selection import select_tests
 from creepkit.records.plugin_calls import accepts_path
-from creepkit.registry import default_registry
+from creepkit.registry import default_registry, kinds
 from creepkit.reports.contents import Exclusion
 from creepkit.studies.study_file import KeyPath, StudyFile, carried_name
 from creepkit.studies.tables import ExcludeTable
@@ -87,7 +87,7 @@ def input_files(file: StudyFile, paths: Sequence[Path], left_out: Sequence[Path]
 
 def _files_of_tests(folder: Path) -> list[Path]:
     """The visible files of a folder: all below where a reader takes it as a whole, else those that a reader accepts."""
-    readers = [found.value for found in default_registry().readers().values()]
+    readers = default_registry().values(kinds.READERS)
     whole = any(accepts_path(reader, folder) for reader in readers)
     below = sorted(folder.rglob("*") if whole else folder.iterdir())
     visible = [one for one in below if not any(part[0] == "." for part in one.relative_to(folder).parts)]

@@ -23,7 +23,7 @@ from creepkit.language import temperature
 from creepkit.options import values_of_table
 from creepkit.quality import DataQuality
 from creepkit.records import ZERO_CELSIUS, History, Nuisance, known_specimens
-from creepkit.registry import default_registry
+from creepkit.registry import default_registry, kinds
 from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
 from creepkit.studies.arguments import check_forecast, planned_test
@@ -340,7 +340,7 @@ def export_name(file: StudyFile, number: int) -> str:
     """The file of the export of this number; StudyError for a target that there is not."""
     part = file.model.export[number]
     with file.at("export", number, "target"):
-        return part.file or f"law{default_registry().exporter(part.target).suffix}"
+        return part.file or f"law{default_registry().one(kinds.EXPORTERS, part.target).suffix}"
 
 
 def _export_stage(study: StageInputs, number: int, group: TestGroup) -> Stage:

@@ -12,7 +12,7 @@ from creepkit.arrays import Floats
 from creepkit.cameras.reading import read_frames
 from creepkit.cameras.recognition import is_for_matlab
 from creepkit.records.camera_format import COORDINATES, DISPLACEMENTS, CameraFormat, ColumnName
-from creepkit.registry import default_registry
+from creepkit.registry import default_registry, kinds
 from creepkit.testing.reader_checks import foreign_places, refusal
 from creepkit.testing.reports import finding
 
@@ -65,7 +65,7 @@ def check_example(format: CameraFormat, path: Path | None) -> str:
 
 def _require_alone(format: CameraFormat, path: Path) -> None:
     """AssertionError where another registered format takes a file as well."""
-    for name, entry in default_registry().cameras().items():
+    for name, entry in default_registry().all(kinds.CAMERAS).items():
         taken = name != format.name and not refusal(lambda path, other=entry.value: read_frames(path, [other]), path)
         assert not taken, f"the format '{name}' takes it as well; name a column that only one of them has"
 

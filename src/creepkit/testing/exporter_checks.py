@@ -11,7 +11,7 @@ from creepkit.exporters.exporting import exported_text
 from creepkit.language.elastic import Elastic
 from creepkit.language.symbols import temperature
 from creepkit.records import Exporter, LawWithValues
-from creepkit.registry import default_registry
+from creepkit.registry import default_registry, kinds
 from creepkit.testing.reports import finding
 
 LONGEST_TEXT = 1_000_000
@@ -31,7 +31,7 @@ HOSTILE_NOTES = (
 
 def registered_sources() -> list[LawWithValues]:
     """Every registered law at the middle of its bounds, and at 1073 K where it depends on temperature."""
-    laws = [registered.value for registered in default_registry().laws().values()]
+    laws = default_registry().values(kinds.LAWS)
     sources = [LawWithValues(law, law.center(), elastic=Elastic(150e3)) for law in laws]
     return [*sources, *(source.at(1073.0) for source in sources if source.law.uses(temperature))]
 

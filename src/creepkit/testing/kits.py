@@ -31,7 +31,7 @@ from creepkit.records import (
     Specimen,
     remember_specimen,
 )
-from creepkit.registry import Plugin, default_registry
+from creepkit.registry import Plugin, default_registry, kinds
 from creepkit.testing import (
     camera_checks,
     exporter_checks,
@@ -232,13 +232,7 @@ def check_temperature_form(form: Callable[..., Any]) -> ConformanceReport:
 
 
 _KITS: dict[str, Callable[..., ConformanceReport]] = {
-    "law": check_law,
-    "specimen": check_specimen,
-    "reader": check_reader,
-    "camera format": check_camera_format,
-    "exporter": check_exporter,
-    "instrument format": check_instrument_format,
-    "temperature form": check_temperature_form,
+    kind.label: globals()[f"check_{kind.label.replace(' ', '_')}"] for kind in kinds.KINDS
 }
 
 
@@ -258,11 +252,7 @@ def check_plugin(plugin: Plugin) -> list[ConformanceReport]:
 def check_named(name: str) -> list[ConformanceReport]:
     """Run the kits of whatever is registered under a name; PluginError with the nearest name where nothing is."""
     registry = default_registry()
-    registered = (
-        *(registry.laws(), registry.specimens(), registry.readers(), registry.cameras(), registry.exporters()),
-        *(registry.instruments(), registry.temperature_forms()),
-    )
-    offered: dict[str, Mapping[str, Any]] = dict(zip(_KITS, registered, strict=True))
+    offered = {kind.label: registry.all(kind) for kind in kinds.KINDS}
     reports = [_KITS[kind](known[name].value) for kind, known in offered.items() if name in known]
     if not reports:
         clashes = [sentence for sentence in registry.conflicts() if f"'{name}' is offered twice" in sentence]

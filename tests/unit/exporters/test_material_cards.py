@@ -23,7 +23,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import LawWithValues, Units
-from creepkit.registry import default_registry
+from creepkit.registry import default_registry, kinds
 from helpers.creep_form_cases import CASES, COMBINED, EXPONENTIAL, HAS, STEEL, valued
 from helpers.input_file_parsers import READERS, abaqus, abaqus_cards, ansys_commands, aster_keywords, code_aster, hit
 from helpers.paths import GOLDEN
@@ -303,9 +303,9 @@ ELSEWHERE = {
 
 def test_every_registered_law_gives_a_card_with_its_rate_or_a_reason():
     """In Pa and h, at points spread over what tests visit, by the formulas of the codes' manuals."""
-    assert set(default_registry().exporters()) == {*EXPORTERS, *ELSEWHERE}
+    assert set(default_registry().all(kinds.EXPORTERS)) == {*EXPORTERS, *ELSEWHERE}
     bad, accepted = [], set()
-    for law in (one.value for one in default_registry().laws().values()):
+    for law in default_registry().values(kinds.LAWS):
         source = LawWithValues(law, law.center(), elastic=STEEL, units=Units("Pa", "h"))
         for name, exporter in EXPORTERS.items():
             try:
@@ -314,7 +314,8 @@ def test_every_registered_law_gives_a_card_with_its_rate_or_a_reason():
                 ways_out = re.findall(r"'([\w-]+)'", str(error).partition("; export it as ")[2])
                 bad += [] if ways_out and f"law '{law.name}'" in str(error) else [f"{law.name} as {name}: {error}"]
                 for other in ways_out:
-                    assert default_registry().exporter(other).text(source), f"{law.name} as {other}, which {name} names"
+                    text = default_registry().one(kinds.EXPORTERS, other).text(source)
+                    assert text, f"{law.name} as {other}, which {name} names"
                 continue
             accepted.add((law.name, name))
             for s, e, t, T in points(8):

@@ -14,7 +14,7 @@ import pytest
 
 from creepkit.errors import ExportError, HistoryError, LawError, PluginError, SolveError
 from creepkit.language import CreepLaw, arrhenius
-from creepkit.registry import Plugin, Registry, plugin_sources
+from creepkit.registry import Plugin, Registry, kinds, plugin_sources
 from helpers.mistakes import said_otherwise
 
 LAW = """
@@ -95,17 +95,18 @@ def test_every_object_has_its_name_and_its_plugin() -> None:
 
     assert all(isinstance(found.value, CreepLaw) and found.value.name == name for name, found in laws.items())
     assert str(laws["norton"].provenance).startswith("plugin 'norton' (creepkit ")
-    assert Registry().temperature_forms()["arrhenius"].value(T_ref=1000.0) == arrhenius(T_ref=1000.0)
+    assert Registry().all(kinds.TEMPERATURE_FORMS)["arrhenius"].value(T_ref=1000.0) == arrhenius(T_ref=1000.0)
 
 
 def test_an_unknown_name_is_an_error_of_its_kind_with_the_nearest_name() -> None:
     registry = Registry()
+    reader, exporter = partial(registry.one, kinds.READERS), partial(registry.one, kinds.EXPORTERS)
     for error, ask, name, sentence in (
         (LawError, registry.law, "nortn", r"there is no law 'nortn': did you mean 'norton'\?"),
         (SolveError, registry.specimen, "uniaxal", r"there is no specimen 'uniaxal': did you mean 'uniaxial'\?"),
-        (HistoryError, registry.reader, "no-such", "there is no reader 'no-such': known: "),
-        (ExportError, registry.exporter, "no-such", "there is no exporter 'no-such': known: "),
-        (ExportError, registry.exporter, "UMAT", "choose one of those that serve it: abaqus, calculix, mfront"),
+        (HistoryError, reader, "no-such", "there is no reader 'no-such': known: "),
+        (ExportError, exporter, "no-such", "there is no exporter 'no-such': known: "),
+        (ExportError, exporter, "UMAT", "choose one of those that serve it: abaqus, calculix, mfront"),
     ):
         assert said_otherwise([(partial(ask, name), sentence)], error) == []
 
@@ -296,7 +297,7 @@ def test_a_law_is_found_whatever_its_capitals_and_by_its_aliases() -> None:
         assert registry.law(word) == registry.law(name)
         assert word not in registry.laws()
     assert registry.law("sinh + norton") == registry.law("hyperbolic-sine") + registry.law("norton")
-    assert registry.exporter("tex").name == "latex"
+    assert registry.one(kinds.EXPORTERS, "tex").name == "latex"
 
 
 def test_a_plugin_whose_commands_fail_is_told_and_the_others_add_theirs(write: Write) -> None:

@@ -21,7 +21,7 @@ from creepkit.inverse.selection.ranking import Criterion, Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Predictor
-from creepkit.registry import default_registry
+from creepkit.registry import default_registry, kinds
 
 
 def sums_of_two(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
@@ -112,7 +112,7 @@ def _registered_laws(tried: Sequence[CreepLaw], histories: Sequence[History]) ->
         return law.uses(strain), law.uses(time), bool(law.states)
 
     known = {memory(law) for law in tried}
-    laws = [one.value for one in default_registry().laws().values() if not one.value.uses(temperature)]
+    laws = [law for law in default_registry().values(kinds.LAWS) if not law.uses(temperature)]
     laws = [_with_temperature_of(tried, law, histories) for law in laws]
     return sorted(laws, key=lambda law: (memory(law) in known, len(law.params), law.name))
 
