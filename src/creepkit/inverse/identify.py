@@ -21,7 +21,13 @@ from creepkit.inverse.defect_correction import (
     shift_of_values,
     with_correction_at_frames,
 )
-from creepkit.inverse.errors_of_tests import LIFE, RATE, error_covariances, errors_of_tests
+from creepkit.inverse.errors_of_tests import (
+    LIFE,
+    RATE,
+    covariances_of_values_with_errors,
+    errors_of_tests,
+    with_expected_scatter,
+)
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
@@ -65,11 +71,9 @@ from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with
 from creepkit.inverse.uncertainty.laplace_approximation import (
     covariance_of_values,
     cut_interval_notes,
-    median_freedom,
+    freedom_of_intervals,
     parameter_estimates,
     positive_semidefinite,
-    restricted_covariance,
-    with_freedom,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
@@ -341,19 +345,17 @@ def _reported(
     noise_model = estimator.final(linear, best.noise)
     law, coordinates, count, residuals = problem.law, problem.coordinates, problem.parameter_count, linear.residuals
     u = x[:count]
-    unestimated = estimator.unestimated_drift_components(noise_model)
-    covariance, freedom = restricted_covariance(linear, noise_model, problem.settings.nuisances, unestimated)
     working_noise, errors, judged = None, best.errors, linear
     if not estimator.by_likelihood:
         errors, judged = errors_of_tests(problem, x, linear, noise_model), judged_at(problem, linear, noise_model)
         working_noise = with_single_value_weight(best.noise, problem.observations)
-        covariance = covariance_of_values(linear, noise_model, working_noise)
     unmodelled = perturbations(
         problem, linear, noise_model, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
     )
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     rates = RateExplanations(problem, x, judged, noise_model)
-    of_errors, of_common = error_covariances(linear, noise_model, errors, working_noise)
+    expected = with_expected_scatter(problem, linear, noise_model)
+    covariance, of_errors, of_common = covariances_of_values_with_errors(linear, expected, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
     prediction = problem.predictor.predict(
         law,
@@ -365,7 +367,9 @@ def _reported(
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
     error_covariance = of_errors[:count, :count]
-    law_covariance = with_freedom(positive_semidefinite(covariance[:count, :count]), freedom[:count]) + error_covariance
+    by_tests_alone = positive_semidefinite(covariance[:count, :count])
+    law_covariance = by_tests_alone + error_covariance
+    estimated = covariance_of_values(linear, noise_model, working_noise)[:count, :count]
     values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)
     single_values = values_of_tests.compared(histories, without_curves=used)
@@ -394,7 +398,7 @@ def _reported(
         rms=pooled_log_strain_rms(tests),
         log_likelihood=best.log_likelihood,
         effective_frames=effective_sample_size(residuals, noise_model),
-        freedom=median_freedom(freedom[:count]),
+        freedom=freedom_of_intervals(by_tests_alone, estimated),
         tests=tests,
         ranges=fitted_ranges(problem),
         settings=problem.settings,

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.errors_of_tests import errors_of_tests, with_errors
+from creepkit.inverse.errors_of_tests import errors_of_tests, with_errors, with_expected_scatter
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
@@ -144,10 +144,12 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
     free = linear.free
     for _ in range(MOST_LAST_STEPS):
         problem, residuals = about_own_rates(problem, linear.x, linear.residuals, noise)
-        problem, residuals = about_stopped_tests(problem, linear.x, residuals, noise)
         linear = replace(problem.linearised(linear.x, residuals), free=free)
+        expected = with_expected_scatter(problem, linear, noise)
+        problem, residuals = about_stopped_tests(problem, linear.x, residuals, expected)
+        linear = replace(linear, residuals=residuals)
         errors = errors_of_tests(problem, linear.x, linear, noise)
-        solution = linear.solve(CovarianceFactor.of_residuals(with_errors(linear, errors).residuals, noise))
+        solution = linear.solve(CovarianceFactor.of_residuals(with_errors(linear, errors).residuals, expected))
         found = replace(found, problem=problem, linear=linear, errors=errors)
         target = linear.x.copy()
         target[free] += solution.step
