@@ -64,7 +64,7 @@ plate = ck.screen(
 seconds = time.monotonic() - began
 print(f"\n{plate}")
 plate.to_csv(arguments.to / "plate.csv")
-pictures = plate.plot(arguments.to / "pictures")
+plate.plot(arguments.to / "plate.png")
 
 # %%
 # Against the truth
@@ -84,4 +84,4 @@ print(
     f"best law right {correct} of {len(results)}, truth in the set {contained}; "
     f"decisive {len(decisive_names)}, of them wrong {wrong}; {seconds:.0f} s"
 )
-print("pictures:", ", ".join(map(str, pictures)))
+print("picture:", arguments.to / "plate.png")

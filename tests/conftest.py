@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import pytest
 
-from creepkit.records import forget_unregistered
 from creepkit.registry import default_registry
 from helpers.compilers import compiler_or_skip, skipped_without_need
 
@@ -40,10 +39,9 @@ def one_torch_thread() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def plugin_files_of_one_test_alone() -> Iterator[None]:
-    """What a test loads by `load_plugin` or `--plugin` is gone with it: tests run in any order, in any process."""
+    """Plugin files that a test loads, and specimens that it gives, are gone with it: tests run in any order."""
     yield
-    forget_unregistered()
-    if any(plugin.provenance.origin.endswith(".py") for plugin in default_registry().plugins()):
+    if default_registry().is_extended:
         default_registry.cache_clear()
 
 

@@ -7,7 +7,6 @@ from .api.objects import example_data as example_data
 from .api.objects import law as law
 from .api.objects import load_plugin as load_plugin
 from .api.objects import specimen as specimen
-from .api.simulation import check_data_quality as check_data_quality
 from .api.simulation import simulate as simulate
 from .app.page import interactive_page as interactive_page
 from .dataset.generation import generate as generate
@@ -66,6 +65,7 @@ from .language.temperature_forms import arrhenius as arrhenius
 from .language.temperature_forms import exponential as exponential
 from .language.temperature_forms import inverse_temperature as inverse_temperature
 from .language.temperature_forms import linear as linear
+from .quality import check_data_quality as check_data_quality
 from .quality import exclude_suspect_frames as exclude_suspect_frames
 from .readers.history_csv import write_history as write_history
 from .records.camera_format import CameraFormat as CameraFormat

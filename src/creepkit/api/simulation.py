@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import ArrayLike
-from creepkit.checked_arguments import checked, checked_with_own_words
+from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import SolveError
 from creepkit.language import symbols
 from creepkit.records import History, Loading, Predictor, Program, Status, call_of_plugin
@@ -18,7 +18,6 @@ from creepkit.specimens.run import Run, run_from_outputs, unusual_values, with_e
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw, Elastic
-    from creepkit.quality import DataQuality
 
 
 ROOM_TEMPERATURE = 293.15
@@ -81,16 +80,3 @@ def _simulated(law: CreepLaw, using: Predictor, values: Mapping[str, float], pla
     prediction = using.predict(law, law.to_internal(values), [planned_test])
     status, end = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
     return run_from_outputs(Run, planned_test, prediction.outputs, prediction.of(0), status, end, prediction.reason)
-
-
-@checked
-def check_data_quality(histories: Sequence[History], *, activation_energy: float | None = None) -> DataQuality:
-    """Return what looks wrong: frames, tests far from others, and what happened in several tests at one time.
-
-    activation_energy : J/mol, with which a factor on the creep rate is put as a step of temperature; 400e3 by default.
-    """
-    from creepkit.quality import ACTIVATION_ENERGY
-    from creepkit.quality import check_data_quality as run
-
-    energy = ACTIVATION_ENERGY if activation_energy is None else activation_energy
-    return run(list(histories), activation_energy=energy)

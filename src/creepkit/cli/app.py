@@ -74,7 +74,7 @@ def built(name: str) -> Any:
     functions = getattr(module, "COMMANDS", None)
     if functions is None:
         help = f"{COMMANDS[name]}\n\n{inspect.cleandoc(module.command.__doc__)}"
-        app.command(name, cls=getattr(module, "Command", None), help=help)(checked(module.command))
+        app.command(name, help=help)(checked(module.command))
     else:
         group = typer.Typer(rich_markup_mode=None, no_args_is_help=True, help=COMMANDS[name])
         for one, function in functions.items():
@@ -134,8 +134,10 @@ class CommandGroup(TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of this name, creepkit's own or a plugin's; say which plugins failed where none has it."""
         name = ALIASES.get(cmd_name, cmd_name)
-        if name in COMMANDS and name not in self.commands:
-            self.commands[name] = built(name)
+        if name in COMMANDS:  # anew for each command line: options may be those of a plugin file
+            if name not in ctx.meta:
+                ctx.meta[name] = built(name)
+            return ctx.meta[name]
         if name not in self.commands and not self._plugins_asked:
             self._plugins_asked = True
             added, problems = _plugin_commands()

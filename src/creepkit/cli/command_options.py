@@ -49,7 +49,7 @@ class OutputPath:
         if self.kind == "picture":
             from creepkit.reports.figures import check_picture_format
 
-            check_picture_format(path, CreepkitError)
+            check_picture_format(path)
 
 
 FORCE = Annotated[bool, typer.Option("--force", help="Overwrite files that creepkit did not write.")]
@@ -81,14 +81,13 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=_default(one), annotation=_annotation(one))
         for name, (_, one, _) in generated.items()
     ]
-    own_force = any(one.name == "force" for one in parameters)
-    if outputs and not own_force:
+    if outputs:
         parameters.append(inspect.Parameter("force", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=FORCE))
     records = [name for name, hint in hints.items() if any(_is_record(one) for one in get_args(hint)[1:])]
 
     @functools.wraps(command)
     def run(**options: Any) -> None:
-        force = bool(options["force"] if own_force else options.pop("force", False))
+        force = bool(options.pop("force", False))
         given: dict[str, dict[str, Any]] = {name: {} for name in records}
         for name, (group, one, error) in generated.items():
             value = given_value(one, options.pop(name), error)
@@ -253,6 +252,16 @@ def steps(texts: Sequence[str]) -> tuple[tuple[float, float], ...]:
     return tuple((parsed_number(start or "0"), parsed_number(value)) for start, _, value in parts)
 
 
+Levels = tuple[tuple[str, float, float], ...]
+"""Steps of a load, or of its components: (component or "", start in s, value)."""
+
+
+def level(text: str) -> tuple[str, float, float]:
+    """Component, start in s and value of a text such as 100, 3600:120 or 11=100."""
+    component, value = pair(text) if "=" in text else ("", text)
+    return component, *steps([value])[0]
+
+
 def _part(text: str) -> tuple[int, int]:
     k, n = (parsed_integer(part) for part in pair(text, "/"))
     if not 1 <= k <= n:
@@ -268,6 +277,7 @@ def _surrogate(name: str) -> Any:
 
 SPECIAL: dict[Any, TextForm] = {
     tuple[int, int]: TextForm("K/N", _part),
+    tuple[str, float, float]: TextForm("[S:]NUMBER", level),
     tuple[tuple[float, float], ...]: TextForm("[S:]NUMBER", steps, several=True),
     Path: TextForm("PATH", Path),
     int: TextForm("INTEGER", parsed_integer),

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from creepkit.api.options import ExportOptions
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import Law, Values, law_source, merged_values
+from creepkit.exporters.exporting import ExportOptions
 from creepkit.reports.terminal import put, tell, tell_written
 
 

@@ -144,7 +144,8 @@ def _screen(
         )  # fmt: skip
     written = [plate.to_csv(to / "plate.csv")]
     if plate.identified:
-        written += [to / "fits", *plate.plot(to / "pictures")]
+        plate.plot(to / "plate.png")
+        written += [to / "fits", to / "plate.png"]
     print_screening(plate, written, as_json)
 
 

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.api.options import ForecastOptions, PlannedTestOptions
-from creepkit.cli.command_options import OutputPath
-from creepkit.cli.planned_test import Command as Command
-from creepkit.cli.planned_test import described_test
+from creepkit.cli.command_options import Levels, OutputPath
+from creepkit.cli.planned_test import described_test, loads_and_lengths
 from creepkit.cli.shared import Json, Tests, show
 from creepkit.errors import FitError
+from creepkit.forecasts.planned_tests import ForecastOptions, PlannedTestOptions
 from creepkit.options import Option
 from creepkit.reports.terminal import ProgressBar
 
@@ -22,11 +21,12 @@ if TYPE_CHECKING:
 
 
 def command(
-    ctx: typer.Context,
     fit: Annotated[Path, typer.Argument(metavar="FIT.json", help="A saved identification, or a ranking.json.")],
     tests: Tests = None,
     *,
     test: Annotated[dict[str, Any], PlannedTestOptions],
+    load: Annotated[dict[str, Levels] | None, Option(help="By name; --load stress=80 is --stress 80.")] = None,
+    piece: Annotated[dict[str, Any], loads_and_lengths()],
     label: Annotated[dict[str, str] | None, Option(help="Of the planned test.", example="heat=X7")] = None,
     how: Annotated[dict[str, Any], ForecastOptions],
     target: Annotated[
@@ -53,11 +53,11 @@ def command(
     source = read_fit_or_ranking(fit)
     histories = ck.read_histories(tests) if tests else []
     if test.get("end") is not None:
-        planned = described_test(test, ctx.obj)
+        planned = described_test(test, piece, load)
         temperature = planned.temperature if planned.temperature is not None else _temperature_of(source)
         histories.append(planned.history(temperature).replace(labels=label or {}))
-    elif test or ctx.obj or label:
-        name = next(iter({**test, **ctx.obj, **(label or {})})).replace("_", "-")
+    elif described := {**test, **piece, **(load or {}), **(label or {})}:
+        name = next(iter(described)).replace("_", "-")
         raise FitError(f"--{name} describes a planned test, which needs an end: give --end-h, such as 100")
     if not histories:
         raise FitError("there is no test to forecast: name files, or describe a test, such as --stress 80 --end-h 100")

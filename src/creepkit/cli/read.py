@@ -50,8 +50,9 @@ def command(
     A record of an instrument is shown with its channels, units, gaps and clock.
     """
     import creepkit as ck
-    from creepkit.quality import remark_flags
+    from creepkit.quality import ACTIVATION_ENERGY, remark_flags
     from creepkit.readers.questions import merged
+    from creepkit.records import Histories
     from creepkit.reports import histories as report
 
     if len(files) == 1 and files[0].suffix.lower() in (".h5", ".hdf5") and reader is None:
@@ -71,7 +72,8 @@ def command(
             tell_written(path)
     found, unread = _readable_tests(files, reader, ignored)
     framed = [history for history in found if history.outputs]
-    quality = ck.check_data_quality(framed, activation_energy=activation_energy)
+    energy = ACTIVATION_ENERGY if activation_energy is None else activation_energy
+    quality = ck.check_data_quality(framed, activation_energy=energy)
     remarked = tuple(remark_flags([history for history in found if not history.outputs]))
     quality = replace(quality, flags=(*quality.flags, *remarked), tests=len(found if remarked else framed))
     if as_json:
@@ -86,7 +88,7 @@ def command(
         for path in _write(found, to):
             tell_written(path, err=as_json)
     if plot is not None:
-        report.histories_figure(found, plot)
+        Histories(found).plot(plot)
         tell_written(plot, err=as_json)
     for error in merged(unread):
         tell(f"not read: {error}", err=True)
@@ -138,7 +140,7 @@ def _write(histories: list[History], folder: Path) -> list[Path]:
                 check_folder_target(folder, HistoryError, (path.name,))
                 history_text(history)
                 if write:
-                    make_folder(folder, HistoryError)
+                    make_folder(folder)
                     ck.write_history(history, path)
     return paths
 

@@ -35,7 +35,7 @@ def command(
         typer.Option(metavar="FOLDER", help="For results, lock, exports and report; by default beside it."),
         OutputPath("folder"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Make everything again.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="Make everything again.")] = False,
     locked: Annotated[
         bool, typer.Option("--locked", help="Refuse to run where anything differs from study.lock.")
     ] = False,
@@ -54,7 +54,7 @@ def command(
     else:
         loaded, target = Study.load(study), to if to is not None else study.parent
     with ProgressBar() as progress:
-        result = loaded.run(to=target, only=only or None, force=force, locked=locked, progress=progress.tick)
+        result = loaded.run(to=target, only=only or None, again=again, locked=locked, progress=progress.tick)
     for change in result.changes:
         tell(f"since the last lock: {change}", err=True)
     if as_json:

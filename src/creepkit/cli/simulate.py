@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.api.options import PlannedTestOptions, elastic_of
-from creepkit.cli.command_options import OutputPath
-from creepkit.cli.planned_test import Command as Command
-from creepkit.cli.planned_test import described_test
+from creepkit.cli.command_options import Levels, OutputPath
+from creepkit.cli.planned_test import described_test, loads_and_lengths
 from creepkit.cli.shared import Law, Values, law_source, merged_values
 from creepkit.errors import SolveError
+from creepkit.forecasts.planned_tests import PlannedTestOptions
+from creepkit.language import elastic_of
 from creepkit.limits import SECONDS, SIMULATED_FRAMES
 from creepkit.options import Option
 from creepkit.reports.terminal import put, tell, tell_written
@@ -27,11 +27,12 @@ DEFAULT_FRAMES = 200
 
 
 def command(
-    ctx: typer.Context,
     law: Law,
     *,
     value: Values = None,
     test: Annotated[dict[str, Any], PlannedTestOptions],
+    load: Annotated[dict[str, Levels] | None, Option(help="By name; --load stress=80 is --stress 80.")] = None,
+    piece: Annotated[dict[str, Any], loads_and_lengths()],
     points: Annotated[
         int | None, Option(help="Number of frames; 200 of most specimens.", limits=SIMULATED_FRAMES)
     ] = None,
@@ -48,7 +49,7 @@ def command(
 
     source = law_source(law)
     valued = ck.law_with_values(source, merged_values(source, value))
-    planned = described_test(test, ctx.obj)
+    planned = described_test(test, piece, load)
     if planned.options.end is None:
         raise SolveError("a test needs its end: give --end-h, such as 100")
     if planned.temperature is None and valued.law.uses(temperature):

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import quoted
-from creepkit.presentation import Presentable
 from creepkit.records import Status, outputs_of
+from creepkit.records.presentable import Presentable
 from creepkit.sampling.conditions import planned_test, specimen_conditions
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ NOT_SIMULATED = -1
 
 
 @dataclass(frozen=True, eq=False)
-class Dataset(Presentable, text="reports.dataset:dataset_text"):
+class Dataset(Presentable):
     """Simulated tests: n samples of a law with its parameters and conditions.
 
     law, specimen : what was simulated. design_document : everything that decided what was drawn.
@@ -145,6 +145,11 @@ class Dataset(Presentable, text="reports.dataset:dataset_text"):
         # a relative grid has no end of its own to fall back on
         end = conditions["end_time"] if "end_time" in conditions else self.grid.end  # noqa: SIM401
         return self.grid.times(end)
+
+    def __str__(self) -> str:
+        from creepkit.reports.dataset import dataset_text
+
+        return dataset_text(self)
 
 
 def concatenate(parts: Sequence[Dataset]) -> Dataset:

@@ -32,8 +32,8 @@ from creepkit.language import CreepLaw, temperature
 from creepkit.language.elastic import Elastic, wachtman
 from creepkit.limits import numbers
 from creepkit.options import Options, option, takes_options
-from creepkit.presentation import Presentable
 from creepkit.records import History, Nuisance, Predictor
+from creepkit.records.presentable import Presentable
 from creepkit.records.units import celsius_text
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictors
@@ -50,7 +50,7 @@ _T0_BOUNDS = (100.0, 3000.0)
 
 
 @dataclass(frozen=True, eq=False)
-class ModulusEstimates(Presentable, text="reports.temperature_law:modulus_estimates_text"):
+class ModulusEstimates(Presentable):
     """What the first frames say of the modulus.
 
     names : of the tests. temperatures : (tests,) K; values, sd : (tests,) MPa.
@@ -64,6 +64,11 @@ class ModulusEstimates(Presentable, text="reports.temperature_law:modulus_estima
     sd: Floats
     elastic: Elastic | None
     fit: Identification
+
+    def __str__(self) -> str:
+        from creepkit.reports.temperature_law import modulus_estimates_text
+
+        return modulus_estimates_text(self)
 
 
 @checked
@@ -231,7 +236,7 @@ class DiscoveryOptions(Options, title="options of a temperature study", error=Fi
 
 
 @dataclass(frozen=True, eq=False)
-class TemperatureStudy(Presentable, text="reports.temperature_law:temperature_study_text"):
+class TemperatureStudy(Presentable):
     """The result of temperature_study().
 
     tests : with the moduli found, where they were. moduli_fit : None where no modulus could be identified.
@@ -245,6 +250,11 @@ class TemperatureStudy(Presentable, text="reports.temperature_law:temperature_st
     isothermal_fits: tuple[Identification, ...]
     temperature_law: TemperatureLaw | None
     notes: tuple[str, ...]
+
+    def __str__(self) -> str:
+        from creepkit.reports.temperature_law import temperature_study_text
+
+        return temperature_study_text(self)
 
 
 @takes_options(DiscoveryOptions)

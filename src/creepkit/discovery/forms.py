@@ -25,6 +25,7 @@ from creepkit import registry
 from creepkit.arrays import Floats
 from creepkit.errors import FitError, LawError, nearest
 from creepkit.language import CreepLaw, Param, TemperatureFactor, TemperatureForm, temperature
+from creepkit.language.symbols import Symbol
 from creepkit.language.temperature_forms import LOG_PARAMETER_RANGE, TEMPERATURE_SPAN
 from creepkit.laws.temperature_forms import creepkit_temperature_forms
 
@@ -62,9 +63,9 @@ def _expression_form(expressions: Sequence[sympy.Expr], T_ref: float) -> Tempera
     name = " and ".join(str(one).replace(temperature.name, "T") for one in expressions)
 
     def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
-        own = {s: sympy.Symbol(s.name, real=True) for one in expressions for s in one.free_symbols - {temperature}}
+        own = {s: Symbol(s.name) for one in expressions for s in one.free_symbols - {temperature}}
         parts = [one.xreplace(own) for one in expressions]
-        real_symbol = sympy.Symbol(symbol.name, real=True)
+        real_symbol = Symbol(symbol.name)
         if real_symbol in own.values():
             expression = parts[0].xreplace({real_symbol: symbol})
             increment = sympy.log(expression / symbol) if param.scale == "log" else expression - symbol
@@ -72,7 +73,7 @@ def _expression_form(expressions: Sequence[sympy.Expr], T_ref: float) -> Tempera
         else:
             coefficients = list(own.values())
             if not coefficients:
-                coefficients = [sympy.Symbol(f"{symbol.name}_{k + 1}", real=True) for k in range(len(parts))]
+                coefficients = [Symbol(f"{symbol.name}_{k + 1}") for k in range(len(parts))]
                 parts = [c * part for c, part in zip(coefficients, parts, strict=True)]
             increment = sum(part - part.subs(temperature, sympy.Float(T_ref)) for part in parts)
             expression = symbol * sympy.exp(increment) if param.scale == "log" else symbol + increment
@@ -309,7 +310,7 @@ def factor_as_form(factor: TemperatureFactor, keep_names: bool) -> TemperatureFo
     """A factor of rates as a form of one rate coefficient; its parameters keep their names where it stands alone."""
 
     def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
-        renamed = {s: s if keep_names else sympy.Symbol(f"{s.name}_{symbol.name}", real=True) for s in factor.params}
+        renamed = {s: s if keep_names else Symbol(f"{s.name}_{symbol.name}") for s in factor.params}
         return symbol * factor.expression.xreplace(renamed), {renamed[s]: p for s, p in factor.params.items()}
 
     return TemperatureForm(factor.name, build, factor.reference, factor.T_ref)

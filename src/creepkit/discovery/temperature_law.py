@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -61,11 +61,8 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, interval_ends, verdict_of_interval
 from creepkit.inverse.uncertainty.mixture_distribution import MixtureDistribution
 from creepkit.language import CreepLaw
-from creepkit.presentation import Presentable, present
 from creepkit.records import History, LawWithValues, Predictor
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from creepkit.records.presentable import Plotted, Presentable
 
 TEMPERATURE_LAW = DocumentFormat(
     "creepkit-temperature-law",
@@ -73,6 +70,10 @@ TEMPERATURE_LAW = DocumentFormat(
     FileKind("a temperature law", FitError, "give a file that TemperatureLaw.save wrote"),
     remedy="run discover again",
 )
+
+
+FIELDS_WRITTEN: tuple[str, ...] = ("law", "isothermal_law", "T_ref", "temperature_range", "criterion_data")
+FIELDS_WRITTEN += ("estimates", "plausible_forms", "fit", "notes")
 
 
 MAX_COMBINATIONS_WRITTEN = 20
@@ -84,15 +85,7 @@ def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
     estimates = temperature_law.isothermal_estimates
     content: dict[str, Any] = {
         "creepkit": version("creepkit"),
-        "law": temperature_law.law,
-        "isothermal_law": temperature_law.isothermal_law,
-        "T_ref": temperature_law.T_ref,
-        "temperature_range": temperature_law.temperature_range,
-        "criterion_data": temperature_law.criterion_data,
-        "estimates": temperature_law.estimates,
-        "plausible_forms": temperature_law.plausible_forms,
-        "fit": temperature_law.fit,
-        "notes": temperature_law.notes,
+        **{name: getattr(temperature_law, name) for name in FIELDS_WRITTEN},
         "candidates": [
             {
                 "forms": candidate.forms,
@@ -124,7 +117,7 @@ NOTED_OVERDISPERSION = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_text"):
+class TemperatureLaw(Presentable, Plotted):
     """The result of discover() and of refit().
 
     law : an ordinary law with temperature in it, printed and exported like any other; `valued` has its numbers.
@@ -198,9 +191,15 @@ class TemperatureLaw(Presentable, text="reports.temperature_law:temperature_law_
         """Write the result as JSON (to a temporary name, then renamed)."""
         return write_json(temperature_law_to_json(self), Path(path), TEMPERATURE_LAW.kind)
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Parameters against temperature, with intervals and the curves of the forms that remain."""
-        return present("reports.temperature_law:plot_temperature_law", self, path)
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.temperature_law import draw_parameter, temperature_law_figure
+
+        return temperature_law_figure, draw_parameter
+
+    def __str__(self) -> str:
+        from creepkit.reports.temperature_law import temperature_law_text
+
+        return temperature_law_text(self)
 
 
 def temperature_law_from_combinations(

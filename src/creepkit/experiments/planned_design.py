@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from creepkit.errors import FitError
 from creepkit.experiments.expectations import Expectation
 from creepkit.experiments.rig import CandidateTest
-from creepkit.presentation import Presentable, present
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+from creepkit.records.presentable import Plotted, Presentable
 
 USEFUL_PROBABILITY = 0.2
 """Of a decisive verdict, below which a test is not advised for it."""
@@ -55,7 +50,7 @@ class PlannedTest(CandidateTest):
 
 
 @dataclass(frozen=True)
-class Design(Presentable, text="reports.design:design_text"):
+class Design(Presentable, Plotted):
     """The next tests, the best first.
 
     goal : "parameters", "law", or the name of a quantity. laws, weights : that remain, the best first.
@@ -94,11 +89,19 @@ class Design(Presentable, text="reports.design:design_text"):
 
     def to_json(self) -> dict[str, object]:
         """Laws, advice, plan and every test considered, as JSON-able data."""
-        return present("reports.design:design_to_json", self)
+        from creepkit.reports.design import design_to_json
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Map of what each candidate tells for an hour of machine time, over load and duration; written to `path`."""
-        return present("reports.design:design_figure", self, path)
+        return design_to_json(self)
+
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.design import design_figure, draw_design
+
+        return design_figure, draw_design
+
+    def __str__(self) -> str:
+        from creepkit.reports.design import design_text
+
+        return design_text(self)
 
 
 def machine_time_text(hours: float) -> str:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
+from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.errors import ExportError
 from creepkit.files.writing import write_text
-from creepkit.language import CreepLaw, Elastic
+from creepkit.language import CreepLaw, Elastic, elastic_of
+from creepkit.options import CELSIUS, GIGAPASCAL, Options, option
 from creepkit.records import Exporter, LawWithValues, Units
 from creepkit.records.plugin_calls import call_of_plugin
 from creepkit.registry import default_registry, kinds, resolve_law
@@ -104,3 +107,23 @@ def _units(units: Units | Mapping[str, str]) -> Units:
     if unknown:
         raise ExportError(f"units have no '{unknown[0]}'; write units={{'stress': 'Pa', 'time': 'h'}}")
     return Units(**units)
+
+
+@dataclass(frozen=True)
+class ExportOptions(Options, title="options of an export", error=ExportError):
+    """What is said of an export beside its target. temperature : K, modulus : MPa."""
+
+    name: str = option("", "What the target is to call the law.")
+    stress_unit: str = option("MPa", "MPa, Pa, kPa, GPa, psi or ksi.")
+    time_unit: str = option("s", "s, min, h, day or year.")
+    temperature: float | None = option(None, "A number in the place of the temperature.", limits.CELSIUS, **CELSIUS)
+    modulus: float | None = option(None, "Young's modulus, for targets that state it.", limits.GIGAPASCAL, **GIGAPASCAL)
+    poisson: float = option(0.3, "Poisson's ratio, beside the modulus.", limits.POISSON)
+
+    def text(
+        self, source: Any, target: str, values: Mapping[str, float] | None = None, to: str | Path | None = None
+    ) -> str:
+        """The export of what has a law with values, and written to a file if asked."""
+        record = law_with_values(source, values, elastic=elastic_of(self.modulus, self.poisson), name=self.name)
+        units = {"stress": self.stress_unit, "time": self.time_unit}
+        return export(record, target, units=units, temperature=self.temperature, to=to)

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints, frozen
 from creepkit.errors import HistoryError
 from creepkit.extraction.noise import NoiseEstimate
-from creepkit.presentation import Presentable, present
 from creepkit.quality.flags import QualityFlag, frame_ranges_text
 from creepkit.records import History, Loading, Program, SurfaceRegion, constant_load, known_specimens, loads_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+from creepkit.records.presentable import Plotted, Presentable
 
 TURNED = "z of the frames points away from the cameras, for the surface moves along -z; heights are counted against it"
 """What is assumed of frames in which the surface falls."""
@@ -50,7 +46,7 @@ class FieldMap(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Extraction(Presentable, text="reports.extraction:extraction_text"):
+class Extraction(Presentable, Plotted):
     """The measured outputs of one test piece, and how they came about.
 
     name : D1, D2 ... or as given. source : the frames. specimen, operator : what was observed, and how.
@@ -101,9 +97,10 @@ class Extraction(Presentable, text="reports.extraction:extraction_text"):
         object.__setattr__(self, "used", frozen(self.used, dtype=bool))
         object.__setattr__(self, "clamped", frozen(self.clamped, dtype=bool))
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """A contact sheet: fields, residuals, points that were used, outputs with bands, rigid motion, residuals."""
-        return present("reports.extraction:extraction_figure", self, path)
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.extraction import draw_extraction, extraction_figure
+
+        return extraction_figure, draw_extraction
 
     def history_under(
         self, loading: Loading | float, temperature: float | Program, *, time_zero: float | None = None
@@ -168,6 +165,11 @@ class Extraction(Presentable, text="reports.extraction:extraction_text"):
     def replace(self, **changes: object) -> Extraction:
         """The same extraction with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+    def __str__(self) -> str:
+        from creepkit.reports.extraction import extraction_text
+
+        return extraction_text(self)
 
 
 def _label(extraction: Extraction) -> str:

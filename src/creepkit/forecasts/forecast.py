@@ -5,8 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -22,13 +21,9 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
 from creepkit.language import temperature
-from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor, outputs_of
+from creepkit.records.presentable import Plotted, Presentable, Tabulated
 from creepkit.registry.arguments import resolve_predictors
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from pandas import DataFrame
 
 DRAWS, COSTLY_DRAWS = 4000, 800
 """Of the law, of each test's own rate, and of its dimensions; and where each is a simulation by finite elements."""
@@ -44,7 +39,7 @@ DEFAULT_TARGETS: Mapping[str, Sequence[float] | float] = {"strain": (0.01,)}
 
 @checked
 @dataclass(frozen=True, eq=False)
-class Forecast(Presentable, text="reports.forecast:forecast_text"):
+class Forecast(Presentable, Plotted, Tabulated):
     """What tests will show: the result of forecast().
 
     laws : {law: weight}; left_out : how many laws of a ranking have too little weight to count.
@@ -64,10 +59,6 @@ class Forecast(Presentable, text="reports.forecast:forecast_text"):
     def __repr__(self) -> str:
         return f"<Forecast of {', '.join(test.name for test in self.tests)} by {', '.join(self.laws)}>"
 
-    def to_dataframe(self) -> DataFrame:
-        """(tests, outputs, times) rows of pandas: value and ends of the band, in s and units of the outputs."""
-        return present("reports.dataframes:to_dataframe", self)
-
     def __getitem__(self, test: str) -> TestForecast:
         """The forecast of one test, by name."""
         known = {one.name: one for one in self.tests}
@@ -75,9 +66,15 @@ class Forecast(Presentable, text="reports.forecast:forecast_text"):
             raise FitError(f"there is no forecast of a test '{test}'; there are those of {', '.join(known)}")
         return known[test]
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Curves with bands, measured points over them, times on the axis, and what the bands are made of."""
-        return present("reports.forecast:forecast_figure", self, path)
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.forecast import draw_forecast, forecast_figure
+
+        return forecast_figure, draw_forecast
+
+    def __str__(self) -> str:
+        from creepkit.reports.forecast import forecast_text
+
+        return forecast_text(self)
 
 
 @checked

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from creepkit import limits
 from creepkit.errors import SolveError
+from creepkit.options import GIGAPASCAL, HOURS, Options, option
 from creepkit.records import (
     History,
     Loading,
@@ -24,6 +27,33 @@ from creepkit.records import (
 if TYPE_CHECKING:
     from creepkit.language import Elastic
     from creepkit.records import Load
+
+
+@dataclass(frozen=True)
+class PlannedTestOptions(Options, title="options of a test", error=SolveError):
+    """What is said of a test that is planned, beside its load and lengths.
+
+    temperature : (start in s, C) of its levels. end : s. modulus : MPa. control : of a bar under stress. ramp : s in
+    which each level of a load is reached.
+    """
+
+    end: float | None = option(None, "End of the test.", limits.HOURS, **HOURS)
+    specimen: str | None = option(None, "By default one that takes the load; see 'creepkit list specimens'.")
+    temperature: tuple[tuple[float, float], ...] = option(
+        (), "Temperature, from S seconds on.", unit="C", metavar="[S:]C"
+    )
+    modulus: float | None = option(None, "Young's modulus; some specimens need it.", limits.GIGAPASCAL, **GIGAPASCAL)
+    control: Literal["load", "stress"] | None = option(None, "Of a bar: the load or the true stress is held.")
+    ramp: float | None = option(None, "s in which each level of a load is reached.", limits.RAMP, unit="s", flag="ramp")
+
+
+@dataclass(frozen=True)
+class ForecastOptions(Options, title="options of a forecast"):
+    """How a forecast is made."""
+
+    level: float = option(0.95, "Probability of bands and intervals.", limits.PROBABILITY)
+    draws: int | None = option(None, "Of the law and all else; more make smoother bands.", limits.BAND_DRAWS)
+
 
 PLANNED_FRAMES = 100
 """Of a planned test, half spread over time and half over its logarithm."""

@@ -9,8 +9,8 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest, quoted
-from creepkit.presentation import Presentable
 from creepkit.records import Channel, ClockAlignment, InstrumentRecord, Program
+from creepkit.records.presentable import Presentable
 from creepkit.records.recorded_programs import (
     LOAD_RECORD_TOLERANCE,
     TEMPERATURE_RECORD_TOLERANCE,
@@ -31,7 +31,7 @@ MOST_ROWS = 200_000
 
 
 @dataclass(frozen=True, eq=False)
-class Imposed(Presentable, text="reports.instrument_records:imposed_text"):
+class Imposed(Presentable):
     """What one specimen was under, over the time of its history, which is zero where the first ramp of load starts.
 
     specimen : its name. channels : of load and temperature. time_zero : s, on the clock of the frames.
@@ -71,6 +71,11 @@ class Imposed(Presentable, text="reports.instrument_records:imposed_text"):
         rate = np.gradient(values - response * loads, times)
         errors = response * (self.load.at(times[:, None] + shifts) - loads[:, None]) + rate[:, None] * shifts
         return np.asarray(np.sqrt(errors**2 @ probability))
+
+    def __str__(self) -> str:
+        from creepkit.reports.instrument_records import imposed_text
+
+        return imposed_text(self)
 
 
 @checked

@@ -17,8 +17,8 @@ from creepkit.inverse.history_checks import without_suspect_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, chance_of_larger
 from creepkit.inverse.predictor_documents import registered_specimens
-from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction, Predictor, Status
+from creepkit.records.presentable import Presentable
 from creepkit.registry.arguments import resolve_predictors
 
 AGREEMENT_LIMIT = 1.0
@@ -76,7 +76,7 @@ class ConfirmedTest:
 
 
 @dataclass(frozen=True)
-class Confirmation(Presentable, text="reports.inference:confirmation_text"):
+class Confirmation(Presentable):
     """The result of confirm(). law, predictor_name : what was simulated, and by what."""
 
     law: str
@@ -142,6 +142,11 @@ class Confirmation(Presentable, text="reports.inference:confirmation_text"):
         measured = [(measure(o), t.name, o.output) for t in self.tests for o in t.outputs]
         _, test, output = max(measured, key=lambda s: -np.inf if np.isnan(s[0]) else s[0])
         return test, output
+
+    def __str__(self) -> str:
+        from creepkit.reports.inference import confirmation_text
+
+        return confirmation_text(self)
 
 
 @checked

@@ -16,8 +16,8 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.single_values import SingleValue
-from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction
+from creepkit.records.presentable import Presentable
 
 FITTED_FRACTION = 0.7
 """Of the duration of each history: the part that is fitted in cross-validation by time."""
@@ -64,7 +64,7 @@ class Fold:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CrossValidation(Presentable, text="reports.inference:cross_validation_text"):
+class CrossValidation(Presentable):
     """The result of cross_validate(): the fit to all histories, and its folds."""
 
     fit: Identification = field(repr=False)
@@ -95,6 +95,11 @@ class CrossValidation(Presentable, text="reports.inference:cross_validation_text
                     predicted.append(fold.prediction.of(k)[used, column])
         return relative_squared_error(measured, predicted)
 
+    def __str__(self) -> str:
+        from creepkit.reports.inference import cross_validation_text
+
+        return cross_validation_text(self)
+
 
 @checked
 def cross_validate(
@@ -102,17 +107,16 @@ def cross_validate(
     histories: Sequence[History] | None = None,
     *,
     by: FoldBy = "test",
-    fitted_fraction: float = FITTED_FRACTION,
     progress: IterationCallback | None = None,
 ) -> CrossValidation:
     """Predict held-out data from refits to the rest, each of which starts where `fit` ended.
 
     histories : by default those of the fit.
     by : "test" leaves out one test after the other, "condition" all tests of one temperature and stress, "time" what
-        comes after `fitted_fraction` of the duration of every history.
+        comes after FITTED_FRACTION of the duration of every history.
     """
     tests = list(fit.histories if histories is None else histories)
-    folds, results = list(_folds(tests, by, fitted_fraction)), []
+    folds, results = list(_folds(tests, by)), []
     for held_out, training in folds:
         results.append(Fold(tuple(held_out), refit(fit, training)))
         if progress is not None:
@@ -120,14 +124,12 @@ def cross_validate(
     return CrossValidation(fit, by, tuple(results))
 
 
-def _folds(
-    tests: Sequence[History], by: FoldBy, fitted_fraction: float
-) -> Iterator[tuple[list[History], list[History]]]:
+def _folds(tests: Sequence[History], by: FoldBy) -> Iterator[tuple[list[History], list[History]]]:
     """(held out, fitted) histories of each fold."""
     if by == "time" and not any(h.outputs for h in tests):
         raise FitError("cross-validation by time holds out the last frames, and these tests have none; take by='test'")
     if by == "time":
-        yield list(tests), [_first_part(h, fitted_fraction) for h in tests]
+        yield list(tests), [_first_part(h) for h in tests]
         return
     if by not in ("test", "condition"):
         raise FitError(f"cross-validation by '{by}' is not known; allowed are test, condition and time")
@@ -140,9 +142,9 @@ def _folds(
         yield group, [h for h in tests if not any(h is one for one in group)]
 
 
-def _first_part(history: History, fitted_fraction: float) -> History:
+def _first_part(history: History) -> History:
     """The first part of a history, without how the test ended; one without frames has no parts, and is fitted."""
     if not history.outputs:
         return history
-    used = history.used & (history.times <= fitted_fraction * float(history.times[-1]))
+    used = history.used & (history.times <= FITTED_FRACTION * float(history.times[-1]))
     return history.replace(used=used, rupture_time=None, unruptured=False)

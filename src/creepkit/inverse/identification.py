@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -49,14 +49,11 @@ from creepkit.inverse.uncertainty.quantities import (
 )
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.language import CreepLaw
-from creepkit.presentation import Presentable, present
 from creepkit.records import History, LawWithValues, Nuisance, Prediction, Predictor
+from creepkit.records.presentable import Plotted, Presentable, Tabulated
 from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from pandas import DataFrame
-
     from creepkit.inverse.search.global_search import SearchTrace
     from creepkit.inverse.sparsity.result import Sparsity
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit, LawMisfits
@@ -67,9 +64,7 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 
 @dataclass(frozen=True, eq=False)
-class Identification(
-    RateStatements, Presentable, text="reports.answer:answer_text", details="reports.identification:identification_text"
-):
+class Identification(RateStatements, Presentable, Plotted, Tabulated):
     """The result of identify().
 
     estimates : one Estimate for each parameter, in the order of the law.
@@ -138,10 +133,6 @@ class Identification(
         values = ", ".join(f"{name} = {value:.4g}" for name, value in self.values.items())
         return f"<Identification of {self.law.name} from {len(self.tests)} tests: {values}>"
 
-    def to_dataframe(self) -> DataFrame:
-        """(parameters,) rows of pandas: value, ends of the 95 % interval, unit and verdict."""
-        return present("reports.dataframes:to_dataframe", self)
-
     def to_arviz(self, *, draws: int = 1000, seed: int = 0) -> Any:
         """Draws from the posterior as an xarray Dataset, which arviz takes: one chain, with units of the parameters."""
         return self.sample(draws=draws, seed=seed).to_arviz()
@@ -149,7 +140,9 @@ class Identification(
     @property
     def headline(self) -> str:
         """How well the law describes the tests, then whether it could be the true one, in one sentence."""
-        return cast(str, present("inverse.description:headline", self))
+        from creepkit.inverse.description import headline
+
+        return headline(self)
 
     @property
     def values(self) -> dict[str, float]:
@@ -168,7 +161,9 @@ class Identification(
 
     def comments(self, ranking: Any = None) -> list[str]:
         """What an exported law says of itself, a line each; ranking : that it is the best of, where there was one."""
-        return present("reports.identification:identification_comments", self, ranking)
+        from creepkit.reports.identification import identification_comments
+
+        return identification_comments(self, ranking)
 
     @property
     def coordinates(self) -> Coordinates:
@@ -387,15 +382,11 @@ class Identification(
         if missing:
             raise FitError(f"this identification was made from '{missing[0]}', which is not among the histories given")
         tests = tuple(by_name[m.name] for m in self.tests)
-        if using is None and (self.predictor is not None or self.predictor_documents):
-            predictor = self._predictor_or(None)
-        elif using is None or isinstance(using, str | Mapping):
-            predictor = CompositePredictor.of(resolve_predictors(using, tests))
-        elif isinstance(using, Predictor):
-            predictor = using
-        else:
-            raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
-        return cast(Identification, present("inverse.identification_notes:with_attached", self, tests, predictor))
+        stated = using is None and (self.predictor is not None or self.predictor_documents)
+        predictor = self._predictor_or(None) if stated else CompositePredictor.of(resolve_predictors(using, tests))
+        from creepkit.inverse.identification_notes import with_attached
+
+        return with_attached(self, tests, predictor)
 
     def _predictor_or(self, using: Predictor | None) -> Predictor:
         """The predictor given, or the identification's own; FitError where a file does not give it."""
@@ -419,14 +410,13 @@ class Identification(
         if self.error_covariance is None:
             return self
         covariance = positive_semidefinite(self.covariance - self.error_covariance)
-        scatter = None if self.rate_scatter is None else replace(self.rate_scatter, errors=None)
         return replace(
             self,
             settings=replace(self.settings, usual_errors="none"),
             covariance=covariance,
             error_covariance=None,
             estimates=parameter_estimates(self.law, self.coordinates, self.u, covariance),
-            rate_scatter=scatter,
+            rate_scatter=self.rate_scatter and replace(self.rate_scatter, errors=None),
         )
 
     def __getstate__(self) -> dict[str, Any]:
@@ -440,30 +430,52 @@ class Identification(
 
         options : targets, tolerances, using, draws, progress, as creepkit.forecast() takes them.
         """
-        return present("forecasts.forecast:forecast", self, tests, level=level, **options)
+        from creepkit.forecasts.forecast import forecast
+
+        return forecast(self, tests, level=level, **options)
 
     def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> Any:
         """The ProfileLikelihood of a parameter, by name, or of another quantity (see uncertainty.quantities)."""
-        return present("inverse.uncertainty.profile_likelihood:profile", self, quantity, level=level)
+        from creepkit.inverse.uncertainty.profile_likelihood import profile
+
+        return profile(self, quantity, level=level)
 
     def sample(self, *, draws: int = 1000, seed: int = 0, using: Predictor | None = None) -> Any:
         """PosteriorSamples by population Monte Carlo; `using` may be a surrogate."""
-        return present(
-            "inverse.uncertainty.importance_sampling:sample_posterior", self, draws=draws, seed=seed, using=using
-        )
+        from creepkit.inverse.uncertainty.importance_sampling import sample_posterior
+
+        return sample_posterior(self, draws=draws, seed=seed, using=using)
 
     def correlation(self, coordinates: Literal["author", "conditioned"] = "author") -> Any:
         """The Correlation of the estimates, of the author's parameters or of the conditioned coordinates."""
-        return present("inverse.uncertainty.correlation:correlation", self, coordinates)
+        from creepkit.inverse.uncertainty.correlation import correlation
+
+        return correlation(self, coordinates)
 
     def undetermined(self) -> tuple[str, ...]:
         """What these tests do not determine, and which combination they do, one sentence each."""
-        return present("inverse.uncertainty.correlation:undetermined", self)
+        from creepkit.inverse.uncertainty.correlation import undetermined
+
+        return undetermined(self)
 
     def save(self, path: str | Path) -> Path:
         """Write the identification as JSON (to a temporary name, then renamed)."""
-        return present("inverse.identification_document:write_identification", self, Path(path))
+        from creepkit.inverse.identification_document import write_identification
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Measured against identified, and residuals; written to `path` when given."""
-        return present("reports.identification_plot:identification_figure", self, path)
+        return write_identification(self, Path(path))
+
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.identification_plot import draw_identification, identification_figure
+
+        return identification_figure, draw_identification
+
+    def __str__(self) -> str:
+        from creepkit.reports.answer import answer_text
+
+        return answer_text(self)
+
+    def details(self) -> str:
+        """Everything that there is to say, as text."""
+        from creepkit.reports.identification import identification_text
+
+        return identification_text(self)

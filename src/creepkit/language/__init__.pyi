@@ -1,6 +1,7 @@
 """The language in which creep laws are written, each name once."""
 
 from .elastic import Elastic as Elastic
+from .elastic import elastic_of as elastic_of
 from .elastic import wachtman as wachtman
 from .law import CreepLaw as CreepLaw
 from .plugin import hookimpl as hookimpl

@@ -17,7 +17,7 @@ import sympy
 
 from creepkit.errors import LawError, nearest
 from creepkit.language.law_record import LawRecord
-from creepkit.language.symbols import POINT_VARIABLES, Param, State, strain, temperature, time
+from creepkit.language.symbols import POINT_VARIABLES, Param, State, Symbol, strain, temperature, time
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
 
 Law = TypeVar("Law", bound=LawRecord)
@@ -102,7 +102,7 @@ class _FactorParameters:
             suffix = "" if owner is None else f"_{owner.name}"
             taken = {*self.law.names, *(s.name for s in self.law.states)}
             taken |= {s.name for table in self.params.values() for s in table}
-            names = {s: sympy.Symbol(unused_name(s.name + suffix, taken), real=True) for s in self.factor.params}
+            names = {s: Symbol(unused_name(s.name + suffix, taken)) for s in self.factor.params}
             owners: dict[sympy.Symbol, Param | State] = {**self.law.params, **self.law.states}
             meaning = "" if owner is None else f" of {owners[owner].meaning}"
             self.params[owner] = {
@@ -223,7 +223,7 @@ def add(first: Law, second: Law) -> Law:
     states: dict[sympy.Symbol, State] = {}
     constraints: list[sympy.Basic] = []
     for law, names, titles in zip(laws, symbols, labels, strict=True):
-        replacements = {s: sympy.Symbol(n, real=True) for s, n in zip((*law.params, *law.states), names, strict=True)}
+        replacements = {s: Symbol(n) for s, n in zip((*law.params, *law.states), names, strict=True)}
         for (_, expression), title in zip(law.terms.items(), titles, strict=True):
             terms[title] = _renamed(expression, replacements)
         params |= {replacements[s]: p for s, p in law.params.items()}
@@ -342,8 +342,8 @@ def with_primary(law: Law) -> Law:
             f"law '{law.name}' has primary or tertiary creep of its own: with_primary() takes a law of stress and "
             "temperature alone, such as law('hyperbolic-sine')"
         )
-    b = sympy.Symbol(unused_name("b", set(law.names)), real=True)
-    e_p = sympy.Symbol(unused_name("e_p", set(law.names)), real=True)
+    b = Symbol(unused_name("b", set(law.names)))
+    e_p = Symbol(unused_name("e_p", set(law.names)))
     params = {
         b: Param("initial over steady rate, less one", bounds=(0.1, 300.0), scale="log", unit="1"),
         e_p: Param("strain over which primary creep fades", bounds=(1e-5, 0.05), scale="log", unit="1"),

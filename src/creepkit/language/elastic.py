@@ -51,3 +51,8 @@ def wachtman(E0: float, b: float, T0: float) -> sympy.Expr:
     Wachtman et al. (1961), Phys. Rev. 122, 1754.
     """
     return sympy.Float(E0) - sympy.Float(b) * temperature * sympy.exp(-sympy.Float(T0) / temperature)
+
+
+def elastic_of(modulus: float | None, poisson: float = 0.3) -> Elastic | None:
+    """Elastic data of Young's modulus, MPa; None without it."""
+    return None if modulus is None else Elastic(E=modulus, nu=poisson)

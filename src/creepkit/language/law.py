@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,7 +11,6 @@ from creepkit.language import algebra
 from creepkit.language.algebra import times
 from creepkit.language.law_record import LawRecord
 from creepkit.language.printing import LatexLawPrinter, latex_equations, law_text
-from creepkit.presentation import present
 
 
 @checked
@@ -86,9 +85,15 @@ class CreepLaw(LawRecord):
         """The law at one temperature, in K; parameters that no longer matter there are dropped."""
         return algebra.at(self, temperature)
 
-    def expression(self, values: Mapping[Any, float] | None = None) -> Any:
-        """The rate for sympy with values in it, by name or symbol; R and T_ref of Arrhenius factors stay symbols."""
-        return present("reports.law_names:law_expression", self, values or {})
+    @property
+    def expr(self) -> Any:
+        """The rate for sympy as it is written: R and T_ref of Arrhenius factors are symbols.
+
+        Values enter by name, law.expr.subs(fit.values).
+        """
+        from creepkit.reports.law_names import law_expression
+
+        return law_expression(self)
 
     def latex(self) -> str:
         """The law as LaTeX equations: of its rate with one summand a term, then of its internal variables."""
@@ -103,4 +108,6 @@ class CreepLaw(LawRecord):
 
     def _repr_html_(self) -> str:
         """For notebooks."""
-        return present("reports.html.notebook:notebook_html", self)
+        from creepkit.reports.html.notebook import notebook_html
+
+        return notebook_html(self)

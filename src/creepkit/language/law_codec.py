@@ -14,7 +14,7 @@ from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError
 from creepkit.language.expression_trees import condition_from_tree, expression_from_tree, expression_to_tree
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT_VARIABLES, Param, ParameterScale, State
+from creepkit.language.symbols import POINT_VARIABLES, Param, ParameterScale, State, Symbol
 
 __all__ = ["LAW", "condition_from_tree", "expression_from_tree", "expression_to_tree", "law_from_json", "law_to_json"]
 
@@ -131,7 +131,7 @@ def _law_of(record: LawDocument) -> CreepLaw:
     names = [param.name for param in record.params] + [state.name for state in record.states]
     _check_unique(names, "parameter or state")
     _check_unique([term.name for term in record.terms], "term")
-    symbols = {symbol.name: symbol for symbol in (*POINT_VARIABLES, *(sympy.Symbol(name, real=True) for name in names))}
+    symbols = {symbol.name: symbol for symbol in (*POINT_VARIABLES, *(Symbol(name) for name in names))}
     return CreepLaw(
         name=record.name,
         title=record.title,

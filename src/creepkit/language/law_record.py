@@ -373,21 +373,16 @@ class LawRecord:
     # ---- value semantics -------------------------------------------------------------------------------------------
 
     def _key(self) -> tuple[Any, ...]:
-        return (
-            self.name,
-            self.title,
-            tuple(self.terms.items()),
-            tuple(self.params.items()),
-            tuple(self.states.items()),
-            self.constraints,
-            self.references,
-        )
+        table: dict[sympy.Symbol, Any] = {**self.params, **self.states}
+        known = tuple((s, *(v for f, v in vars(one).items() if f != "meaning")) for s, one in table.items())
+        return self.rate, known, frozenset(self.constraints)
 
     def __eq__(self, other: object) -> bool:
+        """Whether rates, parameters with their bounds, and constraints are the same, whatever they are called."""
         return self._key() == other._key() if isinstance(other, LawRecord) else NotImplemented
 
     def __hash__(self) -> int:
-        return hash((self.name, tuple(self.terms.items()), self.names))
+        return hash((self.rate, self.names))
 
     def __reduce__(self) -> tuple[Any, ...]:
         state = {f.name: getattr(self, f.name) for f in fields(self)}

@@ -1,7 +1,7 @@
 """The symbols of the language, and the parameters and internal variables of a law's table.
 
-Plain real sympy symbols throughout: sympy orders its arguments by class name, so a subclass of Symbol would
-change printed laws, and assumptions such as `positive` would let sympy rewrite what the author wrote.
+Real sympy symbols throughout: assumptions such as `positive` would let sympy rewrite what the author wrote. sympy
+orders its arguments by class name, so that a subclass of another name would change printed laws.
 
 `stress` is the von Mises stress of the Cauchy stress over 1 MPa, `strain` the accumulated equivalent creep
 strain (logarithmic), `time` the time since the first load ramp began over 1 s, `temperature` in K.
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import sympy
 from sympy.core.sympify import converter
@@ -20,22 +20,48 @@ from sympy.core.sympify import converter
 from creepkit.checked_arguments import checked
 from creepkit.errors import LawError
 
-stress = sympy.Symbol("stress", real=True)
+
+class Symbol(sympy.Symbol):  # type: ignore[misc]  # sympy has no types
+    """A real symbol that subs() finds by its name as well: law.rate.subs(fit.values), law.rate.subs("n", 4).
+
+    It equals sympy.Symbol(name, real=True).
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, name: str, **_: bool) -> Self:
+        """The symbol of a name."""
+        symbol: Self = super().__new__(cls, name, real=True)
+        return symbol
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, sympy.Symbol) and not isinstance(other, sympy.Dummy | sympy.Wild):
+            return bool(self._hashable_content() == other._hashable_content())
+        return False
+
+    __hash__ = sympy.Symbol.__hash__
+
+    def _eval_subs(self, old: Any, new: Any) -> Any:
+        """What sympy asks where `old` is not this symbol itself, such as Symbol("n") which it makes of "n"."""
+        return new if isinstance(old, sympy.Symbol) and old.name == self.name else None
 
 
-strain = sympy.Symbol("strain", real=True)
+stress = Symbol("stress")
 
 
-time = sympy.Symbol("time", real=True)
+strain = Symbol("strain")
 
 
-temperature = sympy.Symbol("temperature", real=True)
+time = Symbol("time")
 
 
-principal_stress = sympy.Symbol("principal_stress", real=True)
+temperature = Symbol("temperature")
 
 
-mean_stress = sympy.Symbol("mean_stress", real=True)
+principal_stress = Symbol("principal_stress")
+
+
+mean_stress = Symbol("mean_stress")
 
 
 POINT_VARIABLES = (stress, strain, time, temperature, principal_stress, mean_stress)
@@ -95,7 +121,7 @@ def parameters(names: str) -> tuple[sympy.Symbol, ...]:
 
 
 def _symbols(names: str) -> list[sympy.Symbol]:
-    return [sympy.Symbol(name, real=True) for name in names.replace(",", " ").split()]
+    return [Symbol(name) for name in names.replace(",", " ").split()]
 
 
 @checked

@@ -15,7 +15,7 @@ import sympy
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import LawError
-from creepkit.language.symbols import GAS_CONSTANT, Param, temperature
+from creepkit.language.symbols import GAS_CONSTANT, Param, Symbol, temperature
 
 ACTIVATION_ENERGY_BOUNDS = (2e4, 9e5)
 """Bounds of an activation energy, J/mol: grain-boundary diffusion to apparent values of precipitate-hardened alloys."""
@@ -59,7 +59,7 @@ class TemperatureForm:
 @checked
 def arrhenius(T_ref: float = 1073.15, Q: float | None = None) -> TemperatureFactor:
     """The Arrhenius factor exp[-(Q/R)(1/T - 1/T_ref)] of Eq. (5); T_ref in K, Q in J/mol (a parameter unless given)."""
-    symbol = sympy.Symbol("Q", real=True)
+    symbol = Symbol("Q")
     energy = symbol if Q is None else sympy.Float(Q)
     expression = sympy.exp(energy * _reciprocal_decrease(T_ref) / GAS_CONSTANT)
     params = (
@@ -121,7 +121,7 @@ def _coefficient(
     name: str, meaning: str, bounds: tuple[float, float], unit: str
 ) -> tuple[sympy.Symbol, dict[sympy.Symbol, Param]]:
     """A parameter that a form introduces, which 0 switches off."""
-    symbol = sympy.Symbol(name, real=True)
+    symbol = Symbol(name)
     return symbol, {symbol: Param(meaning, bounds=bounds, unit=unit, off=0.0)}
 
 
@@ -253,7 +253,7 @@ def _basis_expansion(symbol: sympy.Symbol, param: Param, basis: Sequence[_BasisF
     increment: sympy.Expr = sympy.S.Zero
     for shape in basis:
         name = f"Q_{symbol.name}" if shape.suffix == "Q" else f"{symbol.name}_{shape.suffix}"
-        coefficient, unit = sympy.Symbol(name, real=True), _coefficient_unit(shape.unit, param)
+        coefficient, unit = Symbol(name), _coefficient_unit(shape.unit, param)
         bounds = (-shape.coefficient_bound * parameter_range, shape.coefficient_bound * parameter_range)
         coefficients[coefficient] = Param(f"{shape.meaning} {param.meaning}", bounds=bounds, unit=unit, off=0.0)
         increment += coefficient * shape.expression
@@ -277,7 +277,7 @@ def _form_with_T0(
     """The form of one shape, which a parameter T0 inside its exponential belongs to."""
 
     def build(symbol: sympy.Symbol, param: Param) -> Built:
-        start = sympy.Symbol(f"{symbol.name}_T0", real=True)
+        start = Symbol(f"{symbol.name}_T0")
         basis = _BasisFunction(suffix, shape(start), "slope at T_ref of", "1/K", 1 / (2 * TEMPERATURE_SPAN))
         built, coefficients = _basis_expansion(symbol, param, [basis])
         return built, coefficients | {start: Param(f"T0 of {param.meaning}", bounds=T0, unit="K")}

@@ -52,12 +52,13 @@ FRAME_FLAG_KINDS: tuple[FlagKind, ...] = ("unloading", "falling", "outlier")
 """Kinds that concern frames, which can be marked; the others question whole tests."""
 
 
+@checked
 def check_data_quality(histories: Sequence[History], *, activation_energy: float = ACTIVATION_ENERGY) -> DataQuality:
-    """Everything suspect in the histories, test by test, and what happened in several of them at once.
+    """What looks wrong: frames, tests far from others, and what happened in several tests at one time.
 
     Tests are compared where they are of the same alloy and specimen and were loaded alike; one clock is supposed for
-    tests of one kind of specimen whose frames were taken at the same times. activation_energy : J/mol, of the creep
-    rate.
+    tests of one kind of specimen whose frames were taken at the same times. activation_energy : J/mol,
+    with which a factor on the creep rate is put as a step of temperature.
     """
     if not (np.isfinite(activation_energy) and activation_energy > 0):
         raise HistoryError(f"an activation energy of {activation_energy:g} J/mol is not above zero; try 400e3")

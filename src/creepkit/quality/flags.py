@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
 
-from creepkit.presentation import Presentable
 from creepkit.records import History
+from creepkit.records.presentable import Presentable
 
 FlagKind = Literal[
     "unloading",
@@ -77,7 +77,7 @@ class QualityFlag:
 
 
 @dataclass(frozen=True)
-class DataQuality(Presentable, text="reports.histories:data_quality_text"):
+class DataQuality(Presentable):
     """What is suspect in histories: flags, test by test, then those of several tests; it is iterated over as a list.
 
     tests : number of histories that were checked.
@@ -91,6 +91,11 @@ class DataQuality(Presentable, text="reports.histories:data_quality_text"):
 
     def __len__(self) -> int:
         return len(self.flags)
+
+    def __str__(self) -> str:
+        from creepkit.reports.histories import data_quality_text
+
+        return data_quality_text(self)
 
 
 def frame_ranges_text(frames: Sequence[int]) -> str:

@@ -140,10 +140,8 @@ def history_text(history: History) -> str:
     for name, values in columns.items():
         if not np.isfinite(values).all():
             raise HistoryError(f"history '{history.name}': '{name}' holds a number that is not finite; drop that frame")
-    lines = [f"# {key}: {_one_line(history, text)}" for key, text in _header_lines(history)]
-    lines.append(",".join(columns))
-    lines += [",".join(map(_number_text, row)) for row in zip(*columns.values(), strict=True)]
-    return "\n".join(lines) + "\n"
+    rows = (",".join(map(_number_text, row)) for row in zip(*columns.values(), strict=True))
+    return _head_text(history) + "\n".join([",".join(columns), *rows]) + "\n"
 
 
 def _text_without_frames(history: History) -> str:
@@ -152,7 +150,11 @@ def _text_without_frames(history: History) -> str:
     if not known or history.times.size > 1:
         problem = "no minimum rate and no known end" if not known else f"{history.times.size} times"
         raise HistoryError(f"history '{history.name}' has no outputs and {problem}; it cannot be written and read back")
-    return "\n".join(f"# {key}: {_one_line(history, text)}" for key, text in _header_lines(history)) + "\n"
+    return _head_text(history)
+
+
+def _head_text(history: History) -> str:
+    return "".join(f"# {key}: {_one_line(history, text)}\n" for key, text in _header_lines(history))
 
 
 def _header_lines(history: History) -> Iterator[tuple[str, str]]:

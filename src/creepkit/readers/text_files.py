@@ -55,13 +55,13 @@ def read_table(path: Path, ignored: Collection[str] = ()) -> CellTable:
 
 def read_text_table(path: Path) -> CellTable:
     """Read a text table of any delimiter, decimal sign and encoding; HistoryError where it holds no table."""
-    return _table_of(path, decode_text(read_bytes(path, TABLE_FILE), path))
+    return table_of_text(path, decode_text(read_bytes(path, TABLE_FILE), path))
 
 
 def peek_table(path: Path) -> CellTable | None:
     """The beginning of a text as a table; None where it is no table; never raises for what it holds."""
     try:
-        return _table_of(path, decode_text(_beginning(path), path), decimal=".")
+        return table_of_text(path, decode_text(_beginning(path), path), decimal=".")
     except HistoryError:
         return None
 
@@ -84,8 +84,8 @@ def read_head_alone(path: Path) -> dict[str, SourceText]:
     return _head_entries(path, lines, (), Dialect(decimal=_stated_decimal(path, lines) or "."))
 
 
-def _table_of(path: Path, text: str, decimal: str | None = None) -> CellTable:
-    """The table of a text; decimal : its sign, where it does not matter or is known."""
+def table_of_text(path: Path, text: str, decimal: str | None = None) -> CellTable:
+    """The table of a text; path : whence it came. decimal : its sign, where it does not matter or is known."""
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     if is_labview(text):

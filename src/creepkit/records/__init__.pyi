@@ -9,6 +9,7 @@ from .camera_frames import SurfaceRegion as SurfaceRegion
 from .clock_alignment import ClockAlignment as ClockAlignment
 from .history import EVERY_FRAME as EVERY_FRAME
 from .history import UNKNOWN_DURATION as UNKNOWN_DURATION
+from .history import Histories as Histories
 from .history import History as History
 from .instrument_format import InstrumentFormat as InstrumentFormat
 from .instrument_record import Channel as Channel
@@ -67,7 +68,6 @@ from .specimen_lookup import check_geometry as check_geometry
 from .specimen_lookup import check_load as check_load
 from .specimen_lookup import dimension_named as dimension_named
 from .specimen_lookup import dimensions_of as dimensions_of
-from .specimen_lookup import forget_unregistered as forget_unregistered
 from .specimen_lookup import growing_output as growing_output
 from .specimen_lookup import is_logarithmic as is_logarithmic
 from .specimen_lookup import known_specimens as known_specimens
@@ -78,7 +78,6 @@ from .specimen_lookup import output_named as output_named
 from .specimen_lookup import output_unit as output_unit
 from .specimen_lookup import outputs_of as outputs_of
 from .specimen_lookup import outputs_of_tests as outputs_of_tests
-from .specimen_lookup import remember_specimen as remember_specimen
 from .specimen_lookup import specimen_of as specimen_of
 from .specimen_record import Dimension as Dimension
 from .specimen_record import Load as Load

@@ -9,12 +9,12 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked, checked_with_own_words
 from creepkit.errors import HistoryError
-from creepkit.presentation import Presentable
+from creepkit.records.presentable import Presentable
 
 
 @checked
 @dataclass(frozen=True, eq=False)
-class ClockAlignment(Presentable, text="reports.instrument_records:alignment_text"):
+class ClockAlignment(Presentable):
     """Times of a camera as times of an instrument's record: t - zero + lag.
 
     zero : s on the camera's clock, at which the record's own time is zero where the lag is zero.
@@ -48,3 +48,8 @@ class ClockAlignment(Presentable, text="reports.instrument_records:alignment_tex
         record_times : (...,) s on the record's own clock.
         """
         return np.asarray(record_times, dtype=float) - self.lag + self.zero
+
+    def __str__(self) -> str:
+        from creepkit.reports.instrument_records import alignment_text
+
+        return alignment_text(self)

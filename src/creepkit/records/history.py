@@ -14,8 +14,8 @@ from creepkit.arrays import Bools, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, quoted
 from creepkit.limits import HOTTEST
-from creepkit.presentation import present
 from creepkit.records.loading import Loading, Program, loading_text
+from creepkit.records.presentable import NotebookCell, Plotted, Tabulated
 from creepkit.records.specimen_lookup import load_unit
 from creepkit.records.units import celsius_text
 
@@ -59,7 +59,7 @@ EVERY_FRAME: Bools = frozen([], dtype=bool)
 
 @checked
 @dataclass(frozen=True, eq=False)
-class History:
+class History(NotebookCell, Plotted, Tabulated):
     """One measured (or planned) test: outputs over time, and everything known about how it was made.
 
     times : (frames,) s, strictly increasing.
@@ -216,13 +216,23 @@ class History:
     def __repr__(self) -> str:
         return f"<History '{self.name}': {self.specimen}, {self.condition}, {self.times.size} readings>"
 
-    def to_dataframe(self) -> DataFrame:
-        """(frames,) rows of pandas: time_s, the outputs with their units, and whether a frame is used."""
-        return present("reports.dataframes:to_dataframe", self)
+    @classmethod
+    def from_dataframe(cls, frame: DataFrame, /, **conditions: Any) -> History:
+        """One test from a table of pandas: columns and conditions named with units, as in test files.
 
-    def _repr_html_(self) -> str:
-        """For notebooks."""
-        return present("reports.html.notebook:notebook_html", self)
+        frame : one row a reading, with columns such as time_h and strain_pct; those of to_dataframe() are read back.
+        conditions : what stands in the head of a file: stress_MPa=120, temperature_C=750, name="bar 12".
+
+        >>> ck.History.from_dataframe(frame, stress_MPa=120, temperature_C=750)  # doctest: +SKIP
+        """
+        from creepkit.reports.dataframes import history_from_dataframe
+
+        return history_from_dataframe(frame, conditions)
+
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.histories import draw_history, history_figure
+
+        return history_figure, draw_history
 
     def replace(self, **changes: Any) -> History:
         """The same history with some fields changed.
@@ -296,3 +306,12 @@ class History:
         if np.ptp(kelvin) < 0.5:
             ends = (kelvin[0], kelvin[0])
         return f"{celsius_text(*ends, digits=0)}, {loading_text(self.loading, load_unit(self))}"
+
+
+class Histories(list[History], NotebookCell, Plotted, Tabulated):
+    """A list of tests, which notebooks show as a table."""
+
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.histories import draw_tests, tests_figure
+
+        return tests_figure, draw_tests

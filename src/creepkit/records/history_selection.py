@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest
-from creepkit.records.history import History
+from creepkit.records.history import Histories, History
 
 LabelValues = str | float | Sequence[str | float]
 """A value of a label, or several, of which a test has one."""
@@ -27,7 +27,7 @@ MOST_NAMED = 12
 
 
 @checked
-def select_tests(histories: Sequence[History], **labels: LabelValues) -> list[History]:
+def select_tests(histories: Sequence[History], **labels: LabelValues) -> Histories:
     """Return the tests that have these labels: select_tests(tests, temperature=[1073, 1123], alloy="X", name="a*").
 
     labels : `name`, `alloy`, `specimen`, `temperature` (mean, K, to 1 K), the quantity of the load, such as `stress` or
@@ -50,7 +50,7 @@ def select_tests(histories: Sequence[History], **labels: LabelValues) -> list[Hi
     if not selected:
         conditions = " and ".join(f"{label}={given}" for label, given in labels.items())
         raise HistoryError(f"no test has {conditions} at once; leave one of them out")
-    return [histories[k] for k in selected]
+    return Histories(histories[k] for k in selected)
 
 
 def _labels_of(history: History) -> dict[str, str | float]:

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest
-from creepkit.presentation import Presentable, present
 from creepkit.records.loading import Program
+from creepkit.records.presentable import Plotted, Presentable
 from creepkit.records.recorded_programs import recorded_program
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 GAP_FACTOR = 5.0
 """A gap is an interval between two rows that is longer than so many median intervals."""
@@ -55,7 +51,7 @@ class Channel:
 
 @checked
 @dataclass(frozen=True, eq=False)
-class InstrumentRecord(Presentable, text="reports.instrument_records:record_text"):
+class InstrumentRecord(Presentable, Plotted):
     """Channels that one instrument recorded over one clock.
 
     times : (rows,) s, strictly increasing, from the record's own zero. channels : {name: channel}.
@@ -131,6 +127,12 @@ class InstrumentRecord(Presentable, text="reports.instrument_records:record_text
             raise HistoryError(f"{self.origin}: channel '{channel}' holds no reading after time zero")
         return recorded_program(times[later], values[later], tolerance)
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Every channel over time, one panel for each quantity; written to a file if a path is given."""
-        return present("reports.instrument_records:record_figure", self, path)
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.instrument_records import draw_record, record_figure
+
+        return record_figure, draw_record
+
+    def __str__(self) -> str:
+        from creepkit.reports.instrument_records import record_text
+
+        return record_text(self)

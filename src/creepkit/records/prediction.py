@@ -90,6 +90,10 @@ class Prediction:
     times_to_strain: TimesToStrain | None = None
     reason: str = ""
 
+    def __repr__(self) -> str:
+        candidates, tests = self.status.shape
+        return f"<Prediction of {', '.join(self.outputs)}: tests {tests}, candidates {candidates}>"
+
     def of(self, test: int, candidate: int = 0) -> Floats:
         """Outputs of one test, (times, outputs)."""
         return np.asarray(self.values[candidate, test, : int(self.lengths[test])])

@@ -14,6 +14,7 @@ import sympy
 
 from creepkit.arrays import Floats
 from creepkit.language import CreepLaw, Param, time
+from creepkit.language.symbols import Symbol
 from creepkit.records import STEP_DURATION, STEP_NUISANCES, History, drift_duration, kind_and_start
 
 UNBOUNDED = (-100.0, 100.0)
@@ -31,7 +32,7 @@ def law_with_rate_factors(law: CreepLaw, keys: tuple[str, ...]) -> CreepLaw:
     exponent, params = sympy.S.Zero, dict(law.params)
     for k, key in enumerate(keys):
         kind, start = kind_and_start(key)
-        symbol = sympy.Symbol(_unused_name(law, f"{kind.replace(' ', '_')}_{k}"), real=True)
+        symbol = Symbol(_unused_name(law, f"{kind.replace(' ', '_')}_{k}"))
         shape = _shape_in_time(kind, start)
         exponent += symbol * shape
         params[symbol] = Param(f"ln of a factor on all rates, {kind}", UNBOUNDED)

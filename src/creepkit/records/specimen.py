@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from creepkit.errors import SolveError
 from creepkit.records.predictor import Predictor
+from creepkit.records.presentable import NotebookCell
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from creepkit.records.loading import Loading
 
 
-class Specimen(Predictor):
+class Specimen(Predictor, NotebookCell):
     """A frozen record of a test piece: which outputs are observed, and how to predict them.
 
     dataset_names : {general name of a condition: its own}. surrogate_name : of its

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
@@ -26,29 +25,11 @@ class StatedTest(Protocol):
     def origin(self) -> str: ...  # noqa: D102
 
 
-_used: dict[str, Registered] = {}
-
-
-def remember_specimen(predictor: Registered) -> None:
-    """Keep what a specimen says of itself that was given to a public function and that no plugin registered."""
-    specimen = predictor.specimen
-    if specimen.name:
-        _used[specimen.name] = specimen
-
-
-def forget_unregistered() -> None:
-    """Forget the specimens that no plugin registered."""
-    _used.clear()
-
-
 def known_specimens() -> Mapping[str, Registered]:
-    """{name: specimen} of all that are registered, and after them of others that were used in this process.
+    """{name: specimen} that the registry knows, when a name is looked up: it is a layer above this one."""
+    from creepkit.registry import default_registry
 
-    The registry is a layer above this one; it is asked here alone, and when a name is looked up, not on import.
-    """
-    registry = importlib.import_module("creepkit.registry").default_registry()
-    registered = {name: entry.value for name, entry in registry.specimens().items()}
-    return registered | {name: one for name, one in _used.items() if name not in registered}
+    return default_registry().known_specimens()
 
 
 def specimen_of(history: StatedTest) -> Registered | None:
@@ -87,10 +68,12 @@ def dimension_named(predictor: Registered, name: str) -> Dimension | None:
 
 
 def output_named(name: str, specimen: str = "") -> Output:
-    """What is known of an output: from the specimen of that name, else from any that has such an output.
+    """What is known of an output: what it says itself, the specimen of that name, or any that has such an output.
 
-    An output that no registered specimen has is a number.
+    An output that no known specimen has is a number.
     """
+    if isinstance(name, Output):
+        return name
     known = known_specimens()
     own = [known[specimen]] if specimen in known else []
     for candidate in (*own, *known.values()):

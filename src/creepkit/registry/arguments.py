@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from creepkit.errors import FitError
-from creepkit.records import History, Predictor, Specimen, known_specimens, remember_specimen
+from creepkit.records import History, Predictor, Specimen
 from creepkit.registry.plugin_registry import default_registry
 
 
 def specimen_by_name(name: str) -> Specimen:
-    """The registered specimen of a name, or one that was used in this process; SolveError where there is none."""
-    used: Specimen | None = known_specimens().get(name)
-    return default_registry().specimen(name) if used is None else used
+    """The registered specimen of a name, or one that was given in this process; SolveError where there is none."""
+    registry = default_registry()
+    return registry.known_specimens().get(name) or registry.specimen(name)
 
 
 def resolve_predictor(predictor: Predictor | str) -> Predictor:
     """The predictor itself, or the specimen of that name."""
     if isinstance(predictor, str):
         return default_registry().specimen(predictor)
-    remember_specimen(predictor)
+    default_registry().remember(predictor)
     return predictor
 
 

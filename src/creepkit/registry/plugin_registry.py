@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import typer
 
     from creepkit.language.law import CreepLaw
-    from creepkit.records import Specimen
+    from creepkit.records import Predictor, Specimen
 
 
 MORE_LAWS = 'plugins bring more: pip install "creepkit[plugins]"'
@@ -81,6 +81,7 @@ class Registry:
         self._plugins: dict[str, Plugin] = {}
         self._being_loaded: set[str] = set()
         self._loading = threading.RLock()
+        self._given: dict[str, Specimen] = {}
         self._found: dict[tuple[str, str | None], Any] = {}  # what was asked for, until another plugin is registered
 
     # ---- what there is ---------------------------------------------------------------------------------------------
@@ -133,6 +134,21 @@ class Registry:
     def specimens(self) -> dict[str, Registered[Specimen]]:
         """{name: registered specimen}."""
         return self.all(kinds.SPECIMENS)
+
+    def known_specimens(self) -> dict[str, Specimen]:
+        """{name: specimen} of those registered, and after them of those given to public functions."""
+        registered = {name: entry.value for name, entry in self.specimens().items()}
+        return registered | {name: one for name, one in self._given.items() if name not in registered}
+
+    def remember(self, predictor: Predictor) -> None:
+        """Keep the specimen of a predictor that was given to a public function: files and texts have its name alone."""
+        if predictor.specimen.name:
+            self._given[predictor.specimen.name] = predictor.specimen
+
+    @property
+    def is_extended(self) -> bool:
+        """Whether it knows plugin files, or specimens that were given, beside what is installed."""
+        return bool(self._given) or any(plugin.source.is_file for plugin in self._loaded())
 
     def law(self, name: str) -> CreepLaw:
         """The law of a name, a sum as "norton+strain-hardening", or "hyperbolic-sine*primary"; LawError without one."""

@@ -14,20 +14,20 @@ from creepkit.instruments import reading as instrument_files
 from creepkit.instruments.reading_options import RecordOptions
 from creepkit.options import takes_options
 from creepkit.readers import reading
-from creepkit.records import Frames, History, InstrumentRecord
+from creepkit.records import Frames, Histories, History, InstrumentRecord
 from creepkit.registry import kinds
 from creepkit.registry.plugin_registry import default_registry
 
 
 @checked_with_own_words("ignore")
-def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: Collection[str] = ()) -> list[History]:
+def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: Collection[str] = ()) -> Histories:
     """Read measured histories from a file, a folder, a pattern such as "in625/*.csv", or several of these.
 
     reader : name of the reader; by default the one that accepts the file.
     ignore : columns that nobody needs, such as ["load_kN", "date"]; they are left out wherever they stand.
     """
     readers = default_registry().values(kinds.READERS)
-    return reading.read_histories(paths, readers, reader, ignore)
+    return Histories(reading.read_histories(paths, readers, reader, ignore))
 
 
 def read_those_that_can_be(

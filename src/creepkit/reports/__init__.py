@@ -1,1 +1,1 @@
-"""Every plot and every text for a terminal; `creepkit.presentation` lists which function shows which record."""
+"""Every plot and every text for a terminal; methods of the records import what shows them."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from creepkit.registry import kinds
+from creepkit.reports.blocks import Block, Paragraph, Table, as_text
 from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.terminal import print_table, tell
 
@@ -66,22 +67,27 @@ def law_to_json(entry: Registered[CreepLaw]) -> dict[str, Any]:
 
 
 def print_specimen(entry: Registered[Specimen]) -> None:
-    """Print all that a specimen says of itself; loads and lengths with their options of the command line."""
+    """Print all that a specimen says of itself."""
+    tell(as_text([*specimen_blocks(entry.value), Paragraph(f"from {entry.provenance}")]))
+
+
+def specimen_blocks(specimen: Specimen) -> list[Block]:
+    """All that a specimen says of itself; loads and lengths with their options of the command line."""
     from creepkit.records import dimensions_of, loads_of, outputs_of  # heavy, and a list of laws needs none of it
 
-    specimen = entry.value
-    tell(f"{specimen.name}: {specimen.title}\n  from {entry.provenance}")
     outputs = [(o, o.unit, o.long_name, "" if o.noise is None else f"{o.noise:g}") for o in outputs_of(specimen)]
-    print_table("outputs", ("name", "unit", "what it is", "noise"), outputs)
     loads = [(load.name, load.unit, load.long_name, _option(load.name)) for load in loads_of(specimen)]
-    print_table("loads", ("name", "unit", "what it is", "option"), loads)
     lengths = [
         (d.name, f"{d.default:g}", f"{100 * d.tolerance:g} %" if d.tolerance else "", d.long_name, _option(d.name))
         for d in dimensions_of(specimen)
     ]
-    if lengths:
-        print_table("lengths, mm", ("name", "default", "tolerance", "what it is", "option"), lengths)
-    tell(f"nuisance parameters: {', '.join(getattr(specimen, 'nuisances', ()))}")
+    tables = [
+        Table("outputs", ("name", "unit", "what it is", "noise"), outputs),
+        Table("loads", ("name", "unit", "what it is", "option"), loads),
+        Table("lengths, mm", ("name", "default", "tolerance", "what it is", "option"), lengths),
+    ]
+    nuisances = Paragraph(f"nuisance parameters: {', '.join(specimen.nuisances)}")
+    return [Paragraph(f"{specimen.name}: {specimen.title}", "lead"), *(t for t in tables if t.rows), nuisances]
 
 
 def _option(name: str) -> str:

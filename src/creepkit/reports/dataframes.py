@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import singledispatch
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.errors import ReportError
+from creepkit.errors import HistoryError, ReportError
 from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.importance_sampling import PosteriorSamples
-from creepkit.records import History, output_unit
+from creepkit.readers.history_csv import HISTORY_CSV, histories_of_tests
+from creepkit.readers.questions import Question
+from creepkit.readers.table_layouts import tests_in
+from creepkit.readers.text_files import table_of_text
+from creepkit.records import Histories, History, output_unit
+from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 
 def to_dataframe(record: object) -> DataFrame:
-    """A record as a table: readings, values with intervals, laws with weights, or forecast curves."""
+    """A record as a table: readings, values with intervals, laws with weights, forecast curves, draws, or strengths."""
     try:
         from pandas import DataFrame
     except ImportError:
@@ -25,6 +32,20 @@ def to_dataframe(record: object) -> DataFrame:
     rows, index = _rows(record)
     frame = DataFrame(rows)
     return frame.set_index(index) if index else frame
+
+
+def history_from_dataframe(frame: DataFrame, conditions: Mapping[str, Any]) -> History:
+    """The history of a table and of what is stated of it; see History.from_dataframe."""
+    columns = frame.rename(columns={"strain": "strain_1"}) * 1  # as a History holds strain, and marks as files do
+    head, known = "".join(f"# {key}: {value}\n" for key, value in conditions.items()), HISTORY_CSV.vocabulary
+    table = table_of_text(Path("DataFrame"), head + columns.to_csv(index=frame.index.name is not None))
+    try:
+        histories = histories_of_tests(tests_in(table, known), table.path, known)
+    except Question as asked:
+        raise HistoryError(f"DataFrame: {asked.sentence}, as from_dataframe(frame, {asked.key}=...)") from None
+    if len(histories) != 1:
+        raise HistoryError(f"DataFrame: it holds {len(histories)} tests; give the rows of one, as by groupby()")
+    return histories[0].replace(source="")
 
 
 def to_arviz(samples: PosteriorSamples) -> Any:
@@ -56,6 +77,27 @@ def _(history: History) -> tuple[Any, str]:
 def _column(output: str) -> str:
     """The name of an output with its unit, as files have it."""
     return f"{output}_{output_unit(output)}" if output_unit(output) else output
+
+
+@_rows.register
+def _(tests: Histories) -> tuple[Any, str]:
+    return [{"test": one.name, **row} for one in tests for row in to_dataframe(one).to_dict("records")], ""
+
+
+@_rows.register
+def _(samples: PosteriorSamples) -> tuple[Any, str]:
+    return samples.values, ""
+
+
+@_rows.register
+def _(assessment: RuptureAssessment) -> tuple[Any, str]:
+    rows = []
+    for one in assessment.strengths:
+        bounds = {"mean": one.bounds_of_mean, "heat": one.bounds_of_heat, "test": one.bounds_of_test}
+        ends = {f"{end}_of_{of}_MPa": pair[k] for of, pair in bounds.items() for k, end in enumerate(("low", "high"))}
+        point = {"hours": one.hours, "temperature_K": one.temperature, "method": one.method}
+        rows.append({**point, "strength_MPa": one.value, **ends, "extrapolation": one.extrapolation})
+    return rows, ""
 
 
 @_rows.register

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from creepkit.experiments.planned_design import ALIKE, kind_of_reason, precision
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.records import SECONDS_PER_HOUR, load_unit
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
-from creepkit.reports.figures import panel_grid, save_figure, wrapped
+from creepkit.reports.figures import panel_grid, wrapped
 from creepkit.reports.json_values import fields_to_json
 
 if TYPE_CHECKING:
@@ -169,7 +168,7 @@ def _expectation_to_json(e: Expectation) -> dict[str, Any]:
 # ---- map -------------------------------------------------------------------------------------------------------------
 
 
-def design_figure(design: Design, path: str | Path | None = None) -> Figure:
+def design_figure(design: Design) -> Figure:
     """What candidates tell for each hour of machine time, over the first load and the duration; the best of each place.
 
     Each cell stands for one test: of those of its first load and duration the first in the order of the design,
@@ -179,20 +178,16 @@ def design_figure(design: Design, path: str | Path | None = None) -> Figure:
     specimens that of the best test is drawn.
     """
     figure, panels = panel_grid(2, 2, 5.25, 5.0)
-    specimen = design.best.histories[0].specimen if design.tests else ""
-    drawn = [test for test in design.tests if test.histories[0].specimen == specimen]
-    largest = max([test.first_order_per_hour for test in drawn] or [1.0], default=1.0)
-    titles = {True: "constant load", False: "the load changes during the test"}
-    images = []
-    for panel, (constant, title) in zip(panels, titles.items(), strict=True):
-        tests, plan = ([t for t in group if _is_constant(t) == constant] for group in (drawn, design.plan))
-        plan = [t for t in plan if _place(t) in map(_place, tests)]
-        images += _draw_map(panel, tests, plan, max(largest, 1e-9))
-        panel.set(title=title, xlabel=_load_label(design), ylabel="duration, h")
+    images = [*_draw_map(panels[0], design, constant=True), *_draw_map(panels[1], design, constant=False)]
     if images:
         figure.colorbar(images[0], ax=panels, label="information to first order, nats per hour of machine time")
     figure.suptitle(wrapped(f"{design.sentence}. {cells_text(design)}", 10.0, 9.0), fontsize=9)
-    return save_figure(figure, path)
+    return figure
+
+
+def draw_design(axes: Axes, design: Design) -> None:
+    """The map of the tests of constant load, or, where the best test is none of them, of those whose load changes."""
+    _draw_map(axes, design, constant=not design.tests or _is_constant(design.best))
 
 
 def cells_text(design: Design) -> str:
@@ -209,8 +204,15 @@ def _place(test: PlannedTest) -> tuple[float, float]:
     return round(test.first_level, 6), round(test.duration / SECONDS_PER_HOUR, 6)
 
 
-def _draw_map(panel: Axes, tests: list[PlannedTest], plan: list[PlannedTest], largest: float) -> list[Any]:
+def _draw_map(panel: Axes, design: Design, *, constant: bool) -> list[Any]:
     """One cell for each load and duration, of the first of the tests there (ordered); its probability as a number."""
+    specimen = design.best.histories[0].specimen if design.tests else ""
+    drawn = [test for test in design.tests if test.histories[0].specimen == specimen]
+    largest = max([1e-9, *(test.first_order_per_hour for test in drawn)])
+    tests, plan = ([t for t in group if _is_constant(t) == constant] for group in (drawn, design.plan))
+    plan = [t for t in plan if _place(t) in map(_place, tests)]
+    title = "constant load" if constant else "the load changes during the test"
+    panel.set(title=title, xlabel=_load_label(design), ylabel="duration, h")
     if not tests:
         panel.text(0.5, 0.5, "none considered", transform=panel.transAxes, ha="center")
         return []

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import HistoryError
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.records import output_unit
-from creepkit.reports.figures import empty_figure, panel_grid, save_figure
+from creepkit.reports.figures import empty_figure, panel_grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,8 +28,8 @@ _COURSES = {"left": 0.05, "right": 0.98, "bottom": 0.08, "top": 0.93, "wspace": 
 """Places of maps and of what is drawn over time, as fractions of their halves of the sheet."""
 
 
-def extraction_figure(extraction: Extraction, path: str | Path | None = None) -> Figure:
-    """A contact sheet, written to a file where a path is given.
+def extraction_figure(extraction: Extraction) -> Figure:
+    """A contact sheet.
 
     Top: heights of some frames over the plate, with the points (white) between two circles from which the rigid motion
     was taken, and lost points (grey crosses); below them what the operator's model leaves. Then the outputs over time
@@ -80,7 +78,12 @@ def extraction_figure(extraction: Extraction, path: str | Path | None = None) ->
         axes.legend(fontsize=7, ncols=3)
         _dress(axes, e, title)
     figure.suptitle(_title(e), fontsize=10, x=0.01, ha="left")
-    return save_figure(figure, path, HistoryError)
+    return figure
+
+
+def draw_extraction(axes: Axes, extraction: Extraction) -> None:
+    """The first output over time with its band."""
+    _draw_output(axes, extraction, next(iter(extraction.outputs)))
 
 
 def _title(e: Extraction) -> str:

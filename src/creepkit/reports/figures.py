@@ -6,12 +6,12 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError, FitError
+from creepkit.errors import ReportError
 from creepkit.files.writing import replace_on_success
 
 if TYPE_CHECKING:
@@ -37,6 +37,22 @@ def empty_figure(width: float, height: float) -> Figure:
     return figure
 
 
+def plotted(record: object, figure: Any, panel: Any, path: Any, axes: Any) -> Figure:
+    """The figure of a record by the first of two functions, or by the second its leading panel within axes."""
+    from matplotlib.axes import Axes
+
+    for name, given, kinds in (("path", path, (str, Path)), ("ax", axes, (Axes,))):
+        if given is not None and not isinstance(given, kinds):
+            kind = type(given).__name__
+            raise ReportError(
+                f"{name} of plot() is {kind}; write plot('fit.png'), or plot(ax=ax) with matplotlib's axes"
+            )
+    if axes is None:
+        return save_figure(figure(record), path)
+    panel(axes, record)
+    return save_figure(axes.get_figure(root=True), path, axes)
+
+
 def panels_of(width: float, height: float, *shape: int, **options: Any) -> tuple[Figure, Any]:
     """The same with panels: one, or rows and columns of them, as matplotlib's subplots() has them."""
     figure = empty_figure(width, height)
@@ -59,37 +75,38 @@ def panel_grid(
     return figure, panels[:count]
 
 
-def make_folder(folder: Path, error_type: type[CreepkitError] = FitError) -> None:
-    """Make a folder for figures where there is none; an error of `error_type` where it cannot be made."""
+def make_folder(folder: Path) -> None:
+    """Make a folder for figures where there is none; ReportError where it cannot be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise error_type(f"{folder}: no plots can be written there ({error.strerror}); name another folder") from None
+        raise ReportError(f"{folder}: no plots can be written there ({error.strerror}); name another folder") from None
 
 
-def check_picture_format(path: Path, error_type: type[CreepkitError] = FitError) -> None:
-    """Raise an error of `error_type` for a name that is not that of a picture."""
+def check_picture_format(path: Path) -> None:
+    """ReportError for a name that is not that of a picture."""
     from matplotlib.backend_bases import FigureCanvasBase
 
     if path.suffix.lower().lstrip(".") not in FigureCanvasBase.get_supported_filetypes():
-        raise error_type(f"{path}: '{path.suffix}' is no format of pictures; name a .png, .svg or .pdf file")
+        raise ReportError(f"{path}: '{path.suffix}' is no format of pictures; name a .png, .svg or .pdf file")
 
 
-def save_figure(figure: Figure, path: str | Path | None, error_type: type[CreepkitError] = FitError) -> Figure:
-    """The figure, written whole or not at all where a path is given; an error of `error_type` where it cannot be.
+def save_figure(figure: Figure, path: str | Path | None, drawn: Axes | None = None) -> Figure:
+    """The figure, written whole or not at all where a path is given; ReportError where it cannot be.
 
-    A dollar in the name of a test or of a law is a dollar: only powers of ten on axes are formulas.
+    A dollar in the name of a test or of a law is a dollar: only powers of ten on axes are formulas. drawn : the axes
+    of which this holds; by default all.
     """
     from matplotlib.text import Text
 
-    for text in figure.findobj(Text):
+    for text in (drawn or figure).findobj(Text):
         if "$" in text.get_text() and not POWER_OF_TEN.fullmatch(text.get_text()):
             text.set_parse_math(False)
     if path is not None:
         target = Path(path)
-        check_picture_format(target, error_type)
+        check_picture_format(target)
         resolution = min(RESOLUTION, LARGEST_PIXELS / max(figure.get_size_inches()))
-        with replace_on_success(target, error_type) as temporary:
+        with replace_on_success(target, ReportError) as temporary:
             figure.savefig(temporary, dpi=resolution, format=target.suffix.lower().lstrip("."))
     return figure
 
@@ -183,21 +200,31 @@ class Course(NamedTuple):
     hollow: Any = None
 
 
-def over_time(panels: Mapping[str, Sequence[Course]], path: str | Path | None = None, time: str = "time, h") -> Figure:
-    """A panel for each {label of its axis: what is drawn in it}, one below the other; time : label of their axis."""
+Panels: TypeAlias = Mapping[str, Sequence[Course]]
+"""{label of an axis: what is drawn over time in its panel}."""
+
+
+def over_time(panels: Panels, time: str = "time, h") -> Figure:
+    """A panel for each label, one below the other; time : label of their common axis."""
     figure, every = panel_grid(len(panels), 1, 7.0, 2.6, sharex=True)
-    for axes, (label, courses) in zip(every, panels.items(), strict=True):
-        for k, one in enumerate(courses):
-            style: Any = {"lw": 1.0, "marker": "." if one.hollow is not None else "", "ms": 3}
-            (line,) = axes.plot(one.times, one.values, label=one.name if k < MOST_NAMED else None, **style)
-            if one.hollow is not None:
-                axes.plot(one.times[one.hollow], one.values[one.hollow], "o", mfc="none", color=line.get_color())
-        axes.set_ylabel(label)
-        axes.grid(alpha=0.25)
-        if len(courses) > 1:
-            place_legend_right(axes)
+    for axes, label in zip(every, panels, strict=True):
+        draw_over_time(axes, {label: panels[label]}, "")
     every[-1].set_xlabel(time)
-    return save_figure(figure, path)
+    return figure
+
+
+def draw_over_time(axes: Axes, panels: Panels, time: str = "time, h") -> None:
+    """The first of the panels, in axes."""
+    label, courses = next(iter(panels.items()))
+    for k, one in enumerate(courses):
+        style: Any = {"lw": 1.0, "marker": "." if one.hollow is not None else "", "ms": 3}
+        (line,) = axes.plot(one.times, one.values, label=one.name if k < MOST_NAMED else None, **style)
+        if one.hollow is not None:
+            axes.plot(one.times[one.hollow], one.values[one.hollow], "o", mfc="none", color=line.get_color())
+    axes.set(xlabel=time, ylabel=label)
+    axes.grid(alpha=0.25)
+    if len(courses) > 1:
+        place_legend_right(axes)
 
 
 def draw_parity(axes: Axes, *values: Any, logarithmic: bool = False, margin: float = 1.0, factor: float = 0.0) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, hours_number
 from creepkit.reports.blocks import Block, Items, Paragraph, as_text
-from creepkit.reports.figures import panel_grid, save_figure, span, wrapped
+from creepkit.reports.figures import panel_grid, span, wrapped
 from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.load_programs import kind_of_test
 from creepkit.reports.prediction_bands import axis_label
@@ -202,27 +201,38 @@ SHOWN_RATIO = 1e-3
 """Of the largest strain: the lower end of a logarithmic axis."""
 
 
-def forecast_figure(forecast: Forecast, path: str | Path | None = None) -> Figure:
+def forecast_figure(forecast: Forecast) -> Figure:
     """The leading output of each test with both bands, times to values and rupture, and what was measured.
 
     A single test shows all of its outputs. Tests beyond the first dozen are not drawn.
     """
-    tests = [t for t in forecast.tests if t.outputs]
-    if not tests:
-        raise FitError("nothing is predicted of these tests, so there is nothing to draw")
+    tests = _drawable(forecast)
     drawn = [
         (test, one) for test in tests[:MOST_DRAWN] for one in [*test.outputs.values()][: None if len(tests) == 1 else 1]
     ]
     figure, panels = panel_grid(len(drawn), COLUMNS, max(4.4, 6.6 / len(drawn)), 3.6)  # as wide as the legend at least
     for axes, (test, one) in zip(panels, drawn, strict=True):
         _draw_curve(axes, test, one)
-        axes.set_title(wrapped(f"{test.name}: {test.history.condition}", 4.4, 11.0), fontsize=8)
-    _legend(figure, forecast, [test for test, _ in drawn])
+    _legend(figure, forecast, [test for test, _ in drawn], loc="outside lower center", ncols=3)
     left_out = len(forecast.tests) - len({test.name for test, _ in drawn})
     more = f" ({left_out} more tests are not drawn)" if left_out > 0 else ""
     title = f"forecast by {' or '.join(forecast.laws)}{more}"
     figure.suptitle(wrapped(title, float(figure.get_size_inches()[0])), fontsize=10)
-    return save_figure(figure, path)
+    return figure
+
+
+def draw_forecast(axes: Axes, forecast: Forecast) -> None:
+    """The leading output of the first test with both bands."""
+    test = _drawable(forecast)[0]
+    _draw_curve(axes, test, next(iter(test.outputs.values())))
+    _legend(axes, forecast, [test])
+
+
+def _drawable(forecast: Forecast) -> list[TestForecast]:
+    tests = [t for t in forecast.tests if t.outputs]
+    if not tests:
+        raise FitError("nothing is predicted of these tests, so there is nothing to draw")
+    return tests
 
 
 def _scaled(one: OutputForecast) -> float:
@@ -254,6 +264,7 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast) -> None:
     span(axes, "x", start, end, logarithmic=logarithmic)
     axes.set_xlim(0.95 * start, 1.03 * end)
     _draw_times(axes, test, one)
+    axes.set_title(wrapped(f"{test.name}: {test.history.condition}", 4.4, 11.0), fontsize=8)
     axes.set_ylabel(axis_label(one.output), fontsize=8)
     axes.set_xlabel("time, h", fontsize=8)
     axes.tick_params(labelsize=7)
@@ -296,7 +307,7 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast) -> None:
             axes.plot([measured], [level], "x", color="black", ms=5, zorder=6)
 
 
-def _legend(figure: Figure, forecast: Forecast, tests: Sequence[TestForecast]) -> None:
+def _legend(of: Figure | Axes, forecast: Forecast, tests: Sequence[TestForecast], **place: Any) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -315,4 +326,4 @@ def _legend(figure: Figure, forecast: Forecast, tests: Sequence[TestForecast]) -
             if rupture in drawn
         ),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7)
+    of.legend(handles=handles, fontsize=7, **place)

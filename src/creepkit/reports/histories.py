@@ -6,18 +6,18 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.records import SECONDS_PER_HOUR, History, load_unit, output_named, output_unit
+from creepkit.records import SECONDS_PER_HOUR, History, is_logarithmic, load_unit, output_named, output_unit
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, aligned, as_text, plural
-from creepkit.reports.figures import Course, over_time
+from creepkit.reports.figures import Course, Panels, draw_over_time, over_time
 from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.load_programs import kind_of_test, program_text
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from creepkit.quality.flags import DataQuality
@@ -181,18 +181,39 @@ def data_quality_to_json(quality: DataQuality) -> dict[str, Any]:
 # ---- over time -------------------------------------------------------------------------------------------------------
 
 
-def histories_figure(histories: Sequence[History], path: str | Path | None = None) -> Figure:
-    """A panel for each output, over time; frames that are not used are drawn hollow."""
+def tests_figure(histories: Sequence[History]) -> Figure:
+    """A panel for each output of tests, over time; frames that are not used are drawn hollow."""
+    return over_time(_outputs(histories))
+
+
+def history_figure(history: History) -> Figure:
+    """The same of one test."""
+    return tests_figure([history])
+
+
+def draw_tests(axes: Axes, histories: Sequence[History]) -> None:
+    """The first output of tests over time."""
+    draw_over_time(axes, _outputs(histories))
+
+
+def draw_history(axes: Axes, history: History) -> None:
+    """The same of one test."""
+    draw_tests(axes, [history])
+
+
+def _outputs(histories: Sequence[History]) -> Panels:
     panels: dict[str, list[Course]] = {}
     for history in histories:
         hours, unused = history.times / SECONDS_PER_HOUR, ~np.asarray(history.used)
         for name, values in history.outputs.items():
-            label = ", ".join(filter(None, (name, output_unit(name, history.specimen))))
-            panels.setdefault(label, []).append(Course(history.name, hours, values, unused))
-    return over_time(panels or {"": []}, path)
+            percent = is_logarithmic(name)
+            unit = "%" if percent else output_unit(name, history.specimen)
+            course = Course(history.name, hours, 100.0 * values if percent else values, unused)
+            panels.setdefault(", ".join(filter(None, (name, unit))), []).append(course)
+    return panels or {"": []}
 
 
-def run_figure(run: Run, path: str | Path | None = None) -> Figure:
+def run_figure(run: Run) -> Figure:
     """Outputs and load of a simulated test over time; outputs of one quantity that grow with creep as one."""
     hours, panels = run.times / SECONDS_PER_HOUR, dict[str, list[Course]]()
     for name, values in run.outputs.items():
@@ -204,4 +225,4 @@ def run_figure(run: Run, path: str | Path | None = None) -> Figure:
     knots = np.unique([*program.times[program.times < run.end_time], 0.0, run.end_time])
     label = ", ".join(filter(None, (run.loading.quantity, load_unit(run))))
     panels[label] = [Course(run.reason and f"ended: {run.reason}", knots / SECONDS_PER_HOUR, program.at(knots))]
-    return over_time(panels, path)
+    return over_time(panels)

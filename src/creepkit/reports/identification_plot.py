@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +11,8 @@ from creepkit.arrays import Floats
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
 from creepkit.reports.compared_values import judged_readings
-from creepkit.reports.condition_colours import stress_scale, temperature_scale
-from creepkit.reports.figures import empty_figure, save_figure, shortened, span, wrapped
+from creepkit.reports.condition_colours import ColourScale, stress_scale, temperature_scale
+from creepkit.reports.figures import empty_figure, shortened, span, wrapped
 from creepkit.reports.prediction_bands import (
     FittedCurves,
     TestCurve,
@@ -53,11 +52,20 @@ MOST_LABELLED = 16
 """Tests whose stress stands beside their curve, where colours are temperatures."""
 
 
-def identification_figure(fit: Identification, path: str | Path | None = None) -> Figure:
+def identification_figure(fit: Identification) -> Figure:
     """Draw the tests over time with bands, creep rates over stress, and times to rupture."""
     figure = summary_figure(fit)
     figure.suptitle(wrapped(fit.headline, float(figure.get_size_inches()[0])), fontsize=10)
-    return save_figure(figure, path)
+    return figure
+
+
+def draw_identification(axes: Axes, fit: Identification) -> None:
+    """The tests over time with bands; of tests without frames creep rates over stress."""
+    leading = leading_outputs(fit)
+    if leading:
+        _draw_leading(axes, fit, leading, _curve_scale(fit))
+    else:
+        draw_rates(axes, fit)
 
 
 def leading_outputs(fit: Identification) -> dict[str, list[int]]:
@@ -71,28 +79,39 @@ def leading_outputs(fit: Identification) -> dict[str, list[int]]:
 
 def summary_figure(fit: Identification) -> Figure:
     """Curves (dots measured, lines by the law) coloured by stress, or by temperature where it varies; rates; lives."""
-    curves, leading = fitted_curves(fit), leading_outputs(fit)
-    by_temperature, by_stress = temperature_scale(fit.histories), stress_scale(fit.histories, fit.predictor)
-    scale = by_temperature if np.ptp(by_temperature.values) > ISOTHERMAL_RANGE else by_stress
+    scale, leading = _curve_scale(fit), leading_outputs(fit)
     below = ["rates", "ruptures"] if rupture_rows(fit) else ["rates"]
     figure = empty_figure(SUMMARY_WIDTH, (CURVES_HEIGHT if leading else 0.0) + PANELS_HEIGHT)
     lower: Any = figure
     if leading:
         heights = (CURVES_HEIGHT, PANELS_HEIGHT)
         upper, lower = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
-        output, tests = max(leading.items(), key=lambda pair: len(pair[1]))
         axes = upper.subplots()
-        _draw_curves(axes, fit, curves, output, tests, scale.colours)
-        axes.set_title("measured (dots) and by the law (lines, 95 % band)", fontsize=9)
+        _draw_leading(axes, fit, leading, scale)
         if np.ptp(scale.values) > 0:
             scale.add_bar(upper, [axes])
-        if scale is by_temperature and len(tests) <= MOST_LABELLED:
-            _label_stresses(axes, fit, by_stress.values, tests, scale.colours)
     panels = np.atleast_1d(lower.subplots(1, len(below)))
     draw_rates(panels[0], fit)
     if len(below) > 1:
         draw_ruptures(panels[1], fit, scale.colours)
     return figure
+
+
+def _curve_scale(fit: Identification) -> ColourScale:
+    """Colours by temperature where it varies, else by stress."""
+    by_temperature = temperature_scale(fit.histories)
+    varies = np.ptp(by_temperature.values) > ISOTHERMAL_RANGE
+    return by_temperature if varies else stress_scale(fit.histories, fit.predictor)
+
+
+def _draw_leading(axes: Axes, fit: Identification, leading: dict[str, list[int]], scale: ColourScale) -> None:
+    """The curves of the output that most tests have, their stresses beside them where colours are temperatures."""
+    output, tests = max(leading.items(), key=lambda pair: len(pair[1]))
+    _draw_curves(axes, fit, fitted_curves(fit), output, tests, scale.colours)
+    axes.set_title("measured (dots) and by the law (lines, 95 % band)", fontsize=9)
+    by_stress = stress_scale(fit.histories, fit.predictor)
+    if scale.label != by_stress.label and len(tests) <= MOST_LABELLED:
+        _label_stresses(axes, fit, by_stress.values, tests, scale.colours)
 
 
 def _label_stresses(

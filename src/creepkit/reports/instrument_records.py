@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.instruments.clock_alignment import UNIX_TIME
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
-from creepkit.reports.figures import Course, over_time
+from creepkit.reports.figures import Course, Panels, draw_over_time, over_time
 from creepkit.reports.json_values import fields_to_json
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from creepkit.instruments.imposed import Imposed
@@ -73,14 +73,26 @@ def _channel_text(channel: Channel) -> str:
     return f"{what}, {low:.4g} to {high:.4g} {unit}".rstrip() + written + lost
 
 
-def record_figure(record: InstrumentRecord, path: str | Path | None = None) -> Figure:
+RECORD_TIME = "time of the record, s"
+
+
+def record_figure(record: InstrumentRecord) -> Figure:
     """Every channel over time, one panel for each quantity."""
+    return over_time(_channels(record), RECORD_TIME)
+
+
+def draw_record(axes: Axes, record: InstrumentRecord) -> None:
+    """The channels of the first quantity over time."""
+    draw_over_time(axes, _channels(record), RECORD_TIME)
+
+
+def _channels(record: InstrumentRecord) -> Panels:
     panels: dict[str, list[Course]] = {}
     for name, channel in record.channels.items():
         shift = ZERO_CELSIUS if channel.quantity == "temperature" else 0.0
         label = ", ".join(filter(None, (channel.quantity, UNITS.get(channel.quantity, ""))))
         panels.setdefault(label, []).append(Course(name, record.times, channel.values - shift))
-    return over_time(panels or {"": []}, path, "time of the record, s")
+    return panels or {"": []}
 
 
 def alignment_text(alignment: ClockAlignment) -> str:

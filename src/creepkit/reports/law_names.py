@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import sympy
 
 from creepkit.exporters.documents import equations_in_latex, expression_mathml
 from creepkit.exporters.law_description import comment_lines
-from creepkit.language import CreepLaw, mean_stress, principal_stress, strain, stress, temperature, time
+from creepkit.language import CreepLaw, mean_stress, parameters, principal_stress, strain, stress, temperature, time
 from creepkit.language.printing import arrhenius_exponent
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.reports.answer import equations
@@ -142,12 +142,11 @@ def _variables(laws: Sequence[CreepLaw]) -> Table:
 # ---- with values ----------------------------------------------------------------------------------------------------
 
 
-def law_expression(law: CreepLaw, values: Mapping[Any, float]) -> sympy.Expr:
-    """The rate of a law with values of parameters in it; Arrhenius factors have the symbols R and T_ref."""
-    R, T_ref = sympy.symbols("R T_ref", real=True)
-    rate = law.rate
+def law_expression(law: CreepLaw) -> sympy.Expr:
+    """The rate of a law with the symbols R and T_ref in its Arrhenius factors."""
+    (R, T_ref), rate = parameters("R T_ref"), law.rate
     for exponential in rate.atoms(sympy.exp):
         for part in sympy.Add.make_args(exponential.args[0]):
             if found := arrhenius_exponent(part):
                 rate = rate.subs(part, -found.Q / R * (1 / temperature - 1 / T_ref))
-    return rate.subs({law.symbol(str(name)): value for name, value in values.items()})
+    return rate

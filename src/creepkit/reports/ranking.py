@@ -18,15 +18,7 @@ from creepkit.reports.answer import titled_law
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
 from creepkit.reports.compared_values import judged_readings, misfit_of
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
-from creepkit.reports.figures import (
-    empty_figure,
-    logarithmic_labels,
-    panel_grid,
-    power_of_ten,
-    save_figure,
-    shortened,
-    wrapped,
-)
+from creepkit.reports.figures import empty_figure, logarithmic_labels, panel_grid, power_of_ten, shortened, wrapped
 from creepkit.reports.identification import scatter_of_rates
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
 from creepkit.reports.json_values import fields_to_json
@@ -234,7 +226,7 @@ COMMON_RATE_MISFIT = "mean square misfit of each law in each test over noise², 
 """Of identifications without their tests."""
 
 
-def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
+def ranking_figure(ranking: Ranking) -> Figure:
     """Draw the misfit of each law in each test, and the curves of the laws that tests do not tell apart.
 
     The misfit is that of `misfits`; the title is the verdict.
@@ -246,7 +238,7 @@ def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
     heights, width = [2.0 + 0.42 * len(ranking.laws), *([3.0 * -(-len(shown) // 3)] if shown else [])], 12.5
     figure = empty_figure(width, sum(heights) + 0.7)
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-    _draw_misfits(parts[0], ranking)
+    draw_misfits(parts[0].subplots(), ranking)
     if shown:
         panels = panel_grid(len(shown), 3, 0.0, 0.0, part=parts[1])[1]
         for axes, test in zip(panels, shown, strict=True):
@@ -255,7 +247,7 @@ def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
         title = "credible laws with their 95 % bands; of many tests those in which they differ most"
         parts[1].legend(panels[0].lines, names, loc="outside lower center", ncols=3, fontsize=8, title=title)
     figure.suptitle(wrapped(ranking.verdict, width), fontsize=10)
-    return save_figure(figure, path)
+    return figure
 
 
 # ---- misfits and weights ---------------------------------------------------------------------------------------------
@@ -282,11 +274,12 @@ def misfits(ranking: Ranking) -> Floats:
     return np.array([[misfit_of(test) for test in ranked.fit.tests] for ranked in ranking.laws])
 
 
-def _draw_misfits(part: Any, ranking: Ranking) -> None:
+def draw_misfits(axes: Axes, ranking: Ranking) -> None:
+    """The misfit of each law in each test, as colours."""
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import NullLocator
 
-    axes, best = part.subplots(), ranking.best
+    best = ranking.best
     order = _columns(best)
     values = misfits(ranking)[:, order]
     finite = values[np.isfinite(values) & (values > 0)]
@@ -304,7 +297,7 @@ def _draw_misfits(part: Any, ranking: Ranking) -> None:
         colour = "white" if norm(value) > 0.7 else "black"
         axes.text(column, row, _number(value), ha="center", va="center", fontsize=7.5, color=colour)
     extend = "max" if (finite > labels[-1]).any() else "neither"
-    bar = part.colorbar(image, ax=axes, label="misfit / noise²", pad=0.01, aspect=12, extend=extend)
+    bar = axes.figure.colorbar(image, ax=axes, label="misfit / noise²", pad=0.01, aspect=12, extend=extend)
     bar.set_ticks(list(labels), labels=[_number(v) for v in labels])
     bar.ax.yaxis.set_minor_locator(NullLocator())
     judged = best.adequacy is None or best.adequacy.outputs

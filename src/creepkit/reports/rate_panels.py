@@ -242,10 +242,21 @@ WIDTH, ROW, LARGEST = 8.6, 0.17, 11.0
 """Inches of the figure, of a material in it, and of its height at most."""
 
 
+def plate_size(materials: int) -> tuple[float, float]:
+    """Inches of the map of so many materials."""
+    return WIDTH, min(1.4 + ROW * max(materials, 12), LARGEST)
+
+
 def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
+    """The map of a plate alone, see draw_plate."""
+    figure, axes = panels_of(*plate_size(len(fits)))
+    draw_plate(axes, fits)
+    return figure
+
+
+def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
     """Rates in %/h with 95 % intervals at the median stress of all; fits : (material, best law), in the order drawn."""
     stress = float(np.median([fit.reference.stress for _, fit in fits]))
-    figure, axes = panels_of(WIDTH, min(1.4 + ROW * max(len(fits), 12), LARGEST))
     laws = list(dict.fromkeys(fit.law.name for _, fit in fits))
     colours = dict(zip(laws, distinct_colours(len(laws)), strict=True))
     rates = np.array([[float(v) for v in fit.rate(stress, warn=False)] for _, fit in fits])
@@ -271,4 +282,3 @@ def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
     axes.set_ylim(len(fits) - 0.5, -0.5)
     axes.set(xlabel=f"creep rate at {stress:.3g} MPa, %/h")
     place_legend_right(axes, "law; open:\ncontradicted\nby its tests")
-    return figure

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
-from creepkit.reports.figures import draw_parity, empty_figure, save_figure, span, wrapped
+from creepkit.reports.figures import draw_parity, empty_figure, span, wrapped
 from creepkit.reports.json_values import fields_to_json
 from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
@@ -232,7 +231,7 @@ LONGEST_HOURS = 1e5
 """Up to which isotherms are drawn at least."""
 
 
-def rupture_figure(assessment: RuptureAssessment, path: str | Path | None = None) -> Figure:
+def rupture_figure(assessment: RuptureAssessment) -> Figure:
     """Isotherms of the average of methods beside its best method's master curve and predicted times.
 
     Broken lines are beyond the stresses tested, the shaded part of the time axis beyond three times the longest test.
@@ -245,13 +244,13 @@ def rupture_figure(assessment: RuptureAssessment, path: str | Path | None = None
         figure.add_subplot(grid[1, 1]),
     )
     colours = _colours(assessment)
-    _draw_isotherms(isotherms, assessment, colours)
+    draw_isotherms(isotherms, assessment)
     _draw_master_curve(master, assessment, colours)
     _draw_predicted(compared, assessment, colours)
     handles, labels = isotherms.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 6), fontsize=8)
     figure.suptitle(wrapped(assessment.verdict, 12.5), fontsize=10)
-    return save_figure(figure, path)
+    return figure
 
 
 def _colours(assessment: RuptureAssessment) -> dict[float, Any]:
@@ -270,8 +269,9 @@ def _draw_tests(axes: Axes, tests: RuptureTests, x: Floats, y: Floats, colours: 
         axes.plot(x[k], y[k], ls="", marker=marker, ms=ms, color=colours[T], mec=edge, mew=0.4, zorder=5)
 
 
-def _draw_isotherms(axes: Axes, assessment: RuptureAssessment, colours: dict[float, Any]) -> None:
-    tests = assessment.tests
+def draw_isotherms(axes: Axes, assessment: RuptureAssessment) -> None:
+    """Isotherms with their bounds, and the tests."""
+    colours, tests = _colours(assessment), assessment.tests
     longest = 10.0 ** float(tests.log_time.max())
     hours = 10.0 ** float(tests.log_time.min()) / 2.0, max(3.0 * LONGEST_EXTRAPOLATION * longest, LONGEST_HOURS)
     stresses = 0.6 * float(tests.stress.min()), 1.3 * float(tests.stress.max())

@@ -10,8 +10,8 @@ import numpy as np
 
 from creepkit.errors import FitError
 from creepkit.reports.blocks import aligned
-from creepkit.reports.figures import make_folder, panels_of, save_figure
-from creepkit.reports.rate_panels import plate_figure
+from creepkit.reports.figures import empty_figure, place_legend_right
+from creepkit.reports.rate_panels import draw_plate, plate_size
 from creepkit.reports.terminal import print_json, print_table, tell
 from creepkit.screening.results import (
     COMPARISON_STRESS,
@@ -22,8 +22,10 @@ from creepkit.screening.results import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from creepkit.inverse.identification import Identification
     from creepkit.screening.results import ScreeningResult
 
 
@@ -84,20 +86,33 @@ def _failure_text(alloy: str, failure: str) -> str:
     return failure if f"'{alloy}'" in failure else f"alloy '{alloy}': {failure}"
 
 
-def plot_screening(plate: ScreeningResult, folder: Path) -> list[Path]:
-    """Write laws.png, the share of each law by class, and rates.png, the rate of each alloy; their paths."""
+LAWS_HEIGHT = 4.4
+"""Inches, of the panel of laws by class."""
+
+
+def screening_figure(plate: ScreeningResult) -> Figure:
+    """The share of each law by class, and below it the rate of each alloy by its best law."""
+    size = plate_size(len(_best_of_alloys(plate)))
+    figure = empty_figure(size[0], LAWS_HEIGHT + size[1])
+    laws, rates = figure.subplots(2, 1, height_ratios=(LAWS_HEIGHT, size[1]))
+    _draw_law_fractions(laws, plate)
+    draw_rates_of_alloys(rates, plate)
+    return figure
+
+
+def draw_rates_of_alloys(axes: Axes, plate: ScreeningResult) -> None:
+    """The rate of each alloy at one stress by its best law."""
+    draw_plate(axes, _best_of_alloys(plate))
+
+
+def _best_of_alloys(plate: ScreeningResult) -> list[tuple[str, Identification]]:
     if not plate.identified:
         raise FitError("no alloy of this plate has a law, so there is nothing to draw; see Plate.failed")
-    make_folder(folder, FitError)
-    rates = plate_figure([(one.alloy, one.best) for one in plate.identified])
-    for name, figure in {"laws.png": _plot_law_fractions(plate), "rates.png": rates}.items():
-        save_figure(figure, folder / name, FitError)
-    return [folder / "laws.png", folder / "rates.png"]
+    return [(one.alloy, one.best) for one in plate.identified]
 
 
-def _plot_law_fractions(plate: ScreeningResult) -> Figure:
+def _draw_law_fractions(axes: Axes, plate: ScreeningResult) -> None:
     """Share of each law by class (Fig. 7c): full colour where decisive, hatched what is shared out between laws."""
-    figure, axes = panels_of(7.2, 4.4)
     classes = plate.by_class()
     bottom, positions = np.zeros(len(classes)), range(len(classes))
     for k, law in enumerate(sorted({w.fit.law.name for a in plate.identified for w in a.laws})):
@@ -110,8 +125,7 @@ def _plot_law_fractions(plate: ScreeningResult) -> Figure:
     axes.set_xticks(positions, [f"{name}\n{len(m)} alloy{'s' if len(m) > 1 else ''}" for name, m in classes.items()])
     axes.set(ylim=(0, 1), xlim=(-0.6, max(len(classes), 3) - 0.4), ylabel="share of alloys")
     axes.set_title("identified laws by class; hatched: shared out by weight where not decisive", fontsize=10)
-    figure.legend(loc="outside lower center", ncols=4, fontsize=8)
-    return figure
+    place_legend_right(axes)
 
 
 def _law_fraction(members: tuple[AlloyResult, ...], law: str, decisive: bool) -> float:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, outline
 from creepkit.records import Status
 from creepkit.records.units import time_text
@@ -59,7 +58,7 @@ def section_figure(run: BulgeRun, time: float | None, name: str, path: str | Pat
     axes.set(aspect="equal", xlabel="r, mm", ylabel="z, mm")
     axes.set_title(f"{run.name}: {time_text(time)}, {pressure:.3g} MPa (dashed: at rest)", fontsize=10)
     axes.spines[["top", "right"]].set_visible(False)
-    return save_figure(figure, path, SolveError)
+    return save_figure(figure, path)
 
 
 def _at_nodes(values: Floats, elements: Ints, count: int) -> Floats:

@@ -53,7 +53,7 @@ def training_curves(metadata: SurrogateMetadata, path: str | Path | None = None)
     axes.set(xlabel="epoch", ylabel="loss", title=f"{metadata.law.name}, {metadata.specimen.name}")
     span(axes, "y", *(curves[name] for name in drawn), logarithmic=True, most=8)
     place_legend_below(figure, axes)
-    return save_figure(figure, path, SurrogateError)
+    return save_figure(figure, path)
 
 
 def parity_figure(comparison: PredictionComparison, times: Sequence[float], path: str | Path | None = None) -> Figure:
@@ -75,7 +75,7 @@ def parity_figure(comparison: PredictionComparison, times: Sequence[float], path
             r_squared = 1.0 - ((predicted - true) ** 2).sum() / spread
             axes.text(0.04, 0.96, f"R2 {r_squared:.4f}", va="top", fontsize=8, transform=axes.transAxes)
     figure.suptitle(f"{len(comparison.true)} samples, predicted against simulated", fontsize=10)
-    return save_figure(figure, path, SurrogateError)
+    return save_figure(figure, path)
 
 
 ERROR_COLUMNS = ("rse", "mse", "mae", "r2", "largest_median", "largest_p95")
@@ -104,7 +104,7 @@ def _number_text(value: float | None) -> str:
 
 def write_surrogate_figures(surrogate: Surrogate, data: Dataset, folder: Path, name: str) -> list[Path]:
     """Draw the curves and the parity plot; returns their paths."""
-    make_folder(folder, SurrogateError)
+    make_folder(folder)
     paths = [folder / f"{name}-{what}.png" for what in ("curves", "parity")]
     evaluation = evaluate(surrogate, data)
     training_curves(surrogate.metadata, paths[0])

@@ -15,9 +15,10 @@ from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, 
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import equations, unit_text, value_cells
 from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, Verbatim, as_text
-from creepkit.reports.figures import panel_grid, place_legend_right, save_figure, span
+from creepkit.reports.figures import panel_grid, place_legend_right, span
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from creepkit.discovery.combinations import FormWeight
@@ -34,24 +35,23 @@ MIN_WEIGHT_SHOWN = 0.02
 """Combinations of less weight are not drawn, but those that a parameter's set names."""
 
 
-def plot_temperature_law(temperature_law: TemperatureLaw, path: str | Path | None = None) -> Figure:
+def temperature_law_figure(temperature_law: TemperatureLaw) -> Figure:
     """One panel a parameter: estimates with 95 % intervals, and curves; a coefficient is shown by its rate.
 
     The rate is that at the reference stress: coefficients themselves move with their exponents.
     """
-    coordinates = Coordinates(temperature_law.isothermal_law, temperature_law.isothermal_estimates.reference)
-    names = temperature_law.isothermal_law.names
-    figure, panels = panel_grid(len(names), MAX_PANELS_PER_ROW, 5.2, 3.7)
-    for k, (name, axes) in enumerate(zip(names, panels, strict=True)):
-        _plot_parameter(axes, temperature_law, coordinates, k)
-        axes.set_title(_panel_title(temperature_law, coordinates, k, name), fontsize=9)
+    figure, panels = panel_grid(len(temperature_law.isothermal_law.names), MAX_PANELS_PER_ROW, 5.2, 3.7)
+    for k, axes in enumerate(panels):
+        draw_parameter(axes, temperature_law, k)
     title = temperature_law.law.title or temperature_law.law.name
     figure.suptitle(f"{title}, judged by the {temperature_law.criterion_data}", fontsize=10)
-    return save_figure(figure, path)
+    return figure
 
 
-def _plot_parameter(axes: Any, temperature_law: TemperatureLaw, coordinates: Coordinates, k: int) -> None:
+def draw_parameter(axes: Axes, temperature_law: TemperatureLaw, k: int = 0) -> None:
+    """A parameter of the law, by its position, over temperature."""
     law, estimates = temperature_law.isothermal_law, temperature_law.isothermal_estimates
+    coordinates = Coordinates(law, estimates.reference)
     name, is_rate = law.names[k], k in coordinates.coefficients
     scale = 1 / np.log(10.0) if is_rate or law.table[name].scale == "log" else 1.0
 
@@ -88,6 +88,7 @@ def _plot_parameter(axes: Any, temperature_law: TemperatureLaw, coordinates: Coo
     span(axes, "x", T[0] - beyond, T[-1] + beyond)
     span(axes, "y", lowest - margin, highest + margin, most=8)
     axes.set(xlabel="temperature, K")
+    axes.set_title(_panel_title(temperature_law, coordinates, k, name), fontsize=9)
     place_legend_right(axes, "form, weight", size=7)
 
 
@@ -151,7 +152,7 @@ def law_blocks(law: TemperatureLaw, figures: PageFigures | None = None, of: str 
     blocks.append(Table("values of the temperature law", columns, rows, numeric=(1, 2)))
     if figures is not None:
         picture = figures.picture(
-            lambda: plot_temperature_law(law),
+            lambda: temperature_law_figure(law),
             f"Parameters over temperature{of}",
             f"Isothermal estimates with 95 % intervals at {count} temperatures from {celsius_text(low, high)}, and the "
             f"curves of the forms that remain. Best forms: {chosen}.",

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +21,8 @@ from creepkit.files.record_codec import ANY_NUMBER, NumberRange, RecordCodec, Re
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.limits import PROBABILITY, SEED, Limits, numbers
 from creepkit.options import CELSIUS, Options, option
-from creepkit.presentation import Presentable, present
 from creepkit.records import SECONDS_PER_HOUR
+from creepkit.records.presentable import Plotted, Presentable, Tabulated
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.checks import AssessmentCheck
 from creepkit.rupture_assessment.fitting import MinimumRateRelation
@@ -38,9 +38,6 @@ from creepkit.rupture_assessment.strength import (
     mixed,
     strength_estimates,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 AVERAGE = "average"
 """Name of the average over all ranked methods by their weights."""
@@ -123,7 +120,7 @@ class RankedRuptureFit:
 
 
 @dataclass(frozen=True, eq=False)
-class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
+class RuptureAssessment(Presentable, Plotted, Tabulated):
     """The result of rupture().
 
     ranked : methods, each with every degree that was tried, the highest weight first. rejected : {method: why it is
@@ -279,13 +276,19 @@ class RuptureAssessment(Presentable, text="reports.rupture:rupture_text"):
         median, low, high = (SECONDS_PER_HOUR * power_of_ten(curve[0]) for curve in curves)
         return median, low, high
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Isotherms with tests and bounds, the master curve, and predicted against measured times."""
-        return present("reports.rupture:rupture_figure", self, path)
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.rupture import draw_isotherms, rupture_figure
+
+        return rupture_figure, draw_isotherms
 
     def save(self, path: str | Path) -> Path:
         """Write the assessment to a JSON file."""
-        return present("rupture_assessment.assessment:write_assessment", self, path)
+        return write_assessment(self, path)
+
+    def __str__(self) -> str:
+        from creepkit.reports.rupture import rupture_text
+
+        return rupture_text(self)
 
 
 ISOTHERMAL_TOLERANCE = 5.0

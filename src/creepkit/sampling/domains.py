@@ -26,8 +26,8 @@ from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.language import CreepLaw, temperature
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import POINT_VARIABLES
-from creepkit.presentation import Presentable
 from creepkit.records import Specimen, Status
+from creepkit.records.presentable import Presentable
 from creepkit.sampling.coefficients import (
     draw_stress_scales,
     solve_coefficients,
@@ -429,7 +429,7 @@ DEFAULT_DRAWS = 4096
 
 
 @dataclass(frozen=True, eq=False)
-class Acceptance(Presentable, text="reports.dataset:acceptance_text"):
+class Acceptance(Presentable):
     """What is known of a design without simulating it.
 
     draws : rows of the design. criteria_met : {criterion before simulation: (rows,) whether it is met on its own}.
@@ -458,6 +458,11 @@ class Acceptance(Presentable, text="reports.dataset:acceptance_text"):
         """
         in_range = (self.log10_strains >= self.useful_strains[:, 0]) & (self.log10_strains <= self.useful_strains[:, 1])
         return np.asarray(self.kept & in_range)
+
+    def __str__(self) -> str:
+        from creepkit.reports.dataset import acceptance_text
+
+        return acceptance_text(self)
 
 
 def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0) -> Acceptance:

@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,8 +27,8 @@ from creepkit.inverse.identification_document import CODEC as FIT_CODEC
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
 from creepkit.inverse.selection import CREDIBLE_WEIGHT
 from creepkit.inverse.selection.ranking import RankedLaw
-from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor
+from creepkit.records.presentable import Plotted, Presentable
 from creepkit.screening.alloys import UNKNOWN_CLASS, Alloy, Compositions
 
 """{output: (frames,) mm or strain} of one test."""
@@ -94,7 +95,7 @@ def mean_chi_square(fit: Identification) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class ScreeningResult(Presentable, text="reports.screening:screening_text"):
+class ScreeningResult(Presentable, Plotted):
     """The result of screen().
 
     results : one for each alloy, in the order of their first tests. histories : {alloy: its tests}.
@@ -167,11 +168,17 @@ class ScreeningResult(Presentable, text="reports.screening:screening_text"):
 
     def to_csv(self, path: str | Path) -> Path:
         """Write one row an alloy: class, law, weight, values with intervals, rate, misfits, notes."""
-        return present("screening.results:write_csv", self, Path(path))
+        return write_csv(self, Path(path))
 
-    def plot(self, folder: str | Path) -> list[Path]:
-        """Draw the share of each law by class, and the rate of each alloy by its law; the paths of the pictures."""
-        return present("reports.screening:plot_screening", self, Path(folder))
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.screening import draw_rates_of_alloys, screening_figure
+
+        return screening_figure, draw_rates_of_alloys
+
+    def __str__(self) -> str:
+        from creepkit.reports.screening import screening_text
+
+        return screening_text(self)
 
 
 ALLOY_RESULT = DocumentFormat(

@@ -10,8 +10,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
-from creepkit.presentation import Presentable
 from creepkit.records import History, Status
+from creepkit.records.presentable import Presentable
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw, Elastic
@@ -21,7 +21,7 @@ _RunType = TypeVar("_RunType", bound="Run")
 
 
 @dataclass(frozen=True, eq=False)
-class Run(Presentable, History, text="reports.simulation:run_text"):
+class Run(Presentable, History):
     """A simulated test up to where it ended: the times asked for that were reached, and the outputs there.
 
     status : how it ended; end_time : s, where; reason : why, in words (empty when complete).
@@ -31,6 +31,16 @@ class Run(Presentable, History, text="reports.simulation:run_text"):
     status: Status = Status.COMPLETE
     end_time: float = 0.0
     reason: str = ""
+
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.histories import draw_history, run_figure
+
+        return run_figure, draw_history
+
+    def __str__(self) -> str:
+        from creepkit.reports.simulation import run_text
+
+        return run_text(self)
 
 
 def run_from_outputs(

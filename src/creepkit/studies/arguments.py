@@ -8,19 +8,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.api.options import PlannedTestOptions, elastic_of
 from creepkit.errors import FitError, SurrogateError, nearest, quoted
 from creepkit.experiments.design_task import GoalOptions
 from creepkit.experiments.rig import Rig, changed_rigs
 from creepkit.forecasts.planned_tests import (
     COMPONENTS,
+    PlannedTestOptions,
     load_of_components,
     needs_modulus,
     planned_history,
     stepped_load,
 )
 from creepkit.inverse.candidate_laws import LawChanges
-from creepkit.language import temperature
+from creepkit.language import elastic_of, temperature
 from creepkit.options import values_of_table
 from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, cast
 
 from creepkit.api.extraction import WATCHED, ImposedChannels, extract_as_described, history_of, imposed_on, operator_of
-from creepkit.api.options import elastic_of
 from creepkit.cameras.sequences import in_order
 from creepkit.errors import HistoryError, StudyError, nearest
 from creepkit.extraction import Extraction
@@ -24,6 +23,7 @@ from creepkit.forecasts.planned_tests import stepped_load
 from creepkit.instruments.imposed import Imposed
 from creepkit.instruments.reading_options import RecordOptions
 from creepkit.inverse.fingerprints import predictor_fingerprint
+from creepkit.language import elastic_of
 from creepkit.options import values_of_table
 from creepkit.records import ZERO_CELSIUS, History, Loading, Nuisance, Specimen, dimensions_of, loads_of
 from creepkit.registry.reading import frame_files

@@ -82,6 +82,12 @@ class StudyResult:
         tests = f"{len(self.histories)} tests; stages: {states or 'none'}"
         return f"StudyResult '{self.title}': {tests}; report: {self.report or 'none'}"
 
+    def _repr_html_(self) -> str:
+        """For notebooks: the answers, as its report has them."""
+        from creepkit.reports.html.notebook import notebook_html
+
+        return notebook_html(self.report_contents())
+
     @property
     def title(self) -> str:
         """Of the study."""

@@ -9,17 +9,18 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import creepkit as ck
-from creepkit.api.options import ExportOptions, ForecastOptions, elastic_of
 from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.errors import CreepkitError, StudyError
+from creepkit.exporters.exporting import ExportOptions
 from creepkit.files.record_codec import record_to_json
 from creepkit.files.writing import hashed_stem
+from creepkit.forecasts.planned_tests import ForecastOptions
 from creepkit.inverse.fingerprints import predictor_fingerprint, short_hash
 from creepkit.inverse.kept_fits import history_digest
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.search_options import SearchOptions
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.language import temperature
+from creepkit.language import elastic_of, temperature
 from creepkit.options import values_of_table
 from creepkit.quality import DataQuality
 from creepkit.records import ZERO_CELSIUS, History, Nuisance, known_specimens
@@ -278,7 +279,7 @@ def _forecast_stage(study: StageInputs, number: int) -> Stage:
     """The forecast of this number in the study file."""
     from creepkit.forecasts.forecast import Forecast
 
-    file, place, measured = study.file, ("forecast", number), []
+    file, place, measured = study.file, ("forecast", number), list[History]()
     part = file.model.forecast[number]
     check_forecast(file, number)
     groups = study.groups_of(place, part.group)

@@ -123,7 +123,7 @@ class Study:
         *,
         to: str | Path | None = None,
         only: str | Sequence[str] | None = None,
-        force: bool = False,
+        again: bool = False,
         locked: bool = False,
         progress: ProgressCallback | None = None,
     ) -> StudyResult:
@@ -131,8 +131,9 @@ class Study:
 
         to : folder for results, lock, exports and report; by default that of the study file.
         only : kinds of stages, such as "identification", which are carried out with those that they need.
-        force : make everything again, and overwrite files of the names of exports and report. locked : StudyError where
-        anything differs from the study.lock that is there. progress : called as progress(task, done, total, note).
+        again : make everything again. locked : StudyError where anything differs from the study.lock that is there.
+        progress : called as progress(task, done, total, note). Files of the names of exports and report that creepkit
+        did not write are replaced within `with ck.overwriting():` alone.
 
         A stage that fails leaves the others; `failures` of the result, and the report, say what is missing. Raises
         StudyError for an unknown stage, for files that cannot be read or written, and for a study that is running.
@@ -144,10 +145,10 @@ class Study:
         folder = self.path.parent if to is None else Path(to)
         kept = ResultFolder(folder / f"{self.path.stem}.results")
         with running_alone(kept.folder):
-            if force:
+            if again:
                 kept.clear()
             run = _Run(self, folder, kept, progress or (lambda task, done, total, note: None))
-            return run.result(kinds, force=force, locked=locked)
+            return run.result(kinds, locked=locked)
 
     def report_contents(self) -> ReportContents:
         """What ck.report(study) shows: the study is carried out, or read where nothing changed."""
@@ -167,7 +168,7 @@ class _Run:
     def lock_path(self) -> Path:
         return self.folder / f"{self.study.path.stem}.lock"
 
-    def result(self, kinds: Sequence[str], *, force: bool, locked: bool) -> StudyResult:
+    def result(self, kinds: Sequence[str], *, locked: bool) -> StudyResult:
         file, cameras = self.study.file, self.study.cameras
         self.progress("reading", 0, 1, "")
         before, files = read_lock(self.lock_path), self.input_files()
@@ -183,7 +184,7 @@ class _Run:
         self.progress("reading", 1, 1, f"{len(inputs.histories)} tests in {len(files)} files")
         stages, execution.histories = stages_of(StageInputs(file, inputs, priors)), inputs.histories
         wanted = needed_stages(stages, kinds)
-        self.check_exports([stage for stage in stages if stage.name in wanted], force=force)
+        self.check_exports([stage for stage in stages if stage.name in wanted])
         execution.run(stages, wanted, read_others="report" in kinds)
         if before is not None:
             changes += changed_results(before, execution.records)
@@ -209,9 +210,9 @@ class _Run:
         self.kept.write_identified(result.identified)
         for stage in stages:
             if stage.file and stage.name in execution.results:
-                write_text(execution.results[stage.name].text, self.folder / stage.file, StudyError, force=force)
+                write_text(execution.results[stage.name].text, self.folder / stage.file, StudyError)
         asked = file.model.report is not None and "report" in kinds
-        return self.with_page(result, file.model.report.file, force=force) if asked and file.model.report else result
+        return self.with_page(result, file.model.report.file) if asked and file.model.report else result
 
     def input_files(self) -> list[InputFile]:
         """All data files, those of cameras and forecasts included, without what the study itself writes."""
@@ -230,13 +231,13 @@ class _Run:
             what = f"the study cannot be repeated exactly: {changes[0]}; leave --locked out"
             raise StudyError(f"{self.lock_path}: {what}")
 
-    def check_exports(self, stages: Sequence[Stage], *, force: bool) -> None:
+    def check_exports(self, stages: Sequence[Stage]) -> None:
         """StudyError, before all the work, for exports that could not be written."""
         for stage in stages:
             if stage.file:
-                check_target(self.folder / stage.file, StudyError, force=force)
+                check_target(self.folder / stage.file, StudyError)
 
-    def with_page(self, result: StudyResult, name: str, *, force: bool) -> StudyResult:
+    def with_page(self, result: StudyResult, name: str) -> StudyResult:
         """The result with its report written, unless the same one is there; one that cannot be is a failed stage."""
         from creepkit.reports import html
 
@@ -247,7 +248,7 @@ class _Run:
         if not path.is_file() or self.kept.load("report", key) != sha256_of(path, DATA_FILE):
             self.progress("report", 0, 1, "")
             try:
-                write_text(html.report_html(result.report_contents()), path, StudyError, force=force)
+                write_text(html.report_html(result.report_contents()), path, StudyError)
                 self.kept.save("report", key, sha256_of(path, DATA_FILE))
                 state = "made"
                 self.progress("report", 1, 1, str(path))

@@ -11,11 +11,12 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
-from creepkit.api.options import ExportOptions, ForecastOptions, PlannedTestOptions
 from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.experiments.design_task import GoalOptions
 from creepkit.experiments.rig import Rig
+from creepkit.exporters.exporting import ExportOptions
 from creepkit.extraction.options import ClockOptions, ExtractionOptions
+from creepkit.forecasts.planned_tests import ForecastOptions, PlannedTestOptions
 from creepkit.instruments.reading_options import RecordOptions
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.search_options import SearchOptions

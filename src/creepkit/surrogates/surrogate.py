@@ -19,7 +19,6 @@ from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, ValueCodec
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
-from creepkit.presentation import Presentable
 from creepkit.records import (
     History,
     HistoryPrediction,
@@ -34,6 +33,7 @@ from creepkit.records import (
     outputs_of,
     unpredicted,
 )
+from creepkit.records.presentable import Presentable
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid, specimen_conditions
 from creepkit.surrogates.network_evaluation import SampleArrays, Weights
@@ -228,7 +228,7 @@ class NetworkQuery:
         return directions
 
 
-class Surrogate(Predictor, Presentable, text="reports.surrogate:surrogate_text"):
+class Surrogate(Predictor, Presentable):
     """A trained network in the place of a specimen; a records.Predictor.
 
     It predicts at the frames of its training, and between them linearly in time. recipe, weights, metadata : what it
@@ -387,6 +387,11 @@ class Surrogate(Predictor, Presentable, text="reports.surrogate:surrogate_text")
             jacobian=jacobian,
             nuisance_jacobian=nuisance_jacobian,
         )
+
+    def __str__(self) -> str:
+        from creepkit.reports.surrogate import surrogate_text
+
+        return surrogate_text(self)
 
 
 def reduced_order_models() -> dict[str, Predictor]:

@@ -21,16 +21,7 @@ from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
 from creepkit.kernels.lowering import lower
 from creepkit.language.law import CreepLaw
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
-from creepkit.records import (
-    CameraFormat,
-    Exporter,
-    History,
-    InstrumentFormat,
-    Predictor,
-    Reader,
-    Specimen,
-    remember_specimen,
-)
+from creepkit.records import CameraFormat, Exporter, History, InstrumentFormat, Predictor, Reader, Specimen
 from creepkit.registry import Plugin, default_registry, kinds
 from creepkit.testing import (
     camera_checks,
@@ -121,7 +112,7 @@ def check_specimen(
     histories : tests to check it with, of different lengths; by default planned from its loads and conditions.
     law, values : by default Norton's law with an activation energy, at a creep strain of half a per cent.
     """
-    remember_specimen(specimen)
+    default_registry().remember(specimen)
     return _predictor_report(specimen, histories, law, values, "specimen")
 
 

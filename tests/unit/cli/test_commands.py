@@ -205,7 +205,7 @@ SENSELESS = [
     (f"{NORTON} --specimen point --stress 80", "--stress 80: name the component, such as 11=80"),
     (
         f"{NORTON} --specimen uniaxial --stress 11=80",
-        "11=80 names a component, which --specimen uniaxial has not; give --specimen",
+        "11 is a component of stress, which --specimen uniaxial has not; give --specimen",
     ),
     (
         f"{NORTON} --stress 80 --temperature-c 1800:500",
@@ -215,14 +215,11 @@ SENSELESS = [
     (DIMPLE, "specimen 'bulge' needs a pressure: give --pressure, such as 9"),
     (f"{NORTON} --specimen bulge --pressure 8", "specimen 'bulge' needs a modulus: give --modulus-gpa, such as 150"),
     (f"{DIMPLE} --pressure 8 --set n=4", "--set A=5e-13 n=3 n=4: n is given twice; keep one of them"),
-    (f"{DIMPLE} --pressure -8", "--pressure -8: the first pressure starts at 0 s, none is negative, and each"),
+    (f"{DIMPLE} --pressure -8", "--pressure: the first pressure starts at 0 s, none is negative, and each"),
     (f"{DIMPLE} --pressure 8 --pressure 2:9", "comes 5 s or more after the one before"),
-    (f"{DIMPLE} --pressure high", "--pressure high: write a number, or SECONDS:NUMBER for a later step"),
-    (
-        f"{DIMPLE} --pressure 8 --thicknes 1",
-        "there is no option --thicknes; --specimen bulge takes --pressure, --apex-thickness",
-    ),
-    (f"{DIMPLE} --pressure 8 --apex-thickness thick", "--apex-thickness thick: write a number"),
+    (f"{DIMPLE} --pressure high", "--pressure high is not known; write [S:]NUMBER"),
+    (f"{DIMPLE} --load force=8", "there is no option --load force; --specimen bulge takes --pressure, --apex"),
+    (f"{DIMPLE} --pressure 8 --apex-thickness thick", "--apex-thickness thick is not known; write [S:]NUMBER"),
     (
         f"{DIMPLE} --pressure 8 --every 60 --points 9",
         "--points and --every both say when frames are taken; give one of them",

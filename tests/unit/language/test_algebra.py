@@ -341,6 +341,9 @@ def test_laws_are_summed_multiplied_and_written_with_values_as_expressions_are()
     assert (2 * NORTON).rate == 2 * NORTON.rate
     warm = NORTON.times(arrhenius(T_REF))
     Q, R, T, T_ref = (*sympy.symbols("Q R", real=True), ck.temperature, sympy.Symbol("T_ref", real=True))
-    shown = warm.expression({"A": 3.0, warm.symbol("n"): 5})
+    shown = warm.expr.subs({"A": 3.0, sympy.Symbol("n"): 5})
+    assert warm.rate.subs({"A": 3.0, warm.symbol("n"): 5}).free_symbols == {Q, T, stress}
+    assert STRAIN_HARDENING.fix(m=0) == NORTON != NORTON.with_bounds(n=(3, 5))
+    assert hash(STRAIN_HARDENING.fix(m=0)) == hash(NORTON)
     assert sympy.simplify(shown - 3.0 * stress**5 * sympy.exp(-Q / R * (1 / T - 1 / T_ref))) == 0
     assert r"^{n_\infty + " in DRIFTING_EXPONENT.latex()  # what is added before what is taken away

@@ -14,7 +14,7 @@ import pytest
 import sympy
 
 import creepkit as ck
-from creepkit.errors import ReportError
+from creepkit.errors import HistoryError, ReportError
 from creepkit.exporters.documents import equations_in_latex, law_equations
 from creepkit.inverse.identify import identify
 from creepkit.inverse.perturbation import Perturbation, combined_change_text
@@ -23,6 +23,7 @@ from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
+from creepkit.records import Histories
 from creepkit.reports.answer import cautions, interval_digits, key_figures
 from creepkit.reports.blocks import number, typeset
 from creepkit.reports.compared_values import judged_readings
@@ -183,10 +184,11 @@ def test_the_verb_takes_results_and_keeps_existing_files(tmp_path: Path) -> None
 def test_a_record_is_one_line_and_a_cell_of_html() -> None:
     found = ranking()
     fit = found.best
-    for record in (found, fit, fit.histories[0], fit.forecast(fit.histories[0])):
-        assert len(repr(record).splitlines()) == 1
-        assert len(repr(record)) < 300
-    cells = [one._repr_html_() for one in (found, fit, fit.law, fit.histories[0], fit.forecast(fit.histories[0]))]
+    tests = Histories(fit.histories)
+    records = [found, fit, tests[0], fit.forecast(tests[0]), fit.predict(tests)]
+    assert [repr(one) for one in records if len(repr(one)) > 300 or "\n" in repr(one)] == []
+    shown = (found, fit, fit.law, tests[0], fit.forecast(tests[0]), tests, ck.specimen("bulge"))
+    cells = [one._repr_html_() for one in shown]
     for cell in cells:
         html5lib.HTMLParser(strict=True).parseFragment(cell)
         assert "<script" not in cell
@@ -210,9 +212,28 @@ def test_tables_hold_the_numbers() -> None:
     frame = test.to_dataframe()
     np.testing.assert_array_equal(frame["time_s"], test.times)
     np.testing.assert_array_equal(frame["strain"], test.outputs["strain"])
+    again = ck.History.from_dataframe(frame, stress_MPa=50, temperature_C=800, name="bar")
+    np.testing.assert_array_equal(again.outputs["strain"], test.outputs["strain"])
+    assert (again.condition, again.name) == ("800 °C, 50 MPa", "bar")
+    with pytest.raises(HistoryError, match="stress_MPa"):
+        ck.History.from_dataframe(frame, temperature_C=800)
+    assert len(Histories([test, again]).to_dataframe()) == 2 * len(frame)
     forecast = fit.forecast(test).to_dataframe()
     assert (forecast.low <= forecast.value).all()
     assert (forecast.value <= forecast.high).all()
+
+
+def test_a_picture_is_drawn_into_axes_that_are_given() -> None:
+    from matplotlib.figure import Figure
+
+    fit = ranking().best
+    for record in (ranking(), fit, fit.histories[0], Histories(fit.histories), fit.forecast(fit.histories[0])):
+        axes = Figure().subplots()
+        assert record.plot(ax=axes) is axes.figure, record
+        assert axes.lines or axes.images, record
+        assert record.plot().axes[0].has_data(), record
+    with pytest.raises(ReportError, match="ax=ax"):
+        fit.plot(axes)
 
 
 def test_key_figures_are_those_of_the_law() -> None:

@@ -51,7 +51,7 @@ def test_only_what_changed_runs_again(study: Path) -> None:
 
     study.write_text(STUDY.replace("frames = 12", "frames = 11"))
     assert made(ck.Study.load(study).run()) == everything - {"quality"}
-    assert made(ck.Study.load(study).run(only="quality", force=True)) == {"quality"}
+    assert made(ck.Study.load(study).run(only="quality", again=True)) == {"quality"}
 
 
 def test_other_code_of_the_package_makes_results_again_and_the_lock_compares_them(
@@ -168,7 +168,8 @@ def test_files_that_a_study_has_not_written_stay(study: Path, tmp_path: Path) ->
     with pytest.raises(StudyError, match="creepkit did not write it as it is now"):
         ck.Study.load(study).run()
     assert own.read_text() == "changed"
-    assert ck.Study.load(study).run(only="export", force=True).failures == ()
+    with ck.overwriting():
+        assert ck.Study.load(study).run(only="export", again=True).failures == ()
     assert own.read_text() == text
     own.unlink()
     assert made(ck.Study.load(study).run()) == {"quality", "forecast of next"}

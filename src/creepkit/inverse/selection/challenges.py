@@ -35,6 +35,7 @@ from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.selection.perturbation_trials import Challenge, decisive_effects
 from creepkit.inverse.sparsity.term_selection import TermContributions
 from creepkit.language import CreepLaw, Param, stress
+from creepkit.language.symbols import Symbol
 
 SHARE = 0.3
 """Of the rate at the reference point, that must be excluded of other laws."""
@@ -224,7 +225,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
 def above_threshold(best: FittedLaw) -> AlteredLaw:
     """The best law above a threshold stress; CreepkitError where it cannot be fitted."""
     threshold = THRESHOLD * best.problem.coordinates.reference.stress
-    s_0 = sympy.Symbol("s_0_threshold", real=True)
+    s_0 = Symbol("s_0_threshold")
     terms = {label: term.subs(stress, sympy.Max(stress - s_0, 0)) for label, term in best.law.terms.items()}
     param = Param("threshold stress", unit="MPa", bounds=(0.0, 2.0 * threshold))
     law = replace(

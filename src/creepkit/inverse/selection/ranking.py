@@ -33,12 +33,9 @@ from creepkit.inverse.information_criteria import (
     determined_parameters,
 )
 from creepkit.inverse.selection.discrimination import under_common_covariance
-from creepkit.presentation import Presentable, present
+from creepkit.records.presentable import Plotted, Presentable, Tabulated
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from pandas import DataFrame
-
     from creepkit.inverse.adequacy import Adequacy
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.selection.perturbation_trials import Challenge
@@ -60,7 +57,7 @@ class RankedLaw:
 
 
 @dataclass(frozen=True)
-class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="reports.ranking:ranking_text"):
+class Ranking(Presentable, Plotted, Tabulated):
     """Identified laws, best first.
 
     criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.
@@ -77,10 +74,6 @@ class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="r
 
     def __repr__(self) -> str:
         return f"<Ranking: {', '.join(f'{one.fit.law.name} {one.weight:.3f}' for one in self.laws)}>"
-
-    def to_dataframe(self) -> DataFrame:
-        """(laws,) rows of pandas: weight, criterion less that of the best, chi-square and verdict."""
-        return present("reports.dataframes:to_dataframe", self)
 
     @property
     def best(self) -> Identification:
@@ -140,19 +133,37 @@ class Ranking(Presentable, text="reports.answer:ranking_answer_text", details="r
 
     def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:
         """What tests will show, over all laws by their weights; as creepkit.forecast()."""
-        return present("forecasts.forecast:forecast", self, tests, level=level, **options)
+        from creepkit.forecasts.forecast import forecast
+
+        return forecast(self, tests, level=level, **options)
 
     def further_tests(self) -> Any:
         """A Design: tests like those that were made, by how well they would separate the remaining laws."""
-        return present("experiments.design:design", self, goal="law")
+        from creepkit.experiments.design import design
+
+        return design(self, goal="law")
 
     def save(self, path: str | Path) -> Path:
         """Write the ranking as JSON, and each law's identification as LAW.json beside it; load_ranking() reads them."""
-        return present("inverse.ranking_document:write_ranking", self, Path(path))
+        from creepkit.inverse.ranking_document import write_ranking
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Misfits and weights of the laws, and the curves of the credible ones; written to `path` when given."""
-        return present("reports.ranking:ranking_figure", self, path)
+        return write_ranking(self, Path(path))
+
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.ranking import draw_misfits, ranking_figure
+
+        return ranking_figure, draw_misfits
+
+    def __str__(self) -> str:
+        from creepkit.reports.answer import ranking_answer_text
+
+        return ranking_answer_text(self)
+
+    def details(self) -> str:
+        """Everything that there is to say, as text."""
+        from creepkit.reports.ranking import ranking_text
+
+        return ranking_text(self)
 
 
 def verdict_of(ranking: Ranking) -> str:

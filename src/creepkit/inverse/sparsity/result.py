@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from scipy.stats import chi2
 
 from creepkit.inverse.goodness_of_fit import OutputErrors
-from creepkit.presentation import Presentable
+from creepkit.records.presentable import Presentable
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class FitStatistics:
 
 
 @dataclass(frozen=True)
-class Sparsity(Presentable, text="reports.inference:sparsity_text"):
+class Sparsity(Presentable):
     """How a sum was reduced; the terms are those of `law`, the sum.
 
     penalty : "l2" or "subsets". kept_terms, dropped_terms : of the sum.
@@ -83,6 +83,11 @@ class Sparsity(Presentable, text="reports.inference:sparsity_text"):
         )
         verb = "suffices" if len(self.kept_terms) == 1 else "suffice"
         return f"without {dropped} of '{self.law}' {cost}: {_quoted_list(self.kept_terms)} {verb}"
+
+    def __str__(self) -> str:
+        from creepkit.reports.inference import sparsity_text
+
+        return sparsity_text(self)
 
 
 def _quoted_list(names: list[str] | TermNames) -> str:

@@ -18,7 +18,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED
-from creepkit.presentation import Presentable
+from creepkit.records.presentable import Presentable
 from creepkit.records.units import celsius_text
 
 CoordinateSystem = Literal["author", "conditioned"]
@@ -37,7 +37,7 @@ WELL_DETERMINED_SD = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Correlation(Presentable, text="reports.inference:correlation_text"):
+class Correlation(Presentable):
     """The correlation of estimates: matrix (parameters, parameters) -, and sd (parameters,) on the internal scale.
 
     names : as the matrix is to be read, "ln A" where the logarithm is meant, "ln rate" of a conditioned coefficient.
@@ -54,6 +54,11 @@ class Correlation(Presentable, text="reports.inference:correlation_text"):
             if name not in self.names:
                 raise FitError(f"there is no '{name}' in this correlation; it has {', '.join(self.names)}")
         return float(self.matrix[self.names.index(first), self.names.index(second)])
+
+    def __str__(self) -> str:
+        from creepkit.reports.inference import correlation_text
+
+        return correlation_text(self)
 
 
 def correlation(fit: Identification, coordinates: CoordinateSystem = "author") -> Correlation:

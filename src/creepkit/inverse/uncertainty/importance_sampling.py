@@ -36,8 +36,8 @@ from creepkit.inverse.uncertainty.quantities import (
     quantity_of,
 )
 from creepkit.language import CreepLaw
-from creepkit.presentation import Presentable, present
 from creepkit.records import Predictor
+from creepkit.records.presentable import Presentable, Tabulated
 
 ROUNDS, MOST_ROUNDS = 4, 12
 """Of proposals: at least, and where the samples are still worth too few."""
@@ -97,7 +97,7 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
 
 
 @dataclass(frozen=True, eq=False)
-class PosteriorSamples(RateStatements, Presentable, text="reports.inference:posterior_text"):
+class PosteriorSamples(RateStatements, Presentable, Tabulated):
     """Draws of a law's values from their posterior.
 
     u : (draws, parameters) conditioned coordinates of equal weight. ranges : that the tests cover, as of an
@@ -131,9 +131,20 @@ class PosteriorSamples(RateStatements, Presentable, text="reports.inference:post
         median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
         return median, low, high
 
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} = {np.median(draws):.4g}" for name, draws in self.values.items())
+        return f"<PosteriorSamples of {self.coordinates.law.name}: {len(self.u)} draws, medians {values}>"
+
     def to_arviz(self) -> Any:
         """An xarray Dataset for arviz, whose plots and summaries take it: one chain, with units of the parameters."""
-        return present("reports.dataframes:to_arviz", self)
+        from creepkit.reports.dataframes import to_arviz
+
+        return to_arviz(self)
+
+    def __str__(self) -> str:
+        from creepkit.reports.inference import posterior_text
+
+        return posterior_text(self)
 
 
 def sample_posterior(

@@ -25,8 +25,8 @@ from creepkit.inverse.uncertainty.quantities import (
     log_rate,
 )
 from creepkit.language import CreepLaw
-from creepkit.presentation import Presentable, present
 from creepkit.records import History
+from creepkit.records.presentable import Presentable
 
 
 class WeightedLaws(Protocol):
@@ -39,7 +39,7 @@ class WeightedLaws(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class ModelAverage(RateStatements, Presentable, text="reports.inference:model_average_text"):
+class ModelAverage(RateStatements, Presentable):
     """Laws with weights that add up to one, each with its own posterior."""
 
     fits: tuple[Identification, ...]
@@ -73,7 +73,9 @@ class ModelAverage(RateStatements, Presentable, text="reports.inference:model_av
 
     def forecast(self, tests: History | Sequence[History], *, level: float = 0.95, **options: Any) -> Any:
         """What tests will show, over the laws, so that bands hold the doubt about the law; as creepkit.forecast()."""
-        return present("forecasts.forecast:forecast", self, tests, level=level, **options)
+        from creepkit.forecasts.forecast import forecast
+
+        return forecast(self, tests, level=level, **options)
 
     def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
         """Median and 95 % interval over the laws; point : {name: (...,) or None for the best law's reference}."""
@@ -102,6 +104,11 @@ class ModelAverage(RateStatements, Presentable, text="reports.inference:model_av
             misses = [f.misfit_half_widths(g, *at) / NORMAL_QUANTILE for f, g in zip(self.fits, functions, strict=True)]
             scale = np.stack([np.hypot(own, more) for own, more in zip(scale, misses, strict=True)])
         return MixtureDistribution(np.array(self.weights), np.full(len(self.fits), NORMAL_FREEDOM), location, scale)
+
+    def __str__(self) -> str:
+        from creepkit.reports.inference import model_average_text
+
+        return model_average_text(self)
 
 
 def _normal_under_law(fit: Identification, function: CoordinateFunction) -> tuple[Floats, Floats]:

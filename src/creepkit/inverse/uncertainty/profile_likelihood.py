@@ -29,7 +29,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, TESTS_ALONE
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
-from creepkit.presentation import Presentable
+from creepkit.records.presentable import Presentable
 
 CONSTRAINT_WIDTH = 0.02
 """w over the standard deviation of the quantity."""
@@ -52,7 +52,7 @@ ZERO_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class ProfileLikelihood(Presentable, text="reports.inference:profile_text"):
+class ProfileLikelihood(Presentable):
     """The profile of one quantity.
 
     values, chi_square : (points,) values in the quantity's unit, rising, and the rise of chi-square at each.
@@ -72,6 +72,11 @@ class ProfileLikelihood(Presentable, text="reports.inference:profile_text"):
     level: float
     laplace: tuple[float, float]
     notes: tuple[str, ...] = field(default=())
+
+    def __str__(self) -> str:
+        from creepkit.reports.inference import profile_text
+
+        return profile_text(self)
 
 
 @dataclass(frozen=True)

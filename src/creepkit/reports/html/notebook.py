@@ -10,18 +10,21 @@ from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.language import CreepLaw
-from creepkit.records import History
+from creepkit.records import Histories, History, Specimen
 from creepkit.reports.answer import equations, symbols_of, unit_text
 from creepkit.reports.blocks import Block, Formula, Paragraph, Table, Verbatim, number
-from creepkit.reports.contents import ReportGroup
-from creepkit.reports.findings import findings_of
+from creepkit.reports.catalogue import specimen_blocks
+from creepkit.reports.contents import ReportContents, ReportGroup
+from creepkit.reports.findings import findings_of, with_histories
 from creepkit.reports.forecast import forecast_blocks
 from creepkit.reports.histories import history_blocks
-from creepkit.reports.html.page import block_shown, group_answer
+from creepkit.reports.html.page import block_shown, findings_section, group_answer
 from creepkit.reports.html.templates import template
 from creepkit.reports.law_names import LawNames
 from creepkit.reports.ranking import ranking_blocks
+from creepkit.reports.rupture import rupture_blocks
 from creepkit.reports.svg import PageFigures
+from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 STYLE = (
     ".creepkit .answer{display:grid;grid-template-columns:minmax(0,1.75fr) minmax(16rem,1fr);gap:0 2rem}"
@@ -38,7 +41,10 @@ def notebook_html(record: object) -> str:
     """A record as HTML for one cell; identifiers of its figures are those of no other cell."""
     block = template("blocks.html").module.block  # type: ignore[attr-defined]
     fits = [record] if isinstance(record, Identification) else []
-    fits = [one.fit for one in record.laws] if isinstance(record, Ranking) else fits
+    laws = [record] if isinstance(record, Ranking) else []
+    if isinstance(record, ReportContents):
+        laws = [one.result for one in record.groups if isinstance(one.result, Ranking)]
+    fits += [one.fit for ranking in laws for one in ranking.laws]
     blocks = [block(block_shown(one, LawNames(fits))) for one in _blocks(record)]
     return f'<div class="creepkit"><style>{STYLE}</style>{"".join(blocks)}</div>'
 
@@ -62,11 +68,6 @@ def _(result: Identification | Ranking) -> Sequence[Block]:
 
 
 @_blocks.register
-def _(forecast: Forecast) -> Sequence[Block]:
-    return forecast_blocks(forecast, _figures())
-
-
-@_blocks.register
 def _(law: CreepLaw) -> Sequence[Block]:
     symbols = symbols_of(law)
     rows = [
@@ -77,6 +78,14 @@ def _(law: CreepLaw) -> Sequence[Block]:
     return [Paragraph(law.title or law.name, "lead"), *map(Formula, equations(law)), table]
 
 
+_blocks.register(History)(lambda history: history_blocks([history]))
+_blocks.register(Histories)(history_blocks)
+_blocks.register(Specimen)(specimen_blocks)
+_blocks.register(Forecast)(lambda forecast: forecast_blocks(forecast, _figures()))
+_blocks.register(RuptureAssessment)(lambda assessment: rupture_blocks(assessment, _figures()))
+
+
 @_blocks.register
-def _(history: History) -> Sequence[Block]:
-    return history_blocks([history])
+def _(contents: ReportContents) -> Sequence[Block]:
+    found = [one for one in map(findings_of, map(with_histories, contents.groups)) if one is not None]
+    return [Paragraph(contents.title, "lead"), *findings_section(contents, found, _figures()).blocks]

@@ -85,7 +85,7 @@ def report_html(contents: ReportContents) -> str:
     found = [one for one in map(findings_of, contents.groups) if one is not None]
     names = LawNames(fit for one in found for fit in one.fits)
     sections = [
-        _findings_section(contents, found, figures),
+        findings_section(contents, found, figures),
         *_group_sections(found, figures),
         data_section(contents, found),
         *_stage_sections(contents, figures, identified=bool(found)),
@@ -163,7 +163,7 @@ def block_shown(block: Block, names: LawNames) -> Block:
 # ---- findings --------------------------------------------------------------------------------------------------------
 
 
-def _findings_section(contents: ReportContents, found: Sequence[GroupFindings], figures: PageFigures) -> PageSection:
+def findings_section(contents: ReportContents, found: Sequence[GroupFindings], figures: PageFigures) -> PageSection:
     """The answer of one group; of several groups a map, and their answers in sections of their own."""
     missing = [printable(one.stage, 80) for one in contents.failures]
     missing += [f"identification of {printable(g.name, 80)}" for g in contents.groups if g.failure]

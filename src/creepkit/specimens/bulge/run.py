@@ -10,7 +10,6 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.fem.surface_interpolation import surface_interpolation
-from creepkit.presentation import present
 from creepkit.specimens.finite_element_run import STRESS_FIELD, FiniteElementRun
 
 if TYPE_CHECKING:
@@ -34,11 +33,9 @@ class BulgeRun(FiniteElementRun):
 
     def section(self, time: float | None = None, name: str = STRESS_FIELD, path: str | Path | None = None) -> Figure:
         """A picture of the deformed section, coloured by a field (see `field`), at a time; by default the last."""
-        return present("reports.simulation:section_figure", self, time, name, path)
+        from creepkit.reports.simulation import section_figure
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """A picture of what is observed, and of the pressure, over time."""
-        return present("reports.histories:run_figure", self, path)
+        return section_figure(self, time, name, path)
 
     @property
     def _profiles(self) -> Floats:

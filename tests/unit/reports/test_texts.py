@@ -1,0 +1,27 @@
+"""Records print as text: what their methods import stands in layers above."""
+
+import numpy as np
+
+from creepkit.inverse.selection import rank
+from creepkit.inverse.uncertainty.correlation import Correlation
+from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
+from creepkit.laws.norton import NORTON
+from helpers.log_rate_predictor import known_scatter, measured
+
+AXIS = np.array([10.0, 100.0])
+RECORDS = [
+    Correlation(("ln A", "n"), np.array([[1.0, -0.5], [-0.5, 1.0]]), np.ones(2)),
+    ProfileLikelihood("n", "1", AXIS, np.ones(2), 4.0, None, 5.0, 3.84, 0.95, (3.0, 5.0)),
+]
+
+
+def test_records_print_as_text() -> None:
+    values = {"A": float(np.exp(-15.0 - 4.0 * np.log(50.0))), "n": 4.0}
+    fit = known_scatter(NORTON, measured(NORTON, values, (30.0, 50.0, 80.0), sd=0.2, seed=3), 0.2)
+    ranking = rank([fit])
+    texts = [str(record) for record in (*RECORDS, fit, ranking, ranking.model_average, fit.correlation())]
+    assert [text for text in texts if not text.strip() or "object at" in text] == []
+    assert fit.undetermined() == ()
+    samples = fit.sample(draws=20)
+    assert repr(samples).startswith("<PosteriorSamples of norton: 20 draws, medians A = ")
+    np.testing.assert_array_equal(samples.to_dataframe()["n"], samples.values["n"])
