@@ -373,7 +373,7 @@ def _reported(
     values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)
     single_values = values_of_tests.compared(histories, without_curves=used)
-    random_effects = predicted_random_effects(residuals, noise_model)
+    random_effects = predicted_random_effects(residuals, expected)
     by_law = replace(problem.about_rates(x, None), stopped=None).residuals(x).with_test_weights(residuals.test_weights)
     tests = test_fits(problem, by_law, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(

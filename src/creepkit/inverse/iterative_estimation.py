@@ -143,11 +143,10 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
     problem, linear, noise = found.problem, found.linear, found.noise
     free = linear.free
     for _ in range(MOST_LAST_STEPS):
-        problem, residuals = about_own_rates(problem, linear.x, linear.residuals, noise)
-        linear = replace(problem.linearised(linear.x, residuals), free=free)
         expected = with_expected_scatter(problem, linear, noise)
+        problem, residuals = about_own_rates(problem, linear.x, linear.residuals, expected)
         problem, residuals = about_stopped_tests(problem, linear.x, residuals, expected)
-        linear = replace(linear, residuals=residuals)
+        linear = replace(problem.linearised(linear.x, residuals), free=free)
         errors = errors_of_tests(problem, linear.x, linear, noise)
         solution = linear.solve(CovarianceFactor.of_residuals(with_errors(linear, errors).residuals, expected))
         found = replace(found, problem=problem, linear=linear, errors=errors)
