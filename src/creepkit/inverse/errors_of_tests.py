@@ -69,11 +69,6 @@ def errors_of_tests(
     return (*of_lengths_and_instruments(problem, x, linear), *own)
 
 
-def with_errors(linear: LinearisedProblem, errors: Sequence[Perturbation]) -> LinearisedProblem:
-    """The linear problem with the errors in its covariance that are included."""
-    return linear.with_effects(one for one in errors if one.included)
-
-
 def with_expected_scatter(
     problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel
 ) -> NoiseModel:
@@ -100,7 +95,7 @@ def covariances_of_values_with_errors(
     """
 
     def under(some: Sequence[Perturbation], noise: NoiseModel = noise_model) -> Floats:
-        return covariance_of_values(with_errors(linear, some), noise, working_noise)
+        return covariance_of_values(linear.with_errors(some), noise, working_noise)
 
     alone, with_common, with_all = (under(some) for some in ((), [e for e in errors if e.common], errors))
     of_all, of_common = (positive_semidefinite(c - alone, np.sqrt(np.diag(c))) for c in (with_all, with_common))

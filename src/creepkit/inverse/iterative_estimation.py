@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.errors_of_tests import errors_of_tests, with_errors, with_expected_scatter
+from creepkit.inverse.errors_of_tests import errors_of_tests, with_expected_scatter
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
@@ -107,7 +107,8 @@ def estimate_iteratively(
             residuals = residuals.with_test_weights(robust_test_weights(residuals, noise))
         if by_likelihood and best is not None:
             problem, residuals = about_own_rates(problem, x, residuals, noise)
-        problem, residuals = about_stopped_tests(problem, x, residuals, noise)
+        problem = problem.about_stopped_tests(x, noise)
+        residuals = problem.residuals(x).with_test_weights(residuals.test_weights)
         linear = problem.linearised(x, residuals)
         noise = estimator.estimate(residuals, noise, linear)
         if by_likelihood and best is not None and _expected_gain(linear, noise) < CONVERGED_GAIN:
@@ -145,10 +146,11 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
     for _ in range(MOST_LAST_STEPS):
         expected = with_expected_scatter(problem, linear, noise)
         problem, residuals = about_own_rates(problem, linear.x, linear.residuals, expected)
-        problem, residuals = about_stopped_tests(problem, linear.x, residuals, expected)
+        problem = problem.about_stopped_tests(linear.x, expected)
+        residuals = problem.residuals(linear.x).with_test_weights(residuals.test_weights)
         linear = replace(problem.linearised(linear.x, residuals), free=free)
         errors = errors_of_tests(problem, linear.x, linear, noise)
-        solution = linear.solve(CovarianceFactor.of_residuals(with_errors(linear, errors).residuals, expected))
+        solution = linear.solve(CovarianceFactor.of_residuals(linear.with_errors(errors).residuals, expected))
         found = replace(found, problem=problem, linear=linear, errors=errors)
         target = linear.x.copy()
         target[free] += solution.step
@@ -201,14 +203,6 @@ def about_own_rates(
             break
         problem, residuals = moved, there
     return problem, residuals
-
-
-def about_stopped_tests(
-    problem: LeastSquaresProblem, x: Floats, residuals: Residuals, noise: NoiseModel
-) -> tuple[LeastSquaresProblem, Residuals]:
-    """The problem about what its stopped tests say at x (unknowns,), and its residuals there; as it is without any."""
-    moved = problem.about_stopped_tests(x, noise)
-    return moved, residuals if moved is problem else moved.residuals(x).with_test_weights(residuals.test_weights)
 
 
 def _covariance_factor(
