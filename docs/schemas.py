@@ -1,13 +1,17 @@
-"""Write the schemas of the files in docs/reference/schemas: `python docs/schemas.py`.
+"""Write the schemas of files, and keywords of options for type checkers: `python docs/schemas.py`.
 
-They are made from the models that read the files: of study files the tables, of other documents the records. A test
-compares them with what is there.
+The schemas, in docs/reference/schemas, are made from the models that read the files: the tables of study files, the
+records of other documents. The keywords, in src/creepkit/option_keywords.pyi, are those of records of options. A test
+compares both with what is there.
 """
 
 from __future__ import annotations
 
+import ast
 import enum
+import inspect
 import json
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, is_dataclass
 from pathlib import Path
@@ -17,11 +21,13 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 from pydantic.json_schema import GenerateJsonSchema
 
+from creepkit.discovery.discover import DiscoveryOptions
 from creepkit.exporters import law_files
 from creepkit.files.json_documents import DocumentFormat
 from creepkit.files.record_codec import RecordCodec
+from creepkit.instruments.reading_options import RecordOptions
 from creepkit.inverse import identification_document, ranking_document
-from creepkit.inverse.identification import Identification
+from creepkit.inverse.identification import Identification, IdentificationSettings
 from creepkit.language import CreepLaw, law_codec
 from creepkit.rupture_assessment import assessment
 from creepkit.rupture_assessment.assessment import RuptureAssessment
@@ -188,8 +194,35 @@ def text_of(schema: dict[str, Any]) -> str:
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 
+KEYWORDS = Path(__file__).parents[1] / "src" / "creepkit" / "option_keywords.pyi"
+HEAD = '''"""Options of verbs as keywords for type checkers and editors; `python docs/schemas.py` writes this file."""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, TypedDict
+
+from creepkit.inverse.settings import OutputWeights, UsualErrors
+from creepkit.records import Nuisance
+'''
+
+
+def keywords_text() -> str:
+    """The stub: a TypedDict for each record of options that a public function takes as keywords."""
+    text = HEAD
+    for record in (IdentificationSettings, DiscoveryOptions, RecordOptions):
+        text += f"\nclass {record.__name__}Keywords(TypedDict, total=False):\n"
+        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
+        for field in (one for one in tree.body if isinstance(one, ast.AnnAssign)):  # type: ignore[attr-defined]
+            kind = ast.unparse(field.annotation).replace(
+                "tuple[Nuisance, ...]", "Nuisance | str | Sequence[Nuisance | str]"
+            )
+            kind = kind.replace("tuple[str, ...]", "Sequence[str]").removesuffix(" | None").replace("'", '"')
+            text += f"    {ast.unparse(field.target)}: {kind} | None\n"
+    return text
+
+
 def main() -> None:
     """Write them all."""
+    KEYWORDS.write_text(keywords_text(), encoding="utf-8")
     FOLDER.mkdir(parents=True, exist_ok=True)
     for name, schema in schemas().items():
         (FOLDER / name).write_text(text_of(schema), encoding="utf-8")

@@ -133,7 +133,7 @@ def macos_processor() -> str:
 
 
 def _remove_other_configuration(build: Path, generator: str, compiler: str) -> None:
-    """Remove a folder that was configured for another generator or compiler: CMake can change neither."""
+    """Remove a folder that was configured for another generator, compiler or clone: CMake can change none of them."""
     cache = build / "CMakeCache.txt"
     if cache.is_file():
         lines = cache.read_text(encoding="utf-8", errors="replace").splitlines()
@@ -142,6 +142,7 @@ def _remove_other_configuration(build: Path, generator: str, compiler: str) -> N
         used = shutil.which(entries.get("CMAKE_CXX_COMPILER", ""))
         if (
             entries.get("CMAKE_GENERATOR") != generator
+            or entries.get("CMAKE_HOME_DIRECTORY") != SOURCES.resolve().as_posix()
             or not used
             or not compiler
             or not os.path.samefile(used, compiler)

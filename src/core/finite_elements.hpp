@@ -78,6 +78,9 @@ public:
         }
     }
 
+    // What a reduced-order model does to stresses, or changes of them, of eight points: nothing.
+    CREEPKIT_INLINE void apply_factors(int64_t, double*, int) const {}
+
     // Blocks rr, rz, zz and, unless SYMMETRIC, zr of the tangent of an element whose points are the four lanes from
     // `first` on, by rows; A carries the weights.
     template <bool SYMMETRIC>

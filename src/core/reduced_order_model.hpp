@@ -2,9 +2,10 @@
 //
 // The displacement of the mesh is Phi q with r modes Phi from a proper orthogonal decomposition of finite element
 // solutions (Sirovich 1987, Quart. Appl. Math. 45, 561), and the balance of forces is that of finite elements in the
-// space of the modes (Galerkin). Its integrals run over some of the points with other weights (energy-conserving
-// sampling and weighting: Farhat, Avery, Chapman and Cortial 2014, Int. J. Numer. Meth. Engng 98, 625). A point has the
-// law, the history and the stress of a point of a finite element.
+// space of the modes (Galerkin). Its integrals run over some of the points (empirical cubature: Hernandez, Caicedo and
+// Ferrer 2017, Comput. Meth. Appl. Mech. Engng 313, 687), and the weight of a point is a matrix of the five components of
+// its stress, so that it also stands for those about it whose stress differs. A point has the law, the history and the
+// stress of a point of a finite element.
 //
 // R is r in whole vectors of eight numbers; what is added to r modes or to the points is zero or without weight.
 #pragma once
@@ -26,6 +27,7 @@ struct ReducedOrderModel {
     const double* gradients;      // (points, 5, R) of F11, F12, F21, F22, F33 to q, 1/mm
     const double* points_first;   // (points/8, r, 5, 8) the same
     const double* weights;        // (points,) area times radius, mm^3
+    const double* factors;        // (points/8, 25, 8) by rows, matrix that the stress is multiplied by
     const double* sides;          // (side points, 4) Gauss weight; at rest r, dr/dx, dz/dx, mm, x in [-1, 1] on a side
     const double* side_modes;     // (side points, 4, R) of u_r, u_z, du_r/dx, du_z/dx to q
     const double* surface;        // (observed, R) u_z of the observed nodes to q
@@ -86,6 +88,23 @@ public:
         }
     }
 
+    // Multiply stresses (5, 8) of eight points, or changes (5, columns, 8) of them, by the points' matrices.
+    CREEPKIT_INLINE void apply_factors(int64_t block, double* stresses, int columns) const {
+        for (int v = 0; v < EIGHT; v += LANES) {
+            const double* matrix = model.factors + block * 25 * EIGHT + v;
+            for (int c = 0; c < columns; ++c) {
+                Vector own[5];
+                double* first = stresses + c * EIGHT + v;
+                CREEPKIT_UNROLL for (int s = 0; s < 5; ++s) own[s] = load(first + s * columns * EIGHT);
+                CREEPKIT_UNROLL for (int s = 0; s < 5; ++s) {
+                    Vector total = load(matrix + 5 * s * EIGHT) * own[0];
+                    CREEPKIT_UNROLL for (int t = 1; t < 5; ++t) total += load(matrix + (5 * s + t) * EIGHT) * own[t];
+                    store(first + s * columns * EIGHT, total);
+                }
+            }
+        }
+    }
+
     // Out-of-balance forces into `residual`; if STIFF the tangent, made symmetric, into `tangent`.
     template <bool STIFF>
     PointFlag assemble(const PointLaw& law, const StageConditions& stage, const double* q, PointStates& points,
@@ -100,8 +119,11 @@ public:
             const PointFlag flag =
                 update_points<STIFF>(law, stage, points, first, at, model.weights + first, tolerance, P[0], A[0]);
             if (flag != POINTS_SOLVED) return flag;
+            apply_factors(block, P[0], 1);
             add_forces(block, P);
             if (!STIFF) continue;
+            apply_factors(block, A[0], 5);
+            make_symmetric(A);
             tangent_products(block, A, products);
             for (int64_t column = 0; column < shape.blocks; ++column)
                 for (int64_t row = column; row < shape.blocks; ++row)
@@ -127,6 +149,7 @@ public:
                 stress_of_creep_change(points, k, at, weights, stress);
                 for (int i = 0; i < 5; ++i) store(P[i] + v * LANES, stress[i] * load(model.weights + k));
             }
+            apply_factors(block, P[0], 1);
             add_forces(block, P);
         }
     }
@@ -190,6 +213,17 @@ private:
         double result = 0.0;
         for (int lane = 0; lane < LANES; ++lane) result = fmax(result, worst[lane]);
         return result + sum(unusual);
+    }
+
+    // The symmetric part of matrices (5, 5, 8).
+    CREEPKIT_INLINE static void make_symmetric(double A[25][EIGHT]) {
+        for (int i = 0; i < 5; ++i)
+            for (int j = 0; j < i; ++j)
+                for (int v = 0; v < EIGHT; v += LANES) {
+                    const Vector mean = 0.5 * (load(A[5 * i + j] + v) + load(A[5 * j + i] + v));
+                    store(A[5 * i + j] + v, mean);
+                    store(A[5 * j + i] + v, mean);
+                }
     }
 
     void clear() { memset(residual, 0, sizeof(double) * size_t(shape.rows())); }

@@ -221,6 +221,9 @@ private:
                 store(mises + first, p.stiffness * (p.equivalent - increment));
                 store(weights + first, weight);
             }
+            system.apply_factors(k / EIGHT, piola[0], 1);
+            system.apply_factors(k / EIGHT, tangent[0], 5);
+            system.apply_factors(k / EIGHT, unit[0][0], 3);
             system_memory.add_tangent(system, k / EIGHT, tangent);
             for (int lane = 0; lane < EIGHT; ++lane) {
                 const double scale = weights[lane];

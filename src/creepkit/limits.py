@@ -1,6 +1,7 @@
 """Bounds of numbers that a person gives: options of the command line and arguments that set an amount of work.
 
-Each stands here once, so that `--starts` and IdentificationSettings(starts=...) allow the same.
+Those that several places share stand here once, so that `--starts` and IdentificationSettings(starts=...) allow the
+same.
 """
 
 from __future__ import annotations

@@ -120,7 +120,7 @@ def answer_rounds() -> None:
         predictor = case.specimen.reduced_order_model()
         reduced = predictor.reduced_model_of(case.setup.piece)
         simulation = partial(
-            simulate, case.law, case.theta, reduced, case.setup.load_history, settings=predictor._settings(False)
+            simulate, case.law, case.theta, reduced, case.setup.load_history, settings=predictor.settings(False)
         )
         calls.append((case.simulate, case.predict, partial(case.predict, True), simulation))
     for _ in sys.stdin:

@@ -8,11 +8,12 @@ for tests 01 to 08 and one for tests 09, 11 and 12. Nuisance parameters are the 
 thickness of each dimple (0.4935 mm, standard deviation 0.027 mm). Laws are multiplied by Arrhenius' factor about
 1050 K; n(t) is the drifting exponent without strain hardening.
 
-Misfit: by finite elements, `ck.identify(law, tests, using="bulge", test_loss="student")`. The pooled loss is that of
-the amplitude: squared differences over squared deviations from the mean of all frames. Chi-square is that of
-`fit.adequacy`, of all outputs; "left" is the standard deviation of the amplitude beyond the noise that neighbouring
-frames show. Held out: each test predicted through the reduced-order model from the others, at nominal thickness, with
-the step that its group shows. Values marked * are not determined, or at their bound; units 1/s, s, J/mol, MPa.
+Misfit: by finite elements, `ck.identify(law, tests, using="bulge", test_loss="student", weights="noise")`. The pooled
+loss is that of the amplitude: squared differences over squared deviations from the mean of all frames. Chi-square is
+that of `fit.adequacy`, of all outputs; "left" is the standard deviation of the amplitude beyond the noise that
+neighbouring frames show. Held out: each test predicted through the reduced-order model from the others, at nominal
+thickness, with the step that its group shows. Values marked * are not determined, or at their bound; units 1/s, s,
+J/mol, MPa.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ class Runs:
 
     def fit(self, law: str, event: bool) -> Row:
         """One law by finite elements, by least squares."""
-        return row_of(ck.identify(LAWS[law], self.tests, using="bulge", **self.settings(event)))
+        return row_of(ck.identify(LAWS[law], self.tests, using="bulge", weights="noise", **self.settings(event)))
 
     def held_out(self, law: str, event: bool) -> Row:
         """Each test predicted through the reduced-order model from the others."""

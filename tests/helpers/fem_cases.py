@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
@@ -10,6 +11,7 @@ import numpy as np
 
 from creepkit import kernels
 from creepkit.arrays import Floats
+from creepkit.core import address, function
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, Mesh, StripMesh, discretize, local_tangents, strip_mesh
 from creepkit.fem.reduced_order_model import ReducedBasis
@@ -152,4 +154,27 @@ def full_basis(model: FiniteElementModel) -> ReducedBasis:
     modes = np.zeros((free.size, model.equations.size))
     modes[np.arange(free.size), free] = 1.0
     points = np.arange(model.weights.size)
-    return ReducedBasis(modes.reshape(free.size, -1, 2), points, np.ones(points.size))
+    return ReducedBasis(modes.reshape(free.size, -1, 2), points, np.tile(np.eye(5), (points.size, 1, 1)))
+
+
+class StageConditions(ctypes.Structure):
+    """As of the core's material_point.hpp."""
+
+    names = ("weight", "log_weight", "time", "temperature", "bulk", "shear", "pressure")
+    _fields_ = tuple((name, ctypes.c_double) for name in names)
+
+
+def assemble(law, theta, model: FiniteElementModel, stage: StageConditions, displacement):
+    """Out-of-balance forces (size,), N/rad, and tangent (size, size), N/(rad mm), of a virgin body.
+
+    theta : (P,) internal parameters. displacement : (2 nodes,) mm. The tangent is made symmetric.
+    """
+    theta, displacement = (np.ascontiguousarray(values, dtype=float) for values in (theta, displacement))
+    history = np.zeros((4 * model.compiled.elements, 4 + law.states))
+    history[:, 4:] = law.initial
+    residual, tangent = np.zeros(model.size), np.zeros((model.size, model.size))
+    entries = np.array([law.update.address, law.sensitivity.address, theta.ctypes.data, theta.size, law.states])
+    arrays = map(address, (history, displacement, residual, tangent))
+    structure = ctypes.byref(model.compiled.structure)
+    assert function("creepkit_assemble")(structure, address(entries), ctypes.byref(stage), *arrays) == 0
+    return residual, tangent

@@ -63,6 +63,7 @@ def abaqus(text: str) -> Rate:
 _ABAQUS = {
     "STRAIN": lambda q, e, t, T, A, n, m: (A * q**n * ((m + 1) * e) ** m) ** (1 / (m + 1)),
     "TIME": lambda q, e, t, T, A, n, m: A * q**n * t**m,
+    "NORTON": lambda q, e, t, T, A, n, m: A * q**n * t**m,
     "POWER LAW": lambda q, e, t, T, q0, n, m, e0: e0 * ((q / q0) ** n * ((m + 1) * e) ** m) ** (1 / (m + 1)),
     "TIME POWER LAW": lambda q, e, t, T, q0, n, m, e0: e0 * (q / q0) ** n * (e0 * t) ** m,
     "HYPERB": lambda q, e, t, T, A, B, n, dH=0.0, R=1.0: A * math.sinh(B * q) ** n * math.exp(-dH / (R * T)),

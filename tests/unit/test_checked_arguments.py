@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Unpack, get_origin
 
 import numpy as np
 import sympy
@@ -162,7 +162,8 @@ def test_a_class_known_by_its_name_alone_is_a_class_of_creepkit_and_no_protocol(
         function = inspect.unwrap(outer)
         if function is outer or not hasattr(function, "__code__"):  # not checked
             continue
-        for kind in _parts(list(annotations_of([public if is_dataclass(public) else function]).values())):
+        hints = annotations_of([public if is_dataclass(public) else function]).values()
+        for kind in _parts([hint for hint in hints if get_origin(hint) is not Unpack]):
             if isinstance(kind, KnownByName):
                 home = by_name.get(kind.__name__)
                 if home is None or vars(getattr(importlib.import_module(home), kind.__name__)).get("_is_protocol"):

@@ -11,8 +11,9 @@ using namespace creepkit;
 // rows      : times (rows,), numbers of segments (rows,), coordinates (rows, R), places (rows, 2). ended : (5,) out: rows written, code,
 //             time s, accepted and rejected steps. 0, or 1 when memory runs out.
 CREEPKIT_PAGE_API int32_t creepkit_page_simulate(const int32_t* counts, const double* gradients, double* points_first,
-                                                 const double* weights, const double* sides, const double* side_modes,
-                                                 const double* surface, const double* measures, const double* of_law,
+                                                 const double* weights, const double* factors, const double* sides,
+                                                 const double* side_modes, const double* surface,
+                                                 const double* measures, const double* of_law,
                                                  const double* of_states, const double* segments,
                                                  const double* settings, double* times, int64_t* numbers,
                                                  double* coordinates, double* places, double* ended) {
@@ -22,7 +23,7 @@ CREEPKIT_PAGE_API int32_t creepkit_page_simulate(const int32_t* counts, const do
             for (int64_t i = 0; i < modes; ++i)
                 points_first[((k / 8 * modes + i) * 5 + part) * 8 + k % 8] = gradients[(k * 5 + part) * width + i];
     const ReducedOrderModel model = {modes, points, counts[2], counts[3], counts[4], counts[5], gradients,
-                                     points_first, weights, sides, side_modes, surface, measures};
+                                     points_first, weights, factors, sides, side_modes, surface, measures};
     const PointLaw law = {page_law, nullptr, nullptr, 0, states};
     const SimulationInput input = {of_law[0], of_law[1], counts[7], segments, nullptr, of_states, of_states + states,
                                    0, nullptr};

@@ -22,7 +22,6 @@ from creepkit.records import History, Specimen
 from creepkit.specimens.bulge.gaussian_fit import GaussianFit
 from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.finite_element_tests import solver_settings
 
 PackedType = Literal["float64", "float32", "int32"]
 
@@ -32,8 +31,8 @@ MOST_MODELS = 4
 
 
 SOLVED: dict[str, PackedType] = {
-    "gradients": "float32", "weights": "float64", "sides": "float64", "side_modes": "float32", "surface": "float32",
-    "measures": "float32",
+    "gradients": "float32", "weights": "float64", "factors": "float32", "sides": "float64", "side_modes": "float32",
+    "surface": "float32", "measures": "float32",
 }  # fmt: skip
 """Arrays of a CompiledReducedModel that a page solves with; single precision moves its outputs by some 1e-8."""
 
@@ -82,15 +81,13 @@ def rom_data(predictor: BulgeReducedOrderModel, lengths: Mapping[str, float] | N
         raise SolveError("a page shows amplitude, width and shape of a dimple; observe a profile or a field, not rings")
     model = predictor.reduced_model_of(piece)
     mesh, basis, compiled = model.model, model.basis, model.compiled
-    settings = solver_settings(predictor.specimen)
-    settings = settings._replace(newton=min(settings.newton, 1e-3 * settings.tolerance))
     return {
         "title": predictor.title,
         "modes": len(basis.modes),
         "limited": compiled.structure.limited,
         "window": piece.observation.window,
         "grid": [fit.grid.log_radius.size, fit.grid.angular.size],
-        "settings": settings._asdict(),
+        "settings": predictor.settings(False)._asdict(),
         "lengths": {name: float(getattr(piece.geometry, name)) for name in piece.geometry.lengths},
         "arrays": {
             "modes": packed(basis.modes, "float32"),  # to draw the body by

@@ -8,25 +8,16 @@ well, `--load force=250`: that of a load whose name another option has.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, make_dataclass
+from dataclasses import make_dataclass
 from typing import TYPE_CHECKING
 
 from creepkit.cli.command_options import Levels
 from creepkit.cli.shared import DEFAULT_SPECIMEN
 from creepkit.errors import SolveError
-from creepkit.forecasts.planned_tests import (
-    COMPONENTS,
-    PlannedTestOptions,
-    load_of_components,
-    needs_modulus,
-    planned_history,
-    stepped_load,
-)
-from creepkit.language import elastic_of
+from creepkit.forecasts.planned_tests import COMPONENTS, DescribedTest, PlannedTestOptions
 from creepkit.options import Options, option
 from creepkit.records import (
     ZERO_CELSIUS,
-    History,
     Program,
     check_geometry,
     dimension_named,
@@ -38,7 +29,7 @@ from creepkit.records import (
 if TYPE_CHECKING:
     from typing import Any
 
-    from creepkit.records import Load, Loading, Specimen
+    from creepkit.records import Specimen
 
 
 OF_COMMANDS = ("force", "load")
@@ -74,29 +65,6 @@ def _flag(name: str) -> str:
     return f"--load {name}" if name in OF_COMMANDS else f"--{name.replace('_', '-')}"
 
 
-@dataclass(frozen=True)
-class DescribedTest:
-    """What options say of a test; lengths : mm of its test piece, temperature : K, None where nothing is said."""
-
-    options: PlannedTestOptions
-    specimen: Specimen
-    loading: Loading
-    lengths: Mapping[str, float]
-    temperature: float | Program | None
-
-    def history(self, temperature: float | Program) -> History:
-        """The planned test, without outputs; temperature : K, where the options say none."""
-        chosen = self.options
-        return planned_history(
-            self.specimen,
-            self.loading,
-            float(chosen.end or 0.0),
-            temperature=temperature if self.temperature is None else self.temperature,
-            elastic=elastic_of(chosen.modulus),
-            lengths=self.lengths,
-        )
-
-
 def described_test(given: Mapping[str, Any], *others: Mapping[str, Levels] | None) -> DescribedTest:
     """The test of options and of loads and lengths by name; SolveError where they contradict each other."""
     import creepkit as ck
@@ -106,12 +74,20 @@ def described_test(given: Mapping[str, Any], *others: Mapping[str, Levels] | Non
         stated[name] = (*stated.get(name, ()), *levels)
     specimen = ck.specimen(options.specimen or _specimen_for(stated))
     own = {load.name: load for load in loads_of(specimen)}
-    loads: dict[str, Levels] = {}
+    loads: dict[str, list[tuple[float, float]]] = {}
     lengths: dict[str, float] = {}
     for name, levels in stated.items():
         dimension = dimension_named(specimen, name)
         if name in own or (name in ("stress", "strain") and COMPONENTS in own):
-            loads[name] = levels
+            for component, start, value in levels:
+                if COMPONENTS in own and not component:
+                    raise SolveError(f"--{name} {value:g}: name the component, such as 11={value:g}")
+                if component and COMPONENTS not in own:
+                    raise SolveError(
+                        f"{component} is a component of {name}, which --specimen {specimen.name} has not; give "
+                        "--specimen point"
+                    )
+                loads.setdefault(f"{name}_{component}" if component else name, []).append((start, value))
         elif dimension is None:
             taken = ", ".join(map(_flag, _names(specimen)))
             raise SolveError(f"there is no option {_flag(name)}; --specimen {specimen.name} takes {taken or 'none'}")
@@ -119,18 +95,19 @@ def described_test(given: Mapping[str, Any], *others: Mapping[str, Levels] | Non
             raise SolveError(f"{_flag(name)}: {dimension.name} is given twice; keep one of them")
         else:
             lengths[dimension.name] = levels[0][2]
+    if not loads:
+        named = "component" if COMPONENTS in own else " or ".join(own) or "load"
+        ways = [f"{_flag(name)}, such as {_usual_level(specimen, name)}" for name in own]
+        way = "--stress 11=100, or --strain 12=0.001" if COMPONENTS in own else " or ".join(ways)
+        raise SolveError(f"specimen '{specimen.name}' needs a {named}: give {way}")
     check_geometry(specimen, lengths, "a length")
-    end = float(options.end or 0.0)
-    loading = _components(specimen, loads) if COMPONENTS in own else _loading(specimen, own, loads, options, end)
-    if options.modulus is None and needs_modulus(specimen, loading):
-        raise SolveError(f"specimen '{specimen.name}' needs a modulus: give --modulus-gpa, such as 150")
     temperature: float | Program | None = None
     if options.temperature:
         if options.temperature[0][0] != 0.0:
             raise SolveError("--temperature-c: nothing is said of the time before; give the first one from 0 s on")
         steps = [(start, celsius + ZERO_CELSIUS) for start, celsius in options.temperature]
         temperature = steps[0][1] if len(steps) == 1 else Program.steps(steps)
-    return DescribedTest(options, specimen, loading, lengths, temperature)
+    return DescribedTest(specimen, options, loads, lengths, temperature)
 
 
 def _specimen_for(stated: Mapping[str, Levels]) -> str:
@@ -140,49 +117,6 @@ def _specimen_for(stated: Mapping[str, Levels]) -> str:
     return DEFAULT_SPECIMEN if DEFAULT_SPECIMEN in taking or not taking else taking[0]
 
 
-def _loading(
-    specimen: Specimen, own: Mapping[str, Load], loads: Mapping[str, Levels], options: PlannedTestOptions, end: float
-) -> Loading:
-    """One load by steps; its ramp is the load's own where none is given."""
-    if len(loads) != 1:
-        flags = [_flag(name) for name in (loads or own or ("stress",))]
-        if loads:
-            raise SolveError(f"{' and '.join(flags)} are different loads of one test; leave all but one out")
-        level = _usual_level(specimen, next(iter(own), ""))
-        named = " or ".join(own) or "load"
-        raise SolveError(f"specimen '{specimen.name}' needs a {named}: give {' or '.join(flags)}, such as {level}")
-    ((name, levels),) = loads.items()
-    component = next((component for component, _, _ in levels if component), None)
-    if component is not None:
-        raise SolveError(
-            f"{component} is a component of {name}, which --specimen {specimen.name} has not; give --specimen point"
-        )
-    unknown = "control" if name != "stress" else "ramp"
-    if getattr(options, unknown) is not None:
-        raise SolveError(f"--{unknown} does not belong to {_flag(name)} of --specimen {specimen.name}; leave it out")
-    steps = [(start, value) for _, start, value in levels]
-    try:
-        return stepped_load(name, own[name], steps, control=options.control, ramp=options.ramp, end=end)
-    except SolveError as error:
-        raise SolveError(f"{_flag(name)}: {error}") from None
-
-
 def _usual_level(specimen: Specimen, load: str) -> str:
     low, high = specimen.conditions.get(load, (100.0, 100.0))
     return f"{float(f'{(low * high) ** 0.5:.1g}'):g}"
-
-
-def _components(specimen: Specimen, loads: Mapping[str, Levels]) -> Loading:
-    """Stresses and strains of components; until its first step a component is at rest."""
-    if not loads:
-        raise SolveError(f"specimen '{specimen.name}' needs a component: give --stress 11=100, or --strain 12=0.001")
-    components: dict[str, dict[str, list[tuple[float, float]]]] = {"stress": {}, "strain": {}}
-    for kind, levels in loads.items():
-        for name, start, value in levels:
-            if not name:
-                raise SolveError(f"--{kind} {value:g}: name the component, such as 11={value:g}")
-            components[kind].setdefault(name, []).append((start, value))
-        for name, steps in components[kind].items():
-            if sorted(steps) != steps:
-                raise SolveError(f"--{kind}: the steps of component {name} must follow one another in time")
-    return load_of_components(components)

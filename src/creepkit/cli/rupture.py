@@ -24,7 +24,11 @@ def command(
         dict[str, float] | None, Option(help="Tensile strengths by temperature.", metavar="C=MPA", example="850=420")
     ] = None,
     only: Only = None,
-    to: Annotated[Path | None, typer.Option(help="File for the assessment, JSON."), OutputPath()] = None,
+    to: Annotated[
+        Path | None,
+        typer.Option(help="File for the assessment, JSON; or the time to rupture, .c, .f90 or .csv."),
+        OutputPath(),
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Picture of isotherms and the master curve."), OutputPath("picture")
     ] = None,

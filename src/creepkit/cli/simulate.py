@@ -13,7 +13,6 @@ from creepkit.cli.planned_test import described_test, loads_and_lengths
 from creepkit.cli.shared import Law, Values, law_source, merged_values
 from creepkit.errors import SolveError
 from creepkit.forecasts.planned_tests import PlannedTestOptions
-from creepkit.language import elastic_of
 from creepkit.limits import SECONDS, SIMULATED_FRAMES
 from creepkit.options import Option
 from creepkit.reports.terminal import put, tell, tell_written
@@ -64,7 +63,7 @@ def command(
         loading=planned.loading,
         times=_frame_times(planned.options.end, points, every, specimen),
         temperature=planned.temperature,
-        elastic=elastic_of(planned.options.modulus),
+        elastic=planned.elastic,
         name=valued.law.name if to is None else to.stem,
     )
     run = replace(run, geometry={**run.geometry, **planned.lengths})

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -37,6 +37,9 @@ from creepkit.records.presentable import Presentable
 from creepkit.records.units import celsius_text
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictors
+
+if TYPE_CHECKING:
+    from creepkit.option_keywords import DiscoveryOptionsKeywords
 
 FIRST_FRAMES = 15
 
@@ -266,7 +269,7 @@ def temperature_study(
     *,
     settings: IdentificationSettings | None = None,
     progress: IterationCallback | None = None,
-    **changes: Any,
+    **changes: Unpack[DiscoveryOptionsKeywords],
 ) -> TemperatureStudy:
     """Identify moduli, then the law times Arrhenius, then each temperature alone, and discover forms of temperature.
 

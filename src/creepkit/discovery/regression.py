@@ -3,10 +3,10 @@
 A coefficient and its exponent are correlated to -0.99999 at one temperature, so that estimates with separate error bars
 would mislead: all parameters of one temperature stay together, with their whole covariance. The rows of the generalised
 least squares are all parameters at all temperatures, multiplied by the inverse Cholesky factor of each temperature's
-covariance; the columns are the functions of the forms. It is solved without threshold or ridge unless an optimizer of
-pysindy is given: over ten per cent of temperature the functions are collinear, and a threshold on one wide library
-keeps all of them with coefficients of +-1000. Parameters inside exponentials are found by variable projection (Golub
-and Pereyra (1973), SIAM J. Numer. Anal. 10, 413): the coefficients are solved for at each trial of them.
+covariance; the columns are the functions of the forms. pysindy solves it, without threshold or ridge unless another
+optimizer of its is given: over ten per cent of temperature the functions are collinear, and a threshold on one wide
+library keeps all of them with coefficients of +-1000. Parameters inside exponentials are found by variable projection
+(Golub and Pereyra (1973), SIAM J. Numer. Anal. 10, 413): the coefficients are solved for at each trial of them.
 """
 
 from __future__ import annotations
@@ -310,6 +310,8 @@ def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm], opti
 
     optimizer : of pysindy, which drops terms first; the parameters' values at T_ref stay.
     """
+    import pysindy  # half a second, which nothing else needs
+
     design = _DesignMatrix(forms, estimates.temperatures)
     nonlinear_values = _variable_projection(design, estimates) if design.nonlinear_parameters else np.zeros(0)
     features, target = design.whitened(estimates, nonlinear_values)
@@ -320,7 +322,7 @@ def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm], opti
         dropped = {name for name, is_kept in zip(names, kept, strict=True) if not is_kept}
         if dropped:
             return regress(estimates, [form.without(dropped) for form in forms])
-    coefficients = solve_least_squares(features, target)
+    coefficients = _solved(features, target, pysindy.STLSQ(threshold=0.0, alpha=0.0))
     sensitivities = np.concatenate(
         [features, _nonlinear_sensitivities(design, estimates, nonlinear_values, coefficients)], axis=1
     )
@@ -337,7 +339,10 @@ def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm], opti
 
 
 def solve_least_squares(features: Floats, target: Floats) -> Floats:
-    """Coefficients (terms,) of target (rows,) on features (rows, terms) in units of their norms; no term is dropped."""
+    """Coefficients (terms,) of target (rows,) on features (rows, terms) in units of their norms; no term is dropped.
+
+    For trials of what is inside exponentials: of the same system pysindy takes 1.8 ms longer, for the same digits.
+    """
     column_norms = np.linalg.norm(features, axis=0)
     column_norms = np.where(column_norms > 0, column_norms, 1.0)
     return np.asarray(np.linalg.lstsq(features / column_norms, target, rcond=None)[0] / column_norms, float)
@@ -350,13 +355,19 @@ def _kept_terms(features: Floats, target: Floats, always: Sequence[bool], optimi
     if free.shape[1]:
         basis = np.linalg.qr(fixed / np.linalg.norm(fixed, axis=0))[0]
         columns, values = (array - basis @ (basis.T @ array) for array in (free, target))
-        norms = np.linalg.norm(columns, axis=0)
-        solver = deepcopy(optimizer)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # that every term was dropped, which is an answer
-            solver.fit(columns / np.where(norms > 0, norms, 1.0), values[:, None])
-        kept[~kept] = np.abs(np.ravel(solver.coef_)) > 0
+        kept[~kept] = _solved(columns, values, optimizer) != 0.0
     return kept
+
+
+def _solved(features: Floats, target: Floats, optimizer: Any) -> Floats:
+    """Coefficients (terms,) by an optimizer of pysindy, which sees columns of norm 1."""
+    norms = np.linalg.norm(features, axis=0)
+    norms = np.where(norms > 0, norms, 1.0)
+    solver = deepcopy(optimizer)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # that every term was dropped, which is an answer
+        solver.fit(features / norms, target[:, None])
+    return np.asarray(np.ravel(solver.coef_) / norms, float)
 
 
 def _variable_projection(design: _DesignMatrix, estimates: IsothermalEstimates) -> Floats:

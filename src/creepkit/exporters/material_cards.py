@@ -44,6 +44,10 @@ _SMALLEST_COEFFICIENT = 1e-27
 """Below this A the manual warns of numerical difficulties with LAW=STRAIN and LAW=TIME."""
 
 
+_CALCULIX_LEAST = 1e-20
+"""The least A that ccx 2.20 takes: it creeps by it where less is written, without a word."""
+
+
 _INTERPOLATION_TOLERANCE = 1e-3
 """Relative error of linear interpolation of A between the rows of a table."""
 
@@ -51,22 +55,17 @@ _INTERPOLATION_TOLERANCE = 1e-3
 _TEMPERATURE_STEPS = (50.0, 25.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.25, 0.1)
 
 
-_TABLE_NOTE = (
-    "Table from {low:g} to {high:g} K in steps of {step:g} K: Abaqus interpolates linearly between rows, which is "
-    "within {tolerance:.1%}, and keeps the end values outside."
-)
-
-
 _TABLE_OF_MODULI = (
     "*ELASTIC needs a row at each temperature of *CREEP in CalculiX, which else creeps by the first row at every one."
 )
 
 
+_TIME = "TIME=TOTAL counts all steps, TIME=CREEP those with creep: write the one that starts with the load"
 _FORMULAS = {
     "STRAIN": "rate = (A q^n [(m+1) e]^m)^(1/(m+1)), of equivalent stress q and creep strain e",
-    "TIME": "rate = A q^n t^m, of equivalent stress q and total time t, which must start with the load",
+    "TIME": f"rate = A q^n t^m, of equivalent stress q and time t. {_TIME}",
     "POWER LAW": "rate = e0 ((q/q0)^n [(m+1) e]^m)^(1/(m+1))",
-    "TIME POWER LAW": "rate = e0 (q/q0)^n (e0 t)^m, of total time t, which must start with the load",
+    "TIME POWER LAW": f"rate = e0 (q/q0)^n (e0 t)^m, of time t. {_TIME}",
 }
 """{LAW: its rate}, in Abaqus' older notation and in its newer one."""
 
@@ -79,7 +78,8 @@ CreepCards = tuple[list[str], list[str]]
 class AbaqusCards(CodeInput):
     """Material cards with one of Abaqus' own creep laws."""
 
-    code = "Abaqus' *CREEP"
+    code, program = "Abaqus' *CREEP", "Abaqus"
+    has_steady_arrhenius = True
     alternative = "export it as 'abaqus', a CREEP subroutine"
     marker = "**"
     name: str = "abaqus-cards"
@@ -127,20 +127,51 @@ class AbaqusCards(CodeInput):
             raise self._unsupported(
                 source, f"{form.label}: Abaqus asks for n > 0 and -1 < m <= 0 (n = {form.n:g}, m = {m:g})"
             )
-        if not form.Q:
-            return _power_law(source, form, m, {None: form.log_coefficient}, [])
+        rows, notes = self._rows(source, form)
+        return _power_law(source, form, m, rows, notes)
+
+    def _rows(self, source: LawWithValues, form: CreepForm) -> tuple[dict[float | None, float], list[str]]:
+        """{K, or None: ln of the coefficient} of the rows, and the note on a table of them."""
         temperatures = self._temperatures(source, [form])
-        rows: dict[float | None, float] = {T: form.log_coefficient_at(T) for T in temperatures}
+        if not temperatures:
+            return {None: form.log_coefficient}, []
         low, high, step = temperatures[0], temperatures[-1], _temperature_step(form, temperatures[0])
-        note = _TABLE_NOTE.format(low=low, high=high, step=step, tolerance=_INTERPOLATION_TOLERANCE)
-        return _power_law(source, form, m, rows, [note])
+        note = f"Table from {low:g} to {high:g} K in steps of {step:g} K: {self.program} interpolates linearly between "
+        note += f"rows, which is within {_INTERPOLATION_TOLERANCE:.1%}, and keeps the end values outside."
+        return {T: form.log_coefficient_at(T) for T in temperatures}, [note]
 
     def _temperatures(self, source: LawWithValues, forms: Sequence[CreepForm]) -> list[float]:
-        """K, of the rows of a power law that hardens and depends on temperature; none of what needs no table."""
-        if len(forms) > 1 or not forms[0].Q or forms[0].is_steady:
+        """K, of the rows of a power law that depends on temperature; none of what needs no table."""
+        if len(forms) > 1 or not forms[0].Q or (forms[0].is_steady and self.has_steady_arrhenius):
             return []
         low, high = temperature_span(source)
         return temperature_grid(low, high, _temperature_step(forms[0], low))
+
+
+@dataclass(frozen=True)
+class CalculixCards(AbaqusCards):
+    """Material cards with the creep law that CalculiX has built in, of stress and time."""
+
+    code, program = "CalculiX' *CREEP, LAW=NORTON", "CalculiX"
+    has_steady_arrhenius = False
+    alternative = "export it as 'calculix', a CREEP subroutine"
+    name: str = "calculix-cards"
+    title: str = "CalculiX material cards with its own creep law (*CREEP, LAW=NORTON)"
+
+    def _creep_cards(self, source: LawWithValues, forms: Sequence[CreepForm]) -> CreepCards:
+        form = forms[0]
+        if len(forms) > 1 or form.stress_function != "power" or form.strain_exponent:
+            terms = " + ".join(one.label for one in forms)
+            raise self.refusal(source, f" is not rate = A q^n t^m, the creep law that CalculiX has ({terms})")
+        rows, notes = self._rows(source, form)
+        least = min(rows.values())
+        if least < math.log(_CALCULIX_LEAST):
+            found = f"1e{least / math.log(10):.0f}, and CalculiX creeps by {_CALCULIX_LEAST:g} where less is written"
+            remedy = "a model in GPa and h has larger ones: units={'stress': 'GPa', 'time': 'h'}"
+            raise self.refusal(source, f": A would be as small as {found} ({remedy})")
+        data = [_data_line(exp_in_range(ln, "A", source), form.n, form.time_exponent, T) for T, ln in rows.items()]
+        formula = "rate = A q^n t^m, of equivalent stress q and total time t, which must start with the load. A, n, m."
+        return [f"LAW=NORTON: {formula}", *notes], ["*CREEP, LAW=NORTON", *data]
 
 
 def _power_law(
@@ -152,11 +183,12 @@ def _power_law(
     rows : {temperature in K or None: ln of A in A s^n e^M t^m}.
     """
     by_time, share = bool(form.time_exponent), m + 1.0
+    counted = ", TIME=TOTAL" if by_time else ""
     law, n = ("TIME", form.n) if by_time else ("STRAIN", form.n * share)
     log_A = [ln if by_time else share * ln - m * math.log(share) for ln in rows.values()]
     if min(log_A) >= math.log(_SMALLEST_COEFFICIENT):
         data = [_data_line(exp_in_range(ln, "A", source), n, m, T) for ln, T in zip(log_A, rows, strict=True)]
-        return [f"LAW={law}: {_FORMULAS[law]}. A, n, m.", *comments], [f"*CREEP, LAW={law}", *data]
+        return [f"LAW={law}: {_FORMULAS[law]}. A, n, m.", *comments], [f"*CREEP, LAW={law}{counted}", *data]
     q0 = 100.0 / source.units.megapascals
     shifted = [ln + form.n * math.log(q0) for ln in rows.values()]
     log_rates = [ln / share if by_time else ln - form.strain_exponent * math.log(share) for ln in shifted]
@@ -166,7 +198,7 @@ def _power_law(
         f"the manual of 2022, not in that of 2017: {_FORMULAS[newer]}. q0, n, m, e0."
     )
     data = [_data_line(q0, n, m, exp_in_range(ln, "e0", source), T) for ln, T in zip(log_rates, rows, strict=True)]
-    return [reason, *comments], [f"*CREEP, LAW={newer}", *data]
+    return [reason, *comments], [f"*CREEP, LAW={newer}{counted}", *data]
 
 
 def _double_power(source: LawWithValues, forms: Sequence[CreepForm]) -> CreepCards:
@@ -407,4 +439,4 @@ def _elastic_keywords(source: LawWithValues, label: str) -> tuple[list[str], lis
 @hookimpl
 def creepkit_exporters() -> list[Exporter]:
     """The exporters of this module."""
-    return [AbaqusCards(), AnsysCards(), CodeAsterMaterial()]
+    return [AbaqusCards(), CalculixCards(), AnsysCards(), CodeAsterMaterial()]

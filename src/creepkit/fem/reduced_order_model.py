@@ -30,7 +30,8 @@ class ReducedBasis:
 
     modes : (modes, nodes, 2) mm, zero where a displacement is held.
     points : (points,) number 4 element + point of each integration point that is used.
-    factors : (points,) by which its weight in finite elements is multiplied.
+    factors : (points, 5, 5) by which its first Piola-Kirchhoff stress 11, 12, 21, 22, 33 is multiplied, beside its
+        weight in finite elements.
     """
 
     modes: Floats
@@ -138,7 +139,7 @@ class _ModelStructure(CoreStructure):
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("modes", "points", "side_points", "observed", "limited", "measured")),
         *((name, ctypes.c_void_p) for name in (
-            "gradients", "points_first", "weights", "sides", "side_modes", "surface", "measures",
+            "gradients", "points_first", "weights", "factors", "sides", "side_modes", "surface", "measures",
         )),
     )  # fmt: skip
 
@@ -158,7 +159,8 @@ class CompiledReducedModel:
         self.points = np.concatenate([basis.points, np.repeat(basis.points[:1], pad)])
         narrow = mode_gradients(model, modes, self.points)
         by_block = narrow.reshape(-1, BLOCK, 5, count).transpose(0, 3, 2, 1)
-        weights = model.weights.ravel()[self.points] * np.concatenate([basis.factors, np.zeros(pad)])
+        weights = model.weights.ravel()[self.points] * (np.arange(self.points.size) < basis.points.size)
+        factors = basis.factors[np.minimum(np.arange(self.points.size), basis.points.size - 1)]
         sides, side_modes = _sides(model, modes)
         observed = modes[:, model.top, 1]
         limited = _in_blocks(observed if model.top.size else modes.reshape(count, -1))
@@ -167,6 +169,7 @@ class CompiledReducedModel:
             "gradients": self._padded(narrow),
             "points_first": by_block,
             "weights": weights,
+            "factors": factors.reshape(-1, BLOCK, 25).transpose(0, 2, 1),
             "sides": sides,
             "side_modes": self._padded(side_modes),
             "surface": self._padded(observed.T),

@@ -4,13 +4,15 @@ Snapshots are the accepted steps of finite element simulations, on one mesh or o
 leave as little as they can of the elastic energy of the snapshots' displacements, and of their changes from step to
 step (Sirovich 1987). Points and their weights make the forces of the snapshots' stresses on the modes, and the elastic
 stiffness, what all points make them (energy-conserving sampling and weighting, Farhat et al. 2014), found by the method
-of Lawson and Hanson (1974), Solving Least Squares Problems, chapter 23.
+of Lawson and Hanson (1974), Solving Least Squares Problems, chapter 23. Then least squares near them make a matrix of
+each weight, by which a point stands for others where stress is another.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,16 +44,30 @@ MOST_FORCE_ROWS = 12_000
 """Snapshots times modes that points are chosen by, at most; snapshots are drawn evenly."""
 
 
-STIFFNESS_SHARE = 3.0
-"""Weight of the elastic stiffness beside that of the forces when points are chosen."""
+STIFFNESS_SHARE = 0.2
+"""Weight of the elastic stiffness beside that of the snapshots' forces when points are chosen."""
 
 
-def _energy_norm(poisson: float = 0.3) -> Floats:
+LEAST_IMPORTANCE, WORK_WEIGHT = 0.1, 2.0
+"""Least weight of the force on a mode, where that of the one that moves most is some one; weight of the work."""
+
+
+NEARNESS = 0.1
+"""Weight of what makes a point's weight a matrix, beside the mean square of what forces follow from."""
+
+
+AT_ONCE = 32
+"""Stresses whose forces are in memory together."""
+
+
+POISSON, TRACE = 0.3, np.array([1.0, 0.0, 0.0, 1.0, 1.0])
+
+
+def _energy_norm() -> Floats:
     """(5, 5) R with |R g|^2 the elastic energy density of the gradient g = (F11, F12, F21, F22, F33) at modulus one."""
-    shear, first = 0.5 / (1.0 + poisson), poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
-    trace = np.array([1.0, 0.0, 0.0, 1.0, 1.0])
+    shear, first = 0.5 / (1.0 + POISSON), POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
     strains = np.array([[1, 0, 0, 0, 0], [0, 0.5, 0.5, 0, 0], [0, 0.5, 0.5, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1.0]])
-    values, vectors = np.linalg.eigh(first * np.outer(trace, trace) + 2.0 * shear * strains.T @ strains)
+    values, vectors = np.linalg.eigh(first * np.outer(TRACE, TRACE) + 2.0 * shear * strains.T @ strains)
     return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T)
 
 
@@ -158,11 +174,9 @@ def principal_modes(data: Snapshots, count: int, deflection_limit: float) -> Flo
     weights = np.concatenate([share / size, CHANGE_SHARE * share / np.maximum(step, SMALLEST_CHANGE)])
     fields = np.concatenate([displacements, changes]) * weights[:, None, None]
     roots = _energy_roots(data.models[0], fields).reshape(-1, len(fields))
-    values, vectors = np.linalg.eigh(roots @ roots.T if len(roots) < len(fields) else roots.T @ roots)
+    values, vectors = np.linalg.eigh(roots @ roots.T)
     kept = np.flatnonzero(values > 1e-13 * values[-1])[::-1][:count]
-    scaled = vectors[:, kept] / np.sqrt(values[kept])
-    if len(roots) < len(fields):  # from directions of the gradients to combinations of the fields
-        scaled = roots.T @ scaled / np.sqrt(values[kept])
+    scaled = roots.T @ vectors[:, kept] / values[kept]  # from directions of the gradients to combinations of the fields
     return np.asarray(np.tensordot(scaled.T, fields, 1))
 
 
@@ -182,27 +196,95 @@ def _energy_roots(model: FiniteElementModel, modes: Floats) -> Floats:
 
 
 def cubature(data: Snapshots, modes: Floats, count: int) -> tuple[Ints, Floats]:
-    """Points and the factors of their weights, both (points,), by which the forces on the modes come out right.
+    """Points (points,) and the factors (points, 5, 5) of their stresses by which forces on the modes come out right.
 
     modes : (modes, nodes, 2) mm, orthonormal in the elastic energy, so that forces are measured by the displacements
         they make. count : points at most.
     """
     every = data.models[0].weights.size
     if count >= every:
-        return np.arange(every), np.ones(every)
-    chosen = _evenly(len(data.mesh), max(1, MOST_FORCE_ROWS // len(modes)))
+        return np.arange(every), np.broadcast_to(np.eye(5), (every, 5, 5))
+    parts = [part for number in range(len(data.models)) for part in _forces_wanted(data, modes, number)]
     gram, right = np.zeros((every, every)), np.zeros(every)
-    for number, model in enumerate(data.models):
-        stresses = data.stresses[chosen[data.mesh[chosen] == number]]
-        gradients = mode_gradients(model, modes, np.arange(every)) * model.weights.ravel()[:, None, None]
-        scale = np.sqrt((stresses**2 * model.weights.ravel()[:, None]).sum(axis=(1, 2)))
-        forces = np.einsum("kps,psm->kmp", stresses / scale[:, None, None], gradients).reshape(-1, every)
-        roots = _energy_roots(model, modes)
-        stiffness = np.einsum("psi,psj->ijp", roots, roots)[np.triu_indices(len(modes))]
-        for rows, share in ((forces, 1.0 / len(chosen)), (stiffness, STIFFNESS_SHARE / len(data.models) / len(modes))):
-            gram += share * rows.T @ rows
-            right += share * rows.T @ rows.sum(axis=1)
-    return non_negative_least_squares(gram, right, count)
+    for part in parts:
+        rows = part.of_points()
+        gram += rows.T @ rows
+        right += rows.T @ rows.sum(axis=1)
+    points, weights = non_negative_least_squares(gram, right, count)
+    return points, _matrix_weights(parts, points, weights)
+
+
+class _Forces(NamedTuple):
+    """Forces that a cubature is to be right for: those of stresses on the modes, and their work along a motion each.
+
+    stresses, motions : (k, points, 5), gradients : (points, 5, modes), the latter two times the points' weights.
+    """
+
+    stresses: Floats
+    motions: Floats
+    gradients: Floats
+
+    def of_points(self) -> Floats:
+        """Contributions (k modes + k, points) of all points."""
+        forces = np.einsum("kps,psm->kmp", self.stresses, self.gradients)
+        work = np.einsum("kps,kps->kp", self.stresses, self.motions)
+        return np.concatenate([forces.reshape(-1, forces.shape[2]), work])
+
+    def of_components(self, points: Ints) -> Floats:
+        """As `of_points` for some, (..., 25 points), of component t of the stress by component s of the gradient."""
+        stresses = self.stresses[:, points]
+        forces = np.einsum("kpt,psm->kmpst", stresses, self.gradients[points])
+        work = np.einsum("kpt,kps->kpst", stresses, self.motions[:, points])
+        return np.concatenate([each.reshape(-1, 25 * points.size) for each in (forces, work)])
+
+
+def _forces_wanted(data: Snapshots, modes: Floats, mesh: int) -> list[_Forces]:
+    """Of the snapshots on one mesh, and of elastic changes of volume, and of shape, along the modes, apart: a body that
+    creeps resists the former alone. Work counts more than forces, for what an error of them does is work on the motion.
+    """
+    model, energy = data.models[mesh], NORM.T @ NORM
+    weights, every = model.weights.ravel(), np.arange(model.weights.size)
+    chosen = _evenly(len(data.mesh), max(1, MOST_FORCE_ROWS // len(modes)))
+    own = chosen[data.mesh[chosen] == mesh]
+    gradients = mode_gradients(model, modes, every)
+    volume = np.outer(TRACE, TRACE) @ gradients / (3.0 * (1.0 - 2.0 * POISSON))
+    elastic = np.concatenate([volume, energy @ gradients - volume], axis=2)
+    given = (
+        (data.stresses[own], mode_gradients(model, data.changes[own], every), 1.0 / len(chosen)),
+        (np.moveaxis(elastic, 2, 0), np.tile(gradients, 2), STIFFNESS_SHARE / len(data.models) / (2.0 * len(modes))),
+    )
+    found = []
+    for stresses, motions, share in given:
+        along = np.moveaxis(motions, 2, 0)
+        sizes = (stresses**2 * weights[:, None]).sum(axis=(1, 2))
+        energies = (along * (along @ energy) * weights[:, None]).sum(axis=(1, 2))
+        stresses = stresses * np.sqrt(share / sizes)[:, None, None]
+        along = along * weights[:, None] * (WORK_WEIGHT / np.sqrt(energies))[:, None, None]
+        forces = gradients * weights[:, None, None] * _importance(data, modes)
+        for part in np.array_split(np.arange(len(stresses)), -(-len(stresses) // AT_ONCE)):
+            found.append(_Forces(stresses[part], along[part], forces))
+    return found
+
+
+def _importance(data: Snapshots, modes: Floats) -> Floats:
+    """Weights (modes,) of the forces on the modes, at most some one: by how much each takes part in changes."""
+    changes = data.changes[_evenly(len(data.mesh), MOST_SNAPSHOTS)]
+    roots, fields = (_energy_roots(data.models[0], each).reshape(-1, len(each)) for each in (modes, changes))
+    parts = roots.T @ fields
+    share = np.sqrt(((parts / np.linalg.norm(parts, axis=0)) ** 2).mean(axis=1))
+    return np.asarray(share / share.max() + LEAST_IMPORTANCE)
+
+
+def _matrix_weights(parts: Sequence[_Forces], points: Ints, weights: Floats) -> Floats:
+    """The factors (points, 5, 5) near weights (points,) times one by which forces are those of all points."""
+    count, scalar = 25 * points.size, weights[:, None, None] * np.eye(5)
+    gram, right = np.zeros((count, count)), np.zeros(count)
+    for part in parts:
+        rows = part.of_components(points)
+        gram += rows.T @ rows
+        right += rows.T @ (part.of_points().sum(axis=1) - rows @ scalar.ravel())
+    nearness = NEARNESS * np.trace(gram) / count * np.repeat(weights**-2.0, 25)
+    return np.asarray(scalar + np.linalg.solve(gram + np.diag(nearness), right).reshape(scalar.shape))
 
 
 def non_negative_least_squares(gram: Floats, right: Floats, count: int) -> tuple[Ints, Floats]:

@@ -142,44 +142,6 @@ def solve(
     )  # fmt: skip
 
 
-def assemble(
-    law: CompiledLaw, theta: Floats, model: FiniteElementModel, stage: StageConditions, displacement: Floats
-) -> tuple[Floats, Floats]:
-    """Out-of-balance forces (size,), N/rad, and tangent (size, size), N/(rad mm), of a virgin body.
-
-    theta : (P,) internal parameters. displacement : (2 nodes,) mm. The tangent is made symmetric, as Newton's method
-    takes it. SolveError where a point has no stress.
-    """
-    theta, displacement = _contiguous(theta), _contiguous(displacement)
-    history = np.zeros((4 * model.compiled.elements, 4 + law.states))
-    history[:, 4:] = law.initial
-    residual, tangent = np.zeros(model.size), np.zeros((model.size, model.size))
-    entries = _Law(*_entry_addresses(law), address(theta), theta.size, law.states)
-    flag = function("creepkit_assemble")(
-        ctypes.byref(model.compiled.structure), ctypes.byref(entries), ctypes.byref(_Stage(*stage)),
-        *map(address, (history, displacement, residual, tangent)),
-    )  # fmt: skip
-    if flag != 0:
-        raise SolveError("a point of the body has no stress at these displacements")
-    return residual, tangent
-
-
-class StageConditions(NamedTuple):
-    """What all points of a stage share.
-
-    weight : s, of the creep rate; 0 for a purely elastic change. log_weight : its logarithm. time : s. temperature : K.
-    bulk, shear : K and G, MPa. pressure : MPa.
-    """
-
-    weight: float
-    log_weight: float
-    time: float
-    temperature: float
-    bulk: float
-    shear: float
-    pressure: float
-
-
 class LoadProgram(NamedTuple):
     """The load history as the solver takes it.
 
@@ -235,10 +197,6 @@ class _Law(CoreStructure):
     _fields_ = (
         ("update", _ARRAY), ("sensitivity", _ARRAY), ("theta", _ARRAY), ("parameters", _NUMBER), ("states", _NUMBER),
     )  # fmt: skip
-
-
-class _Stage(CoreStructure):
-    _fields_ = tuple((name, _REAL) for name in StageConditions._fields)
 
 
 class _Input(CoreStructure):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from creepkit import limits
 from creepkit.errors import SolveError
+from creepkit.language import Elastic, elastic_of
 from creepkit.options import GIGAPASCAL, HOURS, Options, option
 from creepkit.records import (
     History,
@@ -22,10 +24,10 @@ from creepkit.records import (
     StressSteps,
     TwoLevels,
     loading_of,
+    loads_of,
 )
 
 if TYPE_CHECKING:
-    from creepkit.language import Elastic
     from creepkit.records import Load
 
 
@@ -63,21 +65,6 @@ COMPONENTS = "components"
 """The load of specimens under stresses and strains of several components."""
 
 
-def needs_modulus(specimen: Specimen, loading: Loading) -> bool:
-    """Whether a planned test has no curve without Young's modulus: by its specimen, or because strain is prescribed."""
-    prescribed = isinstance(loading, StrainSteps) or (isinstance(loading, PointLoading) and bool(loading.strain))
-    return prescribed or "modulus" in specimen.conditions
-
-
-def load_of_components(components: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]]) -> PointLoading:
-    """The load of a material point, {"stress" or "strain": {component: steps}}; a component is at rest until then."""
-    from_rest = {
-        kind: {name: tuple(steps) if steps[0][0] == 0.0 else ((0.0, 0.0), *steps) for name, steps in given.items()}
-        for kind, given in components.items()
-    }
-    return PointLoading(**from_rest)
-
-
 def stepped_load(
     name: str,
     load: Load | None,
@@ -112,25 +99,65 @@ def stepped_load(
     return loading_of(name, steps, ramp=given, end=end)
 
 
-def planned_history(
-    specimen: Specimen,
-    loading: Loading,
-    end: float,
-    *,
-    temperature: float | Program,
-    elastic: Elastic | None = None,
-    lengths: Mapping[str, float] | None = None,
-    name: str = "planned test",
-) -> History:
-    """The history of a test that ends at `end`, s, without outputs; temperature : K, lengths : mm."""
-    half = PLANNED_FRAMES // 2
-    return History(
-        name=name,
-        times=np.union1d(np.geomspace(1e-3 * end, end, half), np.linspace(end / half, end, half)),
-        outputs={},
-        loading=loading,
-        temperature=temperature,
-        specimen=specimen.name,
-        elastic=elastic,
-        geometry=lengths or {},
-    )
+@dataclass(frozen=True)
+class DescribedTest:
+    """A test that is planned, as a command or a study describes it; from it follow its load and its history.
+
+    loads : {name: ((start in s, level), ...)}, of a material point by component, as stress_11, at rest until its first
+    step. lengths : mm of its test piece. temperature : K, None where nothing is said.
+    """
+
+    specimen: Specimen
+    options: PlannedTestOptions
+    loads: Mapping[str, Sequence[tuple[float, float]]]
+    lengths: Mapping[str, float]
+    temperature: float | Program | None = None
+
+    @cached_property
+    def loading(self) -> Loading:
+        """The load; SolveError where the specimen is not loaded so."""
+        own, options, label = {load.name: load for load in loads_of(self.specimen)}, self.options, self.specimen.name
+        named = " and ".join(self.loads)
+        unknown = ("control", "ramp") if COMPONENTS in own else ("ramp",) if "stress" in self.loads else ("control",)
+        for key in (one for one in unknown if getattr(options, one) is not None):
+            raise SolveError(f"{key} does not belong to {named} of specimen '{label}'; leave it out")
+        if COMPONENTS in own:
+            return self._components()
+        if len(self.loads) > 1:
+            raise SolveError(f"a test of specimen '{label}' has one load, found {named}; leave all but one out")
+        ((name, steps),) = self.loads.items()
+        end = float(options.end or 0.0)
+        return stepped_load(name, own[name], steps, control=options.control, ramp=options.ramp, end=end)
+
+    @property
+    def elastic(self) -> Elastic | None:
+        """Elastic data; SolveError where there is no curve without them: by the specimen, or for strain is imposed."""
+        loading = self.loading
+        imposed = isinstance(loading, StrainSteps) or (isinstance(loading, PointLoading) and bool(loading.strain))
+        if self.options.modulus is None and (imposed or "modulus" in self.specimen.conditions):
+            label = self.specimen.name
+            raise SolveError(f"specimen '{label}' needs a modulus: give --modulus-gpa or modulus_GPa, such as 150")
+        return elastic_of(self.options.modulus)
+
+    def _components(self) -> PointLoading:
+        parts: dict[str, dict[str, tuple[tuple[float, float], ...]]] = {"stress": {}, "strain": {}}
+        for name, steps in self.loads.items():
+            kind, _, component = name.partition("_")
+            if sorted(steps) != list(steps):
+                raise SolveError(f"the steps of {kind} {component} must follow one another in time")
+            parts[kind][component] = tuple(steps) if steps[0][0] == 0.0 else ((0.0, 0.0), *steps)
+        return PointLoading(**parts)
+
+    def history(self, temperature: float | Program, name: str = "planned test") -> History:
+        """The history of the test up to its end, without outputs; temperature : K, where the test says none."""
+        half, end = PLANNED_FRAMES // 2, float(self.options.end or 0.0)
+        return History(
+            name=name,
+            times=np.union1d(np.geomspace(1e-3 * end, end, half), np.linspace(end / half, end, half)),
+            outputs={},
+            loading=self.loading,
+            temperature=temperature if self.temperature is None else self.temperature,
+            specimen=self.specimen.name,
+            elastic=self.elastic,
+            geometry=self.lengths,
+        )

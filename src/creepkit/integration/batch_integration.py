@@ -121,8 +121,8 @@ def integrate(
 ) -> Integration:
     """Integrate every candidate over every test.
 
-    theta : (candidates, P) internal parameters. jacobian : calculate derivatives too. keep_states : keep the internal
-    variables at the output times.
+    theta : (candidates, P) internal parameters, or (candidates, tests, P) where tests have values of their own.
+    jacobian : calculate derivatives too. keep_states : keep the internal variables at the output times.
     """
     theta = np.array(theta, dtype=float, order="C", ndmin=2)
     if sentence := refusal(law, theta):
@@ -133,9 +133,9 @@ def integrate(
     batch = BatchStructure(
         update=law.update.address,
         sensitivity=law.sensitivity.address,
-        candidates=theta.shape[0],
+        candidates=len(theta),
         tests=len(tests),
-        parameters=theta.shape[1],
+        parameters=theta.shape[-1],
         states=law.states,
         with_sensitivities=int(jacobian),
         axes=AxesStructure(*axes),
@@ -143,7 +143,14 @@ def integrate(
         tableau=tableau_structure(tableau),
     )
     write_addresses(batch, {**inputs, **result})
-    check_call(function("creepkit_integrate_batch")(ctypes.byref(batch)))
+    call = function("creepkit_integrate_batch")
+    if theta.ndim == 2:
+        check_call(call(ctypes.byref(batch)))
+    else:
+        batch.candidates = batch.tests = 1
+        for c, k in np.ndindex(theta.shape[:2]):
+            write_addresses(batch, _of_one_test({**inputs, **result}, c, k))
+            check_call(call(ctypes.byref(batch)))
     return Integration(
         strain=result["strain"],
         starts=inputs["time_offsets"],
@@ -164,7 +171,7 @@ def _inputs(law: CompiledLaw, theta: Floats, tests: Sequence[PointTest]) -> dict
     segments = [test.segments for test in tests]
     return {
         "theta": theta,
-        "beta": np.array(law.leading_exponent(theta), dtype=float).reshape(theta.shape[0]),
+        "beta": np.array(law.leading_exponent(theta), dtype=float).reshape(theta.shape[:-1]),
         "initial": np.array(law.initial, dtype=float),
         "limits": np.array(law.limits, dtype=float),
         "stress_controls": np.array([[t.stiffness, float(t.constant_load)] for t in tests]).reshape(-1, 2),
@@ -177,6 +184,21 @@ def _inputs(law: CompiledLaw, theta: Floats, tests: Sequence[PointTest]) -> dict
     }
 
 
+def _of_one_test(arrays: dict[str, Any], candidate: int, test: int) -> dict[str, Any]:
+    """Where the arrays of a call of one candidate in one test begin, of those of all with values of their own.
+
+    Offsets count from the beginning of the segments, times and levels of all tests, as in the call of all.
+    """
+    by_test = ("theta", "beta", "endings", "end_times", "steps", "end_jacobian")
+    by_candidate = ("strain", "values", "jacobian", "arrivals", "arrival_slopes", "arrival_jacobian")
+    of_tests = ("stress_controls", "segment_offsets", "time_offsets", "level_offsets")
+    return {
+        **{name: arrays[name][candidate, test:] for name in by_test if len(arrays[name])},
+        **{name: arrays[name][candidate] for name in by_candidate if name in arrays and len(arrays[name])},
+        **{name: arrays[name][test:] for name in of_tests},
+    }
+
+
 def _offsets(sizes: list[int]) -> Ints:
     """Where each of several arrays begins when they are laid end to end, and where the last ends."""
     return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
@@ -184,7 +206,7 @@ def _offsets(sizes: list[int]) -> Ints:
 
 def _unfilled(theta: Floats, tests: Sequence[PointTest], jacobian: bool) -> dict[str, Any]:
     """The arrays that the core writes, by the names of its fields, NaN so far; derivatives only where wanted."""
-    candidates, parameters = theta.shape
+    candidates, parameters = len(theta), theta.shape[-1]
     frames, levels, count = sum(t.times.size for t in tests), sum(t.levels.size for t in tests), len(tests)
     rows = candidates if jacobian else 0
     return {

@@ -220,6 +220,10 @@ class Adequacy:
         """The largest discrepancy of an output, over its noise."""
         return max((o.discrepancy_in_noises for o in self.outputs), default=float("nan"))
 
+    def misses_shape(self, by: float = 1.0) -> bool:
+        """Whether the law misses the shape of curves, by more noises than so many times SHAPE_MISFIT."""
+        return self.rejects and self.discrepancy_in_noises > by * SHAPE_MISFIT
+
     @property
     def _chi_square_text(self) -> str:
         remarks = []

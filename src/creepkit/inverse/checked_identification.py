@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
@@ -12,6 +12,7 @@ from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify as identify_law
+from creepkit.inverse.identify import sampled_where_needed
 from creepkit.inverse.nuisance_parameters import check_nuisance_tests
 from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.selection import Ranking
@@ -23,6 +24,9 @@ from creepkit.options import takes_options
 from creepkit.records import History, Predictor
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictors
+
+if TYPE_CHECKING:
+    from creepkit.option_keywords import IdentificationSettingsKeywords
 
 
 @takes_options(IdentificationSettings)
@@ -37,7 +41,7 @@ def identify(
     through: Predictor | Literal["auto"] | None = "auto",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    **changes: Any,
+    **changes: Unpack[IdentificationSettingsKeywords],
 ) -> Identification:
     """Identify the parameters of a law from all histories at once, with 95 % intervals.
 
@@ -65,6 +69,7 @@ def identify(
         fit = identify_law(law, histories, predictor, **how)
     else:
         fit = identify_sparse(law, histories, predictor, penalty=penalty, **how)
+    fit = sampled_where_needed(fit, surrogate)
     return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
 
 
@@ -80,7 +85,7 @@ def select(
     by: Literal["bic", "aicc"] = "bic",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    **changes: Any,
+    **changes: Unpack[IdentificationSettingsKeywords],
 ) -> Ranking:
     """Identify several laws from the same histories by likelihood, and rank them by how well they explain these.
 

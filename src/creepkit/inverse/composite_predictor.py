@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from creepkit.errors import FitError
-from creepkit.records import History, NuisanceValues, Prediction, Predictor, concatenated_tests
+from creepkit.records import History, NuisanceValues, Prediction, Predictor, concatenated_tests, values_of_tests
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
@@ -106,17 +106,19 @@ class CompositePredictor(Predictor):
 
         def of_group(one: Predictor, group: list[History], tests: list[int]) -> Prediction:
             own = {key: values[:, tests] for key, values in nuisances.items() if one.follows(key)}
-            return one.predict(law, theta, group, nuisances=own, sensitivities=sensitivities)
+            return one.predict(law, values_of_tests(theta, tests), group, nuisances=own, sensitivities=sensitivities)
 
         return self._of_groups(histories, of_group)
 
     def predict_to_rupture(
         self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
     ) -> Prediction:
-        """As each predicts its tests to their rupture; theta : (candidates, parameters) internal values."""
-        return self._of_groups(
-            histories, lambda one, group, _: one.predict_to_rupture(law, theta, group, sensitivities=sensitivities)
-        )
+        """As each predicts its tests to their rupture; theta : (candidates[, tests], parameters) internal values."""
+
+        def of_group(one: Predictor, group: list[History], tests: list[int]) -> Prediction:
+            return one.predict_to_rupture(law, values_of_tests(theta, tests), group, sensitivities=sensitivities)
+
+        return self._of_groups(histories, of_group)
 
     def _of_groups(
         self, histories: Sequence[History], predict: Callable[[Predictor, list[History], list[int]], Prediction]

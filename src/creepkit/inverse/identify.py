@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import CreepkitError, FitError
-from creepkit.inverse.adequacy import SHAPE_MISFIT
 from creepkit.inverse.bound_penalties import check_bounds
 from creepkit.inverse.bounds import MOST_WIDENINGS, widened, widened_notes
 from creepkit.inverse.compared_tests import compared_tests, compares_rupture_times
@@ -19,6 +18,7 @@ from creepkit.inverse.defect_correction import (
     NumericalError,
     correct_defect,
     shift_of_values,
+    with_cheaper_predictor,
     with_correction_at_frames,
 )
 from creepkit.inverse.errors_of_tests import (
@@ -88,6 +88,14 @@ REFIT_ROUNDS = 2
 """Rounds of an estimate that begins near its end."""
 
 
+CLEARLY = 1.2
+"""Times SHAPE_MISFIT, beyond which a law misses the shape of curves whatever the last steps of its estimate are."""
+
+
+DESCRIBING_LIMITS = replace(APPROXIMATE_LIMITS, rounds=8)
+"""For values by frames of equal weight, which follow the noise that is found slowly."""
+
+
 @kept_where_asked
 def identify(
     law: CreepLaw,
@@ -109,37 +117,9 @@ def identify(
         values and intervals are those of `using`.
     A surrogate that does not know this class of laws is replaced by its specimen, or left out; a note says so.
     start : an estimate to begin from instead of a global search.
+    The posterior is not sampled; see sampled_where_needed().
     """
-    how: dict[str, Any] = {"settings": settings, "search": search, "through": through, "start": start}
-    fit = identify_unsampled(law, histories, using, progress=progress, **how)
-    return fit if start is not None and start.values_only else sampled_where_needed(fit, through)
-
-
-def sampled_where_needed(fit: Identification, through: Predictor | None) -> Identification:
-    """With samples of the posterior where values are at bounds or not determined; through : as of identify()."""
-    if fit.samples is not None or not needs_samples(fit):
-        return fit
-    with single_threaded_blas():
-        return with_samples(fit, through_for_law(through, fit.law))
-
-
-@kept_where_asked
-def identify_unsampled(
-    law: CreepLaw,
-    histories: Sequence[History],
-    using: Predictor | Mapping[str, Predictor],
-    *,
-    settings: IdentificationSettings | None = None,
-    search: GlobalSearch | None = None,
-    through: Predictor | None = None,
-    start: StartingEstimate | None = None,
-    progress: IterationCallback | None = None,
-) -> Identification:
-    """As identify(), without samples of the posterior, which select() draws of laws that may be the one."""
     settings = settings or IdentificationSettings()
-    automatic = settings.weights == "automatic"
-    if automatic:
-        settings = replace(settings, weights="likelihood")
     using, through, notes = predictors_for_law(law, using, through)
     histories, left_out = compared_tests(law, histories, settings)
     with single_threaded_blas():
@@ -148,18 +128,27 @@ def identify_unsampled(
         fit = replace(fit, notes=(*left_out, *fit.notes, *widened_notes(law, fit.law), *notes))
         if start is not None and start.values_only:
             return fit
-        if automatic and misses_shape(fit):
-            return describing(fit)
-        if settings.weights == "noise" and start is None:
+        if settings.weights == "automatic" and misses_shape(fit):
+            fit = describing(fit)
+        elif settings.weights == "noise" and start is None:
             fit = _with_rates_of_tests(fit)
     return _without_one_test(fit)
 
 
+def sampled_where_needed(fit: Identification, through: Predictor | None = None) -> Identification:
+    """With samples of the posterior where values are at bounds or not determined.
+
+    through : a cheaper predictor that samples are drawn through, as of identify().
+    """
+    if fit.samples is not None or not needs_samples(fit):
+        return fit
+    with single_threaded_blas():
+        return with_samples(fit, through_for_law(through, fit.law))
+
+
 def misses_shape(fit: Identification) -> bool:
     """Whether an identification by likelihood misses the shape of curves, by more noises than SHAPE_MISFIT."""
-    adequacy = fit.adequacy
-    missed = adequacy is not None and adequacy.rejects and adequacy.discrepancy_in_noises > SHAPE_MISFIT
-    return missed and fit.settings.weights == "likelihood"
+    return fit.adequacy is not None and fit.settings.weights == "likelihood" and fit.adequacy.misses_shape()
 
 
 def describing(fit: Identification) -> Identification:
@@ -234,61 +223,97 @@ def _estimated(
     start: StartingEstimate | None,
     progress: IterationCallback | None,
 ) -> tuple[EstimationResult, SearchOutcome, NumericalError | None]:
-    """The best estimate, where it began, and the error of the predictor there; within bounds as wide as it needs."""
-    count, start = len(law.params), start or StartingEstimate(None)
+    """The best estimate, where it began, and the error of the predictor there; within bounds as wide as it needs.
+
+    With automatic weights it is by likelihood, unless a first one clearly misses the shape of curves.
+    """
+    judged = histories if settings.weights == "automatic" else None
+    settings = settings if judged is None else replace(settings, weights="likelihood")
+    count, start, noise = len(law.params), start or StartingEstimate(None), None
     problem = LeastSquaresProblem.from_histories(law, histories, using, settings, start.reference)
     if start.u is None:
         outcome = initial_search(problem, through, search or MultiStart(), progress)
     else:
         bounds = problem.bounds.of(range(count))
         outcome = SearchOutcome([np.clip(start.u, bounds.lower, bounds.upper)], 0, None)
-    for widenings in range(MOST_WIDENINGS + 1):
-        best, numerical_error = _best_estimate(problem, outcome, through, start, progress)
-        u = best.x[:count]
-        wider = widened(problem.law, problem.coordinates.theta(u)) if widenings < MOST_WIDENINGS else None
-        if wider is None:
-            break
-        start, outcome = StartingEstimate(u, (), problem.coordinates.reference), outcome._replace(starts=[u])
-        wider_problem = LeastSquaresProblem.from_histories(wider, histories, using, settings, start.reference)
-        problem = replace(wider_problem, evaluations=problem.evaluations)
-    residuals, jacobian = best.linear.residuals, best.linear.residuals.jacobian
-    assert jacobian is not None
-    factor = CovarianceFactor.of_residuals(residuals, best.noise)
-    gradient = np.einsum("te,tep->p", factor.inverse_times(residuals.values), jacobian)
-    check_bounds(best.problem.bound_penalties, u, gradient[:count], problem.observations.count)
+    known_values = {(n.key, n.owner): n.value for n in start.nuisances}
+    starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in outcome.starts]
+    stages = [partial(_last_estimate, is_near=start.u is not None, through=through)]
+    if through is not None and start.u is None:
+        stages.insert(0, partial(_cheaper_estimate, through=through))
+    widenings = MOST_WIDENINGS
+    for stage in stages:
+        best, numerical_error = stage(problem, starts, noise, judged, progress)
+        while widenings and (wider := _wider_law(best)) is not None:
+            settings, reference, widenings = best.problem.settings, problem.coordinates.reference, widenings - 1
+            wider_problem = LeastSquaresProblem.from_histories(wider, histories, using, settings, reference)
+            problem = replace(wider_problem, evaluations=problem.evaluations)
+            again = stage if stage is not stages[-1] else partial(stage, is_near=True)
+            best, numerical_error = again(problem, [best.x], None, judged, progress)
+        problem, starts, noise = replace(problem, settings=best.problem.settings), [best.x], best.noise
+    _check_bounds(best)
     return best, outcome, numerical_error
 
 
-def _best_estimate(
-    problem: LeastSquaresProblem,
-    search_outcome: SearchOutcome,
-    through: Predictor | None,
-    start: StartingEstimate,
-    progress: IterationCallback | None,
-) -> tuple[EstimationResult, NumericalError | None]:
-    """The best end of the starts, through the cheaper predictor first if there is one; its best end goes on.
+def _wider_law(found: EstimationResult) -> CreepLaw | None:
+    """The law within wider bounds, where an estimate needs them."""
+    problem = found.problem
+    return widened(problem.law, problem.coordinates.theta(found.x[: problem.parameter_count]))
 
-    The predictor is corrected where the last estimate begins: at an end of its own, or near one that is known.
+
+def _check_bounds(found: EstimationResult) -> None:
+    """FitError where the bounds of the law exclude the data."""
+    residuals, jacobian = found.linear.residuals, found.linear.residuals.jacobian
+    assert jacobian is not None
+    factor, count = CovarianceFactor.of_residuals(residuals, found.noise), found.problem.parameter_count
+    gradient = np.einsum("te,tep->p", factor.inverse_times(residuals.values), jacobian)
+    check_bounds(found.problem.bound_penalties, found.x[:count], gradient[:count], found.problem.observations.count)
+
+
+def _cheaper_estimate(
+    problem: LeastSquaresProblem,
+    starts: Sequence[Floats],
+    noise: NoiseModel | None,
+    judged: Sequence[History] | None,
+    progress: IterationCallback | None,
+    *,
+    through: Predictor,
+) -> tuple[EstimationResult, NumericalError | None]:
+    """The best end of the starts (unknowns,) through a cheaper predictor; judged : as of _last_estimate()."""
+    best = _best_of(problem.with_predictor(through), starts, APPROXIMATE_LIMITS, progress, noise)
+    if judged is None:
+        return best, None
+    corrected = with_cheaper_predictor(problem, best.x, through)
+    known = replace(best, problem=corrected, linear=corrected.linearised(best.x))
+    return _describing_estimate(known, judged, DESCRIBING_LIMITS, progress), None
+
+
+def _last_estimate(
+    problem: LeastSquaresProblem,
+    starts: Sequence[Floats],
+    noise: NoiseModel | None,
+    judged: Sequence[History] | None,
+    progress: IterationCallback | None,
+    *,
+    is_near: bool,
+    through: Predictor | None,
+) -> tuple[EstimationResult, NumericalError | None]:
+    """The best end of the starts (unknowns,), and the error of the predictor, which is corrected.
+
+    It is corrected where the last estimate begins: at an end of its own, or near one that is known.
+    judged : the tests with all frames, where an end that clearly misses the shape of curves goes on with those weights
+    that describe them.
     """
-    estimator = _working_estimator(problem)
-    known_values = {(n.key, n.owner): n.value for n in start.nuisances}
-    starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in search_outcome.starts]
-    limits, noise = IterationLimits(), None
-    if through is not None and start.u is None:
-        best = _best_of(problem.with_predictor(through), starts, estimator, APPROXIMATE_LIMITS, progress)
-        starts, noise = [best.x], best.noise
-    if problem.predictor.reduced_order_model() is not None:
-        limits = SIMULATION_LIMITS
-    if start.u is not None:
-        limits = replace(limits, rounds=REFIT_ROUNDS)
-    x, nearly_there = starts[0], through is not None or start.u is not None
-    if not nearly_there or problem.predictor.refined() is None:
-        best = _best_of(problem, starts, estimator, limits, progress, noise)
+    limits = IterationLimits() if problem.predictor.reduced_order_model() is None else SIMULATION_LIMITS
+    limits = replace(limits, rounds=REFIT_ROUNDS) if is_near else limits
+    x, known = starts[0], None
+    if not (is_near or through is not None) or problem.predictor.refined() is None:
+        best = _best_of(problem, starts, limits, progress, noise)
+        best = _describing_estimate(best, judged, limits, progress)
         problem, x, noise = best.problem, best.x, best.noise
         limits = replace(limits, rounds=REFIT_ROUNDS)
         if problem.predictor.refined() is None:
             return best, None
-    known: Floats | None = None
     for _ in range(MOST_CORRECTIONS):
         corrected, error = correct_defect(problem, x)
         if (
@@ -308,15 +333,34 @@ def _best_estimate(
     return best, numerical_error
 
 
+def _describing_estimate(
+    found: EstimationResult,
+    histories: Sequence[History] | None,
+    limits: IterationLimits,
+    progress: IterationCallback | None,
+) -> EstimationResult:
+    """An estimate by likelihood, or where it clearly misses the shape of curves that of frames of equal weight."""
+    problem, linear, noise = found.problem, found.linear, found.noise
+    if histories is None or problem.settings.weights != "likelihood" or _wider_law(found) is not None:
+        return found
+    errors = {} if problem.correction is not None else problem.predictor.error
+    judge = Judge(problem, noise, errors, histories)
+    if not judge.adequacy(judged_at(problem, linear, noise)).misses_shape(CLEARLY):
+        return found
+    _check_bounds(found)
+    problem = replace(problem.about_rates(found.x, None), settings=replace(problem.settings, weights="noise"))
+    return estimate_iteratively(problem, found.x, _working_estimator(problem), limits, progress)
+
+
 def _best_of(
     problem: LeastSquaresProblem,
     starts: Sequence[Floats],
-    estimator: WorkingNoiseEstimator,
     limits: IterationLimits,
     progress: IterationCallback | None,
     noise: NoiseModel | None = None,
 ) -> EstimationResult:
     """The likeliest of the estimates from starts (unknowns,); by likelihood the start that is best after one round."""
+    estimator = _working_estimator(problem)
     if len(starts) > 1 and estimator.by_likelihood:
         ends = [estimate_iteratively(problem, x, estimator, replace(limits, rounds=1), None, noise) for x in starts]
         best = max(ends, key=lambda end: end.log_likelihood)
@@ -438,4 +482,4 @@ def refit(fit: Identification, histories: Sequence[History]) -> Identification:
     if fit.predictor is None:
         raise FitError("cannot refit an identification that was loaded from a file without its specimen")
     start = StartingEstimate.from_identification(fit)
-    return identify(fit.law, histories, fit.predictor, settings=fit.settings, start=start)
+    return sampled_where_needed(identify(fit.law, histories, fit.predictor, settings=fit.settings, start=start))

@@ -43,6 +43,10 @@ class StartingEstimate:
         return cls(fit.u, fit.nuisances, fit.reference, values_only)
 
 
+LARGEST_COST = 4.0
+"""Of a minimum over the least one: of those that miss the data by more than twice as much none is the likeliest."""
+
+
 class SearchOutcome(NamedTuple):
     """The end of a global search: starts of the estimation, evaluations and trace.
 
@@ -70,6 +74,7 @@ def initial_search(
     search_result = search.minima(searched, progress)
     equal = EQUAL_PREDICTIONS if reduced_order_model is None else EQUAL_REDUCED_ORDER_PREDICTIONS
     apart = distinct(search_result.minima, searched.bounds, equal_predictions=equal)
+    apart = [minimum for minimum in apart if minimum.cost <= LARGEST_COST * apart[0].cost]
     counts = minima_counts(search_result.minima, searched.bounds, equal_predictions=equal)
     return SearchOutcome([minimum.x for minimum in apart], searched.evaluations.count, search_result.trace, counts)
 

@@ -98,7 +98,7 @@ def estimate_iteratively(
     noise : from which to begin, if it is known already.
     """
     robust, by_likelihood = estimator.settings.test_loss == "student", estimator.by_likelihood
-    residuals, best = problem.residuals(x), None
+    residuals, best, is_near = problem.residuals(x), None, noise is not None
     noise = noise or estimator.starting_noise(len(problem.histories))
     tolerances = Tolerances(limits.steps, max(limits.tolerance, LIKELIHOOD_TOLERANCE * by_likelihood))
     for round_index in range(limits.rounds):
@@ -112,10 +112,12 @@ def estimate_iteratively(
         linear = problem.linearised(x, residuals)
         noise = estimator.estimate(residuals, noise, linear)
         if by_likelihood and best is not None and _expected_gain(linear, noise) < CONVERGED_GAIN:
-            best = EstimationResult(problem, linear, noise, _log_likelihood(problem, linear, noise), best.converged)
+            best = EstimationResult(problem, linear, noise, _log_likelihood(problem, linear, noise))
             break
         problem = problem.with_covariance(_covariance_factor(problem, residuals, noise, estimator))
-        minimum = problem.minimise(x, tolerances=tolerances)
+        # The covariance moves with the values: near the end each step is taken under its own.
+        by_steps = by_likelihood and (is_near or best is not None)
+        minimum = problem.minimise(x, tolerances=replace(tolerances, one_step=by_steps))
         x, weights = minimum.x, residuals.test_weights
         residuals = problem.residuals(x).with_test_weights(weights)
         problem = _with_priors_found(problem, residuals, noise, x)
@@ -130,6 +132,7 @@ def estimate_iteratively(
         )
         best = current if best is None or gain > 0 or robust or moved else best
         if abs(gain) < CONVERGED_GAIN and np.abs(weights - previous_weights).max() < CONVERGED_GAIN:
+            best = replace(best, converged=True)
             break
     assert best is not None
     return best

@@ -33,6 +33,7 @@ from creepkit.records import (
     is_logarithmic,
     load_unit,
     outputs_of,
+    values_of_tests,
 )
 
 TIMES = np.concatenate([[0.0], np.geomspace(1e-6, 0.1, 48), np.linspace(0.1, 1.0, 25)[1:]])
@@ -91,14 +92,14 @@ def with_minimum_rates(
 ) -> Prediction:
     """A prediction with the minimum rates of those tests that are compared by them, 1/s, as one more output.
 
-    theta : (candidates, parameters) internal values. The rate stands at the first time of its test; it is NaN where
-    nothing was predicted. sensitivities : also those that the predictor does not know itself, of one candidate.
+    theta : (candidates[, tests], parameters) internal values. The rate stands at the first time of its test; it is NaN
+    where nothing was predicted. sensitivities : also those that the predictor does not know itself, of one candidate.
     """
     tests = [k for k, history in enumerate(histories) if compares_minimum_rate(history)]
     if not tests:
         return prediction
     given = {key: values[:, tests] for key, values in (nuisances or {}).items()}
-    compared = [histories[k] for k in tests]
+    compared, theta = [histories[k] for k in tests], values_of_tests(theta, tests)
     rates, by_parameter, by_nuisance = minimum_rates(predictor, law, theta, compared, given, sensitivities)
 
     def extended(array: Floats, of_tests: Floats) -> Floats:
@@ -129,7 +130,7 @@ def minimum_rates(
 
     Each test is followed from loading to its end, at TIMES.
 
-    theta : (candidates, parameters) internal values. sensitivities : as of with_minimum_rates().
+    theta : (candidates[, tests], parameters) internal values. sensitivities : as of with_minimum_rates().
     """
     known: dict[str, Any] = {"includes_elastic": False, "minimum_rate": None, "minimum_rate_sd": None}
     curves = [h.replace(times=followed_duration(h) * TIMES, outputs={}, **known) for h in histories]

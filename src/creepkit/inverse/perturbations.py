@@ -23,13 +23,12 @@ from typing import Any
 
 import numpy as np
 
-from creepkit.arrays import Floats
+from creepkit.arrays import ArrayLike, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
@@ -84,7 +83,7 @@ def perturbations(
     working_noise : under which values were found that are not by likelihood.
     """
     reference, found = problem.coordinates.reference, list[Perturbation]()
-    slope = log_rate_per_kelvin(problem, linear.x, reference.stress, reference.temperature)
+    slope = float(log_rate_per_kelvin(problem, linear.x, reference.stress, reference.temperature))
     for one in _all(problem, linear.x, linear, full_histories, known):
         if one.common:
             one = replace(one, residual_change=np.zeros((0, 0)))
@@ -303,16 +302,17 @@ def _values(problem: LeastSquaresProblem, x: Floats) -> tuple[Floats, dict[str, 
     return problem.coordinates.theta(x[:count]), dict(problem.nuisance_parameters.predictor_values(x[count:]))
 
 
-def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, stress: float, T: float) -> float:
-    """d ln rate / dT, 1/K, of the law at MPa and K; of one that knows no temperature by the usual activation energy.
+def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, stress: ArrayLike, T: ArrayLike) -> Floats:
+    """d ln rate / dT, (points,) 1/K, of the law; of one that knows no temperature by the usual activation energy.
 
-    x : (unknowns,), or those of the law alone.
+    x : (unknowns,), or those of the law alone. stress, T : (points,) MPa and K.
     """
+    T = np.asarray(T, float)
     if not problem.law.uses(temperature):
-        return USUAL_ACTIVATION_ENERGY / (GAS_CONSTANT * max(T, LOWEST_USUAL_TEMPERATURE) ** 2)
+        return np.asarray(USUAL_ACTIVATION_ENERGY / (GAS_CONSTANT * np.maximum(T, LOWEST_USUAL_TEMPERATURE) ** 2))
     u = x[: problem.parameter_count]
-    up, down = (float(log_rate(problem.coordinates, stress, T + step)(u)) for step in (1.0, -1.0))
-    return 0.5 * (up - down)
+    up, down = (log_rate(problem.coordinates, stress, T + step)(u) for step in (1.0, -1.0))
+    return np.asarray(0.5 * (up - down))
 
 
 def rate_slopes(problem: LeastSquaresProblem, x: Floats) -> Floats:
@@ -320,12 +320,9 @@ def rate_slopes(problem: LeastSquaresProblem, x: Floats) -> Floats:
 
     x : (unknowns,).
     """
-    rows = []
-    for history in problem.histories:
-        at = reference_condition(history, problem.predictor)
-        exponent = float(local_exponent(problem.coordinates, *at)(x[: problem.parameter_count]))
-        rows.append((log_rate_per_kelvin(problem, x, *at), exponent if history.loading.quantity in LOADS else 0.0))
-    return np.array(rows)
+    exponents = local_exponent(problem.coordinates, *problem.conditions)(x[: problem.parameter_count])
+    loaded = [history.loading.quantity in LOADS for history in problem.histories]
+    return np.stack([log_rate_per_kelvin(problem, x, *problem.conditions), np.where(loaded, exponents, 0.0)], axis=1)
 
 
 # ---- what each does to the values ------------------------------------------------------------------------------------

@@ -31,7 +31,12 @@ from creepkit.inverse.noise_model import NoiseModel, Residuals, StoppedTests
 from creepkit.inverse.nuisance_parameters import NuisanceParameters, check_nuisance_law
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
 from creepkit.inverse.prediction_failures import PredictionFailures
-from creepkit.inverse.reference_conditions import ReferencePoint, median_log_inverse_duration, median_log_strain_rate
+from creepkit.inverse.reference_conditions import (
+    ReferencePoint,
+    median_log_inverse_duration,
+    median_log_strain_rate,
+    reference_condition,
+)
 from creepkit.inverse.residuals import (
     candidate_residuals,
     candidate_residuals_and_jacobian,
@@ -50,7 +55,7 @@ from creepkit.inverse.stopped_tests import stopped_tests
 from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
-from creepkit.records import History, NuisanceValues, Prediction, Predictor, concatenated_tests
+from creepkit.records import History, NuisanceValues, Prediction, Predictor
 
 CACHED_EVALUATIONS = 4
 """Points whose residuals are cached: a search ends at one that it has evaluated, and the next begins there."""
@@ -107,6 +112,7 @@ class LeastSquaresProblem:
     histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
     bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. robust : whether a single
         residual far off counts less, as in a search.
+    conditions : (2, tests) MPa and K, the reference stress and the temperature of each test.
     correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
         against a more exact one (see inverse.defect_correction), or None.
     log_factors : (tests,) ln of the factors on the rates of tests about which residuals are taken, None for the law's
@@ -126,6 +132,7 @@ class LeastSquaresProblem:
     bounds: Bounds
     settings: IdentificationSettings
     covariance_factor: CovarianceFactor
+    conditions: Floats
     robust: bool = False
     correction: Floats | None = None
     log_factors: Floats | None = None
@@ -163,7 +170,9 @@ class LeastSquaresProblem:
         covariance_factor = CovarianceFactor.of_residuals(
             residuals_at_measured_values(observations), with_single_value_weight(noise, observations)
         )
-        return cls(tuple(tests), predictor, coordinates, observations, nuisances, bounds, settings, covariance_factor)
+        conditions = np.array([reference_condition(test, predictor) for test in tests]).T
+        posed = (coordinates, observations, nuisances, bounds, settings, covariance_factor, conditions)
+        return cls(tuple(tests), predictor, *posed)
 
     # ---- variants ------------------------------------------------------------------------------------------------
 
@@ -315,19 +324,10 @@ class LeastSquaresProblem:
         return self._predicted(u, nuisances, jacobian)
 
     def _predicted(self, u: Floats, nuisances: NuisanceValues, sensitivities: bool) -> Prediction:
-        if self.log_factors is None:
-            return self._predicted_tests(u, nuisances, self.histories, sensitivities)
-        groups, rates = [], list(self.coordinates.coefficients)
-        for k, history in enumerate(self.histories):
-            moved, own = u.copy(), {key: values[:, [k]] for key, values in nuisances.items()}
-            moved[:, rates] += self.log_factors[k]
-            groups.append(([k], self._predicted_tests(moved, own, [history], sensitivities)))
-        return concatenated_tests(groups, self.histories)
-
-    def _predicted_tests(
-        self, u: Floats, nuisances: NuisanceValues, histories: Sequence[History], sensitivities: bool
-    ) -> Prediction:
-        tests = (self.law, self.coordinates.theta(u), histories)
+        if self.log_factors is not None:  # each test at its own rate
+            u = np.repeat(u[:, None], len(self.histories), axis=1)
+            u[..., list(self.coordinates.coefficients)] += self.log_factors[:, None]
+        tests = (self.law, self.coordinates.theta(u), self.histories)
         if self.observations.followed_to_rupture.any():
             prediction = self.predictor.predict_to_rupture(*tests, sensitivities=sensitivities)
         else:

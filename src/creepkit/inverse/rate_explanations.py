@@ -32,7 +32,6 @@ from creepkit.inverse.explanation import MENTIONED_ODDS, Explanation, Kind, Left
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
 from creepkit.inverse.uncertainty.rate_scatter import SMALLEST_FACTOR, Evidence, rate_scatter, redundant_rates
@@ -86,11 +85,6 @@ class RateConditions:
     stresses: Floats
     temperatures: Floats
 
-    @classmethod
-    def of_problem(cls, problem: LeastSquaresProblem) -> RateConditions:
-        """Medians over each test."""
-        return cls(*np.array([reference_condition(h, problem.predictor) for h in problem.histories]).T)
-
     @cached_property
     def log_stress(self) -> Floats:
         """(tests,) less its mean."""
@@ -111,7 +105,7 @@ class RateExplanations:
         self.problem, self.x = problem, x
         alike = replace(linear, residuals=linear.residuals.with_test_weights(np.ones(len(problem.histories))))
         self.scatter = replace(rate_scatter(problem, alike, noise), members={})
-        self.conditions = RateConditions.of_problem(problem)
+        self.conditions = RateConditions(*problem.conditions)
         self.possible = len(problem.histories) >= FEWEST_TESTS and bool(linear.residuals.log_rate_sensitivity.any())
         self.redundant = redundant_rates(linear, noise) if self.possible else 0
 
@@ -219,9 +213,9 @@ class RateExplanations:
         """
         temperatures, stress = self.conditions.temperatures.round(), self.problem.coordinates.reference.stress
         u, levels = self.x[: self.problem.parameter_count], np.unique(temperatures)
-        slopes = [log_rate_per_kelvin(self.problem, u, stress, float(T)) for T in levels]
+        slopes = log_rate_per_kelvin(self.problem, u, stress, levels)
         columns = [np.asarray(temperatures == T, float) for T in levels]
-        return columns, [USUAL_ERRORS["temperature"] * abs(one) for one in slopes]
+        return columns, list(USUAL_ERRORS["temperature"] * np.abs(slopes))
 
     # ---- single tests ------------------------------------------------------------------------------------------------
 
@@ -357,4 +351,4 @@ class RateExplanations:
         return (self.x + evidence.step)[: self.problem.parameter_count]
 
     def _energy(self, u: Floats, stress: float, T: float) -> float:
-        return log_rate_per_kelvin(self.problem, u, stress, T) * GAS_CONSTANT * T**2
+        return float(log_rate_per_kelvin(self.problem, u, stress, T)) * GAS_CONSTANT * T**2

@@ -107,7 +107,7 @@ def _broadcast_results(entry: Callable[..., Any]) -> Callable[..., list[Any]]:
     def call(*arguments: Any) -> list[Any]:
         with np.errstate(over="ignore", under="ignore", divide="ignore"):
             results = entry(*arguments)
-        shapes = {np.shape(x) for x in arguments} - {()}
+        shapes = {getattr(x, "shape", ()) for x in arguments} - {()}
         shape = shapes.pop() if len(shapes) == 1 else np.broadcast_shapes(*shapes)
         numbers = {y: np.broadcast_to(y, shape) for y in {y for y in results if type(y) is float}}
         return [numbers[y] if type(y) is float else _broadcast(y, shape) for y in results]
@@ -116,4 +116,4 @@ def _broadcast_results(entry: Callable[..., Any]) -> Callable[..., list[Any]]:
 
 
 def _broadcast(y: Any, shape: tuple[int, ...]) -> Any:
-    return y if np.shape(y) == shape else np.broadcast_to(y, shape)
+    return y if getattr(y, "shape", ()) == shape else np.broadcast_to(y, shape)

@@ -6,14 +6,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from creepkit.checked_arguments import checked, checked_with_own_words
+from creepkit.checked_arguments import checked_with_own_words
 from creepkit.language import algebra
 from creepkit.language.algebra import times
 from creepkit.language.law_record import LawRecord
 from creepkit.language.printing import LatexLawPrinter, latex_equations, law_text
 
 
-@checked
+@checked_with_own_words("references")
 @dataclass(frozen=True, eq=False)
 class CreepLaw(LawRecord):
     """A creep law: rate of equivalent creep strain, in 1/s, as a sum of named terms; its fields are LawRecord's.

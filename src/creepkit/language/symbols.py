@@ -244,6 +244,7 @@ class State:
             value = getattr(self, name)
             if value is not None and not math.isfinite(float(value)):
                 raise LawError(f"state '{self.meaning}': {name} = {value!r} must be a finite number")
+        object.__setattr__(self, "unit", self.unit or "1")
         object.__setattr__(self, "initial", float(self.initial))
         object.__setattr__(self, "limit", None if self.limit is None else float(self.limit))
         if self.limit == self.initial:

@@ -7,6 +7,7 @@ hardening, steady and softening creep do. Where it grows by much less, the rest 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -65,7 +66,7 @@ def idle_flags(history: History) -> Iterator[QualityFlag]:
             )
 
 
-def _rates(times: Floats, values: Floats, count: int, sigma: float) -> tuple[Floats, Floats]:
+def _rates(times: Floats, values: Floats, sigma: float, count: int) -> tuple[Floats, Floats]:
     """Rates of lines through `count` frames from each on, and their standard deviations.
 
     times, values : (frames,) s, and the unit of the output, in which sigma is.
@@ -85,12 +86,13 @@ def idle_parts(times: Floats, values: Floats) -> list[IdlePart]:
     is_rounded = steps.size > 0 and (steps == 0.0).mean() > TIES
     sigma = max(noise_of_readings(values), float(steps[steps > 0.0].min(initial=np.inf)) if is_rounded else 0.0)
     found: list[tuple[float, IdlePart]] = []
+    rates_over = cache(partial(_rates, times, values, sigma))
     for width in WIDTHS:
         beside = max(FRAMES_BESIDE, width // 2)
         first = np.arange(beside, times.size - beside - width)
         if not first.size:
             break
-        rates, errors = _rates(times, values, beside + 1, sigma)
+        rates, errors = rates_over(beside + 1)
         before, after, span = first - beside, first + width, times[first + width] - times[first]
         least, error = np.minimum(rates[before], rates[after]), np.maximum(errors[before], errors[after])
         growth = values[after] - values[first]

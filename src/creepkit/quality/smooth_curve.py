@@ -154,36 +154,20 @@ class SmoothCurve:
         u, columns = self._basis.T @ self.values, self._basis.T @ regressors
         others = np.zeros_like(columns) if beside is None else self._basis.T @ beside
         degrees = u.size - (1 if beside is None else 2)
-        best = np.full(regressors.shape[1], -np.inf)
-        estimate, sd = np.zeros(best.size), np.ones(best.size)
         floor = u.size * (_NOISE_FLOOR * float(np.ptp(self.values)) + 1e-300) ** 2
-        for stiffness in _STIFFNESS:
-            weights = 1.0 / (1.0 + stiffness * self._variances)
-            cc, cu, co, oo, ou = (
-                weights @ (a * b)
-                for a, b in (
-                    (columns, columns),
-                    (columns, u[:, None]),
-                    (columns, others),
-                    (others, others),
-                    (others, u[:, None]),
-                )
-            )
-            inverse = np.divide(1.0, oo, out=np.zeros_like(oo), where=oo > 0)
-            information = np.maximum(cc - co**2 * inverse, 1e-12 * np.maximum(cc, 1e-300))
-            value = (cu - co * ou * inverse) / information
-            remainder = np.maximum(weights @ u**2 - ou**2 * inverse - value**2 * information, floor)
-            variance = remainder / degrees
-            likelihood = -0.5 * (
-                degrees * np.log(variance)
-                - np.log(weights).sum()
-                + np.log(information)
-                + np.log(oo, out=np.zeros_like(oo), where=oo > 0)
-            )
-            better = likelihood > best
-            best[better], estimate[better] = likelihood[better], value[better]
-            sd[better] = np.sqrt(variance / information)[better]
-        return estimate, sd, degrees
+        weights = 1.0 / (1.0 + np.outer(_STIFFNESS, self._variances))
+        pairs = [(columns, columns), (columns, u[:, None]), (columns, others), (others, others), (others, u[:, None])]
+        cc, cu, co, oo, ou = (weights @ (a * b) for a, b in pairs)  # (stiffnesses, regressors)
+        inverse = np.divide(1.0, oo, out=np.zeros_like(oo), where=oo > 0)
+        information = np.maximum(cc - co**2 * inverse, 1e-12 * np.maximum(cc, 1e-300))
+        value = (cu - co * ou * inverse) / information
+        remainder = (weights @ u**2)[:, None] - ou**2 * inverse - value**2 * information
+        variance = np.maximum(remainder, floor) / degrees
+        likelihood = np.log(weights).sum(axis=1)[:, None] - degrees * np.log(variance) - np.log(information)
+        likelihood -= np.log(oo, out=np.zeros_like(oo), where=oo > 0)
+        best = likelihood.argmax(axis=0)[None]
+        estimate, square = (np.take_along_axis(a, best, axis=0)[0] for a in (value, variance / information))
+        return estimate, np.sqrt(square), degrees
 
     def _fitted(self, effects: Floats | None = None) -> Floats:
         """(points,) values of the curve less its noise; effects : (points, 1) what further regressors explain."""

@@ -58,6 +58,7 @@ from .prediction_assembly import assemble_prediction as assemble_prediction
 from .prediction_assembly import broadcast_candidates as broadcast_candidates
 from .prediction_assembly import concatenated_tests as concatenated_tests
 from .prediction_assembly import unpredicted as unpredicted
+from .prediction_assembly import values_of_tests as values_of_tests
 from .predictor import Predictor as Predictor
 from .quantities import QUANTITIES as QUANTITIES
 from .quantities import QuantityKind as QuantityKind

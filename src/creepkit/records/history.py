@@ -37,6 +37,8 @@ def correlation_matrix(correlations: Mapping[tuple[str, str], float], names: Seq
 
 def can_hold_together(correlations: Mapping[tuple[str, str], float]) -> bool:
     """Whether some noise has these correlations: their matrix is finite and positive definite."""
+    if not correlations:
+        return True
     matrix = correlation_matrix(correlations)
     return bool(np.isfinite(matrix).all() and (np.linalg.eigvalsh(matrix) > 0.0).all())
 

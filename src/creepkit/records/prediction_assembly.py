@@ -18,12 +18,17 @@ def broadcast_candidates(
 ) -> tuple[Floats, dict[str, Floats]]:
     """Return theta (candidates, parameters) and nuisances {kind: (candidates, tests)} with as many candidates each.
 
-    theta : (candidates or 1, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}.
+    theta : (candidates or 1[, tests], parameters) internal values. nuisances : {kind: (candidates or 1, tests)}.
     """
     values = dict(nuisances or {})
     candidates = max([len(theta), *(len(v) for v in values.values())])
     broadcast = {kind: np.broadcast_to(v, (candidates, tests)) for kind, v in values.items()}
-    return np.array(np.broadcast_to(theta, (candidates, theta.shape[1]))), broadcast
+    return np.array(np.broadcast_to(theta, (candidates, *theta.shape[1:]))), broadcast
+
+
+def values_of_tests(theta: Floats, tests: Sequence[int]) -> Floats:
+    """(candidates[, tests], parameters) theta of some of the tests; theta : (candidates[, tests], parameters)."""
+    return theta if theta.ndim == 2 else theta[:, tests]
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,6 +61,8 @@ class Predictor:
         sets, in their units.
     error : {output: standard deviation of its numerical error}, in the output's unit.
     follows_to_rupture : whether predict_to_rupture() goes beyond the last time of a history.
+    takes_values_of_tests : whether predict_batch() takes theta (candidates, tests, parameters), where tests differ in
+        the values of the law; without, it is called for each test by itself there.
     is_trained : whether train() prepares it before it predicts. is_surrogate : whether it is a trained network.
     """
 
@@ -74,6 +76,7 @@ class Predictor:
     error: ClassVar[Mapping[str, float]] = {}
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = {}
     follows_to_rupture: ClassVar[bool] = False
+    takes_values_of_tests: ClassVar[bool] = False
     is_trained: ClassVar[bool] = False
     is_surrogate: ClassVar[bool] = False
 
@@ -190,7 +193,8 @@ class Predictor:
         """Predict each history's outputs at its times.
 
         theta : (candidates, parameters) internal values in the order of law.names, see CreepLaw.to_internal: the
-            natural logarithm where the scale is log, -inf for a coefficient that is off.
+            natural logarithm where the scale is log, -inf for a coefficient that is off; (candidates, tests,
+            parameters) where tests have values of their own.
         nuisances : {key: (candidates or 1, tests)} of what differs from test to test, measured as Nuisance says. A
             kind that the predictor does not know is a SolveError.
         sensitivities : whether the prediction has its derivatives with respect to theta, in `jacobian`, and to the
@@ -211,11 +215,11 @@ class Predictor:
     ) -> Prediction:
         """Predict as predict() does, with `times_to_strain`: when measured strains are reached, and when it ruptures.
 
-        theta : (candidates, parameters) internal values. Where specimens are not followed to rupture, no strain is
-        reached, and they never break.
+        theta : (candidates[, tests], parameters) internal values. Where specimens are not followed to rupture, no
+        strain is reached, and they never break.
         """
         prediction = self.predict(law, theta, histories, sensitivities=sensitivities)
-        shape, count = prediction.values.shape[:3], theta.shape[1]
+        shape, count = prediction.values.shape[:3], theta.shape[-1]
         never = TimesToStrain(
             np.full(shape, np.nan),
             np.full(shape, np.inf),
@@ -250,33 +254,39 @@ class Predictor:
             return self._checked_batch(law, theta, changed, own, sensitivities)
         from creepkit.records.rate_nuisances import law_with_rate_factors, rate_parameters
 
-        law, count = law_with_rate_factors(law, keys), theta.shape[1]
-        parameters, scales = rate_parameters(keys, np.array([[v[key] for key in keys] for v in of_tests]), changed)
-        groups = []
-        for row in np.unique(parameters, axis=0):  # tests with the same factors
-            tests = [int(k) for k in np.flatnonzero((parameters == row).all(axis=1))]
-            extended = np.concatenate([theta, np.tile(row, (len(theta), 1))], axis=1)
-            of_group = {key: values[:, tests] for key, values in own.items()}
-            prediction = self._checked_batch(law, extended, [changed[k] for k in tests], of_group, sensitivities)
-            if prediction.jacobian is not None:
-                by_parameter, by_rate = np.split(prediction.jacobian, [count], axis=-1)
-                slopes = {key: by_rate[..., k] * scales[tests, k, None, None] for k, key in enumerate(keys)}
-                merged = {**prediction.nuisance_jacobian, **slopes}
-                prediction = replace(prediction, jacobian=by_parameter, nuisance_jacobian=merged)
-            groups.append((tests, prediction))
-        return concatenated_tests(groups, histories)
+        law, count = law_with_rate_factors(law, keys), theta.shape[-1]
+        factors, scales = rate_parameters(keys, np.array([[v[key] for key in keys] for v in of_tests]), changed)
+        if theta.ndim == 2 and (factors == factors[0]).all():
+            factors = factors[0]
+        elif theta.ndim == 2:
+            theta = np.repeat(theta[:, None], len(histories), axis=1)
+        extended = np.concatenate([theta, np.broadcast_to(factors, (*theta.shape[:-1], len(keys)))], axis=-1)
+        prediction = self._checked_batch(law, extended, changed, own, sensitivities)
+        if prediction.jacobian is None:
+            return prediction
+        by_parameter, by_rate = np.split(prediction.jacobian, [count], axis=-1)
+        slopes = {key: by_rate[..., k] * scales[:, k, None, None] for k, key in enumerate(keys)}
+        merged = {**prediction.nuisance_jacobian, **slopes}
+        return replace(prediction, jacobian=by_parameter, nuisance_jacobian=merged)
 
     def _checked_batch(
         self, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues, sensitivities: bool
     ) -> Prediction:
         theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
+        if theta.ndim == 3 and not self.takes_values_of_tests:
+            of_tests = [{key: values[:, [k]] for key, values in nuisances.items()} for k in range(len(histories))]
+            single = [
+                ([k], self._checked_batch(law, theta[:, k], [history], of_tests[k], sensitivities))
+                for k, history in enumerate(histories)
+            ]
+            return concatenated_tests(single, histories)
         prediction = call_of_plugin(
             lambda: self.predict_batch(law, theta, histories, nuisances, sensitivities),
             self,
             f"predictor '{self.label}': predict_batch()",
             SolveError,
         )
-        return checked_prediction(prediction, self, histories, *theta.shape)
+        return checked_prediction(prediction, self, histories, len(theta), theta.shape[-1])
 
     def _with_differences(
         self, prediction: Prediction, law: CreepLaw, theta: Floats, histories: Sequence[History], given: NuisanceValues
@@ -288,19 +298,20 @@ class Predictor:
             return prediction
         theta, nuisances = broadcast_candidates(theta, given, len(histories))
         on = np.isfinite(theta)  # a coefficient that is off stays off, and has a derivative of zero
-        steps = RELATIVE_STEP * np.maximum(np.abs(np.where(on, theta, 0.0)), 1.0).T if numeric else np.zeros((0, 1))
+        sizes = np.moveaxis(np.abs(np.where(on, theta, 0.0)), -1, 0)
+        steps = RELATIVE_STEP * np.maximum(sizes, 1.0) if numeric else sizes[:0]
         own_steps = [_nuisance_step(key, nuisances[key]) for key in kinds]
         count, size = len(steps) + len(kinds), len(theta)
         moved = np.zeros(
             (count, *theta.shape)
         )  # one step in each parameter, then in each nuisance of all tests at once
         for p, step in enumerate(steps):
-            moved[p, :, p] = step
+            moved[p, ..., p] = step
         shifted = {key: np.tile(values, (2, count, 1, 1)) for key, values in nuisances.items()}
         for k, (key, step) in enumerate(zip(kinds, own_steps, strict=True), len(steps)):
             shifted[key][0, k] += step
             shifted[key][1, k] -= step
-        ends = np.stack([theta + moved, theta - moved]).reshape(-1, theta.shape[1])
+        ends = np.stack([theta + moved, theta - moved]).reshape(-1, *theta.shape[1:])
         flat = {key: values.reshape(2 * count * size, -1) for key, values in shifted.items()}
         values = self._predict(law, ends, histories, flat, False).values
         with np.errstate(invalid="ignore"):  # of values that are not finite, whose derivatives are NaN
@@ -309,7 +320,8 @@ class Predictor:
         slopes = {key: differences[len(steps) + k] / (2 * own_steps[k]) for k, key in enumerate(kinds)}
         jacobian = prediction.jacobian
         if numeric:
-            jacobian = np.moveaxis(differences[: len(steps)] / (2 * steps[:, :, None, None, None]), 0, -1)
+            widths = 2 * steps.reshape(*steps.shape, *(1,) * (differences.ndim - steps.ndim))
+            jacobian = np.moveaxis(differences[: len(steps)] / widths, 0, -1)
         return replace(prediction, jacobian=jacobian, nuisance_jacobian={**prediction.nuisance_jacobian, **slopes})
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Unpack
 
 from creepkit.arrays import ArrayLike
 from creepkit.cameras import reading as camera_reading
@@ -17,6 +17,9 @@ from creepkit.readers import reading
 from creepkit.records import Frames, Histories, History, InstrumentRecord
 from creepkit.registry import kinds
 from creepkit.registry.plugin_registry import default_registry
+
+if TYPE_CHECKING:
+    from creepkit.option_keywords import RecordOptionsKeywords
 
 
 @checked_with_own_words("ignore")
@@ -75,7 +78,9 @@ def frame_files(path: camera_reading.FramePath, format: camera_reading.FormatLik
 
 @takes_options(RecordOptions)
 @checked_with_own_words("options")
-def read_record(path: str | Path, format: str | None = None, **options: Any) -> InstrumentRecord:
+def read_record(
+    path: str | Path, format: str | None = None, **options: Unpack[RecordOptionsKeywords]
+) -> InstrumentRecord:
     """Read the record of an instrument: channels of pressure, temperature and others over one clock.
 
     format : name of one of `available("instruments")`; by default the one whose columns are there.

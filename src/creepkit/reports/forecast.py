@@ -47,15 +47,11 @@ def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: 
     right = "the law is right" if len(forecast.laws) == 1 else "one of these laws is right, with these weights"
     bands = f"{100 * forecast.level:g} % bands and intervals of single tests"
     blocks: list[Block] = [Paragraph(f"by {names}: {bands}, if {right}")]
-    if forecast.rejected:
-        blocks.append(
-            Paragraph("the tests contradict the law: bands and intervals are wider by what it misses of their rates")
-        )
+    wider = "the tests contradict the law: bands and intervals are wider by what it misses of their rates"
+    blocks += [Paragraph(wider)] if forecast.rejected else []
     if figures is not None and any(test.outputs for test in forecast.tests):
         caption = f"Forecast with bands of {100 * forecast.level:g} %: of measured values, and of whole curves (paler)."
-        description = (
-            "Forecast curves over time with pointwise and simultaneous bands; the list below holds the numbers."
-        )
+        description = "Forecast curves over time with pointwise and simultaneous bands; the list below has the numbers."
         blocks.append(figures.picture(lambda: forecast_figure(forecast), f"Forecasts{of}", description, caption))
     for test in forecast.tests:
         blocks.append(Paragraph(f"{test.name}: {kind_of_test(test.history)}, {test.history.condition}:"))

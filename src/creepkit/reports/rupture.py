@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from creepkit.arrays import Floats
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
 from creepkit.reports.figures import draw_parity, empty_figure, span, wrapped
-from creepkit.reports.json_values import fields_to_json
+from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
 from creepkit.rupture_assessment.methods import METHODS, THERMAL, Conditions
@@ -56,7 +57,33 @@ def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
     )
     table, note = _strengths(assessment)
     said = [Paragraph(note, "note")] if note else []
-    return [Paragraph(assessment.verdict, "lead"), Paragraph(head), table, *said]
+    lives = [_lives(assessment)] if assessment.lives else []
+    return [Paragraph(assessment.verdict, "lead"), Paragraph(head), *lives, table, *said]
+
+
+def _lives(assessment: RuptureAssessment) -> Table:
+    """The times to rupture of the average method."""
+    rows = [
+        (
+            f"{one.stress:g}",
+            celsius_text(one.temperature),
+            f"{one.hours:.4g}",
+            *(f"[{a:.3g}, {b:.3g}]" for a, b in (one.bounds_of_mean, one.bounds_of_heat, one.bounds_of_test)),
+            one.extrapolation and f"extrapolated: {one.extrapolation}",
+        )
+        for one in assessment.lives
+    ]
+    level = f"{100 * assessment.settings.level:g} %"
+    columns = (
+        "stress, MPa",
+        "temperature",
+        "median, h",
+        f"{level} of the mean",
+        "of a new heat",
+        "of one test",
+        "remarks",
+    )
+    return Table("times to rupture in h, with bounds in brackets", columns, rows, numeric=(0, 2))
 
 
 def rupture_blocks(assessment: RuptureAssessment, figures: PageFigures | None = None, of: str = "") -> list[Block]:
@@ -180,18 +207,15 @@ def _pair(ends: tuple[float | None, float | None]) -> str:
 
 def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
     """The assessment as JSON-able data, without the tests and covariances that its file holds."""
+    relation = assessment.relation
     return {
         "verdict": assessment.verdict,
         "decisive": assessment.decisive,
         "tests": len(assessment.tests),
         "run_outs": int(assessment.tests.censored.sum()),
-        "methods": [
-            {**_fit_to_json(one.fit), "bic_excess": one.excess, "weight": one.weight} for one in assessment.ranked
-        ],
+        "methods": [{**_fit_to_json(r.fit), "bic_excess": r.excess, "weight": r.weight} for r in assessment.ranked],
         "rejected": dict(assessment.rejected),
-        "relation": None
-        if assessment.relation is None
-        else [_fit_to_json(assessment.relation.times), _fit_to_json(assessment.relation.rates)],
+        "relation": relation and [_fit_to_json(relation.times), _fit_to_json(relation.rates)],
         "strengths": [
             {
                 "strength": one.value,
@@ -200,6 +224,7 @@ def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
             }
             for one in assessment.strengths
         ],
+        "lives": finite([asdict(one) for one in assessment.lives]),
         "checks": [fields_to_json(one, "name passed found fault") for one in assessment.checks],
         "level": assessment.settings.level,
         "notes": list(assessment.notes),

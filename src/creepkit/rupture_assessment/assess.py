@@ -60,6 +60,7 @@ def rupture(
     *,
     hours: Sequence[float] = DEFAULT_HOURS,
     temperatures: Sequence[float] | None = None,
+    stresses: Sequence[float] = (),
     tensile_strength: Mapping[float, float] | None = None,
     settings: RuptureSettings | None = None,
 ) -> RuptureAssessment:
@@ -71,7 +72,7 @@ def rupture(
     methods : of "larson-miller", "orr-sherby-dorn", "manson-haferd", "wilshire", "monkman-grant", and "isothermal" for
         tests of one temperature; by default all that the tests allow.
     hours, temperatures : h and K, at which strengths are stated; by default 1e3, 1e4 and 1e5 h at the temperatures
-    tested.
+        tested. stresses : MPa, at which times to rupture are stated at these temperatures.
     tensile_strength : {temperature in K: MPa}, interpolated between; by default as the tests state it.
     """
     chosen = settings or RuptureSettings()
@@ -113,8 +114,9 @@ def rupture(
         stated = [
             one for name in by_name for t in wanted for one in assessment.strengths_at(t, hours=hours, method=name)
         ]
+        lives = tuple(assessment.life(stress, t) for t in wanted for stress in stresses)
         checks = _checks(assessment, tensile, max(hours), wanted)
-    return replace(assessment, strengths=tuple(stated), checks=tuple(checks))
+    return replace(assessment, strengths=tuple(stated), checks=tuple(checks), lives=lives)
 
 
 def _known_names(methods: Sequence[str] | str | None) -> list[str] | None:

@@ -18,6 +18,7 @@ from creepkit.errors import FitError, nearest, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import ANY_NUMBER, NumberRange, RecordCodec, RecordError
+from creepkit.files.writing import write_text
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.limits import PROBABILITY, SEED, Limits, numbers
 from creepkit.options import CELSIUS, Options, option
@@ -31,6 +32,7 @@ from creepkit.rupture_assessment.observed_tests import RuptureTests
 from creepkit.rupture_assessment.rupture_fit import RuptureFit, RuptureParameter, VarianceFreedom, power_of_ten
 from creepkit.rupture_assessment.strength import (
     BOUND_KINDS,
+    LifeEstimate,
     StrengthEstimate,
     WeightedModels,
     bound_curves,
@@ -38,6 +40,7 @@ from creepkit.rupture_assessment.strength import (
     mixed,
     strength_estimates,
 )
+from creepkit.rupture_assessment.written_times import written_times
 
 AVERAGE = "average"
 """Name of the average over all ranked methods by their weights."""
@@ -87,7 +90,7 @@ class RuptureSettings(Options, title="settings of an assessment", error=FitError
 
 @dataclass(frozen=True)
 class RuptureQuestion(Options, title="arguments of an assessment", error=FitError):
-    """What rupture() is asked beside its settings, as its arguments of these names have it; K, h."""
+    """What rupture() is asked beside its settings, as its arguments of these names have it; K, h, MPa."""
 
     methods: tuple[str, ...] | None = option(
         None, "larson-miller, orr-sherby-dorn, manson-haferd, wilshire, monkman-grant or isothermal.", flag="method"
@@ -102,7 +105,10 @@ class RuptureQuestion(Options, title="arguments of an assessment", error=FitErro
         example="1e4h,1e5h",
     )
     temperatures: tuple[float, ...] | None = option(
-        None, "Of strengths; by default those of the tests.", numbers(-273.15, 1e4), flag="temperature-c", **CELSIUS
+        None, "Of what is stated; by default as tested.", numbers(-273.15, 1e4), flag="temperature-c", **CELSIUS
+    )
+    stresses: tuple[float, ...] = option(
+        (), "At which times to rupture are stated.", numbers(0, 1e9, above=True), flag="stress", unit="MPa"
     )
 
 
@@ -126,7 +132,7 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
     ranked : methods, each with every degree that was tried, the highest weight first. rejected : {method: why it is
     not ranked}.
     relation : Monkman-Grant's, where rates are known; it is not ranked, for it uses rates that the others do not.
-    strengths : by the average, by the best fit of each method, and by the relation.
+    strengths : by the average, by the best fit of each method, and by the relation. lives : times to rupture.
     checks : post-assessment checks of the best fit. tensile_temperatures, tensile_strengths : (known,) K and
     MPa, to interpolate.
     """
@@ -142,6 +148,7 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
     rejected: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    lives: tuple[LifeEstimate, ...] = ()
 
     def __repr__(self) -> str:
         return f"<RuptureAssessment of {len(self.tests.names)} tests, best {self.best.method}>"
@@ -271,10 +278,19 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
             raise FitError(f"stress is {stress!r}; give MPa above zero")
         at = Conditions.isotherm(np.array([float(stress)]), temperature, self.tensile)
         models = self.models(method)
+        if reason := self.obstacle(models, temperature):
+            raise FitError(f"no time to rupture is stated at {celsius_text(temperature)}: {reason}")
         ends = [curve for (kind, _), curve in bound_curves(models, at, self.settings.level).items() if kind == of]
         curves = [mixed(models, at, of).quantile(0.5), *ends]
         median, low, high = (SECONDS_PER_HOUR * power_of_ten(curve[0]) for curve in curves)
         return median, low, high
+
+    def life(self, stress: float, temperature: float) -> LifeEstimate:
+        """The time to rupture at a stress, MPa, and a temperature, K, with all bounds, h."""
+        times = [np.divide(self.rupture_time(stress, temperature, of=of), SECONDS_PER_HOUR) for of in BOUND_KINDS]
+        hours, (mean, heat, test) = float(times[0][0]), [(float(low), float(high)) for _, low, high in times]
+        beyond = extrapolation(self.tests, hours, temperature, stress)
+        return LifeEstimate(stress, temperature, hours, mean, heat, test, beyond)
 
     def _drawn_by(self) -> tuple[Any, Any]:
         from creepkit.reports.rupture import draw_isotherms, rupture_figure
@@ -282,7 +298,10 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
         return rupture_figure, draw_isotherms
 
     def save(self, path: str | Path) -> Path:
-        """Write the assessment to a JSON file."""
+        """Write the assessment as JSON; by their suffixes the time to rupture in C or Fortran, or a table with bounds.
+
+        path : .c and .f90 hold a function of the best method, .csv the average at the stresses tested.
+        """
         return write_assessment(self, path)
 
     def __str__(self) -> str:
@@ -339,12 +358,19 @@ CODEC = RecordCodec(
         RuptureFit: {"scale": POSITIVE, "scale_corrected": POSITIVE},
         VarianceFreedom: {"most": NumberRange(low=1.0)},
         RuptureParameter: dict.fromkeys(("value", "low", "high"), ANY_NUMBER),
+        LifeEstimate: dict.fromkeys(("hours", *(f"bounds_of_{of}" for of in BOUND_KINDS)), ANY_NUMBER),
     }
 )
 
 
+PROGRAMS = (".c", ".f90", ".csv")
+"""Suffixes of files that hold the time to rupture for other programs."""
+
+
 def write_assessment(assessment: RuptureAssessment, path: str | Path) -> Path:
-    """Write the assessment; the file is whole or absent."""
+    """Write the assessment, or its time to rupture by the suffix; the file is whole or absent."""
+    if Path(path).suffix in PROGRAMS:
+        return write_text(written_times(assessment, Path(path).suffix), Path(path), FitError)
     return write_json({**ASSESSMENT.heading, **CODEC.to_json(assessment)}, Path(path), ASSESSMENT.kind)
 
 

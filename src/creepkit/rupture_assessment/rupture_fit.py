@@ -227,20 +227,25 @@ class RuptureFit:
         raise FitError(f"{self.method} has no parameter '{name}'; it has {', '.join(p.name for p in self.parameters)}")
 
     def location(self, at: Conditions) -> Floats:
-        """(points,) log10 of the median time in hours, of the average heat."""
-        return self._location(at)[0]
+        """(points,) log10 of the median time in hours, of the average heat; of symbols expressions."""
+        offset, columns, _ = self._basis(at)
+        return np.asarray(offset + columns @ self.coefficients)
+
+    def _basis(self, at: Conditions) -> tuple[Floats, Floats, Floats | None]:
+        """Offset, columns with the curvature in them, and the part that this multiplies."""
+        basis = METHODS[self.method].basis(at, self.degree, self.fixed, self.centre)
+        columns = basis.linear if basis.bilinear is None else basis.linear + self.curvature * basis.bilinear
+        return basis.offset, columns, basis.bilinear
 
     def _location(self, at: Conditions) -> tuple[Floats, Floats]:
         """Median of log10 of time (points,), and its derivatives (points, estimates)."""
-        method = METHODS[self.method]
-        basis = method.basis(at, self.degree, self.fixed, self.centre)
-        columns = basis.linear if basis.bilinear is None else basis.linear + self.curvature * basis.bilinear
-        median = basis.offset + columns @ self.coefficients
+        offset, columns, bilinear = self._basis(at)
+        median = offset + columns @ self.coefficients
         derivatives = np.zeros((at.stress.size, self.parameter_count))
         derivatives[:, : columns.shape[1]] = columns
         count = columns.shape[1]
-        if basis.bilinear is not None:
-            derivatives[:, count] = basis.bilinear @ self.coefficients
+        if bilinear is not None:
+            derivatives[:, count] = bilinear @ self.coefficients
         return median, derivatives
 
     def log_time(self, at: Conditions, of: str) -> StudentLogTime:

@@ -64,6 +64,23 @@ class StrengthEstimate:
     reason: str = ""
 
 
+@dataclass(frozen=True)
+class LifeEstimate:
+    """Time to rupture at a stress, MPa, and a temperature, K, by the average of methods.
+
+    hours : h, the median of the average heat. bounds_of_mean, bounds_of_heat, bounds_of_test : (low, high) h, of that
+    median, of a new heat, of one test of it. extrapolation : what lies beyond the tests, "" where nothing does.
+    """
+
+    stress: float
+    temperature: float
+    hours: float
+    bounds_of_mean: tuple[float, float]
+    bounds_of_heat: tuple[float, float]
+    bounds_of_test: tuple[float, float]
+    extrapolation: str = ""
+
+
 def mixed(models: WeightedModels, at: Conditions, of: str) -> MixedLogTime:
     """The distribution of an average of methods."""
     return MixedLogTime([model.log_time(at, of) for model, _ in models], [weight for _, weight in models])

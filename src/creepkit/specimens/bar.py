@@ -52,6 +52,8 @@ class Bar(PointSpecimen):
             "its limit or the creep rate diverges."
         )
 
+    takes_values_of_tests: ClassVar[bool] = True
+
     imposed_text: ClassVar[str] = ""
     """What the point of such a bar goes through, in a sentence for a paper."""
 

@@ -76,6 +76,7 @@ class FibreBeam(TestPiece, ABC):
     strain_limit: float = 1.0
     max_steps: int = 2000
 
+    takes_values_of_tests: ClassVar[bool] = True
     relaxes: ClassVar[bool] = False
     """Whether the deflection is prescribed and the force observed."""
 

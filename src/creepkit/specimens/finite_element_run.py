@@ -137,8 +137,8 @@ def run_test(
         reason += "; 'creepkit check' says where the rate of a law is no number, or jumps"
     rows = simulation.at(piece.observed_outputs(test.load, simulation), test.history.times)
     return run_from_outputs(
-        piece.run_kind, test.stated_history(), piece.outputs, rows, status, end_time, reason, test=test,
-        simulation=simulation, states=tuple(map(str, law.states)),
+        piece.run_kind, test.history, piece.outputs, rows, status, end_time, reason, test=test,
+        simulation=simulation, states=tuple(map(str, law.states)), **piece.taken_for_granted(test.history),
     )  # fmt: skip
 
 
@@ -149,15 +149,15 @@ def last_finite_rate(law: CompiledLaw, theta: Floats, simulation: Simulation, te
     such as the logarithm of something negative, its rate may look small, but then its derivatives are not finite.
     """
     assert simulation.values is not None
-    temperatures = temperature.at(simulation.times)
-    for k in range(1, simulation.times.size):
-        strains = simulation.values[k, :, EQUIVALENT_STRAIN:]
-        points = np.empty((len(strains), POINT_SIZE + strains.shape[1] - 1))
-        points[:, [STRESS, PRINCIPAL_STRESS]] = np.maximum(simulation.mises[k], 1e-3)[:, None]
-        points[:, MEAN_STRESS] = points[:, STRESS] / 3.0
-        points[:, STRAIN] = np.maximum(strains[:, 0], 1e-9)
-        points[:, TIME], points[:, TEMPERATURE] = simulation.times[k], temperatures[k]
-        points[:, POINT_SIZE:] = strains[:, 1:]
-        if call_entry(law, "update", points, theta)[1]:
-            return float(simulation.times[k - 1])
-    return None
+    strains = simulation.values[1:, :, EQUIVALENT_STRAIN:]
+    points = np.empty((*strains.shape[:2], POINT_SIZE + strains.shape[2] - 1))
+    points[..., STRESS] = points[..., PRINCIPAL_STRESS] = np.maximum(simulation.mises[1:], 1e-3)
+    points[..., MEAN_STRESS] = points[..., STRESS] / 3.0
+    points[..., STRAIN] = np.maximum(strains[..., 0], 1e-9)
+    points[..., TIME] = simulation.times[1:, None]
+    points[..., TEMPERATURE] = temperature.at(simulation.times[1:])[:, None]
+    points[..., POINT_SIZE:] = strains[..., 1:]
+    if not call_entry(law, "update", points.reshape(-1, points.shape[2]), theta)[1]:
+        return None
+    wrong = next(k for k, of_step in enumerate(points) if call_entry(law, "update", of_step, theta)[1])
+    return float(simulation.times[wrong])

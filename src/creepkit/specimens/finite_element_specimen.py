@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -55,6 +55,8 @@ class FiniteElementSpecimen(TestPiece):
         }
     )
     """What is allowed of each setting."""
+
+    takes_values_of_tests: ClassVar[bool] = True
 
     first_step: ClassVar[float] = 10.0
     """s, the longest first step after a change of load; less where high stresses relax in less."""
@@ -129,10 +131,10 @@ class FiniteElementSpecimen(TestPiece):
         """Outputs at times (times,) s, (times, outputs)."""
         return simulation.at(self.observed_outputs(load, simulation), times)
 
-    def stated_history(self, history: History) -> History:
-        """A history with all that was taken for granted: the lengths of the test piece."""
+    def taken_for_granted(self, history: History) -> dict[str, Any]:
+        """{field: value} of a history with all that it does not state: the lengths of the test piece."""
         lengths = {each.name: each.default for each in self.dimensions if each.of_piece}
-        return history.replace(geometry={**lengths, **history.geometry})
+        return {"geometry": {**lengths, **history.geometry}}
 
     def single_threaded(self) -> Self:
         """The same, which starts no threads."""

@@ -73,11 +73,6 @@ class FiniteElementTest:
         model: FiniteElementModel = self.piece.finite_elements(self.load)
         return model
 
-    def stated_history(self) -> History:
-        """The history with all that was taken for granted."""
-        stated: History = self.piece.stated_history(self.history)
-        return stated
-
     def simulate(
         self,
         kernel: CompiledLaw,

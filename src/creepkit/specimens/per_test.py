@@ -6,7 +6,7 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -45,6 +45,8 @@ class PerTest(TestPiece, ABC):
     """
 
     workers: int = 1
+
+    takes_values_of_tests: ClassVar[bool] = True
 
     @abstractmethod
     def one(

@@ -46,13 +46,14 @@ def predict_separately(
 ) -> Prediction:
     """The prediction of all candidates in all tests.
 
-    theta : (candidates, parameters) internal values. nuisances : {key: (candidates, tests)}. threads : that respond,
-    None for one on each core.
+    theta : (candidates[, tests], parameters) internal values. nuisances : {key: (candidates, tests)}. threads : that
+    respond, None for one on each core.
     """
 
     def row(task: tuple[int, int]) -> TestResponse:
         k, c = task
-        return respond(theta[c], k, {key: float(values[c, k]) for key, values in nuisances.items()})
+        values = theta[c] if theta.ndim == 2 else theta[c, k]
+        return respond(values, k, {key: float(each[c, k]) for key, each in nuisances.items()})
 
     rows = _in_threads(row, [(k, c) for k in range(len(histories)) for c in range(len(theta))], threads)
     parts = [_of_test(rows[k * len(theta) : (k + 1) * len(theta)], outputs) for k in range(len(histories))]

@@ -11,16 +11,9 @@ from typing import TYPE_CHECKING, Any
 from creepkit.errors import FitError, SurrogateError, nearest, quoted
 from creepkit.experiments.design_task import GoalOptions
 from creepkit.experiments.rig import Rig, changed_rigs
-from creepkit.forecasts.planned_tests import (
-    COMPONENTS,
-    PlannedTestOptions,
-    load_of_components,
-    needs_modulus,
-    planned_history,
-    stepped_load,
-)
+from creepkit.forecasts.planned_tests import COMPONENTS, DescribedTest, PlannedTestOptions
 from creepkit.inverse.candidate_laws import LawChanges
-from creepkit.language import elastic_of, temperature
+from creepkit.language import temperature
 from creepkit.options import values_of_table
 from creepkit.readers.vocabulary import split_unit
 from creepkit.records import (
@@ -28,7 +21,6 @@ from creepkit.records import (
     TENSOR_COMPONENTS,
     ZERO_CELSIUS,
     History,
-    Loading,
     Nuisance,
     Predictor,
     Program,
@@ -388,46 +380,25 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
     """
     part, place = file.model.forecast[number], ("forecast", number)
     assert part.end_h is not None
-    specimen, end = _specimen_of(file, number, part), SECONDS_PER_HOUR * part.end_h
-    loading = _loading_of(file, number, part, specimen, end)
+    specimen = _specimen_of(file, number, part)
+    own = {load.name: load.kind for load in loads_of(specimen)}
+    loads: dict[str, list[tuple[float, float]]] = {}
+    for key, steps in part.load.items():
+        name, levels = levels_of(file, (*place, "load", key), COMPONENT_KINDS if COMPONENTS in own else own, steps)
+        if name in loads:
+            raise file.error((*place, "load", key), f"{name} is given twice; keep one of them")
+        loads[name] = levels
     if part.temperature_C is not None:
         temperature = temperature_of(file, (*place, "temperature_C"), part.temperature_C)
     if temperature is None:
         raise file.error(place, "the fitted tests were made at several temperatures; give temperature_C")
-    chosen = PlannedTestOptions().changed(values_of_table(PlannedTestOptions, part))
-    if chosen.modulus is None and needs_modulus(specimen, loading):
-        raise file.error(place, f"specimen '{specimen.name}' needs modulus_GPa, such as 150")
+    options = PlannedTestOptions().changed(values_of_table(PlannedTestOptions, part))
     lengths = lengths_of(file, (*place, "lengths"), part.lengths, specimen)
+    described = DescribedTest(specimen, options, loads, lengths, temperature)
+    with file.at(*place, "load", next(iter(part.load))):
+        _ = described.loading  # which may contradict itself or the specimen
     with file.at(*place):
-        elastic = elastic_of(chosen.modulus)
-        return planned_history(
-            specimen, loading, end, temperature=temperature, elastic=elastic, lengths=lengths, name=part.name
-        ).replace(labels=dict(part.labels))
-
-
-def _loading_of(file: StudyFile, number: int, part: ForecastTable, specimen: Specimen, end: float) -> Loading:
-    """One load by steps, or stresses and strains of components, { stress_11_MPa = 60, strain_12 = 0 }, from rest."""
-    place = ("forecast", number)
-    loads = {load.name: load for load in loads_of(specimen)}
-    if COMPONENTS not in loads:
-        if len(part.load) > 1:
-            several = f"a test of specimen '{specimen.name}' has one load, found {' and '.join(part.load)}"
-            raise file.error((*place, "load"), several)
-        ((key, steps),) = part.load.items()
-        name, levels = levels_of(file, (*place, "load", key), {n: load.kind for n, load in loads.items()}, steps)
-        with file.at(*place, "load", key):
-            return stepped_load(name, loads[name], levels, control=part.control, ramp=part.ramp_s, end=end)
-    for key in (one for one in ("control", "ramp_s") if getattr(part, one) is not None):
-        raise file.error((*place, key), "belongs to a single load; leave it out")
-    given: dict[str, dict[str, list[tuple[float, float]]]] = {"stress": {}, "strain": {}}
-    for key, steps in part.load.items():
-        name, levels = levels_of(file, (*place, "load", key), COMPONENT_KINDS, steps)
-        kind, _, component = name.partition("_")
-        if component in given[kind]:
-            raise file.error((*place, "load", key), f"{name} is given twice; keep one of them")
-        given[kind][component] = levels
-    with file.at(*place, "load"):
-        return load_of_components(given)
+        return described.history(temperature, part.name).replace(labels=dict(part.labels))
 
 
 def _specimen_of(file: StudyFile, number: int, part: ForecastTable) -> Specimen:

@@ -26,7 +26,7 @@ from creepkit.kernels.rate_jumps import find_rate_jump
 from creepkit.language.elastic import Elastic
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, strain, stress, temperature, time
-from creepkit.records import History, PointLoading, Status
+from creepkit.records import ZERO_CELSIUS, History, PointLoading, Status
 from creepkit.registry import default_registry
 from creepkit.specimens.material_point import MaterialPoint
 from creepkit.testing.law_dimensions import check_dimensions
@@ -119,6 +119,12 @@ def check_temperature(law: CreepLaw, samples: LawSamples) -> str | None:
     """The rate grows with temperature at most points, or the law declares that it falls."""
     if not law.uses(temperature):
         return None
+    rates = [*law.terms.values(), *(state.rate for state in law.states.values())]
+    for one in set[sympy.Expr]().union(*(rate.atoms(sympy.Add) for rate in rates)):
+        factor = one.coeff(temperature)
+        shift = (one - factor * temperature) / (factor or 1)
+        is_celsius = shift.is_number and abs(shift - ZERO_CELSIUS) < 1.0
+        assert not is_celsius, f"temperature + {shift:.5g} stands in it, and temperature is in K already; leave it out"
     warmer = samples.scaled([POINT_VARIABLES.index(temperature)], 1.01)
     before, after = (log_rate(lower(law, "numpy"), one) for one in (samples, warmer))
     counted = np.isfinite(before) & np.isfinite(after) & constraints_hold(law, warmer.points, warmer.theta)
@@ -161,6 +167,33 @@ def check_signs(law: CreepLaw, samples: LawSamples) -> str:
                 "the law holds, constraints=(stress > s0,), or use Max(stress - s0, 0)"
             )
     return f"{len(samples)} points"
+
+
+_POINT = (100.0, 0.01, 1e5, 1000.0, 100.0, 33.0)
+"""Stress, strain, time, temperature, principal and mean stress at which internal variables are followed."""
+
+
+@finding("internal variables without a limit")
+def check_unlimited_states(law: CreepLaw, _: LawSamples) -> str | None:
+    """As far as an internal variable without a limit grows, no term is infinite, complex or negative."""
+    exact, values, count = MultiprecisionLaw(law), [*law.center().values()], len(law.terms)
+    initial = [state.initial for state in law.states.values()]
+    unlimited = [(k, symbol) for k, (symbol, state) in enumerate(law.states.items()) if state.limit is None]
+    for k, symbol in unlimited:
+        for step in np.geomspace(1e-3, 1e3, 61):
+            reached = [*initial[:k], initial[k] + float(step), *initial[k + 1 :]]
+            try:
+                *terms, rate = exact.term_and_state_rates([*_POINT, *reached], values)[: count + k + 1]
+            except ArithmeticError:
+                terms, rate = [mpmath.inf], 1.0
+            if not (mpmath.im(rate) == 0 and rate > 0):
+                break  # it does not come so far
+            sound = all(mpmath.im(one) == 0 and 0 <= one < mpmath.inf for one in terms)
+            assert sound, (
+                f"'{symbol}' has no limit, and a term is infinite or changes its sign before it is {reached[k]:.3g}; "
+                f"state where the material ends, ck.State(..., limit={reached[k]:.1g})"
+            )
+    return f"{len(unlimited)} followed" if unlimited else None
 
 
 _SMALLEST_ACCURATE = 1e-290

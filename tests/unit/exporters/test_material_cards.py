@@ -13,7 +13,7 @@ from scipy.stats import qmc
 
 import creepkit as ck
 from creepkit.errors import ExportError
-from creepkit.exporters.material_cards import AbaqusCards, AnsysCards, CodeAsterMaterial
+from creepkit.exporters.material_cards import AbaqusCards, AnsysCards, CalculixCards, CodeAsterMaterial
 from creepkit.exporters.moose_neml2 import MooseBlock, Neml2Model
 from creepkit.kernels import lower
 from creepkit.kernels.multiprecision import MultiprecisionLaw
@@ -83,6 +83,25 @@ def test_between_the_rows_of_a_table_abaqus_is_within_a_thousandth(case):
     )
     errors = [rate(100.0, 0.01, 1e4, T) / true - 1 for T, true in zip(temperatures, truth, strict=True)]
     assert -1e-11 < min(errors) < 1e-4 < max(errors) < 1e-3
+
+
+def test_calculix_has_powers_of_stress_and_time_with_a_coefficient_from_1e_20_on():
+    """ccx 2.20 creeps by A = 1e-20 where less is written: a bar at 100 MPa for 1000 h has PEEQ 3.6e-4 of n = 5."""
+    for case in ("norton", "time hardening", "time hardening with temperature", "norton with temperature"):
+        source = CASES[case].replace(elastic=STEEL, units=Units("GPa", "h"))
+        text, rate = CalculixCards().text(source), abaqus(CalculixCards().text(source))
+        for s, e, t, T in points(8):
+            T = 873.15 + round(T - 873.15)
+            true = float(true_rate(source, s, e, t, T))
+            assert rate(1e-3 * s, e, t / 3600, T) / 3600 == pytest.approx(true, rel=1e-10), case
+        cards = abaqus_cards(text)
+        assert [row[2:] for row in cards["ELASTIC"][1]] == [row[3:] for row in cards["CREEP"][1]], case
+    for case, why in {
+        "strain hardening": "not rate = A q",
+        "time hardening, small": "creeps by 1e-20 where less",
+    }.items():
+        with pytest.raises(ExportError, match=f"{why}.*; export it as 'calculix'"):
+            CalculixCards().text(CASES[case])
 
 
 def test_what_a_code_does_not_have_is_refused_with_a_way_out():
@@ -297,6 +316,7 @@ ELSEWHERE = {
     ),
     **dict.fromkeys(("latex", "markdown", "mathml"), "equations and tables for people"),
     "json": "read back",
+    "calculix-cards": "read beside those of Abaqus, in a test of its own",
 }
 """{target: how the test of its own judges it over all laws}; the others are cards, which are read here."""
 

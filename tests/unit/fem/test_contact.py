@@ -12,10 +12,10 @@ import creepkit as ck
 from creepkit import kernels
 from creepkit.core import address, function
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
-from creepkit.fem.solver import StageConditions, assemble
 from creepkit.laws.norton import NORTON
 from creepkit.records import Status
 from creepkit.specimens.bulge.geometry import DimpleGeometry
+from helpers.fem_cases import StageConditions, assemble
 
 E, NU = 2e5, 0.3
 

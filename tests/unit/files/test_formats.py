@@ -81,6 +81,7 @@ def test_the_schemas_are_current() -> None:
     assert current == {path.name: path.read_text(encoding="utf-8") for path in SCHEMAS.iterdir()}, (
         "run 'python docs/schemas.py'"
     )
+    assert module.keywords_text() == module.KEYWORDS.read_text(encoding="utf-8"), "run 'python docs/schemas.py'"
 
 
 def test_written_documents_follow_the_schemas_and_those_of_a_later_version_are_refused(tmp_path) -> None:

@@ -44,7 +44,7 @@ def test_values_at_a_bound_and_rates_are_of_one_point(tmp_path):
         formula = fit.values["A"] * np.sinh(stresses / fit.values["B"]) ** fit.values["n"]
         loaded = ck.load(fit.save(tmp_path / "fit.json"))
         stated = [one.rate(stresses, warn=False)[0] for one in (fit, loaded)]
-        held = min(abs(fit.values["n"] - 1.0), abs(fit.values["n"] - 8.0)) < 0.01
+        held = min(abs(fit.values["n"] - 1.0), abs(fit.values["n"] - 8.0)) < 0.02
         near = np.abs(np.log(stated[0] / rates)).max() < 2.0
         if not (held and near and np.allclose(stated, formula, rtol=1e-9)):
             wrong[shape] = (fit.values, stated[0] / formula, stated[0] / rates)

@@ -1,5 +1,7 @@
 """Assessments of planted rupture tests: constants, ranking, strengths with bounds, flags, and what is refused."""
 
+import csv
+import ctypes
 import json
 from functools import partial
 
@@ -10,8 +12,10 @@ from scipy.stats import t as student
 import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.rupture_assessment.checks import physical_realism
+from creepkit.rupture_assessment.methods import Conditions
 from creepkit.rupture_assessment.observed_tests import rupture_tests
 from creepkit.rupture_assessment.strength import _bound
+from helpers.compilers import compiler_or_skip, shared_library
 from helpers.mistakes import said_otherwise
 from helpers.planted_rupture import (
     HOUR,
@@ -234,7 +238,7 @@ def tests():
 
 @pytest.fixture(scope="module")
 def assessment(tests):
-    return ck.rupture(tests, temperatures=[873.15], tensile_strength=TENSILE, settings=SETTINGS)
+    return ck.rupture(tests, temperatures=[873.15], stresses=[90.0], tensile_strength=TENSILE, settings=SETTINGS)
 
 
 def test_a_file_gives_the_same_assessment(assessment, tmp_path):
@@ -242,6 +246,8 @@ def test_a_file_gives_the_same_assessment(assessment, tmp_path):
     read = ck.load_rupture_assessment(path)
     assert str(read) == str(assessment)
     assert read.strength(860.0, hours=2e4) == assessment.strength(860.0, hours=2e4)
+    assert read.lives == assessment.lives == (assessment.life(90.0, 873.15),)
+    assert assessment.rupture_time(90.0, 873.15)[1:] == tuple(HOUR * np.array(read.lives[0].bounds_of_test))
     assert read.provenance["data"] == assessment.tests.fingerprint
     data = json.loads(path.read_text())
     data["ranked"][0]["fit"]["covariance"] = [[1.0]]
@@ -252,6 +258,27 @@ def test_a_file_gives_the_same_assessment(assessment, tmp_path):
     path.write_text(json.dumps(data))
     with pytest.raises(FitError, match="no method is ranked"):
         ck.load_rupture_assessment(path)
+
+
+def test_programs_and_a_table_give_the_times(tmp_path):
+    """Of the best method compiled as C and Fortran, and of the average in a table with its bounds."""
+    commands = {".c": ("gcc", "-std=c99"), ".f90": ("gfortran", "-std=f2003")}
+    for model in (larson_miller, orr_sherby_dorn, manson_haferd):
+        found = ck.rupture(planted(model, count=24), model.__name__.replace("_", "-"), temperatures=[860.0])
+        stress, T = 87.0, 861.0
+        hours = 10 ** found.best.location(Conditions.isotherm(np.array([stress]), T, found.tensile))[0]
+        for suffix, (compiler, standard) in commands.items():
+            path = found.save(tmp_path / f"{model.__name__}{suffix}")
+            flags = [compiler_or_skip(compiler), standard, "-pedantic", "-Wall", "-Wextra", "-Werror", path, "-lm"]
+            library, _ = shared_library(flags, tmp_path / f"{model.__name__}_{compiler}.so")
+            function = getattr(library, "rupture_hours" if suffix == ".c" else "rupture_hours_")
+            function.restype, numbers = ctypes.c_double, [ctypes.c_double(one) for one in (stress, T)]
+            given = numbers if suffix == ".c" else map(ctypes.byref, numbers)
+            assert function(*given) == pytest.approx(hours, rel=1e-9), path
+        rows = list(csv.DictReader(found.save(tmp_path / "times.csv").read_text().splitlines()))
+        life = found.life(float(found.tests.stress.min()), 860.0)
+        read = (float(rows[0]["median_h"]), float(rows[0]["high_of_one_test_h"]))
+        assert read == pytest.approx((life.hours, life.bounds_of_test[1]), rel=1e-5)
 
 
 # ---- odd tables ------------------------------------------------------------------------------------------------------

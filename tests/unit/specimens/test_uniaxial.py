@@ -8,12 +8,14 @@ import sympy
 
 import creepkit as ck
 from creepkit.errors import LawError
+from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.language import Elastic, arrhenius, wachtman
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Program, Status, StressSteps, constant_stress
 from creepkit.specimens.bar import elastic_strain
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.literature_laws import EQUATIONS
+from helpers.narrow_predictor import Narrow
 
 TIMES = np.array([0.0, 10.0, 100.0, 1000.0])
 VALUES = {"A": 1e-13, "n": 4.0}
@@ -43,6 +45,22 @@ def test_predictions_are_padded_to_the_longest_test() -> None:
     assert np.isnan(result.values[:, 1, 2:]).all()
     np.testing.assert_allclose(result.jacobian[0, 0, :, 0, 0], RATE * TIMES, rtol=1e-9)
     np.testing.assert_allclose(result.jacobian[0, 0, :, 0, 1], RATE * TIMES * np.log(100), rtol=1e-9)
+
+
+def test_tests_with_values_of_their_own_are_one_prediction() -> None:
+    """Of bars in one call, of Narrow test by test, alone or as a part: each test as with its values alone."""
+    own, narrow = Uniaxial(tolerance=1e-9), Narrow(unknown=())
+    tests = [history(), history(times=TIMES[:3], loading=constant_stress(50.0, "load"), specimen="narrow")]
+    theta = NORTON.to_internal({"A": np.array([1e-13, 3e-13, 2e-13, 0.0]), "n": 4.0}).reshape(2, 2, 2)
+    for predictor in (own, narrow, CompositePredictor({"uniaxial": own, "narrow": narrow})):
+        for nuisances in ({}, {"rate drift": np.array([[0.1, -0.2]])}):
+            joint = predictor.predict(NORTON, theta, tests, nuisances=nuisances, sensitivities=True)
+            for k, test in enumerate(tests):
+                of_test = {key: values[:, [k]] for key, values in nuisances.items()}
+                single = predictor.predict(NORTON, theta[:, k], [test], nuisances=of_test, sensitivities=True)
+                for name in ("values", "jacobian"):
+                    found, expected = getattr(joint, name)[:, k], getattr(single, name)[:, 0]
+                    np.testing.assert_array_equal(found[:, : test.times.size], expected)
 
 
 def test_engineering_strain_and_constant_load() -> None:

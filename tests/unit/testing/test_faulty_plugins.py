@@ -105,6 +105,15 @@ LAWS: dict[str, tuple[str, str]] = {
         law("A*stress**n*time**(m - 1)", PLAIN + ", m: Param('m', (-0.2, 1))"),
         "narrow the bounds so that the power stays above -1",
     ),
+    "damage without a limit": (damage("State(0.0, B*stress**n, 'damage')"), "'w' has no limit, and a term is infinite"),
+    "softening without a limit": (
+        damage("State(0.0, B*stress**n, 'softening')", "A*stress**n*(1 - w)"),
+        "state where the material ends, ck.State(..., limit=1)",
+    ),
+    "temperature in C": (
+        law("A*stress**n*sympy.exp(-Q/(R*(temperature + 273.15)))", ACTIVATED),
+        "temperature is in K already; leave it out",
+    ),
     "falls with temperature": (
         law("A*stress**n*sympy.exp(Q/(R*temperature))", ACTIVATED),
         "check the sign of the activation energy",

@@ -14,13 +14,13 @@
   function placedModel(data, modes) {
     const array = {};
     for (const [name, packed] of Object.entries(data.arrays)) array[name] = creepkit.decode(packed);
-    const { weights, sides, measures, top } = array, points = weights.length, measured = measures.length / data.modes;
+    const { weights, factors, sides, measures, top } = array, points = weights.length, measured = measures.length / data.modes;
     const all = Math.ceil(data.modes / BLOCK) * BLOCK, width = Math.ceil(modes / BLOCK) * BLOCK;
     const [gradients, sideModes, surface] = [array.gradients, array.side_modes, array.surface]
       .map((values) => values.filter((_, k) => k % all < width));
     const counts = [modes, points, sides.length / 4, top.length, data.limited, measured];
     const leading = measures.slice(0, modes * measured);
-    const arrays = [gradients, 5 * points * modes, weights, sides, sideModes, surface, leading];
+    const arrays = [gradients, 5 * points * modes, weights, factors, sides, sideModes, surface, leading];
     return { ...array, surface, counts, width, modeCount: modes,
       placed: arrays.map((values) => creepkit.placed(values)) };
   }

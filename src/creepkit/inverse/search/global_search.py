@@ -106,7 +106,10 @@ def _continued(problem: LeastSquaresProblem, end: Minimum, others: Sequence[Mini
             return near[0]
         if end.converged:
             break
-        end = problem.minimise(end.x, tolerances=replace(LAST_STEPS, max_steps=FIRST_STEPS.max_steps + 1))
+        further = problem.minimise(end.x, tolerances=replace(LAST_STEPS, max_steps=FIRST_STEPS.max_steps + 1))
+        if np.array_equal(further.x, end.x):  # no step of those that are tried gains anything
+            break
+        end = further
     return end
 
 

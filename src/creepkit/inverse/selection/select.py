@@ -14,7 +14,7 @@ from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import describing, identify_unsampled, sampled_where_needed
+from creepkit.inverse.identify import describing, identify, sampled_where_needed
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.ranking import Criterion, Ranking, rank
@@ -142,9 +142,8 @@ def _identify_all(
         if progress is not None:
             progress(task, k, len(laws))
         try:
-            fits.append(
-                identify_unsampled(law, histories, using, settings=settings, through=through_for_law(through, law))
-            )
+            known = through_for_law(through, law)
+            fits.append(identify(law, histories, using, settings=settings, through=known))
         except CreepkitError as error:
             failed[law.name] = str(error)
         if progress is not None:

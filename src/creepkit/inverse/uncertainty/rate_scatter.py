@@ -28,14 +28,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import logsumexp, ndtr
+from scipy.special import ndtr
 
 from creepkit.arrays import Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel, Residuals
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, scaled_inverse
 from creepkit.records import History, Nuisance
 
@@ -225,18 +224,19 @@ class RateScatter:
         prior = np.zeros(1) if known else log_prior(nodes[:, None], ("test",))
         groups = [np.full(nodes.size, self.posterior.mean_square(level) ** 0.5) for level in self.levels[:-1]]
         log, mean, covariance = self.solved(np.stack([*groups, nodes], axis=-1), columns, prior_sd)
-        return log + prior - logsumexp(prior), mean, covariance
+        return log + prior - np.logaddexp.reduce(prior), mean, covariance
 
     def evidence(self, columns: Floats, prior_sd: Floats) -> Evidence:
         """Of further effects on ln rates. columns : (tests, effects). prior_sd : (effects,) standard deviations."""
         logs, means, covariances = self.over_scatter(columns, prior_sd)
-        share, unknowns = np.exp(logs - logsumexp(logs)), self.joint_design.shape[1]
+        log, unknowns = float(np.logaddexp.reduce(logs)), self.joint_design.shape[1]
+        share = np.exp(logs - log)
         mean = share @ means
         variances = np.diagonal(covariances, axis1=1, axis2=2)
         sd = np.sqrt(share @ (variances + (means - mean) ** 2))
         p_value = share @ (2.0 * ndtr(-np.abs(means) / np.sqrt(variances)))
         step = mean[: self.design.shape[1]]
-        return Evidence(float(logsumexp(logs)), mean[unknowns:], sd[unknowns:], step, p_value[unknowns:])
+        return Evidence(log, mean[unknowns:], sd[unknowns:], step, p_value[unknowns:])
 
     def joint(self, sd: Floats) -> tuple[Floats, Floats]:
         """Mean (unknowns + effects,) and covariance of (dx, c) about the estimate, given sd (levels,) of the effects.
@@ -371,7 +371,6 @@ def rate_scatter(
     prior_gradient[integrated] = 0.0
     at_prior_means = nuisances.integrate_out(residuals, nuisances.mean[: nuisances.size] + from_prior_means)
     observations = problem.observations
-    conditions = np.array([reference_condition(h, problem.predictor) for h in problem.histories])
     transforms = dict(zip(observations.outputs, observations.transforms, strict=True))
     return RateScatter(
         tests=tuple(h.name for h in problem.histories),
@@ -379,8 +378,8 @@ def rate_scatter(
         weight=np.array(residuals.test_weights, float),
         common=_common_members(problem.histories),
         known=_known_sd(problem.settings.nuisances),
-        stresses=conditions[:, 0],
-        temperatures=conditions[:, 1],
+        stresses=problem.conditions[0],
+        temperatures=problem.conditions[1],
         errors=errors,
         reach=max(1.0, REACH * noise_model.rate / USUAL_SD["test"]),
         output_scales={n: t.scale for n, t in transforms.items() if isinstance(t, LinearTransform)},

@@ -327,9 +327,9 @@ class Bulge(FiniteElementSpecimen):
         assert known is not None
         return _movement(self.geometry, self.refinement, known.name)
 
-    def stated_history(self, history: History) -> History:
-        """A history with the lengths of the dimple and the operator."""
-        return super().stated_history(history).replace(operator=str(self.observation))
+    def taken_for_granted(self, history: History) -> dict[str, Any]:
+        """As of every body, and the operator."""
+        return {**super().taken_for_granted(history), "operator": str(self.observation)}
 
 
 @lru_cache(maxsize=16)

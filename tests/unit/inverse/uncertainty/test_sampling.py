@@ -8,7 +8,7 @@ from scipy.integrate import cumulative_trapezoid, trapezoid
 from scipy.stats import beta, multivariate_normal, truncnorm
 from scipy.stats import t as student
 
-from creepkit.inverse.identify import identify
+from creepkit.inverse.identify import identify, sampled_where_needed
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.importance_sampling import (
     SAMPLES,
@@ -170,7 +170,7 @@ def steady_tests(n=4.0, noise=4e-4):
 @pytest.fixture(scope="module")
 def at_bound():
     """n of 4.1 planted, at most 4 allowed."""
-    return identify(BOUNDED, steady_tests(4.1), Steady(), settings=SETTINGS)
+    return sampled_where_needed(identify(BOUNDED, steady_tests(4.1), Steady(), settings=SETTINGS))
 
 
 def test_a_value_at_its_bound_gets_samples(at_bound):
@@ -214,7 +214,7 @@ def test_intervals_come_from_the_samples_and_hold_the_value(at_bound):
 
 
 def test_values_inside_their_bounds_need_none():
-    fit = identify(NORTON, steady_tests(), Steady(), settings=SETTINGS)
+    fit = sampled_where_needed(identify(NORTON, steady_tests(), Steady(), settings=SETTINGS))
     assert not needs_samples(fit)
     assert fit.samples is None
 
