@@ -153,10 +153,9 @@ class Adequacy:
 
     def with_explanations(self, explanations: tuple[Explanation, ...]) -> Adequacy:
         """The same, rejected where something other than scatter explains the rates of tests, likeliest first."""
-        if not explanations or self.rejects or explanations[0].odds > VERDICT_ODDS:
-            verdict = "leaves a discrepancy" if explanations else self.verdict
-            return replace(self, verdict=verdict, explanations=explanations)
-        return replace(self, mentioned=explanations[0])
+        if explanations and not self.rejects and explanations[0].odds < VERDICT_ODDS:
+            return replace(self, mentioned=explanations[0])
+        return replace(self, verdict="leaves a discrepancy", explanations=explanations) if explanations else self
 
     def with_unpredicted(self, tests: tuple[str, ...]) -> Adequacy:
         """The same; not judged to explain tests that it does not predict."""

@@ -61,11 +61,8 @@ def errors_of_tests(
         sizes = np.array([kelvin, included.get("load", 0.0)])
         rates = np.linalg.norm(rate_slopes(problem, x) * sizes, axis=1)
         changes[RATE] = rates[:, None] * linear.residuals.log_rate_sensitivity
-    own = [
-        Perturbation(kind, 1.0, "", residual_change=change, tests=tests, included=True)
-        for kind, change in changes.items()
-        if change.any()
-    ]
+    made = [Perturbation(kind, 1.0, "", residual_change=s, tests=tests, included=True) for kind, s in changes.items()]
+    own = [one for one in made if one.residual_change.any()]
     return (*of_lengths_and_instruments(problem, x, linear), *own)
 
 

@@ -130,8 +130,6 @@ def identify(
             return fit
         if settings.weights == "automatic" and misses_shape(fit):
             fit = describing(fit)
-        elif settings.weights == "noise" and start is None:
-            fit = _with_rates_of_tests(fit)
     return _without_one_test(fit)
 
 
@@ -163,22 +161,6 @@ def describing(fit: Identification) -> Identification:
     values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
     notes = dict.fromkeys((*values.notes, *(note for note in fit.notes if "were not used" in note)))
     return replace(values, notes=tuple(notes), provenance={**fit.provenance, **values.provenance})
-
-
-def _with_rates_of_tests(fit: Identification) -> Identification:
-    """An identification by noise that misses the shape of curves, by likelihood where the tests explain that.
-
-    Least squares bend the curves of a law towards tests that creep at rates of their own; the likelihood knows these.
-    """
-    adequacy = fit.adequacy
-    if adequacy is None or not adequacy.explanations or adequacy.explanations[0].is_of_law or adequacy.is_explained:
-        return fit
-    start, settings = StartingEstimate.from_identification(fit, values_only=True), fit.settings
-    settings, predictor = replace(settings, weights="likelihood"), fit.least_squares_problem.predictor
-    again = identify(fit.law, fit.histories, predictor, settings=settings, start=start)
-    search = {key: value for key, value in fit.provenance.items() if key.startswith("search")}
-    explained = again.adequacy is not None and again.adequacy.lies_in_tests
-    return replace(again, provenance={**again.provenance, **search}) if explained else fit
 
 
 def _without_one_test(fit: Identification) -> Identification:
@@ -393,12 +375,12 @@ def _reported(
     if not estimator.by_likelihood:
         errors, judged = errors_of_tests(problem, x, linear, noise_model), judged_at(problem, linear, noise_model)
         working_noise = with_single_value_weight(best.noise, problem.observations)
+    expected = with_expected_scatter(problem, linear, noise_model)
     unmodelled = perturbations(
-        problem, linear, noise_model, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
+        problem, linear, expected, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
     )
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     rates = RateExplanations(problem, x, judged, noise_model)
-    expected = with_expected_scatter(problem, linear, noise_model)
     covariance, of_errors, of_common = covariances_of_values_with_errors(linear, expected, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
     prediction = problem.predictor.predict(
