@@ -55,7 +55,9 @@ def restricted_covariance(
     components = [component for component in _estimated_components(noise_model, nuisances) if component not in fixed]
     if not components:
         return solution.covariance, np.full(len(solution.covariance), NORMAL_FREEDOM)
-    covariance_derivatives = [_covariance_derivative(linearised.residuals, noise_model, *one) for one in components]
+    covariance_derivatives = [
+        _covariance_derivative(linearised.residuals, noise_model, factor.blocks, *one) for one in components
+    ]
     projected = [
         np.einsum("tep,tef,tfq->pq", solution.weighted_jacobian, s, solution.weighted_jacobian, optimize=True)
         for s in covariance_derivatives
@@ -124,8 +126,13 @@ def _estimated_components(noise_model: NoiseModel, nuisances: Sequence[Nuisance]
     return components + ([("", "discrepancy"), ("", "discrepancy_length")] if discrepant else [])
 
 
-def _covariance_derivative(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> Floats:
-    """Derivative of the covariances to the logarithm of one component, (tests, observations, observations)."""
+def _covariance_derivative(
+    residuals: Residuals, noise_model: NoiseModel, blocks: Floats, output: str, name: str
+) -> Floats:
+    """Derivative of the covariances to the logarithm of one component, (tests, observations, observations).
+
+    blocks : (tests, observations, observations) the covariances.
+    """
 
     def at(factor: float) -> Floats:
         if not output:
@@ -136,7 +143,7 @@ def _covariance_derivative(residuals: Residuals, noise_model: NoiseModel, output
 
     if name.endswith("length"):
         return np.asarray((at(np.exp(LOG_STEP)) - at(np.exp(-LOG_STEP))) / (2.0 * LOG_STEP))
-    return 2.0 * (at(1.0) - at(0.0))  # a standard deviation
+    return 2.0 * (blocks - at(0.0))  # a standard deviation
 
 
 DETERMINED_FACTOR, DETERMINED_SHARE = 10.0, 0.25
