@@ -14,6 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from bulge_cases import FILLET, TIMES, TRUE, Case, drawn_cases
+from core_speed import CASES as SPEED_CASES
+from core_speed import Case as SpeedCase
+from core_speed import least
 from measured import Page, arguments
 from public_calls import predict
 
@@ -141,6 +144,38 @@ def default_table(page: Page, cases: list[Reference], count: int, seed: int) -> 
         row(page, page_label + f"{1e3 * np.mean([e.cpu for e in others]):.1f} ms", others, own)
 
 
+def costs_table(page: Page) -> None:
+    """Where the time of the six laws of core_speed.py goes."""
+    page.heading("Where the time goes")
+    page.paragraph(
+        "Means of the six laws of [core_speed](core_speed.md). Passes are equilibrium iterations, with a new tangent "
+        "and without; a prediction adds Python, the Gaussian fits and the interpolation in time to the simulation."
+    )
+    page.table("model", "steps", "passes with tangent", "without", "simulation, CPU ms", "prediction, CPU ms")
+    rows: dict[str, list[list[float]]] = {}
+    for each in map(SpeedCase, SPEED_CASES):
+        reduced = each.specimen.reduced_order_model()
+        for label, predictor in (
+            ("finite elements", None),
+            ("reduced", reduced),
+            ("in searches", reduced.for_search()),
+        ):
+            settings = solver_settings(each.specimen) if predictor is None else predictor.settings(False)
+            model = each.setup.model if predictor is None else predictor.reduced_model_of(each.setup.piece)
+
+            def run(each=each, settings=settings, model=model):
+                return each.setup.simulate(each.law, each.theta, settings, model)
+
+            def predicted(setup=each.setup, run=run):
+                return setup.response(run())
+
+            found = [*run().iterations[[0, 2, 3]], least(run, 10), least(predicted, 10)]
+            rows.setdefault(label, []).append(found)
+    for label, found in rows.items():
+        steps, stiff, light, *times = np.mean(found, axis=0)
+        page.row(label, f"{steps:.0f}", f"{stiff:.0f}", f"{light:.0f}", *(f"{time:.2f}" for time in times))
+
+
 def default_basis(specimen: Bulge, reference: Reference) -> ReducedBasis:
     """The basis that a test of a specimen uses."""
     return BulgeReducedOrderModel(specimen).reduced_model_of(reference.setup.piece).basis
@@ -222,6 +257,7 @@ def main() -> None:
     page = Page("reduced_order_model", __doc__)
     cases = references(TRUE, (), options.cases, options.seed)
     default_table(page, cases, options.cases, options.seed)
+    costs_table(page)
     sensitivities_table(page)
     if options.write:
         page.write()

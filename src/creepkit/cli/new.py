@@ -34,7 +34,8 @@ def command(
 ) -> None:
     """A package that can be installed, with a test; what exists is left as it is."""
     if kind not in KINDS:
-        raise PluginError(f"'{kind}' is no kind of plugin; {nearest(kind, KINDS)}")
+        pages = "the pages on plugins show how others are written"
+        raise PluginError(f"there is no '{kind}' to start from; {nearest(kind, KINDS)}; {pages}")
     if not NAME_PATTERN.fullmatch(name):
         raise typer.BadParameter(
             f"'{name}' is not a {kind}'s name: use lower-case words joined by '-', such as my-{kind}"

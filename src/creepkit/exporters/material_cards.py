@@ -171,7 +171,8 @@ class CalculixCards(AbaqusCards):
             raise self.refusal(source, f": A would be as small as {found} ({remedy})")
         data = [_data_line(exp_in_range(ln, "A", source), form.n, form.time_exponent, T) for T, ln in rows.items()]
         formula = "rate = A q^n t^m, of equivalent stress q and total time t, which must start with the load. A, n, m."
-        return [f"LAW=NORTON: {formula}", *notes], ["*CREEP, LAW=NORTON", *data]
+        steps = "CETOL of 1e-2 and 1e-4 give the same increments: state small ones where the rate falls with time."
+        return [f"LAW=NORTON: {formula}", *notes, steps], ["*CREEP, LAW=NORTON", *data]
 
 
 def _power_law(

@@ -84,17 +84,15 @@ def imposed(
     specimen: str | tuple[str, str],
     frame_times: ArrayLike,
     alignment: ClockAlignment | None = None,
-    *,
-    load_tolerance: float | None = None,
-    temperature_tolerance: float | None = None,
 ) -> Imposed:
     """Load and temperature of one specimen on the clock of its frames, as programs of few straight pieces.
 
     specimen : its name, such as "D1", from which the record's format knows its channels; or the names of the channels
     of load and temperature. frame_times : (frames,) s on the camera's clock, with any zero. alignment : by
-    align_clocks; None: both clocks agree, which needs a record and frames with absolute times. load_tolerance : MPa, by
-    default 0.002 of the largest load; temperature_tolerance : K, by default 0.25. Three standard deviations of the
-    noise are taken where they are more; the programs follow its mean.
+    align_clocks; None: both clocks agree, which needs a record and frames with absolute times.
+
+    The programs follow the mean of the record to 0.002 of the largest load and to 0.25 K, or to three standard
+    deviations of the noise where these are more.
     """
     times = np.asarray(frame_times, dtype=float)
     if times.ndim != 1 or times.size < 2 or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
@@ -113,9 +111,9 @@ def imposed(
     load_times, loads = _on_camera_clock(record, names[0], alignment, times)
     zero = _start_of_loading(load_times, loads, times)
     size = float(np.abs(loads).max())
-    program, load_error = _program(load_times - zero, loads, load_tolerance or LOAD_RECORD_TOLERANCE * size)
+    program, load_error = _program(load_times - zero, loads, LOAD_RECORD_TOLERANCE * size)
     warm_times, warm = _on_camera_clock(record, names[1], alignment, times)
-    furnace, warm_error = _program(warm_times - zero, warm, temperature_tolerance or TEMPERATURE_RECORD_TOLERANCE)
+    furnace, warm_error = _program(warm_times - zero, warm, TEMPERATURE_RECORD_TOLERANCE)
     return Imposed(
         specimen if isinstance(specimen, str) else "",
         names,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -168,12 +168,20 @@ def integrate(
 
 def _inputs(law: CompiledLaw, theta: Floats, tests: Sequence[PointTest]) -> dict[str, Any]:
     """The arrays that the core reads, by the names of its fields; tests laid end to end."""
-    segments = [test.segments for test in tests]
     return {
         "theta": theta,
         "beta": np.array(law.leading_exponent(theta), dtype=float).reshape(theta.shape[:-1]),
         "initial": np.array(law.initial, dtype=float),
         "limits": np.array(law.limits, dtype=float),
+        **_of_tests(tuple(tests)),
+    }
+
+
+@lru_cache(maxsize=256)
+def _of_tests(tests: tuple[PointTest, ...]) -> dict[str, Any]:
+    """What the core reads of tests; kept, for a fit asks for them a thousand times."""
+    segments = [test.segments for test in tests]
+    return {
         "stress_controls": np.array([[t.stiffness, float(t.constant_load)] for t in tests]).reshape(-1, 2),
         "segments": np.concatenate([*segments, np.zeros((0, 6))]),
         "segment_offsets": _offsets([s.shape[0] for s in segments]),

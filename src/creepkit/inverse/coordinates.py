@@ -135,6 +135,7 @@ class Coordinates:
     def __init__(self, law: CreepLaw, reference: ReferencePoint) -> None:
         self.law, self.reference = law, reference
         self.names = law.names
+        self._last: dict[str, tuple[object, Floats]] = {}
         self._rate_kernels: list[tuple[int, list[int], ArrayKernel]] = []
         for label in law.terms:
             single_term = law.only(label)
@@ -173,6 +174,16 @@ class Coordinates:
 
     def theta(self, u: Floats) -> Floats:
         """(..., parameters) internal parameters of conditioned coordinates u (..., parameters)."""
+        return self._kept(self._theta, np.asarray(u, float))
+
+    def _kept(self, function: Callable[[Floats], Floats], u: Floats) -> Floats:
+        """A function of u (..., parameters); that of the last u is kept, for a fit asks for it several times."""
+        key, kept = (u.shape, u.tobytes()), self._last.get(function.__name__)
+        if kept is None or kept[0] != key:
+            kept = self._last[function.__name__] = key, function(u)
+        return kept[1].copy()
+
+    def _theta(self, u: Floats) -> Floats:
         theta = np.array(u, float)
         for local in self.exponents:
             a, b, _, _ = local.evaluate(self._point(self.law), theta)
@@ -213,6 +224,9 @@ class Coordinates:
 
     def jacobian(self, u: Floats) -> Floats:
         """d theta / d u at u (..., parameters): (..., parameters, parameters)."""
+        return self._kept(self._jacobian, np.asarray(u, float))
+
+    def _jacobian(self, u: Floats) -> Floats:
         theta = self.theta(u)
         matrix = np.zeros((*theta.shape, theta.shape[-1])) + np.eye(theta.shape[-1])
         for k, positions, kernel in self._rate_kernels:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
@@ -13,6 +15,7 @@ def usable_frames(history: History, output: str) -> Bools:
     return np.asarray(history.used & (history.times > 0) & np.isfinite(history.outputs[output]))
 
 
+@lru_cache(maxsize=4096)
 def frame_noise(history: History, output: str) -> float:
     """Standard deviation of one output from frame to frame, in its unit; 0 for under 6 frames.
 

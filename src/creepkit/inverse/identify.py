@@ -54,7 +54,7 @@ from creepkit.inverse.iterative_estimation import (
 from creepkit.inverse.judging import Judge
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
-from creepkit.inverse.noise_model import NoiseModel
+from creepkit.inverse.noise_model import NoiseModel, autocorrelated_components
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbation import unmodelled_note
@@ -263,7 +263,7 @@ def _cheaper_estimate(
 ) -> tuple[EstimationResult, NumericalError | None]:
     """The best end of the starts (unknowns,) through a cheaper predictor; judged : as of _last_estimate()."""
     best = _best_of(problem.with_predictor(through), starts, APPROXIMATE_LIMITS, progress, noise)
-    if judged is None:
+    if judged is None or problem.settings.weights != "likelihood":
         return best, None
     corrected = with_cheaper_predictor(problem, best.x, through)
     known = replace(best, problem=corrected, linear=corrected.linearised(best.x))
@@ -324,6 +324,8 @@ def _describing_estimate(
     """An estimate by likelihood, or where it clearly misses the shape of curves that of frames of equal weight."""
     problem, linear, noise = found.problem, found.linear, found.noise
     if histories is None or problem.settings.weights != "likelihood" or _wider_law(found) is not None:
+        return found
+    if not autocorrelated_components(noise):  # the curves are followed to a white noise
         return found
     errors = {} if problem.correction is not None else problem.predictor.error
     judge = Judge(problem, noise, errors, histories)

@@ -304,12 +304,12 @@ class ObservationVector:
         """The factors of the correlated noise of frames; None where outputs err independently."""
         return SharedNoise.of_correlations(self.noise_correlation, self.output_index, self.frame_index)
 
-    @property
+    @cached_property
     def log_times(self) -> Floats:
         """(tests, observations) ln of time in s."""
         return np.log(self.times)
 
-    @property
+    @cached_property
     def correlation_coordinate(self) -> Floats:
         """(tests, observations) -, ln t where the transform is logarithmic, else 5 t / last time."""
         last_times = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)

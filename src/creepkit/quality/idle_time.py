@@ -94,11 +94,12 @@ def idle_parts(times: Floats, values: Floats) -> list[IdlePart]:
             break
         rates, errors = rates_over(beside + 1)
         before, after, span = first - beside, first + width, times[first + width] - times[first]
-        least, error = np.minimum(rates[before], rates[after]), np.maximum(errors[before], errors[after])
-        growth = values[after] - values[first]
-        lacking = least * span - growth
-        is_idle = (least > RATE_THRESHOLD * error) & (np.maximum(rates[before], rates[after]) < RATE_RATIO * least)
-        is_idle &= growth < LARGEST_GROWTH * least * span
+        least, growth = np.minimum(rates[before], rates[after]), values[after] - values[first]
+        is_idle = growth < LARGEST_GROWTH * least * span
+        if not is_idle.any():
+            continue
+        lacking, error = least * span - growth, np.maximum(errors[before], errors[after])
+        is_idle &= (least > RATE_THRESHOLD * error) & (np.maximum(rates[before], rates[after]) < RATE_RATIO * least)
         is_idle &= lacking > THRESHOLD * np.hypot(1.5 * sigma, span * error)
         shorter = np.minimum(times[first] - times[before], times[after + beside] - times[after])
         is_idle &= shorter > SHORTEST_BESIDE * span

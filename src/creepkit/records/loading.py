@@ -78,7 +78,9 @@ class Program:
 
     def _interpolated(self, times: ArrayLike, side: Literal["left", "right"]) -> Floats:
         t = np.asarray(times, dtype=float)
-        index = np.clip(np.searchsorted(self.times, t, side=side) - 1, 0, self.times.size - 1)
+        if self.times.size == 1:
+            return np.full(t.shape, self.values[0])
+        index = np.maximum(np.searchsorted(self.times, t, side=side) - 1, 0)
         following = np.minimum(index + 1, self.times.size - 1)
         width = self.times[following] - self.times[index]
         fraction = np.divide(t - self.times[index], width, out=np.zeros_like(t), where=width > 0)

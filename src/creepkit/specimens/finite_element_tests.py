@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 
 STEPS = {"temperature step": 1.0, "temperature drift": 1.0, "load step": 1e-3, "modulus": 1e-3, "temperature": 1.0}
-"""K and relative, of central differences of the load history by kind; it is linear in all but for the modulus in K."""
+"""K and relative, of differences of the load history by kind; they are central where the modulus varies with K."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +140,12 @@ def _prepared(
         fields = (changed.get(name, getattr(history, name)) for name in ("loading", "temperature", "elastic"))
         return _load_history_of(piece, history, *fields).segments
 
-    steps = {key: STEPS[kind_and_start(key)[0]] for key in loads}
-    along = [(segments(key, step) - segments(key, -step)) / (2.0 * step) for key, step in steps.items()]
+    linear = isinstance(getattr(history.elastic, "E", None), Real)
+    along = []
+    for key in loads:
+        step = STEPS[kind_and_start(key)[0]]
+        before, width = (load_history.segments, step) if linear else (segments(key, -step), 2.0 * step)
+        along.append((segments(key, step) - before) / width)
     moves = [piece.movement(test.load, key) for key in lengths]
     directions = sensitivity_directions(
         test.model,

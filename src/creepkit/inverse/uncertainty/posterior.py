@@ -81,7 +81,7 @@ class Posterior:
             nuisance_basis=np.linalg.qr(np.concatenate([nuisance_rows, root_precision]))[0],
             prior_residuals=root_precision @ (e - nuisances.mean[: nuisances.size]),
             degrees_of_freedom=max(fit.freedom, 1.0),
-            least_chi_square=whole.chi_square(whole.minimise(fit.x, tolerances=REFIT_TOLERANCES).x),
+            least_chi_square=whole.chi_square(whole.minimise(fit.x).x),
         )
 
     @property

@@ -22,7 +22,7 @@ from creepkit.reports.html.page import block_shown, findings_section, group_answ
 from creepkit.reports.html.templates import template
 from creepkit.reports.law_names import LawNames
 from creepkit.reports.ranking import ranking_blocks
-from creepkit.reports.rupture import rupture_blocks
+from creepkit.reports.rupture import rupture_blocks, strength_blocks
 from creepkit.reports.svg import PageFigures
 from creepkit.rupture_assessment.assessment import RuptureAssessment
 
@@ -82,7 +82,7 @@ _blocks.register(History)(lambda history: history_blocks([history]))
 _blocks.register(Histories)(history_blocks)
 _blocks.register(Specimen)(specimen_blocks)
 _blocks.register(Forecast)(lambda forecast: forecast_blocks(forecast, _figures()))
-_blocks.register(RuptureAssessment)(lambda assessment: rupture_blocks(assessment, _figures()))
+_blocks.register(RuptureAssessment)(lambda one: [*strength_blocks(one), *rupture_blocks(one, _figures())])
 
 
 @_blocks.register

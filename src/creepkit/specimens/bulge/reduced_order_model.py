@@ -35,8 +35,9 @@ THICKNESS_RANGE = 1.25
 """Largest over smallest apex thickness of one basis."""
 
 
-STEP_SHARE, STEP_GROWTH = 2.0, 3.0
-"""Tolerance of the steps over that of the specimen, and their growth: they add less than the modes err by."""
+STEP_SHARE, EQUILIBRIUM_SHARE, STEP_GROWTH = 1.5, 3.0, 3.0
+"""Tolerances of steps and of equilibrium over those of the specimen, and the growth of steps: they err by half as much
+as the modes."""
 
 
 SEARCH_TOLERANCE, SEARCH_GROWTH = 4e-2, 4.0
@@ -131,7 +132,7 @@ class BulgeReducedOrderModel(Predictor):
         if self.searching:
             tolerance = max(SEARCH_TOLERANCE, own)  # and one newton, so that values are the same with derivatives
             return settings._replace(tolerance=tolerance, newton=1e-3 * tolerance, growth=SEARCH_GROWTH)
-        newton = settings.newton if sensitivities else STEP_SHARE * settings.newton
+        newton = settings.newton if sensitivities else EQUILIBRIUM_SHARE * settings.newton
         return settings._replace(tolerance=STEP_SHARE * own, newton=newton, growth=STEP_GROWTH)
 
     def reduced_model_of(self, piece: Any) -> ReducedOrderModel:
