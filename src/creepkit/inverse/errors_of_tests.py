@@ -78,8 +78,7 @@ def with_expected_scatter(
     scatter = replace(rate_scatter(problem, linear, noise_model), members={})
     if len(problem.histories) == 1 or scatter.known is not None:
         return noise_model
-    posterior = scatter.posterior
-    return replace(noise_model, rate=max(noise_model.rate, float(posterior.mean_square("test")) ** 0.5))
+    return replace(noise_model, rate=max(noise_model.rate, scatter.posterior.mean_square("test") ** 0.5))
 
 
 def covariances_of_values_with_errors(

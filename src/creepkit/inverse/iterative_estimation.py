@@ -228,9 +228,7 @@ def _log_likelihood(problem: LeastSquaresProblem, linear: LinearisedProblem, noi
     # The optimum under weights is none of the noise model: that it is flat in the law's parameters says nothing for it.
     by_likelihood = problem.settings.weights == "likelihood"
     integrated = np.arange(linear.x.size) >= (0 if by_likelihood else problem.parameter_count)
-    stopped = linear.residuals.stopped
-    of_stopped_tests = 0.0 if stopped is None else stopped.log_likelihood
-    return restricted_log_likelihood(linear, noise, integrated) + of_stopped_tests
+    return restricted_log_likelihood(linear, noise, integrated) + linear.residuals.stopped.log_likelihood
 
 
 def _with_priors_found(

@@ -9,7 +9,7 @@ the misfit of one output noise and fit the others.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -26,14 +26,14 @@ class StoppedTests:
     """What stopped tests say, as Gaussian observations about one point (see inverse.stopped_tests).
 
     shift, sd : (tests, observations) -, what is added to the residuals of their ends, and the standard deviation that
-    these have beyond the noise model. chi_square, log_variance : -2 ln of the probability to last, and ln of the
-    variance of the ends, over those of the Gaussian observations, summed over the tests.
+    these have beyond the noise model, None where no test was stopped. chi_square, log_variance : -2 ln of the
+    probability to last, and ln of the variance of the ends, over those of the Gaussian observations, summed over tests.
     """
 
-    shift: Floats
-    sd: Floats
-    chi_square: float
-    log_variance: float
+    shift: Floats = field(default_factory=lambda: np.zeros(0))
+    sd: Floats | None = None
+    chi_square: float = 0.0
+    log_variance: float = 0.0
 
     @property
     def log_likelihood(self) -> float:
@@ -60,7 +60,7 @@ class Residuals:
     discrepancy_unit : (tests, observations) -, what a model discrepancy of one is in the transformed output: the stated
         or estimated noise of the frame; 1 % where the transform is logarithmic; 0 where there can be none.
     shared_noise : how the noise of the outputs of a frame is correlated; None where it is not.
-    stopped : what tests that were stopped before rupture say, which is in their values; None without.
+    stopped : what tests that were stopped before rupture say, which is in their values.
     """
 
     values: Floats
@@ -76,7 +76,7 @@ class Residuals:
     common_effects: Floats | None = None
     discrepancy_unit: Floats | None = None
     shared_noise: SharedNoise | None = None
-    stopped: StoppedTests | None = None
+    stopped: StoppedTests = field(default_factory=StoppedTests)
 
     def with_test_weights(self, test_weights: Floats) -> Residuals:
         """The same with other weights of tests."""
@@ -127,11 +127,8 @@ class Residuals:
             self.log_rate_sensitivity,
         ]
         stacked = np.stack(effects, axis=-1)
-        more = [
-            *([] if further is None else [further]),
-            *([] if self.stopped is None else [self.stopped.sd[..., None]]),
-        ]
-        stacked = np.concatenate([stacked, *more], axis=-1)
+        ends = None if self.stopped.sd is None else self.stopped.sd[..., None]
+        stacked = np.concatenate([stacked, *(one for one in (further, ends) if one is not None)], axis=-1)
         return ObservationSeries.of_observations(
             self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights, self.shared_noise
         )

@@ -255,7 +255,7 @@ class LeastSquaresProblem:
         residuals = self._residuals(x)
         if self.stopped is not None:
             return replace(residuals, values=residuals.values + self.stopped.shift, stopped=self.stopped)
-        return residuals.where(self._outlasted(residuals.values))
+        return residuals.where(residuals.present & ~(self.observations.stopped_ends & (residuals.values <= 0.0)))
 
     def _residuals(self, x: Floats) -> Residuals:
         """The same with ends of stopped tests as if these had broken then."""
@@ -264,16 +264,13 @@ class LeastSquaresProblem:
         residuals = self.evaluations.residuals(key, lambda: self._evaluated(x))
         return replace(residuals, values=self._about_rates(residuals.values))
 
-    def _outlasted(self, values: Floats) -> Bools:
-        """Which residuals (..., tests, observations) count: not those of stopped tests that are predicted to last."""
-        return self.observations.present & ~(self.observations.stopped_ends & (values <= 0.0))
-
     def candidate_residuals(self, u: Floats) -> Floats:
         """(candidates, tests, observations) - of u (candidates, parameters), nuisance parameters at their means."""
         prediction = self._counted(u, jacobian=False)
         values = candidate_residuals(self.observations, prediction, self.correction)
         values = self._about_rates(values)
-        return np.where(self._outlasted(values), values, 0.0) if self.stopped is None else values + self.stopped.shift
+        outlasted = np.where(self.observations.stopped_ends, np.maximum(values, 0.0), values)
+        return outlasted if self.stopped is None else values + self.stopped.shift
 
     def candidate_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
         """Residuals (candidates, tests, observations) of u (candidates, parameters), and their derivatives to u.

@@ -115,9 +115,7 @@ class WorkingNoiseEstimator:
             offsets, residuals.output_index, axis=1
         )
         relative_sd = self.observations.per_observation([self.relative_sd[name] for name in self.observations.outputs])
-        whitened = (remaining / relative_sd)[residuals.present] ** 2 * _weight_per_observation(residuals)[
-            residuals.present
-        ]
+        whitened = ((remaining / relative_sd) ** 2 * residuals.test_weights[:, None])[residuals.present]
         scaled = self._in_ratio_of_weights(previous, float(np.sqrt(np.mean(whitened))))
         return estimate_variance_components(residuals, scaled, nuisances, fixed=("misfit",))
 
@@ -278,10 +276,6 @@ def _relative_standard_deviations(weights: Mapping[str, float], observations: Ob
             np.sqrt(sum_of_squares / max(weights.get(name, 0.0), SMALLEST_WEIGHT * largest))
         )
     return standard_deviations
-
-
-def _weight_per_observation(residuals: Residuals) -> Floats:
-    return np.broadcast_to(residuals.test_weights[:, None], residuals.values.shape)
 
 
 def robust_test_weights(residuals: Residuals, working: NoiseModel) -> Floats:
