@@ -22,6 +22,26 @@ from creepkit.records import Nuisance
 
 
 @dataclass(frozen=True, eq=False)
+class StoppedTests:
+    """What stopped tests say, as Gaussian observations about one point (see inverse.stopped_tests).
+
+    shift, sd : (tests, observations) -, what is added to the residuals of their ends, and the standard deviation that
+    these have beyond the noise model. chi_square, log_variance : -2 ln of the probability to last, and ln of the
+    variance of the ends, over those of the Gaussian observations, summed over the tests.
+    """
+
+    shift: Floats
+    sd: Floats
+    chi_square: float
+    log_variance: float
+
+    @property
+    def log_likelihood(self) -> float:
+        """What is to be added to that of the Gaussian observations."""
+        return -0.5 * (self.chi_square + self.log_variance)
+
+
+@dataclass(frozen=True, eq=False)
 class Residuals:
     """Residuals of the observation vector (see inverse.observation_vector), with what their covariance depends on.
 
@@ -40,6 +60,7 @@ class Residuals:
     discrepancy_unit : (tests, observations) -, what a model discrepancy of one is in the transformed output: the stated
         or estimated noise of the frame; 1 % where the transform is logarithmic; 0 where there can be none.
     shared_noise : how the noise of the outputs of a frame is correlated; None where it is not.
+    stopped : what tests that were stopped before rupture say, which is in their values; None without.
     """
 
     values: Floats
@@ -55,6 +76,7 @@ class Residuals:
     common_effects: Floats | None = None
     discrepancy_unit: Floats | None = None
     shared_noise: SharedNoise | None = None
+    stopped: StoppedTests | None = None
 
     def with_test_weights(self, test_weights: Floats) -> Residuals:
         """The same with other weights of tests."""
@@ -105,7 +127,11 @@ class Residuals:
             self.log_rate_sensitivity,
         ]
         stacked = np.stack(effects, axis=-1)
-        stacked = stacked if further is None else np.concatenate([stacked, further], axis=-1)
+        more = [
+            *([] if further is None else [further]),
+            *([] if self.stopped is None else [self.stopped.sd[..., None]]),
+        ]
+        stacked = np.concatenate([stacked, *more], axis=-1)
         return ObservationSeries.of_observations(
             self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights, self.shared_noise
         )

@@ -14,7 +14,6 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random
 from creepkit.inverse.noise_model import (
     ASSUMED_RATE_SD,
     MINIMUM_TESTS,
-    NEGLIGIBLE_DRIFT,
     NoiseModel,
     OutputNoise,
     Residuals,
@@ -192,15 +191,6 @@ class WorkingNoiseEstimator:
             drift = float(np.hypot(components.drift, error))
             noise_model = noise_model.with_output(name, drift=drift, correlation_length=length)
         return noise_model
-
-    def unestimated_drift_components(self, noise_model: NoiseModel) -> set[tuple[str, str]]:
-        """Those (output, component) that were not estimated: drifts that are the predictor's error and no more."""
-        outputs = [
-            n
-            for n, error in self._transformed_predictor_errors().items()
-            if noise_model[n].drift <= float(np.hypot(error, NEGLIGIBLE_DRIFT))
-        ]
-        return {(name, source) for name in outputs for source in ("drift", "correlation_length")}
 
     def _transformed_predictor_errors(self) -> dict[str, float]:
         """{output: standard deviation} of what the predictor is wrong by, on the output's scale."""
