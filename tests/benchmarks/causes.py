@@ -5,9 +5,8 @@
 8 to 12 bars at three temperatures, rates scattering by 3, 8 or 15 %, strains in closed form, every second campaign
 with primary creep: rate = r (1 + 10 exp(-e / 0.002)), r = A s^n exp(-Q/R T). Planted is one fault: a temperature 8 to
 20 K or a load 10 or 15 % other than stated, a strain in another unit (10, 25.4, 100), two materials (a factor of 2 to
-5), or r of sinh(s / 60 MPa)^4 fitted by a power law. "Named": the likeliest explanation is the planted one, with its
-test, whether it contradicts the law (odds of 50) or is mentioned (odds of 6, or one test by p < 5 %); of no fault: the
-tests do not contradict the law.
+5), or r of sinh(s / 60 MPa)^4 fitted by a power law. "Named", in a verdict
+(odds of 50) or a caution: the likeliest explanation is the planted one, with its test.
 """
 
 from __future__ import annotations
