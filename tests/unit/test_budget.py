@@ -15,7 +15,7 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 300,
-    "app": 650,
+    "app": 600,
     "cameras": 850,
     "cli": 2200,
     "core": 100,

@@ -21,7 +21,13 @@ from creepkit.inverse.defect_correction import (
     with_cheaper_predictor,
     with_correction_at_frames,
 )
-from creepkit.inverse.errors_of_tests import LIFE, RATE, error_covariances, errors_of_tests
+from creepkit.inverse.errors_of_tests import (
+    LIFE,
+    RATE,
+    covariances_of_values_with_errors,
+    errors_of_tests,
+    with_expected_scatter,
+)
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
@@ -65,11 +71,9 @@ from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with
 from creepkit.inverse.uncertainty.laplace_approximation import (
     covariance_of_values,
     cut_interval_notes,
-    median_freedom,
+    freedom_of_intervals,
     parameter_estimates,
     positive_semidefinite,
-    restricted_covariance,
-    with_freedom,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
@@ -126,8 +130,6 @@ def identify(
             return fit
         if settings.weights == "automatic" and (described := describing(fit)) is not fit:
             return described
-        if settings.weights == "noise" and start is None:
-            fit = _with_rates_of_tests(fit)
     return _without_one_test(fit)
 
 
@@ -155,22 +157,6 @@ def describing(fit: Identification) -> Identification:
     values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
     notes = dict.fromkeys((*values.notes, *(note for note in fit.notes if "were not used" in note)))
     return replace(values, notes=tuple(notes), provenance={**fit.provenance, **values.provenance})
-
-
-def _with_rates_of_tests(fit: Identification) -> Identification:
-    """An identification by noise that misses the shape of curves, by likelihood where the tests explain that.
-
-    Least squares bend the curves of a law towards tests that creep at rates of their own; the likelihood knows these.
-    """
-    adequacy = fit.adequacy
-    if adequacy is None or not adequacy.explanations or adequacy.explanations[0].is_of_law or adequacy.is_explained:
-        return fit
-    start, settings = StartingEstimate.from_identification(fit, values_only=True), fit.settings
-    settings, predictor = replace(settings, weights="likelihood"), fit.least_squares_problem.predictor
-    again = identify(fit.law, fit.histories, predictor, settings=settings, start=start)
-    search = {key: value for key, value in fit.provenance.items() if key.startswith("search")}
-    explained = again.adequacy is not None and again.adequacy.lies_in_tests
-    return replace(again, provenance={**again.provenance, **search}) if explained else fit
 
 
 def _without_one_test(fit: Identification) -> Identification:
@@ -370,19 +356,17 @@ def _reported(
     noise_model = estimator.final(linear, best.noise)
     law, coordinates, count, residuals = problem.law, problem.coordinates, problem.parameter_count, linear.residuals
     u = x[:count]
-    unestimated = estimator.unestimated_drift_components(noise_model)
-    covariance, freedom = restricted_covariance(linear, noise_model, problem.settings.nuisances, unestimated)
     working_noise, errors, judged = None, best.errors, linear
     if not estimator.by_likelihood:
         errors, judged = errors_of_tests(problem, x, linear, noise_model), judged_at(problem, linear, noise_model)
         working_noise = with_single_value_weight(best.noise, problem.observations)
-        covariance = covariance_of_values(linear, noise_model, working_noise)
+    expected = with_expected_scatter(problem, linear, noise_model)
     unmodelled = perturbations(
-        problem, linear, noise_model, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
+        problem, linear, expected, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
     )
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     rates = RateExplanations(problem, x, judged, noise_model)
-    of_errors, of_common = error_covariances(linear, noise_model, errors, working_noise)
+    covariance, of_errors, of_common = covariances_of_values_with_errors(linear, expected, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
     prediction = problem.predictor.predict(
         law,
@@ -394,12 +378,14 @@ def _reported(
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
     error_covariance = of_errors[:count, :count]
-    law_covariance = with_freedom(positive_semidefinite(covariance[:count, :count]), freedom[:count]) + error_covariance
+    by_tests_alone = positive_semidefinite(covariance[:count, :count])
+    law_covariance = by_tests_alone + error_covariance
+    estimated = covariance_of_values(linear, noise_model, working_noise)[:count, :count]
     values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)
     single_values = values_of_tests.compared(histories, without_curves=used)
-    random_effects = predicted_random_effects(residuals, noise_model)
-    by_law = problem.about_rates(x, None).residuals(x).with_test_weights(residuals.test_weights)
+    random_effects = predicted_random_effects(residuals, expected)
+    by_law = replace(problem.about_rates(x, None), stopped=None).residuals(x).with_test_weights(residuals.test_weights)
     tests = test_fits(problem, by_law, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance + of_errors))[count:]
@@ -411,7 +397,7 @@ def _reported(
     judge = Judge(problem, noise_model, estimator.predictor_errors, histories)
     adequacy = judge.adequacy_with_remedies(judged, unmodelled, rates.found).with_unpredicted(unpredicted)
     adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
-    outlying = None if adequacy.rejects else rates.outlying
+    mentioned = None if adequacy.rejects else adequacy.mentioned or rates.outlying
     estimates = parameter_estimates(law, coordinates, u, law_covariance)
     return Identification(
         law=law,
@@ -423,7 +409,7 @@ def _reported(
         rms=pooled_log_strain_rms(tests),
         log_likelihood=best.log_likelihood,
         effective_frames=effective_sample_size(residuals, noise_model),
-        freedom=median_freedom(freedom[:count]),
+        freedom=freedom_of_intervals(by_tests_alone, estimated),
         tests=tests,
         ranges=fitted_ranges(problem),
         settings=problem.settings,
@@ -435,7 +421,7 @@ def _reported(
         error_covariance=error_covariance if problem.settings.included_errors else None,
         nuisances=nuisance_estimates,
         converged=best.converged,
-        adequacy=replace(adequacy, implausible=implausible, outlying=outlying),
+        adequacy=replace(adequacy, implausible=implausible, mentioned=mentioned),
         numerical_error=numerical_error,
         unmodelled=unmodelled,
         left_out=rates.left_out,

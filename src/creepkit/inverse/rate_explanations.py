@@ -28,7 +28,7 @@ from functools import cached_property
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.explanation import Explanation, Kind, LeftOut
+from creepkit.inverse.explanation import MENTIONED_ODDS, Explanation, Kind, LeftOut
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -45,10 +45,6 @@ FACTOR_SD = 1.5
 
 EXPONENT_CHANGE, ENERGY_CHANGE = 5.0, 200e3
 """Prior standard deviations of what the stress exponent and the activation energy, J/mol, change by over the tests."""
-
-
-DECISIVE_ODDS = float(np.log(6.0))
-"""ln of the odds against the law as it is, from which on an explanation is stated."""
 
 
 ENERGY_ODDS = float(np.log(0.3))
@@ -98,7 +94,7 @@ class RateExplanations:
         if self.redundant < FEWEST_CONTRASTS:
             return ()
         found = [*self._of_law(), *self._of_tests(), *self._of_groups()]
-        return tuple(sorted((e for e in found if e.odds > DECISIVE_ODDS), key=lambda e: -e.odds))
+        return tuple(sorted((e for e in found if e.odds > MENTIONED_ODDS), key=lambda e: -e.odds))
 
     @cached_property
     def outlying(self) -> Explanation | None:
@@ -214,9 +210,9 @@ class RateExplanations:
             ]
             evidence, test = max(tried, key=lambda one: one[0].log)
             odds = evidence.log - base - float(np.log(len(tried)))
-            if odds < DECISIVE_ODDS or abs(evidence.mean[-1]) < SMALLEST_FACTOR:
+            if odds < MENTIONED_ODDS or abs(evidence.mean[-1]) < SMALLEST_FACTOR:
                 break
-            near = [k for e, k in tried if k != test and e.log > evidence.log - DECISIVE_ODDS]
+            near = [k for e, k in tried if k != test and e.log > evidence.log - MENTIONED_ODDS]
             kept.append(test)
             base, total = evidence.log, total + odds
             best = evidence, tuple(self.problem.histories[k].name for k in near)

@@ -40,13 +40,11 @@ class OrthogonalDistance:
 
     values : (...,) -, the distance r, with its sign.
     strain_derivative, time_derivative : (...,) -, its derivatives to the error in strain and to that in ln time.
-    informative : (...,), false for the end of a test that was stopped before its predicted rupture.
     """
 
     values: Floats
     strain_derivative: Floats
     time_derivative: Floats
-    informative: Bools | bool = True
 
 
 def orthogonal_distance(strain_residual: Floats, time_residual: Floats, curve_slope: Floats) -> OrthogonalDistance:
@@ -132,8 +130,8 @@ def residuals_of_prediction(
         log_rate_sensitivity = by_strain * _time_derivative(observations, predicted[0]) + by_time
     else:
         log_rate_sensitivity = np.asarray(jacobian[..., list(coefficients)].sum(axis=-1))
-    informative = observations.present & np.broadcast_to(distance.informative, distance.values.shape)[0]
-    return _masked_residuals(observations, distance.values[0], offsets, jacobian, log_rate_sensitivity, informative)
+    mask = observations.present
+    return _masked_residuals(observations, distance.values[0], offsets, jacobian, log_rate_sensitivity, mask)
 
 
 def life_sensitivity(residuals: Residuals, observations: ObservationVector) -> Floats:
@@ -188,7 +186,7 @@ def median_log_rupture_excess(observations: ObservationVector, residuals: Floats
 
     residuals : (candidates, tests, observations) -.
     """
-    ruptured = observations.rupture_mask & ~observations.censored[:, None]
+    ruptured = observations.rupture_mask & ~observations.stopped_ends
     return np.median(residuals[:, ruptured], axis=1) if ruptured.any() else np.zeros(len(residuals))
 
 
@@ -203,8 +201,8 @@ def _predicted_values(observations: ObservationVector, prediction: Prediction, c
 def _distance(observations: ObservationVector, predicted: Floats, prediction: Prediction) -> OrthogonalDistance:
     """Of the observations from the curves of candidates, predicted : (candidates, tests, observations).
 
-    Of tests that are not followed to rupture it is the residual in the transformed output alone; of a rupture ln of
-    measured over predicted time, and a stopped test counts where it lasted longer than that.
+    Of tests that are not followed to rupture it is the residual in the transformed output alone; of an end ln of
+    measured over predicted time.
     """
     reached, times = np.isfinite(predicted), prediction.times_to_strain
     vertical = _extended_after_rupture(observations, predicted, prediction.end_times) - observations.transformed_values
@@ -227,13 +225,11 @@ def _distance(observations: ObservationVector, predicted: Floats, prediction: Pr
     ruptured = np.isfinite(times.rupture_times)
     log_end_times = np.log(np.where(ruptured, times.rupture_times, times.horizon))
     late = observations.log_times - log_end_times[..., None]
-    uninformative = ends & observations.censored[:, None] & (late <= 0.0)
-    at_end = np.where(ruptured[..., None] & ~uninformative, 1.0, 0.0)
+    at_end = np.where(ruptured[..., None], 1.0, 0.0)
     return OrthogonalDistance(
-        np.where(ends, np.where(uninformative, 0.0, late), np.where(frames, orthogonal.values, vertical)),
+        np.where(ends, late, np.where(frames, orthogonal.values, vertical)),
         np.where(ends, 0.0, np.where(frames, orthogonal.strain_derivative, 1.0)),
         np.where(ends, at_end, np.where(frames, orthogonal.time_derivative, 0.0)),
-        ~uninformative,
     )
 
 

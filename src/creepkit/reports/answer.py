@@ -218,8 +218,8 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         yield "minimum rates and rupture times of the tests contradict one another by this law"
     if adequacy.is_explained:
         yield adequacy.explanations[0].headline
-    if adequacy.outlying is not None:
-        yield adequacy.outlying.caution
+    if adequacy.mentioned is not None:
+        yield adequacy.mentioned.caution
     if adequacy.misses_shape() and adequacy.largest is not None:
         worst = adequacy.largest
         percent = is_logarithmic(worst.output)
