@@ -15,6 +15,7 @@ C0. Values that are not found by likelihood stay as they are, and their covarian
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,10 +28,14 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import life_sensitivity
 from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values, positive_semidefinite
 from creepkit.inverse.uncertainty.rate_scatter import redundant_rates
-from creepkit.inverse.variance_components import LinearisedProblem
+from creepkit.inverse.variance_components import LinearisedProblem, restricted_log_likelihood
 
 SCATTER_NODES = 60
 """Standard deviations over which the scatter by errors of single tests is averaged."""
+
+
+LIFE_SHARES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)
+"""Shares of the scatter of rupture times that are tried as a scatter of lives in curves."""
 
 
 RATE, LIFE = "rate of a test", "life of a test"
@@ -49,10 +54,9 @@ def errors_of_tests(
     if not problem.settings.included_errors:
         return ()
     rates = _usual_scatter(problem, x, linear, noise_model)
-    lives = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
     changes = {
         RATE: rates[:, None] * linear.residuals.log_rate_sensitivity,
-        LIFE: lives * life_sensitivity(linear.residuals, problem.observations),
+        LIFE: effect_of_lives(problem, linear, noise_model),
     }
     own = [
         Perturbation(kind, 1.0, "", residual_change=change, tests=len(rates), included=True)
@@ -65,6 +69,25 @@ def errors_of_tests(
 def with_errors(linear: LinearisedProblem, errors: Sequence[Perturbation]) -> LinearisedProblem:
     """The linear problem with the errors in its covariance that are included."""
     return linear.with_effects(one for one in errors if one.included)
+
+
+def effect_of_lives(problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel) -> Floats:
+    """(tests, observations) change of residuals by the scatter of lives, one standard deviation, beside that of rates.
+
+    What rupture times miss a law by is a scatter of lives as far as the curves show it: specimens may as well break
+    before the law's creep runs away, at whatever rate. Of LIFE_SHARES of it the one is taken that makes the readings
+    likeliest, at the optimum of the linear problem.
+    """
+    lives = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
+    effect = lives * life_sensitivity(linear.residuals, problem.observations)
+    if not effect.any():
+        return effect
+
+    def log_likelihood(share: float) -> float:
+        affected = replace(linear, residuals=linear.residuals.with_effects([share * effect]))
+        return restricted_log_likelihood(affected, noise_model)
+
+    return effect * max(LIFE_SHARES, key=log_likelihood)
 
 
 def _usual_scatter(
