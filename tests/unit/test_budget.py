@@ -15,7 +15,7 @@ from helpers.paths import ROOT
 
 BUDGET = {
     "api": 300,
-    "app": 650,
+    "app": 600,
     "cameras": 850,
     "cli": 2200,
     "core": 100,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29_600
+TESTS = 29_700
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

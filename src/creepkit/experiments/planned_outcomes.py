@@ -29,7 +29,7 @@ from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.residuals import candidate_residuals_and_jacobian, residuals_of_prediction
+from creepkit.inverse.residuals import candidate_residuals, residuals_of_prediction
 from creepkit.inverse.selection.challenges import AlteredLaw
 from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.records import History, Predictor, Status, dimension_named
@@ -391,7 +391,8 @@ class PlannedOutcomes:
             nuisances=nuisances.predictor_values(values_of_nuisances(nuisances, known)),
             sensitivities=True,
         )
-        values, internal = candidate_residuals_and_jacobian(observations, prediction)
+        values, internal = candidate_residuals(observations, prediction)
+        assert internal is not None
         of_u = np.einsum("cep,cpq->ecq", internal[:, 0], known.fit.coordinates.jacobian(u))
         derivatives = of_u.reshape(1, mask.size, -1)
         transformed = np.where(observations.present, values + observations.transformed_values, 0.0)

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from creepkit.inverse.explanation import Explanation
+from creepkit.inverse.explanation import VERDICT_ODDS, Explanation
 from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.inverse.single_values import ContradictingValues
@@ -113,7 +113,8 @@ class Adequacy:
         many frames it has, where these are too few to show the noise.
     unpredicted : tests of which nothing, or not every reading, is predicted: a law is never judged to explain them.
     contradicting : minimum rates and rupture times that contradict one another by the law, beyond their own scatter.
-    outlying : one test alone that the others did not lead to expect, where nothing rejects the law: a caution.
+    mentioned : a caution, where nothing rejects the law: an explanation of too small odds for a verdict, or one test
+    alone that the others did not lead to expect.
     """
 
     verdict: AdequacyVerdict
@@ -134,7 +135,7 @@ class Adequacy:
     smallest_p_value: float = float("nan")
     unpredicted: tuple[str, ...] = ()
     contradicting: ContradictingValues | None = None
-    outlying: Explanation | None = None
+    mentioned: Explanation | None = None
 
     @property
     def scatters_too_much(self) -> bool:
@@ -151,7 +152,9 @@ class Adequacy:
         return self if values is None else replace(self, verdict="leaves a discrepancy", contradicting=values)
 
     def with_explanations(self, explanations: tuple[Explanation, ...]) -> Adequacy:
-        """The same, rejected where something other than scatter explains the rates of tests."""
+        """The same, rejected where something other than scatter explains the rates of tests, likeliest first."""
+        if explanations and not self.rejects and explanations[0].odds < VERDICT_ODDS:
+            return replace(self, mentioned=explanations[0])
         return replace(self, verdict="leaves a discrepancy", explanations=explanations) if explanations else self
 
     def with_unpredicted(self, tests: tuple[str, ...]) -> Adequacy:
@@ -167,7 +170,8 @@ class Adequacy:
     @property
     def in_tests(self) -> Explanation | None:
         """What lies in the tests and is to be checked: the likeliest explanation, or the test that stands out."""
-        return self.explanations[0] if self.lies_in_tests else self.outlying
+        mentioned = None if self.mentioned is None or self.mentioned.is_of_law else self.mentioned
+        return self.explanations[0] if self.lies_in_tests else mentioned
 
     @property
     def is_explained(self) -> bool:

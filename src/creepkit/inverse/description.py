@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.inverse.adequacy import SHAPE_MISFIT
 from creepkit.records import is_logarithmic
 
 if TYPE_CHECKING:
@@ -93,7 +92,7 @@ def headline(fit: Identification) -> str:
     elif adequacy.contradicting is not None:
         truth = "but minimum rates and rupture times contradict one another by it"
     else:
-        shape = adequacy.discrepancy_in_noises > SHAPE_MISFIT
+        shape = adequacy.misses_shape()
         truth = "the shape of the curves contradicts it" if shape else "the tests contradict it beyond their noise"
     return f"{fit.law.name} {useful}; {truth}"
 

@@ -7,9 +7,11 @@ the usual size each,
     C = C0 + sum of s s',
 
 one s for each test of what its tests have independently, one s over all tests of what an instrument has in all of them,
-which no number of tests averages out. So tests count by how exactly they are known, and the covariance of the values,
-(J'C^-1 J + P)^-1, includes the errors; a further test never widens it. The noise model, and what a law is judged by, is
-C0. Values that are not found by likelihood stay as they are, and their covariance is that under C.
+which no number of tests averages out. C0 has the scatter of rates between tests with its expected square, given the
+tests: temperatures and loads that are off in each by itself are part of it, and counted once. So tests count by how
+exactly they are known, and the covariance of the values, (J'C^-1 J + P)^-1, includes the errors; a further test never
+widens it. The noise model, and what a law is judged by, has the scatter as estimated. Values that are not found by
+likelihood stay as they are, and their covariance is that under C.
 """
 
 from __future__ import annotations
@@ -20,19 +22,20 @@ from dataclasses import replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
+from creepkit.inverse.noise_covariance import effective_sample_size
+from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.perturbations import of_lengths_and_instruments, rate_slopes
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import life_sensitivity
-from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values, positive_semidefinite
-from creepkit.inverse.uncertainty.rate_scatter import redundant_rates
+from creepkit.inverse.uncertainty.laplace_approximation import (
+    covariance_of_values,
+    known_to_freedom,
+    positive_semidefinite,
+)
+from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.variance_components import LinearisedProblem, restricted_log_likelihood
-
-SCATTER_NODES = 60
-"""Standard deviations over which the scatter by errors of single tests is averaged."""
-
 
 LIFE_SHARES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)
 """Shares of the scatter of rupture times that are tried as a scatter of lives in curves."""
@@ -40,7 +43,7 @@ LIFE_SHARES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)
 
 RATE, LIFE = "rate of a test", "life of a test"
 """Kinds of what is included beside lengths and instruments, each test by itself: ln rate by temperatures and loads,
-beyond the scatter that was estimated; the scatter of lives, as estimated of rupture times, in curves that are followed
+where no nuisance lets rates scatter; the scatter of lives, as estimated of rupture times, in curves that are followed
 to rupture."""
 
 
@@ -51,24 +54,19 @@ def errors_of_tests(
 
     Those of lengths and instruments, then RATE and LIFE.
     """
-    if not problem.settings.included_errors:
+    included, tests = problem.settings.included_errors, len(problem.histories)
+    if not included:
         return ()
-    rates = _usual_scatter(problem, x, linear, noise_model)
-    changes = {
-        RATE: rates[:, None] * linear.residuals.log_rate_sensitivity,
-        LIFE: effect_of_lives(problem, linear, noise_model),
-    }
-    own = [
-        Perturbation(kind, 1.0, "", residual_change=change, tests=len(rates), included=True)
-        for kind, change in changes.items()
-        if change.any()
-    ]
+    kinds = {n.kind for n in problem.settings.nuisances}
+    changes = {LIFE: effect_of_lives(problem, linear, noise_model)}
+    if tests > 1 and "rate" not in kinds:
+        kelvin = 0.0 if "temperature" in kinds else included.get("temperature", 0.0)
+        sizes = np.array([kelvin, included.get("load", 0.0)])
+        rates = np.linalg.norm(rate_slopes(problem, x) * sizes, axis=1)
+        changes[RATE] = rates[:, None] * linear.residuals.log_rate_sensitivity
+    made = [Perturbation(kind, 1.0, "", residual_change=s, tests=tests, included=True) for kind, s in changes.items()]
+    own = [one for one in made if one.residual_change.any()]
     return (*of_lengths_and_instruments(problem, x, linear), *own)
-
-
-def with_errors(linear: LinearisedProblem, errors: Sequence[Perturbation]) -> LinearisedProblem:
-    """The linear problem with the errors in its covariance that are included."""
-    return linear.with_effects(one for one in errors if one.included)
 
 
 def effect_of_lives(problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel) -> Floats:
@@ -90,47 +88,35 @@ def effect_of_lives(problem: LeastSquaresProblem, linear: LinearisedProblem, noi
     return effect * max(LIFE_SHARES, key=log_likelihood)
 
 
-def _usual_scatter(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
-) -> Floats:
-    """(tests,) standard deviation of ln rate by temperatures and loads that are off in each test by itself.
+def with_expected_scatter(
+    problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel
+) -> NoiseModel:
+    """The noise model with the root of the expected square of the scatter of ln rate between tests.
 
-    x : (unknowns,) the optimum. The standard deviation that the usual errors make is that of a prior of the scatter,
-    half of a normal distribution: what is added is its mean square, given the estimate, beyond that; all of it where no
-    test is redundant: where no combination of rates of tests is left that the law does not move. Nothing is added where
-    the settings state the scatter, and in one test, whose error is the common one.
+    Few tests hardly show how they scatter, as by temperatures and loads that are off in each by itself; see
+    uncertainty.rate_scatter for the prior. As it is where no nuisance has it or that states it, and of one test, whose
+    error is the common one.
     """
-    included, settings, tests = problem.settings.included_errors, problem.settings, len(problem.histories)
-    if tests == 1 or ("", "rate") in components_fixed_by_priors(settings.nuisances, list(noise_model.outputs)):
-        return np.zeros(tests)
-    own = any(n.kind == "temperature" for n in settings.nuisances)
-    kelvin, load = 0.0 if own else included.get("temperature", 0.0), included.get("load", 0.0)
-    redundant = redundant_rates(linear, noise_model) if noise_model.rate > 0 else 0
-    usual = rate_slopes(problem, x) ** 2 @ np.array([kelvin, load]) ** 2
-    return np.sqrt([_mean_square(float(one), noise_model.rate, redundant) for one in usual])
+    scatter = replace(rate_scatter(problem, linear, noise_model), members={})
+    if len(problem.histories) == 1 or scatter.known is not None:
+        return noise_model
+    return replace(noise_model, rate=max(noise_model.rate, scatter.posterior.mean_square("test") ** 0.5))
 
 
-def _mean_square(usual: float, estimate: float, redundant: int) -> float:
-    """Mean square of ln rate by scatter of which `usual` is the prior variance, beyond the square of its estimate."""
-    if not usual > 0:
-        return 0.0
-    s = np.geomspace(1e-3, 5.0, SCATTER_NODES) * np.sqrt(usual)
-    log_weight = (1 - redundant) * np.log(s) - 0.5 * redundant * (estimate / s) ** 2 - 0.5 * s**2 / usual
-    weight = np.exp(log_weight - log_weight.max())
-    return max(float(weight @ s**2 / weight.sum()) - estimate**2, 0.0)
-
-
-def error_covariances(
+def covariances_of_values_with_errors(
     linear: LinearisedProblem, noise_model: NoiseModel, errors: Sequence[Perturbation], working_noise: NoiseModel | None
-) -> tuple[Floats, Floats]:
-    """(unknowns, unknowns) what errors of tests add to the covariance of x: all of them, and those common to all tests.
+) -> tuple[Floats, Floats, Floats]:
+    """(unknowns, unknowns) covariance of x by the tests alone, what errors add to it, and what common ones add.
 
-    working_noise : under which values were found that are not by likelihood.
+    noise_model : with the expected scatter of rates. working_noise : under which values were found that are not by
+    likelihood.
     """
-    of_instruments = [one for one in errors if one.common]
-    without, with_common, with_all = (
-        covariance_of_values(with_errors(linear, some), noise_model, working_noise)
-        for some in ((), of_instruments, errors)
-    )
-    of_all, of_common = (positive_semidefinite(c - without, np.sqrt(np.diag(c))) for c in (with_all, with_common))
-    return of_all, of_common
+
+    def under(some: Sequence[Perturbation], noise: NoiseModel = noise_model) -> Floats:
+        return covariance_of_values(linear.with_errors(some), noise, working_noise)
+
+    alone, with_common, with_all = (under(some) for some in ((), [e for e in errors if e.common], errors))
+    of_all, of_common = (positive_semidefinite(c - alone, np.sqrt(np.diag(c))) for c in (with_all, with_common))
+    of_readings = replace(noise_model, rate=0.0)
+    freedom = effective_sample_size(linear.residuals, of_readings) - linear.precision.size
+    return known_to_freedom(alone, under((), of_readings), freedom), of_all, of_common

@@ -34,6 +34,12 @@ MOST_NAMED = 6
 """Tests in a sentence."""
 
 
+MENTIONED_ODDS, VERDICT_ODDS = float(np.log(6.0)), float(np.log(50.0))
+"""ln of the odds against the law as it is, from which on an explanation is mentioned, and from which on it alone
+contradicts a law that the readings do not: 6 are reached by 0.5 to 1.5 % of right laws whose rates scatter by 5 to
+15 %, 50 by 0 to 0.5 % (400 draws each)."""
+
+
 @dataclass(frozen=True)
 class Explanation:
     """One explanation of what the rates of tests leave of a law.
@@ -106,7 +112,9 @@ class Explanation:
 
     @property
     def caution(self) -> str:
-        """Of one test that stands out, its size as a rate and as what would make it, without a full stop."""
+        """Where it is no verdict: of one test its size, as a rate and as what would make it; without a full stop."""
+        if self.kind != "one test":
+            return f"{self.headline}: {np.exp(self.odds):.2g} times likelier than scatter, too little for a verdict"
         found = f"{self.tests[0]} creeps {np.exp(self.size):.2g} times as fast as the others lead to expect"
         kelvin = self.errors.get("temperature", 0.0)
         error = f"; {abs(kelvin):.2g} K {'less' if kelvin < 0 else 'more'} than stated would do it"
@@ -123,7 +131,7 @@ class Explanation:
         if self.label:
             key, _, value = self.label.partition(" ")
             return f'identify each {key} apart (group_by = "{key}" in a study, or --only "{key}={value}")'
-        if self.kind == "one test" and not self.odds > 0.0:
+        if self.kind == "one test" and self.odds < VERDICT_ODDS:
             return f"check the {'temperature' if self.may_be_temperature else 'record'} of {self.tests[0]}"
         what = "the two groups apart" if self.kind == "two groups" else f"{self._named_tests} again"
         return f"check {what} (label, unit, thermocouple), then identify without"

@@ -91,7 +91,7 @@ def check_creep(observations: ObservationVector, histories: Sequence[History]) -
 
     A minimum rate, and a rupture, are creep.
     """
-    if (observations.single_value_mask & ~(observations.rupture_mask & observations.censored[:, None])).any():
+    if (observations.single_value_mask & ~observations.stopped_ends).any():
         return
     for position, (name, transform) in enumerate(zip(observations.outputs, observations.transforms, strict=True)):
         mask = observations.leading_output & (observations.output_index == position)

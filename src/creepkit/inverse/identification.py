@@ -88,8 +88,8 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
     log_likelihood : of the fitted frames as if they were independent (working noise), with explicit nuisances
         integrated out; of identifications by likelihood the restricted one, but for a constant of the law.
     effective_frames : number of independent frames (about one a test when tests differ from one another).
-    freedom : the median degrees of freedom of the parameters, those of profiles and samples; in `covariance` each
-        variance has its own, so that 1.96 standard deviations are a 95 % interval.
+    freedom : the median degrees of freedom of the parameters, those of profiles and samples; `covariance` is as large
+        as these ask for, so that 1.96 standard deviations are a 95 % interval.
     search_trace : how its global search went; linearised : the problem made linear at the optimum, of identifications
         by likelihood; problem : what was minimised, under the covariance that was found (none of them is saved).
     sparsity : how a penalty reduced the sum that this law was part of, if one did.
@@ -194,6 +194,7 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
         log_factors = np.log([m.rate_factor for m in self.tests])
         if self.settings.weights == "likelihood" and np.abs(log_factors).max() > NOTEWORTHY_FACTOR:
             problem = problem.about_rates(self.x, log_factors)
+        problem = problem.about_stopped_tests(self.x, self.noise_model)
         return problem.with_covariance(CovarianceFactor.of_residuals(self.residuals_of(problem), self.noise_model))
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,13 @@ from creepkit.inverse.defect_correction import (
     with_cheaper_predictor,
     with_correction_at_frames,
 )
-from creepkit.inverse.errors_of_tests import LIFE, RATE, error_covariances, errors_of_tests
+from creepkit.inverse.errors_of_tests import (
+    LIFE,
+    RATE,
+    covariances_of_values_with_errors,
+    errors_of_tests,
+    with_expected_scatter,
+)
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
@@ -65,11 +71,9 @@ from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with
 from creepkit.inverse.uncertainty.laplace_approximation import (
     covariance_of_values,
     cut_interval_notes,
-    median_freedom,
+    freedom_of_intervals,
     parameter_estimates,
     positive_semidefinite,
-    restricted_covariance,
-    with_freedom,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
@@ -124,10 +128,8 @@ def identify(
         fit = replace(fit, notes=(*left_out, *fit.notes, *widened_notes(law, fit.law), *notes))
         if start is not None and start.values_only:
             return fit
-        if settings.weights == "automatic" and misses_shape(fit):
-            fit = describing(fit)
-        elif settings.weights == "noise" and start is None:
-            fit = _with_rates_of_tests(fit)
+        if settings.weights == "automatic" and (described := describing(fit)) is not fit:
+            return described
     return _without_one_test(fit)
 
 
@@ -142,39 +144,19 @@ def sampled_where_needed(fit: Identification, through: Predictor | None = None) 
         return with_samples(fit, through_for_law(through, fit.law))
 
 
-def misses_shape(fit: Identification) -> bool:
-    """Whether an identification by likelihood misses the shape of curves, by more noises than SHAPE_MISFIT."""
-    return fit.adequacy is not None and fit.settings.weights == "likelihood" and fit.adequacy.misses_shape()
-
-
 def describing(fit: Identification) -> Identification:
     """An identification by likelihood, with values that describe the tests where these contradict the law.
 
     Where it misses the shape of curves its likelihood is that of the misfit: values are those of frames of equal
     weight.
     """
-    if not misses_shape(fit) or fit.predictor is None:
+    missed = fit.settings.weights == "likelihood" and fit.adequacy is not None and fit.adequacy.misses_shape()
+    if not missed or fit.predictor is None:
         return fit
     start, settings = StartingEstimate.from_identification(fit), replace(fit.settings, weights="noise")
     values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
     notes = dict.fromkeys((*values.notes, *(note for note in fit.notes if "were not used" in note)))
     return replace(values, notes=tuple(notes), provenance={**fit.provenance, **values.provenance})
-
-
-def _with_rates_of_tests(fit: Identification) -> Identification:
-    """An identification by noise that misses the shape of curves, by likelihood where the tests explain that.
-
-    Least squares bend the curves of a law towards tests that creep at rates of their own; the likelihood knows these.
-    """
-    adequacy = fit.adequacy
-    if adequacy is None or not adequacy.explanations or adequacy.explanations[0].is_of_law or adequacy.is_explained:
-        return fit
-    start, settings = StartingEstimate.from_identification(fit, values_only=True), fit.settings
-    settings, predictor = replace(settings, weights="likelihood"), fit.least_squares_problem.predictor
-    again = identify(fit.law, fit.histories, predictor, settings=settings, start=start)
-    search = {key: value for key, value in fit.provenance.items() if key.startswith("search")}
-    explained = again.adequacy is not None and again.adequacy.lies_in_tests
-    return replace(again, provenance={**again.provenance, **search}) if explained else fit
 
 
 def _without_one_test(fit: Identification) -> Identification:
@@ -225,27 +207,22 @@ def _estimated(
     """
     judged = histories if settings.weights == "automatic" else None
     settings = settings if judged is None else replace(settings, weights="likelihood")
-    count, start, noise = len(law.params), start or StartingEstimate(None), None
+    start, noise = start or StartingEstimate(None), None
     problem = LeastSquaresProblem.from_histories(law, histories, using, settings, start.reference)
     if start.u is None:
         outcome = initial_search(problem, through, search or MultiStart(), progress)
     else:
-        bounds = problem.bounds.of(range(count))
-        outcome = SearchOutcome([np.clip(start.u, bounds.lower, bounds.upper)], 0, None)
+        outcome = SearchOutcome([problem.bounds.of(range(len(law.params))).clip(start.u)], 0, None)
     known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in outcome.starts]
-    stages = [partial(_last_estimate, is_near=start.u is not None, through=through)]
-    if through is not None and start.u is None:
-        stages.insert(0, partial(_cheaper_estimate, through=through))
-    widenings = MOST_WIDENINGS
-    for stage in stages:
-        best, numerical_error = stage(problem, starts, noise, judged, progress)
+    how, widenings = EstimationOptions(start.u is not None, through, judged, progress), MOST_WIDENINGS
+    for stage in (_cheaper_estimate, _last_estimate)[int(through is None or start.u is not None) :]:
+        best, numerical_error = stage(problem, starts, noise, how)
         while widenings and (wider := _wider_law(best)) is not None:
             settings, reference, widenings = best.problem.settings, problem.coordinates.reference, widenings - 1
             wider_problem = LeastSquaresProblem.from_histories(wider, histories, using, settings, reference)
             problem = replace(wider_problem, evaluations=problem.evaluations)
-            again = stage if stage is not stages[-1] else partial(stage, is_near=True)
-            best, numerical_error = again(problem, [best.x], None, judged, progress)
+            best, numerical_error = stage(problem, [best.x], None, how._replace(is_near=True))
         problem, starts, noise = replace(problem, settings=best.problem.settings), [best.x], best.noise
     _check_bounds(best)
     return best, outcome, numerical_error
@@ -266,46 +243,44 @@ def _check_bounds(found: EstimationResult) -> None:
     check_bounds(found.problem.bound_penalties, found.x[:count], gradient[:count], found.problem.observations.count)
 
 
+class EstimationOptions(NamedTuple):
+    """How an estimate is made, beside its problem and where it begins.
+
+    is_near : whether it begins near its end. through : a cheaper predictor, which comes first. judged : the tests with
+    all frames, where an end that clearly misses the shape of curves goes on with those weights that describe them.
+    """
+
+    is_near: bool
+    through: Predictor | None
+    judged: Sequence[History] | None
+    progress: IterationCallback | None
+
+
 def _cheaper_estimate(
-    problem: LeastSquaresProblem,
-    starts: Sequence[Floats],
-    noise: NoiseModel | None,
-    judged: Sequence[History] | None,
-    progress: IterationCallback | None,
-    *,
-    through: Predictor,
+    problem: LeastSquaresProblem, starts: Sequence[Floats], noise: NoiseModel | None, how: EstimationOptions
 ) -> tuple[EstimationResult, NumericalError | None]:
-    """The best end of the starts (unknowns,) through a cheaper predictor; judged : as of _last_estimate()."""
-    best = _best_of(problem.with_predictor(through), starts, APPROXIMATE_LIMITS, progress, noise)
-    if judged is None or problem.settings.weights != "likelihood":
+    """The best end of the starts (unknowns,) through the cheaper predictor."""
+    assert how.through is not None
+    best = _best_of(problem.with_predictor(how.through), starts, APPROXIMATE_LIMITS, how.progress, noise)
+    if how.judged is None or problem.settings.weights != "likelihood":
         return best, None
-    corrected = with_cheaper_predictor(problem, best.x, through)
+    corrected = with_cheaper_predictor(problem, best.x, how.through)
     known = replace(best, problem=corrected, linear=corrected.linearised(best.x))
-    return _describing_estimate(known, judged, DESCRIBING_LIMITS, progress), None
+    return _describing_estimate(known, DESCRIBING_LIMITS, how), None
 
 
 def _last_estimate(
-    problem: LeastSquaresProblem,
-    starts: Sequence[Floats],
-    noise: NoiseModel | None,
-    judged: Sequence[History] | None,
-    progress: IterationCallback | None,
-    *,
-    is_near: bool,
-    through: Predictor | None,
+    problem: LeastSquaresProblem, starts: Sequence[Floats], noise: NoiseModel | None, how: EstimationOptions
 ) -> tuple[EstimationResult, NumericalError | None]:
     """The best end of the starts (unknowns,), and the error of the predictor, which is corrected.
 
     It is corrected where the last estimate begins: at an end of its own, or near one that is known.
-    judged : the tests with all frames, where an end that clearly misses the shape of curves goes on with those weights
-    that describe them.
     """
     limits = IterationLimits() if problem.predictor.reduced_order_model() is None else SIMULATION_LIMITS
-    limits = replace(limits, rounds=REFIT_ROUNDS) if is_near else limits
+    limits = replace(limits, rounds=REFIT_ROUNDS) if how.is_near else limits
     x, known = starts[0], None
-    if not (is_near or through is not None) or problem.predictor.refined() is None:
-        best = _best_of(problem, starts, limits, progress, noise)
-        best = _describing_estimate(best, judged, limits, progress)
+    if not (how.is_near or how.through is not None) or problem.predictor.refined() is None:
+        best = _describing_estimate(_best_of(problem, starts, limits, how.progress, noise), limits, how)
         problem, x, noise = best.problem, best.x, best.noise
         limits = replace(limits, rounds=REFIT_ROUNDS)
         if problem.predictor.refined() is None:
@@ -319,7 +294,7 @@ def _last_estimate(
         ):
             break
         numerical_error = error
-        best = estimate_iteratively(corrected, x, _working_estimator(corrected, error), limits, progress, noise)
+        best = estimate_iteratively(corrected, x, _working_estimator(corrected, error), limits, how.progress, noise)
         x, noise, known = best.x, best.noise, corrected.correction
         if error is None or known is None:
             break
@@ -329,25 +304,19 @@ def _last_estimate(
     return best, numerical_error
 
 
-def _describing_estimate(
-    found: EstimationResult,
-    histories: Sequence[History] | None,
-    limits: IterationLimits,
-    progress: IterationCallback | None,
-) -> EstimationResult:
+def _describing_estimate(found: EstimationResult, limits: IterationLimits, how: EstimationOptions) -> EstimationResult:
     """An estimate by likelihood, or where it clearly misses the shape of curves that of frames of equal weight."""
     problem, linear, noise = found.problem, found.linear, found.noise
-    if histories is None or problem.settings.weights != "likelihood" or _wider_law(found) is not None:
+    if how.judged is None or problem.settings.weights != "likelihood" or _wider_law(found) is not None:
         return found
     if not autocorrelated_components(noise):  # the curves are followed to a white noise
         return found
-    errors = {} if problem.correction is not None else problem.predictor.error
-    judge = Judge(problem, noise, errors, histories)
+    judge = Judge(problem, noise, {} if problem.correction is not None else problem.predictor.error, how.judged)
     if not judge.adequacy(judged_at(problem, linear, noise)).misses_shape(CLEARLY):
         return found
     _check_bounds(found)
     problem = replace(problem.about_rates(found.x, None), settings=replace(problem.settings, weights="noise"))
-    return estimate_iteratively(problem, found.x, _working_estimator(problem), limits, progress)
+    return estimate_iteratively(problem, found.x, _working_estimator(problem), limits, how.progress)
 
 
 def _best_of(
@@ -387,19 +356,17 @@ def _reported(
     noise_model = estimator.final(linear, best.noise)
     law, coordinates, count, residuals = problem.law, problem.coordinates, problem.parameter_count, linear.residuals
     u = x[:count]
-    unestimated = estimator.unestimated_drift_components(noise_model)
-    covariance, freedom = restricted_covariance(linear, noise_model, problem.settings.nuisances, unestimated)
     working_noise, errors, judged = None, best.errors, linear
     if not estimator.by_likelihood:
         errors, judged = errors_of_tests(problem, x, linear, noise_model), judged_at(problem, linear, noise_model)
         working_noise = with_single_value_weight(best.noise, problem.observations)
-        covariance = covariance_of_values(linear, noise_model, working_noise)
+    expected = with_expected_scatter(problem, linear, noise_model)
     unmodelled = perturbations(
-        problem, linear, noise_model, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
+        problem, linear, expected, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
     )
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
     rates = RateExplanations(problem, x, judged, noise_model)
-    of_errors, of_common = error_covariances(linear, noise_model, errors, working_noise)
+    covariance, of_errors, of_common = covariances_of_values_with_errors(linear, expected, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
     prediction = problem.predictor.predict(
         law,
@@ -411,12 +378,14 @@ def _reported(
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
     error_covariance = of_errors[:count, :count]
-    law_covariance = with_freedom(positive_semidefinite(covariance[:count, :count]), freedom[:count]) + error_covariance
+    by_tests_alone = positive_semidefinite(covariance[:count, :count])
+    law_covariance = by_tests_alone + error_covariance
+    estimated = covariance_of_values(linear, noise_model, working_noise)[:count, :count]
     values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)
     single_values = values_of_tests.compared(histories, without_curves=used)
-    random_effects = predicted_random_effects(residuals, noise_model)
-    by_law = problem.about_rates(x, None).residuals(x).with_test_weights(residuals.test_weights)
+    random_effects = predicted_random_effects(residuals, expected)
+    by_law = replace(problem.about_rates(x, None), stopped=None).residuals(x).with_test_weights(residuals.test_weights)
     tests = test_fits(problem, by_law, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance + of_errors))[count:]
@@ -428,7 +397,7 @@ def _reported(
     judge = Judge(problem, noise_model, estimator.predictor_errors, histories)
     adequacy = judge.adequacy_with_remedies(judged, unmodelled, rates.found).with_unpredicted(unpredicted)
     adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
-    outlying = None if adequacy.rejects else rates.outlying
+    mentioned = None if adequacy.rejects else adequacy.mentioned or rates.outlying
     estimates = parameter_estimates(law, coordinates, u, law_covariance)
     return Identification(
         law=law,
@@ -440,7 +409,7 @@ def _reported(
         rms=pooled_log_strain_rms(tests),
         log_likelihood=best.log_likelihood,
         effective_frames=effective_sample_size(residuals, noise_model),
-        freedom=median_freedom(freedom[:count]),
+        freedom=freedom_of_intervals(by_tests_alone, estimated),
         tests=tests,
         ranges=fitted_ranges(problem),
         settings=problem.settings,
@@ -452,7 +421,7 @@ def _reported(
         error_covariance=error_covariance if problem.settings.included_errors else None,
         nuisances=nuisance_estimates,
         converged=best.converged,
-        adequacy=replace(adequacy, implausible=implausible, outlying=outlying),
+        adequacy=replace(adequacy, implausible=implausible, mentioned=mentioned),
         numerical_error=numerical_error,
         unmodelled=unmodelled,
         left_out=rates.left_out,

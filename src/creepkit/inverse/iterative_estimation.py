@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.errors_of_tests import errors_of_tests, with_errors
+from creepkit.inverse.errors_of_tests import errors_of_tests, with_expected_scatter
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
@@ -107,6 +107,8 @@ def estimate_iteratively(
             residuals = residuals.with_test_weights(robust_test_weights(residuals, noise))
         if by_likelihood and best is not None:
             problem, residuals = about_own_rates(problem, x, residuals, noise)
+        problem = problem.about_stopped_tests(x, noise)
+        residuals = problem.residuals(x).with_test_weights(residuals.test_weights)
         linear = problem.linearised(x, residuals)
         noise = estimator.estimate(residuals, noise, linear)
         if by_likelihood and best is not None and _expected_gain(linear, noise) < CONVERGED_GAIN:
@@ -124,8 +126,10 @@ def estimate_iteratively(
         if progress is not None:
             progress("round", round_index + 1, limits.rounds)
         gain = np.inf if best is None else current.log_likelihood - best.log_likelihood
-        # a likelihood about other rates of tests is another approximation
-        moved = best is not None and best.problem.log_factors is not problem.log_factors
+        # a likelihood about other rates or ends of tests is another approximation
+        moved = best is not None and (
+            best.problem.log_factors is not problem.log_factors or best.problem.stopped is not problem.stopped
+        )
         best = current if best is None or gain > 0 or robust or moved else best
         if abs(gain) < CONVERGED_GAIN and np.abs(weights - previous_weights).max() < CONVERGED_GAIN:
             best = replace(best, converged=True)
@@ -143,10 +147,13 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
     problem, linear, noise = found.problem, found.linear, found.noise
     free = linear.free
     for _ in range(MOST_LAST_STEPS):
-        problem, residuals = about_own_rates(problem, linear.x, linear.residuals, noise)
+        expected = with_expected_scatter(problem, linear, noise)
+        problem, residuals = about_own_rates(problem, linear.x, linear.residuals, expected)
+        problem = problem.about_stopped_tests(linear.x, expected)
+        residuals = problem.residuals(linear.x).with_test_weights(residuals.test_weights)
         linear = replace(problem.linearised(linear.x, residuals), free=free)
         errors = errors_of_tests(problem, linear.x, linear, noise)
-        solution = linear.solve(CovarianceFactor.of_residuals(with_errors(linear, errors).residuals, noise))
+        solution = linear.solve(CovarianceFactor.of_residuals(linear.with_errors(errors).residuals, expected))
         found = replace(found, problem=problem, linear=linear, errors=errors)
         target = linear.x.copy()
         target[free] += solution.step
@@ -206,8 +213,7 @@ def _covariance_factor(
 ) -> CovarianceFactor:
     """The covariance under which the values of a round are found."""
     fitting_noise = noise if estimator.by_likelihood else with_single_value_weight(noise, problem.observations)
-    # A stopped test that says nothing here may say something a step further.
-    return CovarianceFactor.of_residuals(replace(residuals, present=problem.observations.present), fitting_noise)
+    return CovarianceFactor.of_residuals(residuals, fitting_noise)
 
 
 def _expected_gain(linear: LinearisedProblem, noise: NoiseModel) -> float:
@@ -222,7 +228,7 @@ def _log_likelihood(problem: LeastSquaresProblem, linear: LinearisedProblem, noi
     # The optimum under weights is none of the noise model: that it is flat in the law's parameters says nothing for it.
     by_likelihood = problem.settings.weights == "likelihood"
     integrated = np.arange(linear.x.size) >= (0 if by_likelihood else problem.parameter_count)
-    return restricted_log_likelihood(linear, noise, integrated)
+    return restricted_log_likelihood(linear, noise, integrated) + linear.residuals.stopped.log_likelihood
 
 
 def _with_priors_found(

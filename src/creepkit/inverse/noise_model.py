@@ -9,7 +9,7 @@ the misfit of one output noise and fit the others.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,26 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.observation_series import ObservationSeries, SharedNoise
 from creepkit.inverse.observation_vector import SINGLE_VALUES, ObservationVector
 from creepkit.records import Nuisance
+
+
+@dataclass(frozen=True, eq=False)
+class StoppedTests:
+    """What stopped tests say, as Gaussian observations about one point (see inverse.stopped_tests).
+
+    shift, sd : (tests, observations) -, what is added to the residuals of their ends, and the standard deviation that
+    these have beyond the noise model, None where no test was stopped. chi_square, log_variance : -2 ln of the
+    probability to last, and ln of the variance of the ends, over those of the Gaussian observations, summed over tests.
+    """
+
+    shift: Floats = field(default_factory=lambda: np.zeros(0))
+    sd: Floats | None = None
+    chi_square: float = 0.0
+    log_variance: float = 0.0
+
+    @property
+    def log_likelihood(self) -> float:
+        """What is to be added to that of the Gaussian observations."""
+        return -0.5 * (self.chi_square + self.log_variance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +60,7 @@ class Residuals:
     discrepancy_unit : (tests, observations) -, what a model discrepancy of one is in the transformed output: the stated
         or estimated noise of the frame; 1 % where the transform is logarithmic; 0 where there can be none.
     shared_noise : how the noise of the outputs of a frame is correlated; None where it is not.
+    stopped : what tests that were stopped before rupture say, which is in their values.
     """
 
     values: Floats
@@ -55,6 +76,7 @@ class Residuals:
     common_effects: Floats | None = None
     discrepancy_unit: Floats | None = None
     shared_noise: SharedNoise | None = None
+    stopped: StoppedTests = field(default_factory=StoppedTests)
 
     def with_test_weights(self, test_weights: Floats) -> Residuals:
         """The same with other weights of tests."""
@@ -105,7 +127,8 @@ class Residuals:
             self.log_rate_sensitivity,
         ]
         stacked = np.stack(effects, axis=-1)
-        stacked = stacked if further is None else np.concatenate([stacked, further], axis=-1)
+        ends = None if self.stopped.sd is None else self.stopped.sd[..., None]
+        stacked = np.concatenate([stacked, *(one for one in (further, ends) if one is not None)], axis=-1)
         return ObservationSeries.of_observations(
             self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights, self.shared_noise
         )

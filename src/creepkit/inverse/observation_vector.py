@@ -340,6 +340,11 @@ class ObservationVector:
         return self.present & self._mask_of(RUPTURE_OUTPUT)
 
     @property
+    def stopped_ends(self) -> Bools:
+        """(tests, observations) which are times without rupture."""
+        return self.rupture_mask & self.censored[:, None]
+
+    @property
     def single_value_mask(self) -> Bools:
         """(tests, observations) which are the only value of their output: rupture times and minimum rates."""
         return self.present & self._mask_of(*SINGLE_VALUES)

@@ -3,8 +3,8 @@
 A dimple may be thicker than its drawing, a camera may have moved, a furnace may drift; a thermocouple, a load cell or a
 micrometer may be off in every test. Where no nuisance parameter stands for it, it is a perturbation.
 What an error does to values that do not know of it is, to first order, du = -(J'C^-1 J + P)^-1 J'C^-1 s, with s its
-effect on the residuals and C the covariance as it would be found: with the scatter of rates or the misfit that the
-error makes. Those that the settings name are in the covariance instead (see inverse.errors_of_tests).
+effect on the residuals and C the covariance under which values are found, of a drift with the misfit that it makes.
+Those that the settings name are in the covariance instead (see inverse.errors_of_tests).
 
 A temperature or load that is off changes the creep rate of each test by its own factor. Of tests under an imposed
 strain or displacement the stress is E (strain - creep strain): a modulus or a strain that is off moves it from the
@@ -25,13 +25,13 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, components_fixed_by_priors
+from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
-from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem
+from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import temperature, time
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import (
@@ -88,9 +88,7 @@ def perturbations(
         if one.common:
             one = replace(one, residual_change=np.zeros((0, 0)))
         elif not one.included:
-            change, noise = one.residual_change, working_noise
-            if noise is None:
-                noise = _with_scatter_of(change, problem, linear, noise_model)
+            change, noise = one.residual_change, working_noise or noise_model
             if one.kind == DRIFT:
                 noise = _with_misfit_of(change, problem, noise)
                 one = replace(one, per_kelvin=slope, assumed=not problem.law.uses(temperature))
@@ -340,25 +338,6 @@ def _log_rate_gradient(problem: LeastSquaresProblem, x: Floats) -> Floats:
     """(parameters,) derivatives of ln of the rate at the reference point to u."""
     coordinates, count = problem.coordinates, problem.parameter_count
     return gradient(log_rate(coordinates, coordinates.reference.stress), x[:count], np.ones(count))
-
-
-def _with_scatter_of(
-    change: Floats, problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel
-) -> NoiseModel:
-    """The noise model with the scatter of rates that independent errors of tests would be estimated as.
-
-    change : (tests, observations) -, of the residuals by one standard deviation. Of each test its projection on a
-    change of ln of the rate counts.
-    """
-    fixed = components_fixed_by_priors(problem.settings.nuisances, list(noise_model.outputs))
-    if not noise_model.rate > 0 or ("", "rate") in fixed:
-        return noise_model
-    sensitivity = linear.residuals.log_rate_sensitivity
-    weighted = CovarianceFactor.of_residuals(linear.residuals, noise_model).inverse_times(sensitivity)
-    information = np.maximum((sensitivity * weighted).sum(axis=1), 1e-300)
-    like_rates = (change * weighted).sum(axis=1) / information
-    scatter = float(np.hypot(noise_model.rate, np.sqrt(np.mean(like_rates**2))))
-    return replace(noise_model, rate=min(scatter, LARGEST_RATE_SCATTER))
 
 
 def _with_misfit_of(change: Floats, problem: LeastSquaresProblem, noise_model: NoiseModel) -> NoiseModel:

@@ -27,7 +27,7 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import check_creep, check_explicit_nuisances, check_histories
 from creepkit.inverse.minimum_rates import check_minimum_rates, with_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import Residuals
+from creepkit.inverse.noise_model import NoiseModel, Residuals, StoppedTests
 from creepkit.inverse.nuisance_parameters import NuisanceParameters, check_nuisance_law
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
 from creepkit.inverse.prediction_failures import PredictionFailures
@@ -37,12 +37,7 @@ from creepkit.inverse.reference_conditions import (
     median_log_strain_rate,
     reference_condition,
 )
-from creepkit.inverse.residuals import (
-    candidate_residuals,
-    candidate_residuals_and_jacobian,
-    residuals_at_measured_values,
-    residuals_of_prediction,
-)
+from creepkit.inverse.residuals import candidate_residuals, residuals_at_measured_values, residuals_of_prediction
 from creepkit.inverse.search.local_refinement import (
     AdditionalResiduals,
     Minimum,
@@ -51,6 +46,7 @@ from creepkit.inverse.search.local_refinement import (
     robust_loss,
 )
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.stopped_tests import stopped_tests
 from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
@@ -118,6 +114,8 @@ class LeastSquaresProblem:
         own rates. With b such a factor, r(x, b) the residuals and d their derivative to it, r(x, b) - d b is linear in
         a rate that scatters where r(x, 0) is not (Lindstrom & Bates (1990), Biometrics 46, 673).
     rate_shift : (tests, observations) -, d b of them, or None.
+    stopped : what tests that were stopped before rupture say; None before any noise is known, as in a search: they
+        then count where they lasted longer than is predicted.
     evaluations : the last residuals, shared by the problems that differ in covariance or priors alone.
     """
 
@@ -134,6 +132,7 @@ class LeastSquaresProblem:
     correction: Floats | None = None
     log_factors: Floats | None = None
     rate_shift: Floats | None = None
+    stopped: StoppedTests | None = None
     evaluations: EvaluationCache = field(default_factory=EvaluationCache, repr=False)
 
     @classmethod
@@ -201,6 +200,13 @@ class LeastSquaresProblem:
         there = replace(self, log_factors=log_factors, rate_shift=None)
         return replace(there, rate_shift=log_factors[:, None] * there.residuals(x).log_rate_sensitivity)
 
+    def about_stopped_tests(self, x: Floats, noise_model: NoiseModel) -> LeastSquaresProblem:
+        """The same with what tests say that were stopped, about x (unknowns,), under a noise model."""
+        stopped = self.observations.stopped_ends
+        if not stopped.any():
+            return self
+        return replace(self, stopped=stopped_tests(self._residuals(x), noise_model, stopped))
+
     def with_covariance(self, covariance_factor: CovarianceFactor) -> LeastSquaresProblem:
         """The same under another covariance."""
         return replace(self, covariance_factor=covariance_factor)
@@ -241,16 +247,24 @@ class LeastSquaresProblem:
 
     def residuals(self, x: Floats) -> Residuals:
         """Residuals of one x (unknowns,), with exact derivatives to x; the last few are cached."""
+        residuals = self._residuals(x)
+        if self.stopped is not None:
+            return replace(residuals, values=residuals.values + self.stopped.shift, stopped=self.stopped)
+        return residuals.where(residuals.present & ~(self.observations.stopped_ends & (residuals.values <= 0.0)))
+
+    def _residuals(self, x: Floats) -> Residuals:
+        """The same with ends of stopped tests as if these had broken then."""
         held = [self.nuisance_parameters.mean if self.nuisance_parameters.fixed else None, self.log_factors]
         key = x.tobytes() + b"".join(b"" if values is None else values.tobytes() for values in held)
         residuals = self.evaluations.residuals(key, lambda: self._evaluated(x))
-        return replace(residuals, values=self._about_rates(residuals.values, residuals.present))
+        return replace(residuals, values=self._about_rates(residuals.values))
 
     def candidate_residuals(self, u: Floats) -> Floats:
         """(candidates, tests, observations) - of u (candidates, parameters), nuisance parameters at their means."""
         prediction = self._counted(u, jacobian=False)
-        values = candidate_residuals(self.observations, prediction, self.correction)
-        return self._about_rates(values, self.observations.present)
+        values = self._about_rates(candidate_residuals(self.observations, prediction, self.correction)[0])
+        outlasted = np.where(self.observations.stopped_ends, np.maximum(values, 0.0), values)
+        return outlasted if self.stopped is None else values + self.stopped.shift
 
     def candidate_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
         """Residuals (candidates, tests, observations) of u (candidates, parameters), and their derivatives to u.
@@ -263,10 +277,11 @@ class LeastSquaresProblem:
             jacobians = [r.jacobian for r in evaluated if r.jacobian is not None]
             return np.stack([r.values for r in evaluated]), np.stack(jacobians)
         prediction = self._counted(u, jacobian=True)
-        values, internal_jacobian = candidate_residuals_and_jacobian(self.observations, prediction, self.correction)
+        values, internal_jacobian = candidate_residuals(self.observations, prediction, self.correction)
+        assert internal_jacobian is not None
         jacobian = np.einsum("ctep,cpq->cteq", internal_jacobian, self.coordinates.jacobian(u))
         present = self.observations.present
-        return self._about_rates(values, present), np.where(present[..., None], jacobian, 0.0)
+        return self._about_rates(values), np.where(present[..., None], jacobian, 0.0)
 
     def linearised(self, x: Floats, residuals: Residuals | None = None) -> LinearisedProblem:
         """The problem made linear at x (unknowns,), (u, e): weak priors of the bounds on u, their own on e.
@@ -284,8 +299,9 @@ class LeastSquaresProblem:
         """FitError, with counts over all that were tried, where nothing is predicted at u (candidates, parameters)."""
         self.evaluations.failures.check(self._prediction(u, jacobian=False), self.histories, self.law.name)
 
-    def _about_rates(self, values: Floats, present: Bools) -> Floats:
+    def _about_rates(self, values: Floats) -> Floats:
         """Residuals (..., tests, observations), less what the rates do about which they are taken."""
+        present = self.observations.present
         return values if self.rate_shift is None else values - np.where(present, self.rate_shift, 0.0)
 
     def _counted(self, u: Floats, *, jacobian: bool) -> Prediction:

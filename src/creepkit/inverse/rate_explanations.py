@@ -22,13 +22,13 @@ One test alone that the others do not lead to expect, by Student's t, is a cauti
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.explanation import Explanation, Kind, LeftOut
+from creepkit.inverse.explanation import MENTIONED_ODDS, Explanation, Kind, LeftOut
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -45,10 +45,6 @@ FACTOR_SD = 1.5
 
 EXPONENT_CHANGE, ENERGY_CHANGE = 5.0, 200e3
 """Prior standard deviations of what the stress exponent and the activation energy, J/mol, change by over the tests."""
-
-
-DECISIVE_ODDS = float(np.log(6.0))
-"""ln of the odds against the law as it is, from which on an explanation is stated."""
 
 
 ENERGY_ODDS = float(np.log(0.3))
@@ -79,29 +75,6 @@ MOST_TESTS = 3
 """That may be named one after the other."""
 
 
-@dataclass(frozen=True, eq=False)
-class RateConditions:
-    """Stress and temperature of each test.
-
-    stresses : (tests,) MPa. temperatures : (tests,) K.
-    """
-
-    stresses: Floats
-    temperatures: Floats
-
-    @cached_property
-    def log_stress(self) -> Floats:
-        """(tests,) less its mean."""
-        x = np.log(self.stresses)
-        return np.asarray(x - x.mean())
-
-    @cached_property
-    def activation(self) -> Floats:
-        """(tests,) mol/J, less its mean."""
-        z = -1.0 / (GAS_CONSTANT * self.temperatures)
-        return np.asarray(z - z.mean())
-
-
 class RateExplanations:
     """The search for explanations of a problem at its optimum x (unknowns,), where it is made linear."""
 
@@ -109,7 +82,9 @@ class RateExplanations:
         self.problem, self.x = problem, x
         alike = replace(linear, residuals=linear.residuals.with_test_weights(np.ones(len(problem.histories))))
         self.scatter = replace(rate_scatter(problem, alike, noise), members={})
-        self.conditions = RateConditions(*problem.conditions)
+        self.stresses, self.temperatures = problem.conditions
+        log_stress, activation = np.log(self.stresses), -1.0 / (GAS_CONSTANT * self.temperatures)  # -, mol/J
+        self.log_stress, self.activation = log_stress - log_stress.mean(), activation - activation.mean()
         self.possible = len(problem.histories) >= FEWEST_TESTS and bool(linear.residuals.log_rate_sensitivity.any())
         self.redundant = redundant_rates(linear, noise) if self.possible else 0
 
@@ -119,7 +94,7 @@ class RateExplanations:
         if self.redundant < FEWEST_CONTRASTS:
             return ()
         found = [*self._of_law(), *self._of_tests(), *self._of_groups()]
-        return tuple(sorted((e for e in found if e.odds > DECISIVE_ODDS), key=lambda e: -e.odds))
+        return tuple(sorted((e for e in found if e.odds > MENTIONED_ODDS), key=lambda e: -e.odds))
 
     @cached_property
     def outlying(self) -> Explanation | None:
@@ -167,7 +142,7 @@ class RateExplanations:
 
     def _of_law(self) -> Iterable[Explanation]:
         """A stress exponent that changes with stress, an activation energy that changes with temperature."""
-        s, z = self.conditions.log_stress, self.conditions.activation
+        s, z = self.log_stress, self.activation
         if np.unique(s.round(2)).size >= 3:
             yield from self._change("stress exponent", s, EXPONENT_CHANGE)
         if self.problem.law.uses(temperature) and np.unique((z / max(np.ptp(z), 1e-300)).round(2)).size >= 3:
@@ -194,10 +169,10 @@ class RateExplanations:
         u, coordinates, middle = self._moved(evidence), self.problem.coordinates, self.problem.coordinates.reference
         first, last = int(over.argmin()), int(over.argmax())
         if kind == "stress exponent":
-            at = float(self.conditions.stresses[first]), float(self.conditions.stresses[last])
+            at = float(self.stresses[first]), float(self.stresses[last])
             own = [float(local_exponent(coordinates, stress)(u)) for stress in at]
         else:
-            at = float(self.conditions.temperatures[first]), float(self.conditions.temperatures[last])
+            at = float(self.temperatures[first]), float(self.temperatures[last])
             own = [self._energy(u, middle.stress, T) for T in at]
         low, high = (value + float(evidence.mean[0] * slope[k]) for value, k in zip(own, (first, last), strict=True))
         if abs(high - low) < SMALLEST_CHANGE[kind] or abs(evidence.mean[0]) * span < SMALLEST_CHANGE[kind]:
@@ -215,7 +190,7 @@ class RateExplanations:
 
         Returns columns (tests,) and standard deviations, one for each temperature.
         """
-        temperatures, stress = self.conditions.temperatures.round(), self.problem.coordinates.reference.stress
+        temperatures, stress = self.temperatures.round(), self.problem.coordinates.reference.stress
         u, levels = self.x[: self.problem.parameter_count], np.unique(temperatures)
         slopes = log_rate_per_kelvin(self.problem, u, stress, levels)
         columns = [np.asarray(temperatures == T, float) for T in levels]
@@ -235,9 +210,9 @@ class RateExplanations:
             ]
             evidence, test = max(tried, key=lambda one: one[0].log)
             odds = evidence.log - base - float(np.log(len(tried)))
-            if odds < DECISIVE_ODDS or abs(evidence.mean[-1]) < SMALLEST_FACTOR:
+            if odds < MENTIONED_ODDS or abs(evidence.mean[-1]) < SMALLEST_FACTOR:
                 break
-            near = [k for e, k in tried if k != test and e.log > evidence.log - DECISIVE_ODDS]
+            near = [k for e, k in tried if k != test and e.log > evidence.log - MENTIONED_ODDS]
             kept.append(test)
             base, total = evidence.log, total + odds
             best = evidence, tuple(self.problem.histories[k].name for k in near)
@@ -252,11 +227,11 @@ class RateExplanations:
         size, T = float(evidence.mean[-1]), history.mean_temperature
         errors = {
             name: float(np.exp(np.clip(size / exponent, -50.0, 50.0)))
-            for name, exponent in self._rate_exponents(u, float(self.conditions.stresses[test]), T).items()
+            for name, exponent in self._rate_exponents(u, float(self.stresses[test]), T).items()
         }
         energy = USUAL_ACTIVATION_ENERGY
         if self.problem.law.uses(temperature):
-            energy = self._energy(u, float(self.conditions.stresses[test]), T)
+            energy = self._energy(u, float(self.stresses[test]), T)
         inverse = 1.0 / T - GAS_CONSTANT * size / energy if energy > 0 else 0.0
         if inverse > 0:
             errors["temperature"] = 1.0 / inverse - T
@@ -324,7 +299,7 @@ class RateExplanations:
 
     def _of_split(self, group: Bools) -> Evidence:
         """The likelier of a factor between two groups alone, and of one with exponents and energies of their own."""
-        s, z, inside = self.conditions.log_stress, self.conditions.activation, group.astype(float)
+        s, z, inside = self.log_stress, self.activation, group.astype(float)
         simple = self._evidence([inside], [FACTOR_SD])
         columns, deviations = [inside], [FACTOR_SD]
         if np.ptp(s[group]) > 0.05 and np.ptp(s[~group]) > 0.05:

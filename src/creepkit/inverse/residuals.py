@@ -40,13 +40,11 @@ class OrthogonalDistance:
 
     values : (...,) -, the distance r, with its sign.
     strain_derivative, time_derivative : (...,) -, its derivatives to the error in strain and to that in ln time.
-    informative : (...,), false for the end of a test that was stopped before its predicted rupture.
     """
 
     values: Floats
     strain_derivative: Floats
     time_derivative: Floats
-    informative: Bools | bool = True
 
 
 def orthogonal_distance(strain_residual: Floats, time_residual: Floats, curve_slope: Floats) -> OrthogonalDistance:
@@ -84,27 +82,18 @@ def residuals_at_measured_values(observations: ObservationVector) -> Residuals:
 
 def candidate_residuals(
     observations: ObservationVector, prediction: Prediction, correction: Floats | None = None
-) -> Floats:
-    """(candidates, tests, observations) - residuals of all candidates; zero where there are no data.
+) -> tuple[Floats, Floats | None]:
+    """Residuals of all candidates, zero where there are no data; with derivatives to internal parameters.
 
-    correction : (tests, observations) in the output's unit, what is added to predictions.
+    correction : (tests, observations) in the output's unit, what is added to predictions. Returns residuals
+    (candidates, tests, observations), and derivatives (candidates, tests, observations, parameters) for tests that are
+    not followed to rupture, None of a prediction without them.
     """
-    distance = _distance(observations, _predicted_values(observations, prediction, correction), prediction)
-    return np.where(observations.present, distance.values, 0.0)
-
-
-def candidate_residuals_and_jacobian(
-    observations: ObservationVector, prediction: Prediction, correction: Floats | None = None
-) -> tuple[Floats, Floats]:
-    """Residuals of all candidates, with derivatives to internal parameters, for tests that are not followed to rupture.
-
-    correction : (tests, observations) in the output's unit. Returns residuals (candidates, tests, observations) and
-    derivatives (candidates, tests, observations, parameters).
-    """
-    assert prediction.jacobian is not None
     predicted = _predicted_values(observations, prediction, correction)
-    jacobian = observations.select_outputs(prediction.jacobian, prediction)
     values = np.where(observations.present, _distance(observations, predicted, prediction).values, 0.0)
+    if prediction.jacobian is None:
+        return values, None
+    jacobian = observations.select_outputs(prediction.jacobian, prediction)
     return values, _transformed_jacobian(observations, predicted, jacobian)
 
 
@@ -141,8 +130,8 @@ def residuals_of_prediction(
         log_rate_sensitivity = by_strain * _time_derivative(observations, predicted[0]) + by_time
     else:
         log_rate_sensitivity = np.asarray(jacobian[..., list(coefficients)].sum(axis=-1))
-    informative = observations.present & np.broadcast_to(distance.informative, distance.values.shape)[0]
-    return _masked_residuals(observations, distance.values[0], offsets, jacobian, log_rate_sensitivity, informative)
+    mask = observations.present
+    return _masked_residuals(observations, distance.values[0], offsets, jacobian, log_rate_sensitivity, mask)
 
 
 def life_sensitivity(residuals: Residuals, observations: ObservationVector) -> Floats:
@@ -197,7 +186,7 @@ def median_log_rupture_excess(observations: ObservationVector, residuals: Floats
 
     residuals : (candidates, tests, observations) -.
     """
-    ruptured = observations.rupture_mask & ~observations.censored[:, None]
+    ruptured = observations.rupture_mask & ~observations.stopped_ends
     return np.median(residuals[:, ruptured], axis=1) if ruptured.any() else np.zeros(len(residuals))
 
 
@@ -212,8 +201,8 @@ def _predicted_values(observations: ObservationVector, prediction: Prediction, c
 def _distance(observations: ObservationVector, predicted: Floats, prediction: Prediction) -> OrthogonalDistance:
     """Of the observations from the curves of candidates, predicted : (candidates, tests, observations).
 
-    Of tests that are not followed to rupture it is the residual in the transformed output alone; of a rupture ln of
-    measured over predicted time, and a stopped test counts where it lasted longer than that.
+    Of tests that are not followed to rupture it is the residual in the transformed output alone; of an end ln of
+    measured over predicted time.
     """
     reached, times = np.isfinite(predicted), prediction.times_to_strain
     vertical = _extended_after_rupture(observations, predicted, prediction.end_times) - observations.transformed_values
@@ -236,13 +225,11 @@ def _distance(observations: ObservationVector, predicted: Floats, prediction: Pr
     ruptured = np.isfinite(times.rupture_times)
     log_end_times = np.log(np.where(ruptured, times.rupture_times, times.horizon))
     late = observations.log_times - log_end_times[..., None]
-    uninformative = ends & observations.censored[:, None] & (late <= 0.0)
-    at_end = np.where(ruptured[..., None] & ~uninformative, 1.0, 0.0)
+    at_end = np.where(ruptured[..., None], 1.0, 0.0)
     return OrthogonalDistance(
-        np.where(ends, np.where(uninformative, 0.0, late), np.where(frames, orthogonal.values, vertical)),
+        np.where(ends, late, np.where(frames, orthogonal.values, vertical)),
         np.where(ends, 0.0, np.where(frames, orthogonal.strain_derivative, 1.0)),
         np.where(ends, at_end, np.where(frames, orthogonal.time_derivative, 0.0)),
-        ~uninformative,
     )
 
 

@@ -47,6 +47,10 @@ class LinearisedProblem:
             (common if effect.common else own).append(effect.residual_change)
         return replace(self, residuals=self.residuals.with_effects(own, common))
 
+    def with_errors(self, errors: Iterable[Perturbation]) -> LinearisedProblem:
+        """The same with those errors of tests in its covariance that intervals include."""
+        return self.with_effects(one for one in errors if one.included)
+
     def solve(self, factor: CovarianceFactor) -> LinearSolution:
         """The optimum under a covariance."""
         J, p = self.jacobian, self.precision[self.free]

@@ -14,7 +14,6 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random
 from creepkit.inverse.noise_model import (
     ASSUMED_RATE_SD,
     MINIMUM_TESTS,
-    NEGLIGIBLE_DRIFT,
     NoiseModel,
     OutputNoise,
     Residuals,
@@ -116,9 +115,7 @@ class WorkingNoiseEstimator:
             offsets, residuals.output_index, axis=1
         )
         relative_sd = self.observations.per_observation([self.relative_sd[name] for name in self.observations.outputs])
-        whitened = (remaining / relative_sd)[residuals.present] ** 2 * _weight_per_observation(residuals)[
-            residuals.present
-        ]
+        whitened = ((remaining / relative_sd) ** 2 * residuals.test_weights[:, None])[residuals.present]
         scaled = self._in_ratio_of_weights(previous, float(np.sqrt(np.mean(whitened))))
         return estimate_variance_components(residuals, scaled, nuisances, fixed=("misfit",))
 
@@ -192,15 +189,6 @@ class WorkingNoiseEstimator:
             drift = float(np.hypot(components.drift, error))
             noise_model = noise_model.with_output(name, drift=drift, correlation_length=length)
         return noise_model
-
-    def unestimated_drift_components(self, noise_model: NoiseModel) -> set[tuple[str, str]]:
-        """Those (output, component) that were not estimated: drifts that are the predictor's error and no more."""
-        outputs = [
-            n
-            for n, error in self._transformed_predictor_errors().items()
-            if noise_model[n].drift <= float(np.hypot(error, NEGLIGIBLE_DRIFT))
-        ]
-        return {(name, source) for name in outputs for source in ("drift", "correlation_length")}
 
     def _transformed_predictor_errors(self) -> dict[str, float]:
         """{output: standard deviation} of what the predictor is wrong by, on the output's scale."""
@@ -288,10 +276,6 @@ def _relative_standard_deviations(weights: Mapping[str, float], observations: Ob
             np.sqrt(sum_of_squares / max(weights.get(name, 0.0), SMALLEST_WEIGHT * largest))
         )
     return standard_deviations
-
-
-def _weight_per_observation(residuals: Residuals) -> Floats:
-    return np.broadcast_to(residuals.test_weights[:, None], residuals.values.shape)
 
 
 def robust_test_weights(residuals: Residuals, working: NoiseModel) -> Floats:

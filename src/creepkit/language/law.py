@@ -34,6 +34,8 @@ class CreepLaw(LawRecord):
         name, terms = f"{factor:g}*{self.name}", {label: factor * term for label, term in self.terms.items()}
         return replace(self, name=name, title=self.title and f"{factor:g}*{self.title}", terms=terms, examples=())
 
+    __mul__ = __rmul__
+
     def without(self, *terms: str) -> CreepLaw:
         """The law less the named terms and the parameters that only they used."""
         return algebra.without(self, terms)

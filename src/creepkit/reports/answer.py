@@ -14,7 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 from creepkit.exporters.documents import expression_mathml, law_equations
-from creepkit.inverse.adequacy import SHAPE_MISFIT, UNDETECTED_SCATTER
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.inverse.perturbation import beyond_intervals, combined_change_text
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
@@ -218,9 +218,9 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         yield "minimum rates and rupture times of the tests contradict one another by this law"
     if adequacy.is_explained:
         yield adequacy.explanations[0].headline
-    if adequacy.outlying is not None:
-        yield adequacy.outlying.caution
-    if adequacy.rejects and adequacy.discrepancy_in_noises > SHAPE_MISFIT and adequacy.largest is not None:
+    if adequacy.mentioned is not None:
+        yield adequacy.mentioned.caution
+    if adequacy.misses_shape() and adequacy.largest is not None:
         worst = adequacy.largest
         percent = is_logarithmic(worst.output)
         unit = "%" if percent else output_unit(worst.output)

@@ -25,10 +25,11 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 from scipy.sparse import csr_array
-from scipy.special import log_ndtr, logsumexp, stdtrit
+from scipy.special import logsumexp, stdtrit
 
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import FitError
+from creepkit.inverse.stopped_tests import HALF_LOG_TAU, log_survival
 from creepkit.inverse.uncertainty.quantities import gradient
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.rupture_assessment.methods import MINIMUM_RATE, MONKMAN_GRANT, Basis, Centre, Conditions, RuptureMethod
@@ -53,8 +54,6 @@ LARGEST_STEP = 4.0
 
 LEAST_SCATTER = 1e-9
 """Standard deviation of an effect that is none, log10 of time."""
-
-HALF_LOG_TAU = 0.5 * float(np.log(2.0 * np.pi))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +94,7 @@ class GroupedTimes:
     def _terms(self, mean: Floats, scale: Floats) -> tuple[Floats, Floats, Floats]:
         """Log-density, or log-probability to last, and its first two derivatives by the mean; (..., tests) each."""
         z = (self.log_time - mean) / scale
-        lasting = log_ndtr(-z)
-        exponent = np.minimum(-0.5 * z**2 - HALF_LOG_TAU - lasting, 700.0)
-        hazard = np.minimum(np.exp(exponent), np.maximum(z, 0.0) + 1.0)  # of which it never has more: rounding
+        lasting, hazard = log_survival(z)
         value = np.where(self.censored, lasting, -0.5 * z**2 - HALF_LOG_TAU - np.log(scale))
         first = np.where(self.censored, hazard, z) / scale
         second = -np.where(self.censored, hazard * (hazard - z), 1.0) / scale**2

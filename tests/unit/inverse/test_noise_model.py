@@ -301,5 +301,3 @@ def test_the_error_of_the_predictor_is_a_drift_that_is_not_estimated():
     assert found["width"].drift == pytest.approx(np.hypot(plain["width"].drift, 0.06 / SCALE))
     assert found["width"].correlation_length == 1.0
     assert found["amplitude"] == plain["amplitude"]
-    estimator = WorkingNoiseEstimator(LIKELIHOOD, observations(), {"width": 0.06})
-    assert estimator.unestimated_drift_components(found) == {("width", "drift"), ("width", "correlation_length")}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.inverse.errors_of_tests import with_expected_scatter
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
@@ -14,7 +15,6 @@ from creepkit.inverse.perturbations import (
     OFFSET_IN_NOISES,
     USUAL_DRIFT,
     _log_rate_gradient,
-    _with_scatter_of,
     perturbations,
     value_changes,
 )
@@ -148,8 +148,7 @@ def test_independent_errors_of_rates_average_out_as_in_least_squares_of_equal_we
     assert fit.noise_model.rate < 1e-3
     problem, linear = fit.least_squares_problem, fit.linearised
     change = error * linear.residuals.log_rate_sensitivity
-    noise = _with_scatter_of(change, problem, linear, fit.noise_model)
-    assert noise.rate == pytest.approx(error, rel=1e-3)
+    noise = with_expected_scatter(problem, linear, fit.noise_model)
     to_rate = _log_rate_gradient(problem, fit.x)
     found = np.linalg.norm(value_changes(linear, noise, change) @ to_rate)
     assert found == pytest.approx(error / np.sqrt(5.0), rel=0.01)

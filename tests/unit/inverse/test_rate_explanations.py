@@ -119,12 +119,12 @@ def test_one_test_that_stands_out_is_a_caution_and_no_verdict_and_the_others_are
     tests = bars(planted, conditions, scatter=0.0, kelvin={4: 12.0}, factor=noise)
     fit = fitted(tests, T_ref=923.15)
     assert fit.adequacy.explains
-    assert fit.adequacy.outlying.tests == ("test_4",)
-    assert fit.adequacy.outlying.errors["temperature"] == pytest.approx(12.0, abs=3.0)
+    assert fit.adequacy.mentioned.tests == ("test_4",)
+    assert fit.adequacy.mentioned.errors["temperature"] == pytest.approx(12.0, abs=3.0)
     assert "test_4 creeps 1.8 times as fast as the others lead to expect" in str(fit)
     assert "check the temperature of test_4" in str(fit)
     others = fitted(tests[:4] + tests[5:], T_ref=923.15).adequacy
-    assert (others.explanations, others.outlying) == ((), None)
+    assert (others.explanations, others.mentioned) == ((), None)
 
 
 def test_an_exponent_that_rises_is_the_law_s_fault_and_not_that_of_the_test_at_the_lowest_stress():

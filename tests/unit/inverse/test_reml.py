@@ -1,25 +1,22 @@
-"""The restricted likelihood against textbooks: unbiased variances, Student's freedom, generalised least squares."""
+"""The restricted likelihood against textbooks: unbiased variances, Student's intervals, generalised least squares."""
 
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.stats import multivariate_normal, norm, t
 
+from creepkit.inverse.errors_of_tests import covariances_of_values_with_errors
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
-from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.residuals import life_sensitivity, orthogonal_distance
-from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.uncertainty.laplace_approximation import restricted_covariance, with_freedom
 from creepkit.inverse.variance_components import (
     LinearisedProblem,
     estimate_variance_components,
     restricted_log_likelihood,
 )
-from creepkit.inverse.working_noise import WorkingNoiseEstimator
 
 
 def linear_model(values, design, clock=None, outputs=1):
@@ -58,51 +55,14 @@ def _model(values, design):
 
 
 def test_intervals_of_white_noise_are_students():
-    """With one estimated variance the freedom is n - p, and the covariance s^2 (X'X)^-1."""
+    """With one estimated variance the freedom is n - p, whatever a predictor states of its error; (X'X)^-1 s^2."""
     rng, design = np.random.default_rng(1), polynomial(25, 2)
     linear = linear_model(0.3 * rng.normal(size=(1, 25)), design)
-    posterior, freedom = restricted_covariance(linear, white(0.3), ())
-    assert freedom == pytest.approx(22.0, rel=1e-6)
-    assert posterior == pytest.approx(0.09 * np.linalg.inv(design[0].T @ design[0]), rel=1e-6)
-
-
-def test_what_a_predictor_states_of_its_error_is_not_asked_of_the_data():
-    """An error of a thousandth, under noise of .3, leaves the noise its n - p = 22; asked of the data it takes most."""
-    linear = linear_model(0.3 * np.random.default_rng(1).normal(size=(1, 25)), polynomial(25, 2))
-    entries = SimpleNamespace(outputs=("amplitude",), transforms=(LinearTransform(2.0, 1.0),))
-    weighting = WorkingNoiseEstimator(IdentificationSettings(weights="likelihood"), entries, {"amplitude": 0.004})
-    scatter = white(0.3, ("amplitude",), drift=0.002)
-    assert weighting.unestimated_drift_components(scatter) == {
-        ("amplitude", "drift"),
-        ("amplitude", "correlation_length"),
-    }
-    assert weighting.unestimated_drift_components(white(0.3, ("amplitude",), drift=0.1)) == set()
-    assert (restricted_covariance(linear, scatter, ())[1] < 10.0).all()
-    assert restricted_covariance(linear, scatter, (), weighting.unestimated_drift_components(scatter))[
-        1
-    ] == pytest.approx(22.0, rel=1e-3)
-
-
-def test_the_mean_of_a_few_tests_has_their_number_less_one():
-    """Rates that scatter, seen without noise: Student's interval of the mean of T numbers has T - 1."""
-    linear = linear_model(np.zeros((5, 3)), np.ones((5, 3, 1)))
-    linear = replace(linear, residuals=replace(linear.residuals, log_rate_sensitivity=np.ones((5, 3))))
-    scatter = NoiseModel({"strain": OutputNoise(1e-4)}, rate=0.3)
-    assert restricted_covariance(linear, scatter, ())[1] == pytest.approx(4.0, rel=1e-3)
-
-
-def test_what_every_curve_shows_has_more_degrees_of_freedom_than_what_tests_scatter_in():
-    """Of 5 tests with 30 readings, balanced: the mean has T - 1, a slope within tests T (N - 1) - 1."""
-    x = np.linspace(-1.0, 1.0, 30)
-    design = np.repeat(np.stack([np.ones(30), x], axis=-1)[None], 5, axis=0)
-    linear = linear_model(np.zeros((5, 30)), design)
-    linear = replace(linear, residuals=replace(linear.residuals, log_rate_sensitivity=np.ones((5, 30))))
-    scatter = NoiseModel({"strain": OutputNoise(0.1)}, rate=0.3)
-    covariance, freedom = restricted_covariance(linear, scatter, ())
-    assert freedom == pytest.approx([4.0, 144.0], rel=1e-3)
-    widths = 1.959964 * np.sqrt(np.diag(with_freedom(covariance, freedom)))
-    exact = [2.776445 * np.sqrt((0.3**2 + 0.1**2 / 30) / 5), 1.976575 * 0.1 / np.sqrt(5 * (x**2).sum())]
-    assert widths == pytest.approx(exact, rel=1e-3)
+    for noise in (white(0.3), white(0.3, drift=0.002)):
+        covariance, *errors = covariances_of_values_with_errors(linear, noise, (), None)
+        expected = (t.ppf(0.975, 22) / norm.ppf(0.975) * 0.3) ** 2 * np.linalg.inv(design[0].T @ design[0])
+        assert covariance == pytest.approx(expected, rel=5e-3)
+        assert not np.any(errors)
 
 
 def test_a_prior_counts_where_its_unknown_stands_at_its_bound():

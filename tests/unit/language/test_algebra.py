@@ -338,7 +338,7 @@ def test_wrong_choices_are_explained(chosen, message):
 
 def test_laws_are_summed_multiplied_and_written_with_values_as_expressions_are():
     assert sum([NORTON, STRAIN_HARDENING]) == NORTON + STRAIN_HARDENING
-    assert (2 * NORTON).rate == 2 * NORTON.rate
+    assert (2 * NORTON).rate == (NORTON * 2).rate == 2 * NORTON.rate
     warm = NORTON.times(arrhenius(T_REF))
     Q, R, T, T_ref = (*sympy.symbols("Q R", real=True), ck.temperature, sympy.Symbol("T_ref", real=True))
     shown = warm.expr.subs({"A": 3.0, sympy.Symbol("n"): 5})

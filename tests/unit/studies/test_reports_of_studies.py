@@ -38,6 +38,8 @@ def test_a_stage_that_fails_leaves_the_others(study: Path, plain_pages: None) ->
     assert result.report is not None
     page = result.report.read_text()
     assert "temperature of A" in page
+    assert "Two laws.</p>" in (cell := result._repr_html_())
+    assert "Laws were identified of 2 of 2 materials" in cell
     again = ck.Study.load(study).run()
     assert states(again)["report"] == "kept"
     assert states(again)["temperature of A"] == "failed"

@@ -262,11 +262,11 @@ def _are_one_function(problem: LeastSquaresProblem, x: Floats, own_terms: int) -
 
 
 def _of_law(single: LeastSquaresProblem, law: CreepLaw) -> LeastSquaresProblem:
-    """The problem of another law under the same covariance, with the same nuisances, correction and rates of tests."""
+    """The problem of another law under the same covariance, with the same nuisances, correction, and rates of tests."""
     problem = LeastSquaresProblem.from_histories(
         law, single.histories, single.predictor, single.settings, single.coordinates.reference
     )
-    names = ["covariance_factor", "histories", "observations"]
+    names = ["covariance_factor", "histories", "observations", "stopped"]
     names += ["log_factors", "rate_shift"] if problem.coordinates.every_rate_has_coefficient else []
     same: dict[str, Any] = {name: getattr(single, name) for name in names}
     problem = replace(problem, **same)

@@ -39,8 +39,7 @@ class CommonCovarianceFits:
 
     chi_square : (laws,) - with priors; log_determinant : (laws,) - of the nuisance parameters that are integrated out.
     independent_frames : number of independent frames; reference_law : position of the law whose covariance it is.
-    whitened : (laws, observations) - whitened residuals, zero where there are no data, or where a stopped test says
-        nothing of a law.
+    whitened : (laws, observations) - whitened residuals, zero where there are no data.
     """
 
     chi_square: Floats
@@ -67,7 +66,11 @@ def under_common_covariance(fits: Sequence[Identification]) -> CommonCovarianceF
     independent_frames = effective_sample_size(reference_residuals, noise_model)
     chi_squares, log_determinants, whitened = zip(*results, strict=True)
     return CommonCovarianceFits(
-        np.array(chi_squares), np.array(log_determinants), independent_frames, reference_law, np.array(whitened)
+        np.add(chi_squares, [linear.residuals.stopped.chi_square for linear in problems]),
+        np.array(log_determinants),
+        independent_frames,
+        reference_law,
+        np.array(whitened),
     )
 
 
@@ -97,6 +100,7 @@ def _score_under_own_covariance(fit: Identification, linearised: LinearisedProbl
     independent_frames = effective_sample_size(linearised.residuals, fit.noise_model)
     parameter_count = len(fit.u) + len(fit.noise_model.outputs) + autocorrelated_components(fit.noise_model)
     chi_square, _, _ = _optimum_under(linearised, factor, len(fit.u))
+    chi_square -= 2.0 * linearised.residuals.stopped.log_likelihood
     return factor.log_determinant + chi_square + bic_penalty(parameter_count, independent_frames)
 
 

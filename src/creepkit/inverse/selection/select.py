@@ -142,8 +142,7 @@ def _identify_all(
         if progress is not None:
             progress(task, k, len(laws))
         try:
-            known = through_for_law(through, law)
-            fits.append(identify(law, histories, using, settings=settings, through=known))
+            fits.append(identify(law, histories, using, settings=settings, through=through_for_law(through, law)))
         except CreepkitError as error:
             failed[law.name] = str(error)
         if progress is not None:

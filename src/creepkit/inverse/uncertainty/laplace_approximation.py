@@ -1,11 +1,12 @@
 """Laplace's approximation: covariance and intervals of parameters, with their degrees of freedom.
 
-The degrees of freedom of a restricted likelihood are Satterthwaite's.
+The scatter between tests is in the covariance with its expected square, given the tests (see
+inverse.errors_of_tests); the noise of readings, of which there are many, with degrees of freedom of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,135 +16,38 @@ from scipy.stats import t as student
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import (
-    NEGLIGIBLE_DISCREPANCY,
-    NEGLIGIBLE_DRIFT,
-    NoiseModel,
-    Residuals,
-    components_fixed_by_priors,
-)
+from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM
 from creepkit.inverse.uncertainty.quantities import gradient
-from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, scaled_inverse
+from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import CreepLaw, Param
-from creepkit.records import Nuisance
-
-LOG_STEP = 1e-3
-"""Of the logarithm of a correlation length, for differences of the covariance, which is smooth in it."""
-
 
 MINIMUM_FREEDOM = 3.0
 """Lower limit of degrees of freedom: below it a quantile only says that the variance is unknown."""
 
 
-def restricted_covariance(
-    linearised: LinearisedProblem,
-    noise_model: NoiseModel,
-    nuisances: Sequence[Nuisance],
-    fixed: Collection[tuple[str, str]] = (),
-) -> tuple[Floats, Floats]:
-    """Posterior covariance of x = (u, e) by likelihood, (unknowns, unknowns), and its degrees of freedom, (unknowns,).
-
-    fixed : (output, component) that are known beside those that nuisances give. The variance of an unknown that the
-    scatter between tests decides is known worse than that of one which every curve shows: each has degrees of freedom
-    of its own, NaN where no observation depends on it. Unknowns at their bounds count here as all others: their
-    intervals reach inwards.
-    """
-    unconstrained = replace(linearised, free=np.ones_like(linearised.free))
-    factor = CovarianceFactor.of_residuals(linearised.residuals, noise_model)
-    solution = unconstrained.solve(factor)
-    components = [component for component in _estimated_components(noise_model, nuisances) if component not in fixed]
-    if not components:
-        return solution.covariance, np.full(len(solution.covariance), NORMAL_FREEDOM)
-    covariance_derivatives = [
-        _covariance_derivative(linearised.residuals, noise_model, factor.blocks, *one) for one in components
-    ]
-    projected = [
-        np.einsum("tep,tef,tfq->pq", solution.weighted_jacobian, s, solution.weighted_jacobian, optimize=True)
-        for s in covariance_derivatives
-    ]
-    information = _information(solution, factor, covariance_derivatives, projected)
-    gradient = np.stack([np.diag(solution.covariance @ p @ solution.covariance) for p in projected], axis=1)
-    component_covariance = scaled_inverse(
-        information + 1e-9 * np.diag(np.diag(information)) + 1e-12 * np.eye(len(components))
-    )
-    variance_of_variance = np.einsum("pj,jk,pk->p", gradient, component_covariance, gradient)
-    with np.errstate(over="ignore"):  # a variance that nothing makes uncertain has a freedom without bound
-        freedom = 2.0 * np.diag(solution.covariance) ** 2 / np.maximum(variance_of_variance, 1e-300)
-    determined = (unconstrained.jacobian != 0).any(axis=(0, 1))
-    return solution.covariance, np.where(determined, np.clip(freedom, MINIMUM_FREEDOM, NORMAL_FREEDOM), np.nan)
+FREEDOMS = np.geomspace(MINIMUM_FREEDOM, NORMAL_FREEDOM, 400)
+"""Degrees of freedom among which those of an interval are found."""
 
 
-def median_freedom(freedom: Floats) -> float:
-    """Of those that the tests determine; the least where there are none. freedom : (n,)."""
-    known = freedom[np.isfinite(freedom)]
-    return float(np.median(known)) if known.size else MINIMUM_FREEDOM
-
-
-def with_freedom(covariance: Floats, freedom: Floats) -> Floats:
+def known_to_freedom(covariance: Floats, within: Floats, freedom: float) -> Floats:
     """The covariance of the normal distribution whose 95 % intervals are those of Student's t, (n, n).
 
-    covariance : (n, n). freedom : (n,) degrees of freedom of each variance, NaN of one that is a prior's.
+    covariance : (n, n). within : (n, n) the part of it by the noise of readings, which is estimated to `freedom`
+    degrees of freedom: those readings that are independent, less the unknowns. The other part, by the scatter between
+    tests, is a mean over what this may be.
     """
-    scale = student.ppf(0.975, np.nan_to_num(freedom, nan=NORMAL_FREEDOM)) / NORMAL_QUANTILE
-    return np.asarray(covariance * np.outer(scale, scale))
+    scale = student.ppf(0.975, np.clip(freedom, MINIMUM_FREEDOM, NORMAL_FREEDOM)) / NORMAL_QUANTILE
+    return np.asarray(covariance + (scale**2 - 1.0) * within)
 
 
-def _information(
-    solution: LinearSolution,
-    factor: CovarianceFactor,
-    covariance_derivatives: Sequence[Floats],
-    projected: Sequence[Floats],
-) -> Floats:
-    """I_ij = tr(Q C_i Q C_j) / 2 with Q = C^-1 - B M B', B = C^-1 J: the values that tests share tie them together.
+def freedom_of_intervals(covariance: Floats, estimated: Floats) -> float:
+    """Degrees of freedom of Student's t by which 95 % intervals of a covariance (n, n) are those of another one.
 
-    covariance_derivatives : C_i, (tests, observations, observations) each; projected : B' C_i B, (unknowns, unknowns).
+    estimated : (n, n) at the estimated noise, NORMAL_FREEDOM where it is as large; the median over the unknowns.
     """
-    weighted = [factor.inverse_times(slope) for slope in covariance_derivatives]
-    left_products = [
-        np.einsum("tep,tef->tpf", solution.weighted_jacobian, slope, optimize=True) for slope in covariance_derivatives
-    ]
-    right_products = [a @ solution.weighted_jacobian for a in weighted]
-    shared = [solution.covariance @ own for own in projected]
-    information = np.empty((len(covariance_derivatives), len(covariance_derivatives)))
-    for i, j in np.ndindex(information.shape):
-        own_term = np.einsum("tef,tfe->", weighted[i], weighted[j])
-        cross_term = np.einsum("pq,tqe,tep->", solution.covariance, left_products[j], right_products[i], optimize=True)
-        information[i, j] = 0.5 * float(own_term - 2.0 * cross_term + np.trace(shared[i] @ shared[j]))
-    return information
-
-
-def _estimated_components(noise_model: NoiseModel, nuisances: Sequence[Nuisance]) -> list[tuple[str, str]]:
-    """(output, component) of the variance components that were estimated; "" for the rate."""
-    fixed = components_fixed_by_priors(nuisances, list(noise_model.outputs))
-    components = []
-    for output, output_noise in noise_model.outputs.items():
-        names = ["noise"] + ["misfit"] * (output_noise.misfit > 0) + ["offset"] * (output_noise.offset > 0)
-        names += ["drift", "correlation_length"] * (output_noise.drift > NEGLIGIBLE_DRIFT)
-        components += [(output, name) for name in names if (output, name) not in fixed]
-    components += [("", "rate")] if noise_model.rate > 0 and ("", "rate") not in fixed else []
-    discrepant = noise_model.discrepancy > NEGLIGIBLE_DISCREPANCY
-    return components + ([("", "discrepancy"), ("", "discrepancy_length")] if discrepant else [])
-
-
-def _covariance_derivative(
-    residuals: Residuals, noise_model: NoiseModel, blocks: Floats, output: str, name: str
-) -> Floats:
-    """Derivative of the covariances to the logarithm of one component, (tests, observations, observations).
-
-    blocks : (tests, observations, observations) the covariances.
-    """
-
-    def at(factor: float) -> Floats:
-        if not output:
-            changed = replace(noise_model, **{name: getattr(noise_model, name) * factor})
-        else:
-            changed = noise_model.with_output(output, **{name: getattr(noise_model[output], name) * factor})
-        return CovarianceFactor.of_residuals(residuals, changed).blocks
-
-    if name.endswith("length"):
-        return np.asarray((at(np.exp(LOG_STEP)) - at(np.exp(-LOG_STEP))) / (2.0 * LOG_STEP))
-    return 2.0 * (blocks - at(0.0))  # a standard deviation
+    quantile = NORMAL_QUANTILE * float(np.median(np.sqrt(np.diag(covariance) / np.diag(estimated))))
+    return float(np.interp(-quantile, -student.ppf(0.975, FREEDOMS), FREEDOMS))
 
 
 DETERMINED_FACTOR, DETERMINED_SHARE = 10.0, 0.25

@@ -13,9 +13,10 @@ effects of heats and laboratories, c, are those of a linear mixed model: given t
 
 Z saying which heat and laboratory a test is of, and S being diagonal with s_heat^2 and s_laboratory^2. Integrating it
 out leaves the restricted likelihood of s. Few tests say little of s: a prior of the size u that is usual between creep
-tests holds it, exp(-s^2 / 2 u^2) / (s + u / 3). Below u it is like that of Jeffreys, 1 / s, with which intervals by few
-tests are those of Student's t, but flat where s is too small to matter; a flat prior made them wider by a quarter.
-Intervals of predictions are integrals over the posterior distribution of s.
+tests holds it, exp(-s^2 / 2 u^2) / (s + u / 3), with four times the estimate in the exponent where that is more than
+u. Below that it is like that of Jeffreys, 1 / s, with which intervals by few tests are those of Student's t, but flat
+where s is too small to matter; a flat prior made them wider by a quarter. Intervals of predictions are integrals over
+the posterior distribution of s.
 
 Source: S. Searle, G. Casella and C. McCulloch, Variance Components (1992), chapters 6 and 7.
 """
@@ -77,6 +78,11 @@ SMALLEST_SD, LARGEST_IN_PRIORS = 1e-3, 4.0
 """Ends of these standard deviations: of ln rate, and over the standard deviation of the prior."""
 
 
+REACH = 4.0
+"""Standard deviation of the prior over the estimate, where that is more than what is usual: of 5 and 9 tests intervals
+then hold as often as those of Student's t whatever the scatter."""
+
+
 def level_of(history: History, level: str) -> str:
     """The laboratory or the heat of a history, by its labels; "" where it states none, and of the level "test"."""
     return next((history.labels[key] for key in LABELS.get(level, ()) if history.labels.get(key)), "")
@@ -109,6 +115,7 @@ class RateScatter:
     known : the standard deviation between tests where it was given, None where it is estimated; 0 for none.
     stresses, temperatures : (tests,) MPa and K. errors : (unknowns, unknowns) covariance of x by errors common to all
         tests that nobody modelled, or None; of nuisances none.
+    reach : standard deviation of the prior of the scatter, over what is usual.
     output_scales, output_floors : {output: scale of a linear, floor of a logarithmic transform}, in its unit, in which
         misfit and drift of the noise model are stated.
     """
@@ -126,6 +133,7 @@ class RateScatter:
     stresses: Floats = field(default_factory=lambda: np.zeros(0))
     temperatures: Floats = field(default_factory=lambda: np.zeros(0))
     errors: Floats | None = None
+    reach: float = 1.0
     output_scales: Mapping[str, float] = field(default_factory=dict)
     output_floors: Mapping[str, float] = field(default_factory=dict)
 
@@ -157,7 +165,7 @@ class RateScatter:
             sd = np.array([[0.0] * (len(self.levels) - 1) + [self.known]])
             return ScatterPosterior(self.levels, sd, np.ones(1))
         scale = np.array([USUAL_SD[level] for level in self.levels])
-        low, high = np.full(scale.size, np.log(SMALLEST_SD)), np.log(LARGEST_IN_PRIORS * scale)
+        low, high = np.full(scale.size, np.log(SMALLEST_SD)), np.log(LARGEST_IN_PRIORS * self.reach * scale)
         result = self._on_grid(low, high)
         for _ in range(REFINEMENTS):
             centre = result.weight @ np.log(result.sd)
@@ -171,7 +179,7 @@ class RateScatter:
         """The posterior on a grid, even in ln of standard deviations between low and high, (levels,) each."""
         axes = [np.linspace(first, last, NODES[low.size]) for first, last in zip(low, high, strict=True)]
         sd = np.exp(np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=-1))
-        log_weight = log_prior(sd, self.levels) + self.solved(sd)[0]
+        log_weight = log_prior(sd, self.levels, self.reach) + self.solved(sd)[0]
         weight = np.exp(log_weight - log_weight.max())
         return ScatterPosterior(self.levels, sd, weight / weight.sum())
 
@@ -321,10 +329,10 @@ class ScatterPosterior:
         return float(values[order][min(int(np.searchsorted(cumulative, 0.5)), values.size - 1)])
 
 
-def log_prior(sd: Floats, levels: Sequence[str]) -> Floats:
+def log_prior(sd: Floats, levels: Sequence[str], reach: float = 1.0) -> Floats:
     """(...,) ln of the prior density of ln of standard deviations sd (..., levels), but for a constant."""
     usual = np.array([USUAL_SD[level] for level in levels])
-    return np.asarray((np.log(sd / (sd + FLAT_BELOW * usual)) - 0.5 * (sd / usual) ** 2).sum(axis=-1))
+    return np.asarray((np.log(sd / (sd + FLAT_BELOW * usual)) - 0.5 * (sd / (reach * usual)) ** 2).sum(axis=-1))
 
 
 def redundant_rates(linear: LinearisedProblem, noise_model: NoiseModel) -> int:
@@ -373,6 +381,7 @@ def rate_scatter(
         stresses=problem.conditions[0],
         temperatures=problem.conditions[1],
         errors=errors,
+        reach=max(1.0, REACH * noise_model.rate / USUAL_SD["test"]),
         output_scales={n: t.scale for n, t in transforms.items() if isinstance(t, LinearTransform)},
         output_floors={n: t.floor for n, t in transforms.items() if isinstance(t, LogTransform)},
         **_evidence(

@@ -1,5 +1,7 @@
 """Scatter of rates: balanced designs, where REML is the analysis of variance (Searle et al. (1992), chapter 4)."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
@@ -9,7 +11,7 @@ import creepkit as ck
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.uncertainty.law_misfit import LawMisfits
-from creepkit.inverse.uncertainty.rate_scatter import FLAT_BELOW, USUAL_SD, RateScatter
+from creepkit.inverse.uncertainty.rate_scatter import FLAT_BELOW, REACH, USUAL_SD, RateScatter
 from creepkit.laws.norton import NORTON
 from helpers.rupture_tests import BAR
 
@@ -82,6 +84,21 @@ def test_the_posterior_distribution_integrates_to_that_of_the_prior_without_info
     shares = np.cumsum(density) / density.sum()
     assert posterior.mean_square("test") == pytest.approx((density * sd**2).sum() / density.sum(), rel=0.02)
     assert posterior.median("test") == pytest.approx(sd[np.searchsorted(shares, 0.5)], rel=0.1)
+
+
+def test_intervals_of_the_mean_hold_as_often_as_those_of_student_whatever_the_scatter():
+    """Of 5 and 9 tests that scatter by 0.1 to 1, with the expected square of it; 400 draws each."""
+    rng, missed = np.random.default_rng(2), {}
+    for count in (5, 9):
+        drawn = rng.standard_normal((400, count))
+        for sd in (0.1, 0.3, 1.0):
+            held = []
+            for z in sd * drawn:
+                reach = max(1.0, REACH * z.std(ddof=1) / USUAL_SD["test"])
+                square = replace(scatter_of(z - z.mean(), 1e-8), reach=reach).posterior.mean_square("test")
+                held.append(abs(z.mean()) < 1.96 * np.sqrt(square / count))
+            missed[count, sd] = 1.0 - float(np.mean(held))
+    assert all(0.02 < share < 0.07 for share in missed.values()), missed
 
 
 def bars(count, scatter, seed, noise=2e-6):
