@@ -35,7 +35,11 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     positive_semidefinite,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.variance_components import LinearisedProblem
+from creepkit.inverse.variance_components import LinearisedProblem, restricted_log_likelihood
+
+LIFE_SHARES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)
+"""Shares of the scatter of rupture times that are tried as a scatter of lives in curves."""
+
 
 RATE, LIFE = "rate of a test", "life of a test"
 """Kinds of what is included beside lengths and instruments, each test by itself: ln rate by temperatures and loads,
@@ -54,8 +58,7 @@ def errors_of_tests(
     if not included:
         return ()
     kinds = {n.kind for n in problem.settings.nuisances}
-    lives = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
-    changes = {LIFE: lives * life_sensitivity(linear.residuals, problem.observations)}
+    changes = {LIFE: effect_of_lives(problem, linear, noise_model)}
     if tests > 1 and "rate" not in kinds:
         kelvin = 0.0 if "temperature" in kinds else included.get("temperature", 0.0)
         sizes = np.array([kelvin, included.get("load", 0.0)])
@@ -64,6 +67,25 @@ def errors_of_tests(
     made = [Perturbation(kind, 1.0, "", residual_change=s, tests=tests, included=True) for kind, s in changes.items()]
     own = [one for one in made if one.residual_change.any()]
     return (*of_lengths_and_instruments(problem, x, linear), *own)
+
+
+def effect_of_lives(problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel) -> Floats:
+    """(tests, observations) change of residuals by the scatter of lives, one standard deviation, beside that of rates.
+
+    What rupture times miss a law by is a scatter of lives as far as the curves show it: specimens may as well break
+    before the law's creep runs away, at whatever rate. Of LIFE_SHARES of it the one is taken that makes the readings
+    likeliest, at the optimum of the linear problem.
+    """
+    lives = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
+    effect = lives * life_sensitivity(linear.residuals, problem.observations)
+    if not effect.any():
+        return effect
+
+    def log_likelihood(share: float) -> float:
+        affected = replace(linear, residuals=linear.residuals.with_effects([share * effect]))
+        return restricted_log_likelihood(affected, noise_model)
+
+    return effect * max(LIFE_SHARES, key=log_likelihood)
 
 
 def with_expected_scatter(

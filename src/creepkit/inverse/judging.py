@@ -28,16 +28,16 @@ from scipy.optimize import lsq_linear
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
+from creepkit.inverse.errors_of_tests import effect_of_lives
 from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.iterative_estimation import judged_at
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NEGLIGIBLE_DISCREPANCY, NoiseModel, OutputNoise, Residuals
-from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH, RUPTURE_OUTPUT
+from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
 from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.residuals import life_sensitivity
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, LinearSolution
 from creepkit.records import History, is_logarithmic
 
@@ -191,10 +191,8 @@ class Judge:
         return NoiseModel(outputs, self.noise_model.rate)
 
     def _with_scatter_of_lives(self, linear: LinearisedProblem) -> LinearisedProblem:
-        """The problem with the scatter of lives, as estimated of rupture times, as a random effect of each test."""
-        outputs = self.noise_model.outputs
-        scatter = outputs[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in outputs else 0.0
-        effect = scatter * life_sensitivity(linear.residuals, self.problem.observations)
+        """The problem with the scatter of lives as a random effect of each test."""
+        effect = effect_of_lives(self.problem, linear, self.noise_model)
         if not effect.any():
             return linear
         return replace(linear, residuals=linear.residuals.with_effects([effect]))

@@ -67,6 +67,31 @@ def test_by_likelihood_ruptures_have_a_scatter_of_their_own_and_laws_are_ranked(
     assert ck.rank(fits).best.law.name == law.name
 
 
+def test_bars_that_break_before_the_law_runs_away_do_not_move_its_values():
+    """Rate A s^n (1 + C e) under a constant load, by quadrature; bars break at 12 %, rates scatter, strains to 1e-4."""
+    A, n, C = ck.parameters("A n C")
+    table = {
+        A: ck.Param("rate", unit="1/s", bounds=(1e-45, 1e-5), scale="log", off=0.0),
+        n: ck.Param("exponent", bounds=(1, 12)),
+        C: ck.Param("growth", unit="1", bounds=(1, 500), scale="log"),
+    }
+    law = ck.CreepLaw("growing", {"growing": A * ck.stress**n * (1 + C * ck.strain)}, table)
+    strain = np.linspace(0.0, 0.12, 400)
+    slowness = np.exp(-6 * strain) / (1 + 60 * strain)  # over that at the first moment
+    passed = np.concatenate([[0.0], np.cumsum(np.diff(strain) * (slowness[1:] + slowness[:-1]) / 2)])
+    rng, tests = np.random.default_rng(2), []
+    for number, stress in enumerate((100.0, 115.0, 130.0, 150.0, 170.0, 200.0, 115.0, 150.0)):
+        rate = 2e-8 * (stress / 200) ** 6 * np.exp(rng.normal(0, 0.15))
+        life = passed[-1] / rate
+        times = life * np.linspace(0.01, 0.99, 55)
+        outputs = {"strain": np.interp(times * rate, passed, strain) + rng.normal(0, 1e-4, 55)}
+        tests.append(History(f"bar {number}", times, outputs, constant_stress(stress), 1273.15, rupture_time=life))
+    found = {e.name: e for e in ck.identify(law, tests, using=BAR).estimates}
+    for name, truth, width in (("n", 6.0, 0.1), ("C", 60.0, 1.0)):
+        assert found[name].low <= truth <= found[name].high
+        assert abs(found[name].value - truth) < width
+
+
 def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
     law, values, _, fit = planted
     stresses = np.array([50.0, 80.0, 130.0])
