@@ -34,7 +34,7 @@ LIKELIHOOD_TOLERANCE = 1e-5
 and above what the steps of a solver leave."""
 
 
-MOST_LAST_STEPS, LAST_STEP, MOST_HALVINGS = 20, 0.02, 4
+MOST_LAST_STEPS, LAST_STEP, MOST_HALVINGS = 10, 0.02, 4
 """Last steps of values by likelihood, the largest one left out, in standard deviations, and halvings of each."""
 
 
