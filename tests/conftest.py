@@ -41,7 +41,8 @@ def one_torch_thread() -> Iterator[None]:
 def plugin_files_of_one_test_alone() -> Iterator[None]:
     """Plugin files that a test loads, and specimens that it gives, are gone with it: tests run in any order."""
     yield
-    if default_registry().is_extended:
+    registry = default_registry()
+    if registry._given or any(plugin.source.is_file for plugin in registry._loaded()):
         default_registry.cache_clear()
 
 

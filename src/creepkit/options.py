@@ -190,20 +190,26 @@ def table_of(
     *,
     types: Mapping[Any, Any] | None = None,
     without: Sequence[str] = (),
+    only: Sequence[str] | None = None,
     **further: Any,
 ) -> Any:
     """A strict model of a table of a study file: a key for each option, None where it is missing.
 
     base : of the model, with its settings. types : {type of a field: that of its key}, where TOML has none of the kind.
-    without : fields that are no keys. further : keys beside, {key: (type, default)} as pydantic has them.
+    without : fields that are no keys. only : the fields that are keys, with their defaults, where a table has some of a
+    record for all that the study does. further : keys beside, {key: (type, default)} as pydantic has them.
     """
     from pydantic import Field, create_model
 
     keys: dict[str, Any] = {}
     for one in options_of(record):
-        if one.python_only or one.name in without:
+        if one.python_only or one.name in without or (only is not None and one.name not in only):
             continue
-        keys[one.key] = (_toml_type(one.type, one.limits, types or {}) | None, Field(None, description=one.help))
+        hint = _toml_type(one.type, one.limits, types or {})
+        keys[one.key] = (
+            (hint | None, Field(None, description=one.help)) if only is None
+            else (hint, Field(one.default, description=one.help))
+        )  # fmt: skip
     return create_model(record.__name__, __base__=base, **{**keys, **further})
 
 

@@ -1,19 +1,21 @@
 """One declaration of an option is found in Python, on the command line and in a study."""
 
 import inspect
-from dataclasses import dataclass, fields, make_dataclass
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import pytest
 import typer
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from typer.testing import CliRunner
 
 import creepkit as ck
+from creepkit.cli.app import built
 from creepkit.cli.command_options import checked
 from creepkit.errors import FitError
 from creepkit.limits import Limits
-from creepkit.options import CELSIUS, HOURS, Options, option, options_of, table_of, takes_options, values_of_table
+from creepkit.options import CELSIUS, HOURS, Options, option, options_of, table_of, values_of_table
+from creepkit.studies import tables
 
 
 class Table(BaseModel):
@@ -74,27 +76,26 @@ def test_what_is_not_allowed_is_refused_in_all_three() -> None:
 
 
 def test_a_field_more_is_an_argument_an_option_and_a_key() -> None:
-    """As if a line were added to IdentificationSettings."""
-    line = ("patience", int, option(15, "Steps without gain.", Limits(1, 100)))
-    record = make_dataclass("Settings", [line], bases=(ck.IdentificationSettings,), frozen=True)
-
-    @takes_options(record)
-    def identify(law: str, **changes: Any) -> None: ...
-
-    assert inspect.signature(identify).parameters["patience"].default == 15
-    assert record().changed({"patience": 20}).patience == 20
-    assert answered(record, "--patience", "20", "--starts", "2") == {"patience": 20, "starts": 2}
-    assert "allowed are whole numbers from 1 to 100" in answered(record, "--patience", "0")
-    table = table_of(record, Table, types={tuple[ck.Nuisance, ...]: Any})
-    assert values_of_table(record, table(patience=20)) == {"patience": 20}
-
-
-def test_public_functions_show_their_options_with_defaults() -> None:
-    for function in (ck.identify, ck.select):
-        parameters = inspect.signature(function).parameters
-        assert "changes" not in parameters
-        for one in fields(ck.IdentificationSettings):
-            assert parameters[one.name].default == one.default, one.name
+    """Each field of IdentificationSettings, with what it allows, in whichever table of a study its key stands."""
+    models = (tables.StudyTable, tables.DataTable, tables.IdentificationTable, tables.SelectionTable)
+    flags, wrong = {flag for one in built("identify").params for flag in one.opts}, []
+    for one in options_of(ck.IdentificationSettings):
+        keys = [model.model_fields[one.key] for model in models if one.key in model.model_fields]
+        wrong += [one.name] if not keys or one.flag not in flags else []
+        known = [inspect.signature(verb).parameters[one.name].default for verb in (ck.identify, ck.select)]
+        wrong += [] if known == [one.default] * 2 else [f"{one.name} as an argument"]
+        allowed = one.words if one.limits is None else (int(one.limits.low), int(one.limits.high))
+        refused = ("neon",) if one.limits is None else (int(one.limits.low) - 1, int(one.limits.high) + 1)
+        if one.name in ("nuisances", "weights", "usual_errors"):  # which are more than words
+            continue
+        for key in keys:
+            check = TypeAdapter(Annotated[key.annotation, "key", *key.metadata]).validate_python
+            for value in allowed:
+                check(value)
+            for value in refused:
+                with pytest.raises(ValidationError):
+                    check(value)
+    assert wrong == []
 
 
 def test_a_misspelt_option_is_answered_by_the_nearest() -> None:

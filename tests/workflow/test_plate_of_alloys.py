@@ -55,7 +55,7 @@ def test_init_one_edit_and_run_give_a_law_of_every_alloy(lab: Path) -> None:
     study = lab / "study.toml"
     text = study.read_text().replace("subset_mm = 0 ", "subset_mm = 1 ")
     text = re.sub(r"laws = \[.*?\]", 'laws = ["norton"]\nstarts = 1\nframes = 12', text).replace(
-        '[selection]\nby = "bic"', ""
+        '[selection]\ncriterion = "bic"', ""
     )
     study.write_text(text)
     empty = creepkit("run", study, "--only", "identification")
@@ -165,7 +165,7 @@ def test_one_alloy_at_four_temperatures_gives_its_temperature_form(tmp_path: Pat
     study = tmp_path / "study.toml"
     text = study.read_text().replace("subset_mm = 0 ", "subset_mm = 1 ")
     text = re.sub(r"laws = \[.*?\]", 'laws = ["norton"]\nstarts = 1\nframes = 12', text).replace(
-        '[selection]\nby = "bic"', ""
+        '[selection]\ncriterion = "bic"', ""
     )
     study.write_text(text.partition("[report]")[0])
     result = ck.Study.load(study).run()

@@ -87,7 +87,7 @@ def test_identify(folder, tmp_path, case):
         words = ("--seed", 3, "--frames", 12, "--starts", 2, "--suspect-frames", "keep", "--nuisance", "rate=0:0.2")
         options = {"seed": 3, "frames": 12, "starts": 2, "suspect_frames": "keep", "nuisances": NUISANCES}
     elif case == "dimples":
-        folder, words, using = tmp_path / "dimples", ("--surrogate", "dimple"), ck.surrogate("dimple")
+        folder, words, using = tmp_path / "dimples", ("--using", "dimple"), ck.surrogate("dimple")
         folder.mkdir()
         dimples(folder)
     fit = ck.identify("norton", isothermal(folder), using, **options)

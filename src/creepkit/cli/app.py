@@ -112,7 +112,9 @@ class CommandGroup(TyperGroup):
             yield
         except KeyboardInterrupt as error:
             name = (ctx.invoked_subcommand if ctx is not None else "") or ""
-            goes_on = name in ("run", "surrogate") or (name == "identify" and "--by" in sys.argv)
+            goes_on = name in ("run", "surrogate") or (
+                name == "identify" and any(word.split("=")[0] == "--by" for word in sys.argv)
+            )
             say(interrupted_sentence(name, str(error) or GOES_ON * goes_on))
             raise typer.Exit(exit_code_of_signal()) from None
         except Exception as error:

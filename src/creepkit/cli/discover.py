@@ -39,7 +39,7 @@ def command(
     ),
     reader: Reader = None,
     only: Only = None,
-    surrogate: Annotated[Predictor | None, Option(help="Identify through a surrogate alone; quicker.")] = None,
+    using: Annotated[Predictor | None, Option(help="Identify through a surrogate alone; quicker.")] = None,
     as_json: Json = False,
 ) -> None:
     """Every temperature is identified alone, closed forms are found through the parameters and refitted to all tests.
@@ -52,14 +52,14 @@ def command(
 
     with ProgressBar() as progress:
         if all(name.endswith(".json") for name in files):
-            if only or changes or surrogate or settings:
-                raise FitError("settings, --only, --fix, --bound and --surrogate are for tests, not for saved fits")
+            if only or changes or using or settings:
+                raise FitError("settings, --only, --fix, --bound and --using are for tests, not for saved fits")
             own = {name: value for name, value in forms.items() if name in ("forms", "parameters")}
             found: TemperatureLaw = ck.discover([ck.load(n) for n in files], progress=progress.tick, **own)
         else:
             (changed,) = LawChanges(temperature="none").changed(changes).applied([ck.law(law)], [])
             study = ck.temperature_study(
-                changed, selected(ck.read_histories(files, reader), only), surrogate,
+                changed, selected(ck.read_histories(files, reader), only), using,
                 settings=IdentificationSettings().changed(settings), progress=progress.tick, **forms,
             )  # fmt: skip
             for note in study.notes:

@@ -16,7 +16,7 @@ from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.search_options import SearchOptions
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.limits import STRAIN
-from creepkit.options import Option
+from creepkit.options import Option, options_of
 from creepkit.records import Predictor
 from creepkit.reports.terminal import ProgressBar, print_json, tell
 from creepkit.studies.candidates import by_likelihood, ranked_candidates
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
     from creepkit.records import History
     from creepkit.screening.screen import ScreeningOptions
+
+DENSE = "combined"
+"""The law that each alloy is identified with without sparsity, where --dense says none."""
 
 
 def command(
@@ -50,9 +53,9 @@ def command(
     up_to: Annotated[
         float | None, Option(help="Frames up to this strain alone.", limits=STRAIN, example="0.05")
     ] = None,
-    surrogate: Annotated[Predictor | None, Option(help="Identify through a surrogate alone, such as dimple.")] = None,
+    using: Annotated[Predictor | None, Option(help="Identify through a surrogate alone, such as dimple.")] = None,
     through: Annotated[
-        Predictor | None, Option(help="Search through a surrogate, and end with the specimen itself.")
+        Predictor | None, Option(help="Search through a using, and end with the specimen itself.")
     ] = None,
     confirm: Annotated[
         bool | None, Option(help="Simulate the best law by the specimen itself; a law may be a saved FIT.json.")
@@ -67,7 +70,7 @@ def command(
     ] = None,
     dense: Annotated[
         str | None, Option(help="Of a plate: the law without sparsity, to compare with; or none.")
-    ] = "combined",
+    ] = DENSE,
     workers: Workers = None,
     as_json: Json = False,
 ) -> None:
@@ -81,28 +84,38 @@ def command(
     from creepkit.reports.ranking import print_ranking, ranking_to_json
     from creepkit.screening.screen import CANDIDATE_LAWS
 
-    search = SearchOptions().changed(how)
+    search, chosen = SearchOptions().changed(how), IdentificationSettings().changed(settings)
+    if each is None:
+        given = {
+            "--compositions": compositions is not None,
+            "--dense": dense != DENSE,
+            "--workers": workers is not None,
+        }
+        advice = "is for a plate: add --by alloy, or leave it out"
+    else:
+        given = {one.flag: one.name in how for one in options_of(SearchOptions)}
+        given |= {"--temperature": "temperature" in changes, "--further-tests": further_tests}
+        advice = "is not for a plate, whose alloys are identified each by itself: leave it out, or --by alloy"
+    for flag in (flag for flag, is_given in given.items() if is_given):
+        raise FitError(f"{flag} {advice}")
     histories = selected(ck.read_histories(files, reader), only)
     if up_to is not None:
         histories = _truncate_at_strain(histories, up_to)
     if law and confirm and all(is_file_name(name) for name in law):
-        _confirm([ck.load(name) for name in law], histories, surrogate, as_json)
+        _confirm([ck.load(name) for name in law], histories, using, as_json)
         return
     candidates = [ck.law(name) for name in dict.fromkeys(law or CANDIDATE_LAWS)]
     if each is not None:
         options = ck.ScreeningOptions(
-            settings=ck.IdentificationSettings().changed(settings),
-            through=through,
-            dense=dense,
-            confirm="when in doubt" if confirm is None else confirm,
+            settings=chosen, through=through, dense=dense, confirm="when in doubt" if confirm is None else confirm
         )
-        laws = LawChanges(temperature="none").changed({**changes, "temperature": "none"}).applied(candidates, [])
-        _screen(histories, laws, surrogate, compositions, to, options, workers, as_json)
+        laws = LawChanges(temperature="none").changed(changes).applied(candidates, [])
+        _screen(histories, laws, using, compositions, to, options, workers, as_json)
         return
     _tell_assumptions(histories)
     candidates = LawChanges().changed(changes).applied(candidates, histories)
-    compared = search.sums is not None or ("by" in how and len(candidates) > 1)
-    if compared and not by_likelihood(search, settings):
+    compared = search.sums is not None or ("criterion" in how and len(candidates) > 1)
+    if compared and not by_likelihood(search, chosen):
         raise FitError(
             "--sums and --criterion compare laws by their likelihood: leave out --weights, --search, --penalty"
         )
@@ -110,7 +123,7 @@ def command(
     options_of_fits: dict[str, Any] = {"compared": compared, **({} if through is None else {"through": through})}
     with ProgressBar() as progress:
         ranking = ranked_candidates(
-            candidates, histories, surrogate, search, settings, progress=progress.tick, **options_of_fits
+            candidates, histories, using, search, chosen, progress=progress.tick, **options_of_fits
         )
     written = write_ranking(ranking, to)
     if as_json:
@@ -118,7 +131,7 @@ def command(
     else:
         print_ranking(ranking, written, len(histories))
     if confirm:
-        _confirm([ranking.best], histories, surrogate, as_json)
+        _confirm([ranking.best], histories, using, as_json)
     if further_tests:
         tell(ranking.further_tests(), err=as_json)
 
@@ -126,7 +139,7 @@ def command(
 def _screen(
     histories: list[History],
     laws: list[CreepLaw],
-    surrogate: Predictor | None,
+    using: Predictor | None,
     compositions: Path | None,
     to: Path,
     options: ScreeningOptions,
@@ -139,7 +152,7 @@ def _screen(
 
     with ProgressBar() as progress:
         plate = ck.screen(
-            histories, laws, surrogate, compositions=compositions, to=to, options=options, workers=workers,
+            histories, laws, using, compositions=compositions, to=to, options=options, workers=workers,
             progress=progress.tick,
         )  # fmt: skip
     written = [plate.to_csv(to / "plate.csv")]
@@ -149,13 +162,13 @@ def _screen(
     print_screening(plate, written, as_json)
 
 
-def _confirm(fits: list[Identification], histories: list[History], surrogate: Predictor | None, as_json: bool) -> None:
-    """Simulate identified laws for each test; surrogate : what they were identified through."""
+def _confirm(fits: list[Identification], histories: list[History], using: Predictor | None, as_json: bool) -> None:
+    """Simulate identified laws for each test; using : what they were identified through."""
     import creepkit as ck
     from creepkit.reports.inference import confirmation_to_json
 
     for fit in fits:
-        found = ck.confirm(fit if surrogate is None else replace(fit, predictor=surrogate), histories)
+        found = ck.confirm(fit if using is None else replace(fit, predictor=using), histories)
         if as_json:
             print_json(confirmation_to_json(found))
         else:

@@ -100,7 +100,7 @@ def moduli(
         raise FitError(f"frames is {frames}; at least 3 are needed to tell a modulus from creep")
     first_frames = [h.replace(used=h.used & (np.cumsum(h.used) <= frames)) for h in histories]
     modulus = Nuisance("modulus", sd=np.inf, bounds=MODULUS_BOUNDS)
-    chosen = replace(settings or IdentificationSettings(starts=4), nuisances=(modulus,))
+    chosen = replace(settings or IdentificationSettings(), nuisances=(modulus,))
     fit = identify(resolve_law(law), first_frames, predictor, settings=chosen)
     estimates = {n.owner: n for n in fit.nuisances if n.kind == "modulus"}
     stated = np.array([float(h.elastic.at(h.mean_temperature).E) for h in histories if h.elastic is not None])
@@ -296,7 +296,7 @@ def temperature_study(
     notes = [*left_out, *([not_isothermal] if not_isothermal else [])]
     moduli_fit = None
     if options.moduli:
-        moduli_fit = moduli(with_arrhenius(law, histories), histories, predictor, frames=FIRST_FRAMES)
+        moduli_fit = moduli(with_arrhenius(law, histories), histories, predictor, settings=settings)
         if moduli_fit.elastic is not None:
             histories = [h.replace(elastic=moduli_fit.elastic) for h in histories]
     joint_fit = identify(with_arrhenius(law, histories), histories, predictor, settings=settings, progress=progress)

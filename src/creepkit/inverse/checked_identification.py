@@ -82,7 +82,7 @@ def select(
     *,
     through: Predictor | Literal["auto"] | None = "auto",
     sums: bool | None = None,
-    by: Literal["bic", "aicc"] = "bic",
+    criterion: Literal["bic", "aicc"] = "bic",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     **changes: Unpack[IdentificationSettingsKeywords],
@@ -91,8 +91,9 @@ def select(
 
     laws : candidates; sums : also sums of two of them: True, False, or None, with which sums of the best law and then
         richer registered laws are tried where none explains the tests to their noise, at most `further_laws` of them.
-    by : the criterion; the result is a set of laws with weights, and a verdict: "decisive" only where one law of those
-        asked for explains the tests, has 95 % of the weight, and nothing that the tests allow stands against it.
+    criterion : of the comparison; the result is a set of laws with weights, and a verdict: "decisive" only where one
+        law of those asked for explains the tests, has 95 % of the weight, and nothing that the tests allow stands
+        against it.
     using, through, settings, changes : as for identify(); weights are "automatic" or "likelihood".
     """
     predictor = resolve_predictors(using, histories)
@@ -107,7 +108,7 @@ def select(
         settings=settings,
         through=_resolve_through(through, predictor),
         sums=sums,
-        by=by,
+        criterion=criterion,
         progress=progress,
     )
     notes = (*left_out, *loading_notes(histories), *rig_notes(histories, settings))

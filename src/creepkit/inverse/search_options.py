@@ -17,13 +17,13 @@ class SearchOptions(Options, title="options of a search", error=FitError):
     """What identify() and select() take as objects or arguments of their own.
 
     search : how to begin. penalty : on the terms of a sum. sums : whether sums of
-    two laws are tried; None where no candidate explains the tests. by : the criterion of a comparison.
+    two laws are tried; None where no candidate explains the tests. criterion : of a comparison.
     """
 
     search: Literal["multi-start", "swarm"] = option("multi-start", "How to begin.")
     penalty: Literal["l2", "subsets"] | None = option(None, "Keep those terms of a sum that the tests need.")
     sums: bool | None = option(None, "Whether sums of two laws are tried; by default where no law explains the tests.")
-    by: Literal["bic", "aicc"] = option("bic", "Of a comparison of laws.", flag="criterion")
+    criterion: Literal["bic", "aicc"] = option("bic", "Of a comparison of laws.")
 
     @property
     def global_search(self) -> GlobalSearch | None:

@@ -36,12 +36,6 @@ POINT_SIZE = 6
 STRESS, STRAIN, TIME, TEMPERATURE, PRINCIPAL_STRESS, MEAN_STRESS = range(POINT_SIZE)
 
 
-RATE_NOT_FINITE = 1
-
-
-DERIVATIVE_NOT_FINITE = 2
-
-
 @dataclass(frozen=True, eq=False)
 class CompiledEntry:
     """A C function; code : what keeps its machine code in memory."""

@@ -18,7 +18,7 @@ def specimen_by_name(name: str) -> Specimen:
 def resolve_predictor(predictor: Predictor | str) -> Predictor:
     """The predictor itself, or the specimen of that name."""
     if isinstance(predictor, str):
-        return default_registry().specimen(predictor)
+        return specimen_by_name(predictor)
     default_registry().remember(predictor)
     return predictor
 
@@ -31,7 +31,7 @@ def resolve_predictors(
         names = sorted({h.specimen for h in histories})
         if not names:
             raise FitError("there are no histories to identify a law from")
-        specimens = {name: default_registry().specimen(name) for name in names}
+        specimens = {name: specimen_by_name(name) for name in names}
         return specimens[names[0]] if len(names) == 1 else dict(specimens)
     if isinstance(predictors, Mapping):
         return {name: resolve_predictor(predictor) for name, predictor in predictors.items()}

@@ -145,11 +145,6 @@ class Registry:
         if predictor.specimen.name:
             self._given[predictor.specimen.name] = predictor.specimen
 
-    @property
-    def is_extended(self) -> bool:
-        """Whether it knows plugin files, or specimens that were given, beside what is installed."""
-        return bool(self._given) or any(plugin.source.is_file for plugin in self._loaded())
-
     def law(self, name: str) -> CreepLaw:
         """The law of a name, a sum as "norton+strain-hardening", or "hyperbolic-sine*primary"; LawError without one."""
         if "+" in name and name not in self.laws():

@@ -240,13 +240,12 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
     """What else the tests allow."""
     if ranking is None or len(ranking.laws) < 2 or ranking.decisive or ranking.adequacy is None:
         return
-    others = [one.fit.law.name for one in ranking.credible[1:]]
+    unmet, others = ranking.unmet, [one.fit.law.name for one in ranking.credible[1:]]
     if others:
         yield f"the tests cannot tell it apart from {_named(others, 'law')}"
-    for challenge in (ranking.challenges or ())[:1]:
-        yield str(challenge)
-    if ranking.challenges is None and not others and not ranking.adequacy.rejects:
-        yield "what else the tests allow was not examined"
+    yield from map(str, (ranking.challenges or ())[:1])
+    if not (others or ranking.challenges or ranking.adequacy.rejects):
+        yield from (unmet[name] for name in ("weight", "challenges") if name in unmet)
 
 
 def _precision(fit: Identification) -> Iterator[str]:

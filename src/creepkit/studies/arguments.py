@@ -151,12 +151,12 @@ def predictor_of(file: StudyFile) -> Predictor | None:
     from creepkit.surrogates.surrogate import reduced_order_models
 
     part = file.model.identification
-    named = None if part is None else part.predictor
+    named = None if part is None else part.using
     specimen = None if file.model.specimen is None else specimen_of_study(file)
     if named is None or named == "specimen":
         return specimen
     beside = predictor_path(file)
-    with file.at("identification", "predictor"):
+    with file.at("identification", "using"):
         if beside is None and named not in reduced_order_models():  # never a file of the folder one happens to be in
             what = f"no file '{quoted(named)}' lies beside the study, and no surrogate is called that"
             raise SurrogateError(f"{what}; {nearest(named, reduced_order_models())}")
@@ -166,9 +166,9 @@ def predictor_of(file: StudyFile) -> Predictor | None:
 def predictor_path(file: StudyFile) -> Path | None:
     """The file of the study's predictor; None where it has none, or it is known by its name."""
     part = file.model.identification
-    if part is None or part.predictor is None:
+    if part is None or part.using is None:
         return None
-    path = file.base / file.place_of(("identification", "predictor"), part.predictor)
+    path = file.base / file.place_of(("identification", "using"), part.using)
     return path if path.is_file() else None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -13,15 +13,9 @@ if TYPE_CHECKING:
     from creepkit.records import History
 
 
-def by_likelihood(asked: SearchOptions, changes: Mapping[str, Any]) -> bool:
-    """Whether laws are compared by their likelihood: no search, penalty or weights ask for something else.
-
-    changes : fields of the settings that are stated.
-    """
-    from creepkit.inverse.settings import IdentificationSettings
-
-    weights = IdentificationSettings().changed({"weights": changes.get("weights")})
-    return asked.global_search is None and asked.penalty is None and weights.by_likelihood
+def by_likelihood(asked: SearchOptions, settings: IdentificationSettings) -> bool:
+    """Whether laws are compared by their likelihood: no search, penalty or weights ask for something else."""
+    return asked.global_search is None and asked.penalty is None and settings.by_likelihood
 
 
 def ranked_candidates(
@@ -29,28 +23,34 @@ def ranked_candidates(
     tests: Sequence[History],
     using: Any,
     asked: SearchOptions,
-    changes: Mapping[str, Any],
+    settings: IdentificationSettings,
     *,
     compared: bool,
     progress: Callable[[str, int, int], None],
-    settings: IdentificationSettings | None = None,
     **options: Any,
 ) -> Ranking:
     """Several laws compared as by select(), where likelihood compares them; else each as by identify(), and ranked.
 
-    changes : fields of the settings that are stated. compared : whether a single law is compared, with sums or others.
-    options : further ones of both verbs, such as `through`.
+    compared : whether a single law is compared, with sums or others. options : further ones of both verbs, such as
+    `through`.
     """
     import creepkit as ck
     from creepkit.inverse.compared_tests import common_rupture_times
 
-    if by_likelihood(asked, changes) and (len(laws) > 1 or compared):
+    if by_likelihood(asked, settings) and (len(laws) > 1 or compared):
         return ck.select(
-            laws, tests, using, sums=asked.sums, by=asked.by, settings=settings, progress=progress, **options, **changes
+            laws,
+            tests,
+            using,
+            sums=asked.sums,
+            criterion=asked.criterion,
+            settings=settings,
+            progress=progress,
+            **options,
         )
-    base = settings or ck.IdentificationSettings()
-    ends = common_rupture_times(laws, base.changed({"rupture_times": changes.get("rupture_times")})).rupture_times
-    options |= {**changes, "rupture_times": ends, "search": asked.global_search, "penalty": asked.penalty}
+    options |= {
+        "settings": common_rupture_times(laws, settings), "search": asked.global_search, "penalty": asked.penalty
+    }  # fmt: skip
     fits = []
     for k, law in enumerate(laws, start=1):
         place = f"law {k} of {len(laws)}: {law.title or law.name}"
@@ -58,5 +58,5 @@ def ranked_candidates(
         def of_law(task: str, done: int, total: int, place: str = place) -> None:
             progress(f"{place}, {task}", done, total)
 
-        fits.append(ck.identify(law, tests, using, settings=settings, progress=of_law, **options))
+        fits.append(ck.identify(law, tests, using, progress=of_law, **options))
     return ck.rank(fits)

@@ -143,8 +143,7 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
     settings = study.settings(group, laws)
     how = {} if selection is None else values_of_table(SearchOptions, selection)
     asked = SearchOptions().changed({**values_of_table(SearchOptions, part), **how})
-    changes = values_of_table(IdentificationSettings, part) | {"nuisances": None}  # which the settings have
-    if selection is not None and not by_likelihood(asked, changes):
+    if selection is not None and not by_likelihood(asked, settings):
         what = "compares laws by their likelihood: leave out weights, search and penalty"
         raise study.file.error(("selection",), what)
 
@@ -156,9 +155,7 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
             where = "modulus [GPa] of the table of alloys, or modulus_GPa of [[camera]]"
             raise StudyError(f"Young's modulus of {', '.join(needing[:30])} is not stated; write {where}")
         compared = selection is not None
-        return ranked_candidates(
-            laws, tests, using, asked, changes, compared=compared, settings=settings, progress=tick
-        )
+        return ranked_candidates(laws, tests, using, asked, settings, compared=compared, progress=tick)
 
     described = {
         "laws": [[law.name, law.fingerprint, [[n, *p.bounds, p.off] for n, p in law.table.items()]] for law in laws],

@@ -118,22 +118,21 @@ TYPES: dict[Any, Any] = {
 """{type of an option: that of its key}, where it is another one in TOML."""
 
 
-def _keys(*records: type[Options], without: tuple[str, ...] = ()) -> Any:
-    """A table with the options of records as keys, None where they are missing."""
+def _keys(*records: type[Options], without: tuple[str, ...] = (), only: tuple[str, ...] | None = None) -> Any:
+    """A table with the options of records as keys, None where they are missing; `only` these, with their defaults."""
     keys: Any = TableModel
     for record in records:
-        keys = table_of(record, keys, types=TYPES, without=without)
+        keys = table_of(record, keys, types=TYPES, without=without, only=only)
     return keys
 
 
-class StudyTable(TableModel):
+class StudyTable(_keys(IdentificationSettings, only=("seed",)), TableModel):  # type: ignore[misc]
     """[study]: what the report is called, and the seed of all random draws."""
 
     title: Text = "creep study"
-    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
 
 
-class DataTable(TableModel):
+class DataTable(_keys(IdentificationSettings, only=("suspect_frames",)), TableModel):  # type: ignore[misc]
     """[data]: files of tests, patterns or folders, relative to the study file; none where cameras give the tests.
 
     only : values of labels that tests must have. up_to_strain : frames beyond it are left out.
@@ -145,7 +144,6 @@ class DataTable(TableModel):
     ignore: Texts = []
     only: dict[Text, Labels] = {}
     up_to_strain: Positive | None = None
-    suspect_frames: Literal["exclude", "keep"] = "exclude"
     check_quality: bool = True
     citation: Annotated[Texts, BeforeValidator(_one_or_more)] = []
 
@@ -229,7 +227,7 @@ class SpecimenTable(TableModel):
     lengths: dict[Text, Positive] = {}
 
 
-ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws", "bounds", "sums", "by")
+ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws", "bounds", "sums", "criterion")
 """Options of identifications whose keys stand in tables of their own, in [study], [data] and [selection]."""
 
 
@@ -246,15 +244,16 @@ class IdentificationTable(_OF_IDENTIFICATION, TableModel):  # type: ignore[misc]
     laws: OneOrMore
     confirm: bool | None = None
     group_by: Text | None = None
-    predictor: Text | None = None
+    using: Text | None = None
     bounds: dict[Text, Bounds] = {}
     nuisances: Texts = []
 
 
-class SelectionTable(_keys(SearchOptions, without=("search", "penalty")), TableModel):  # type: ignore[misc]
-    """[selection]: how laws are compared; without sums, sums are tried where no candidate explains the tests."""
+_OF_SELECTION: Any = _keys(IdentificationSettings, only=("further_laws",))
 
-    further_laws: Annotated[int, Field(ge=0, le=100)] | None = None
+
+class SelectionTable(_keys(SearchOptions, without=("search", "penalty")), _OF_SELECTION):  # type: ignore[misc]
+    """[selection]: how laws are compared; without sums, sums are tried where no candidate explains the tests."""
 
 
 class TemperatureTable(_keys(DiscoveryOptions, without=("forms",)), TableModel):  # type: ignore[misc]

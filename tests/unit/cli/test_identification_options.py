@@ -39,23 +39,6 @@ def test_parameters_are_fixed_and_bounded_where_a_law_has_them() -> None:
     assert change_laws([NORTON], None, None) == [NORTON]
 
 
-@pytest.mark.parametrize(
-    ("fix", "bound", "message"),
-    [
-        (["nn=5"], None, "fix: no parameter of norton, strain-hardening is called 'nn'; did you mean 'n'"),
-        (None, ["m_1=0:1"], "bounds: no parameter of norton, strain-hardening is called 'm_1'; "),
-        (["n"], None, "--fix n is not known; write NAME=NUMBER, such as n=5"),
-        (["n=inf"], None, "--fix n=inf is not known; write NAME=NUMBER, such as n=5"),
-        (["n=5", "n=6"], None, "--fix n=5 n=6: n is given twice; keep one of them"),
-        (None, ["n=5"], "--bound n=5 is not known; write NAME=LOW:HIGH, such as n=1:8"),
-    ],
-)
-def test_a_wrong_change_of_a_law_is_one_sentence(fix: list[str] | None, bound: list[str] | None, message: str) -> None:
-    with pytest.raises(FitError) as raised:
-        change_laws([NORTON, HARDENING], fix, bound)
-    assert message in str(raised.value)
-
-
 def test_only_takes_labels() -> None:
     times = np.array([1.0, 2.0])
     tests = [ck.History(name, times, {"strain": times}, ck.constant_stress(50), 1073.15) for name in ("a", "b", "c")]
@@ -94,9 +77,18 @@ def test_weights_that_select_does_not_take_are_an_error() -> None:
 
 
 def test_options_for_measured_tests_are_refused_with_identifications() -> None:
-    assert "--only, --fix, --bound and --surrogate are for tests" in one_line(
+    assert "--only, --fix, --bound and --using are for tests" in one_line(
         creepkit("discover", "fit.json", "--fix", "n=5")
     )
+
+
+def test_what_has_no_effect_with_or_without_a_plate_is_refused() -> None:
+    alone = (["--dense", "none"], ["--workers", "1"], ["--compositions", "c.csv"])
+    of_plate = (["--sums"], ["--search", "swarm"], ["--penalty", "l2"], ["--criterion", "aicc"], ["--further-tests"])
+    cases = [(words, f"{words[0]} is for a plate: add --by alloy, or leave it out") for words in alone]
+    cases += [(["--by=alloy", *words], f"{words[0]} is not for a plate, ") for words in of_plate]
+    answers = [(one_line(creepkit("identify", "tests", *words)), sentence) for words, sentence in cases]
+    assert [(answer, sentence) for answer, sentence in answers if sentence not in answer] == []
 
 
 # ---- identify options ------------------------------------------------------------------------------------------------
@@ -107,50 +99,53 @@ def test_options_for_measured_tests_are_refused_with_identifications() -> None:
 OPTIONS = {one.name: one for one in options_of(IdentificationSettings)}
 
 
-def parse_nuisances(texts):
-    return given_value(OPTIONS["nuisances"], texts, FitError)
-
-
-def parse_weights(text):
-    return given_value(OPTIONS["weights"], text, FitError)
+def read(option, text):
+    if option in OPTIONS:
+        return given_value(OPTIONS[option], text, FitError)
+    return change_laws([NORTON, HARDENING], *(text if option == one else None for one in ("fix", "bound")))
 
 
 def test_weights():
-    assert parse_weights("noise") == "noise"
-    assert parse_weights("paper") == "paper"
-    assert parse_weights("amplitude=0.99, width=0.005") == {"amplitude": 0.99, "width": 0.005}
-    with pytest.raises(
-        FitError,
-        match="--weights amplitude is not known; write automatic.noise.likelihood.equal.paper.NAME=NUMBER,..., such as",
-    ):
-        parse_weights("amplitude")
+    assert read("weights", "noise") == "noise"
+    assert read("weights", "paper") == "paper"
+    assert read("weights", "amplitude=0.99, width=0.005") == {"amplitude": 0.99, "width": 0.005}
 
 
 def test_nuisances_are_added_to_the_usual_two():
-    assert parse_nuisances(None) is None
+    assert read("nuisances", None) is None
     offset, rate = Nuisance("offset"), Nuisance("rate")
     thickness = Nuisance("thickness", mean=0.4935, sd=0.027)
-    assert parse_nuisances(["thickness=0.4935:0.027"]) == default_nuisances(thickness) == (offset, rate, thickness)
-    assert parse_nuisances(["temperature", "rate=0:0.2"]) == (offset, Nuisance("temperature"), Nuisance("rate", sd=0.2))
-    assert parse_nuisances(["thickness=0.4935:0.027", "rate=none"]) == (offset, thickness)
-    assert parse_nuisances(["rate=none", "offset=none"]) == ()
+    assert read("nuisances", ["thickness=0.4935:0.027"]) == default_nuisances(thickness) == (offset, rate, thickness)
+    rough = Nuisance("rate", sd=0.2)
+    assert read("nuisances", ["temperature", "rate=0:0.2"]) == (offset, Nuisance("temperature"), rough)
+    assert read("nuisances", ["thickness=0.4935:0.027", "rate=none"]) == (offset, thickness)
+    assert read("nuisances", ["rate=none", "offset=none"]) == ()
 
 
-def test_nuisances_that_cannot_be_read_are_refused():
-    with pytest.raises(FitError, match="--nuisance ofset=3: nuisance 'ofset' is not known; did you mean 'offset'"):
-        parse_nuisances(["ofset=3"])
-    with pytest.raises(FitError, match="nuisance 'thicknes' is not known; did you mean 'thickness'"):
-        parse_nuisances(["thicknes=0.5"])
-    with pytest.raises(
-        FitError, match="--nuisance rat=none: 'rat' is no default nuisance that could be left out; did you mean 'rate'"
-    ):
-        parse_nuisances(["rat=none"])
-    with pytest.raises(FitError, match="--nuisance thickness=thin: .* is not known; write KIND"):
-        parse_nuisances(["thickness=thin"])
-    with pytest.raises(FitError, match="--nuisance rate step=0:1: nuisance 'rate step': start is 0 s; say when"):
-        parse_nuisances(["rate step=0:1"])
-    with pytest.raises(FitError, match="--nuisance temperature=nan: .* is not known; write KIND"):
-        parse_nuisances(["temperature=nan"])
+CANNOT_BE_READ = [
+    ("fix", ["nn=5"], "fix: no parameter of norton, strain-hardening is called 'nn'; did you mean 'n'"),
+    ("bound", ["m_1=0:1"], "bounds: no parameter of norton, strain-hardening is called 'm_1'; "),
+    ("fix", ["n"], "--fix n is not known; write NAME=NUMBER, such as n=5"),
+    ("fix", ["n=inf"], "--fix n=inf is not known; write NAME=NUMBER, such as n=5"),
+    ("fix", ["n=5", "n=6"], "--fix n=5 n=6: n is given twice; keep one of them"),
+    ("bound", ["n=5"], "--bound n=5 is not known; write NAME=LOW:HIGH, such as n=1:8"),
+    ("weights", "amplitude", "write automatic|noise|likelihood|equal|paper|NAME=NUMBER,..., such as"),
+    ("nuisances", ["ofset=3"], "--nuisance ofset=3: nuisance 'ofset' is not known; did you mean 'offset'"),
+    ("nuisances", ["thicknes=0.5"], "nuisance 'thicknes' is not known; did you mean 'thickness'"),
+    ("nuisances", ["rat=none"], "--nuisance rat=none: 'rat' is no default nuisance that could be left out; did you"),
+    ("nuisances", ["thickness=thin"], " is not known; write KIND"),
+    ("nuisances", ["rate step=0:1"], "--nuisance rate step=0:1: nuisance 'rate step': start is 0 s; say when"),
+    ("nuisances", ["temperature=nan"], " is not known; write KIND"),
+]
+
+
+def test_what_cannot_be_read_is_one_sentence():
+    wrong = []
+    for option, text, words in CANNOT_BE_READ:
+        with pytest.raises(FitError) as raised:
+            read(option, text)
+        wrong += [] if words in str(raised.value) else [(text, str(raised.value))]
+    assert wrong == []
 
 
 # ---- identified folder -----------------------------------------------------------------------------------------------

@@ -1,5 +1,7 @@
 """discover() and refit() from creep curves to an ordinary law, on a closed-form predictor and on one dimple."""
 
+import sys
+
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
@@ -100,6 +102,19 @@ def test_a_study_groups_tests_and_finds_the_same(tests, trend):
     assert found.joint_fit.law.names == ("A", "n", "Q")
     assert found.temperature_law.forms == trend.forms
     assert "norton*arrhenius describes" in str(found)
+
+
+def test_moduli_are_found_with_the_settings_of_the_study(tests, monkeypatch):
+    asked = {}
+
+    def moduli(law, histories, using, **how):
+        asked.update(how)
+        raise FitError("no more")
+
+    monkeypatch.setattr(sys.modules["creepkit.discovery.discover"], "moduli", moduli)
+    with pytest.raises(FitError, match="no more"):
+        temperature_study(NORTON, tests, Steady(), settings=QUICK, moduli=True)
+    assert asked == {"settings": QUICK}
 
 
 def stepped(test, kelvin):

@@ -108,7 +108,7 @@ MISTAKES = [
     (lambda tests, fit: History("bar", *BAR, rupture_time=9.0), "a used frame at 10 s lies after the rupture at 9 s"),
     (lambda tests, fit: History("bar", *BAR, rupture_time=10.0, unruptured=True), "keep one of them"),
     (lambda tests, fit: rank([]), "there are no identifications to rank"),
-    (lambda tests, fit: rank([fit], "hold-up"), "rank(by='hold-up') is not known"),
+    (lambda tests, fit: rank([fit], "hold-up"), "criterion 'hold-up' is not known"),
     (lambda tests, fit: rank([fit, replace(fit, provenance={"data": "others"})]), "were made from different histories"),
     (lambda tests, fit: ck.select([], tests, "uniaxial"), "there are no candidate laws"),
     (lambda tests, fit: ParticleSwarm(particles=1), "particles is 1; allowed are whole numbers from 2 to"),

@@ -10,11 +10,15 @@ from pathlib import Path
 from time import sleep
 from typing import Any
 
+import numpy as np
 import pytest
 
 from creepkit.errors import ExportError, HistoryError, LawError, PluginError, SolveError
 from creepkit.language import CreepLaw, arrhenius
-from creepkit.registry import Plugin, Registry, kinds, plugin_sources
+from creepkit.records import History, constant_load
+from creepkit.registry import Plugin, Registry, default_registry, kinds, plugin_sources
+from creepkit.registry.arguments import resolve_predictors
+from helpers.cantilever import Cantilever
 from helpers.mistakes import said_otherwise
 
 LAW = """
@@ -333,3 +337,12 @@ def test_threads_that_ask_first_wait_until_all_plugins_are_loaded(monkeypatch: p
         answers = list(threads.map(ask, [registry] * 4))
     assert answers[0]
     assert answers == [answers[0]] * 4
+
+
+def test_a_specimen_that_was_given_is_found_by_the_name_that_histories_have():
+    beam = Cantilever()
+    history = History("beam", np.ones(1), {"deflection": np.ones(1)}, constant_load("force", 8.0), 973.15, beam.name)
+    with pytest.raises(SolveError, match="cantilever"):
+        resolve_predictors(None, [history])
+    default_registry().remember(beam)
+    assert resolve_predictors(None, [history]) is beam is resolve_predictors("cantilever", [history])

@@ -186,8 +186,8 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
         (BASE + "fix = { n = 50 }\n", 5, "n"),
         (BASE + "bounds = { n = [5, 2] }\n", 5, "n"),
         (BASE + "bounds = { n = [1, 1e308] }\n", 5, "at most 1e+100"),
-        (BASE + 'predictor = "dimpel"\n', 5, "did you mean 'dimple'"),
-        (BASE + 'predictor = "/etc/passwd"\n', 5, "absolute"),
+        (BASE + 'using = "dimpel"\n', 5, "did you mean 'dimple'"),
+        (BASE + 'using = "/etc/passwd"\n', 5, "absolute"),
         (BASE + 'test_loss = "lin"\n', 5, "must be one of these: gaussian, "),
         (BASE + 'nuisances = ["offst=none"]\n', 5, "did you mean 'offset'"),
         (BASE + 'nuisances = ["thicknes=0.5"]\n', 5, "thickness"),
@@ -268,7 +268,7 @@ def test_a_predictor_is_no_file_of_the_working_folder(folder, tmp_path_factory, 
     (elsewhere / "net").write_bytes(b"of somebody else")
     monkeypatch.chdir(elsewhere)
     for name in ("net.safetensors", "net"):
-        (folder / "study.toml").write_text(BASE + f'predictor = "{name}"\n')
+        (folder / "study.toml").write_text(BASE + f'using = "{name}"\n')
         with pytest.raises(StudyError, match=rf"study\.toml:5: .*no file '{name}' lies beside the study"):
             ck.Study.load(folder / "study.toml").run()
 

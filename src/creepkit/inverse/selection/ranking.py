@@ -86,17 +86,31 @@ class Ranking(Presentable, Plotted, Tabulated):
         return self.best.valued.replace(notes=tuple(self.best.comments(self)))
 
     @property
+    def unmet(self) -> Mapping[str, str]:
+        """{condition of a decisive answer that is not met: why, in words}, most telling first.
+
+        "alternatives": two laws or more were fitted. "adequacy": the best one explains the tests, with nuisances of
+        plausible size. "weight": it has more than 95 %. "asked": it was asked for. "challenges": it stands every one.
+        """
+        adequacy, unmet = self.adequacy, dict[str, str]()
+        if len(self.laws) == 1:
+            unmet["alternatives"] = f"only {self.best.law.name} was fitted"
+        if adequacy is None or not adequacy.explains_plausibly:
+            unmet["adequacy"] = self.adequacy_text
+        if not self.laws[0].weight > DECISIVE_WEIGHT:
+            unmet["weight"] = f"its weight is not above {DECISIVE_WEIGHT:g}"
+        if self.best.law.name in self.further:
+            unmet["asked"] = "it is none of the laws asked for"
+        if self.challenges is None:
+            unmet["challenges"] = "what else the tests allow was not examined"
+        elif self.challenges:
+            unmet["challenges"] = "; and ".join(challenge.sentence for challenge in self.challenges)
+        return unmet
+
+    @property
     def decisive(self) -> bool:
         """Whether a law that was asked for explains the tests, has 95 % of the weight, and stands every challenge."""
-        return (
-            len(self.laws) > 1
-            and self.singled_out
-            and self.best.law.name not in self.further
-            and self.challenges is not None
-            and not self.challenges
-            and self.adequacy is not None
-            and self.adequacy.explains_plausibly
-        )
+        return not self.unmet
 
     @property
     def singled_out(self) -> bool:
@@ -109,14 +123,24 @@ class Ranking(Presentable, Plotted, Tabulated):
         return self.best.adequacy
 
     @property
+    def adequacy_text(self) -> str:
+        """What the tests say of the best law, in words that begin with "it"."""
+        return "whether the tests contradict it is not known" if self.adequacy is None else f"it {self.adequacy}"
+
+    @property
     def credible(self) -> tuple[RankedLaw, ...]:
         """The laws that the tests cannot rule out: weight above 5 %."""
         return tuple(r for r in self.laws if r.weight > CREDIBLE_WEIGHT)
 
     @property
     def verdict(self) -> str:
-        """One sentence: which law, or which laws these tests cannot tell apart."""
-        return verdict_of(self)
+        """One sentence: what is known of the law, of how many tried, and what keeps it from being decisive."""
+        unmet, best = self.unmet, self.best.law.name
+        if "alternatives" in unmet:
+            return f"{unmet['alternatives']}; {self.adequacy_text}"
+        if not unmet:
+            return f"decisive: {best}, of {len(self.laws)} laws tried; {self.adequacy_text}"
+        return f"not decisive: {_reason(self, unmet)}"
 
     @property
     def model_average(self) -> ModelAverage:
@@ -166,23 +190,11 @@ class Ranking(Presentable, Plotted, Tabulated):
         return ranking_text(self)
 
 
-def verdict_of(ranking: Ranking) -> str:
-    """One sentence: what is known of the law, of how many tried, and what keeps it from being decisive."""
-    names, count, adequacy = [r.fit.law.name for r in ranking.credible], len(ranking.laws), ranking.adequacy
-    best = ranking.best.law.name
-    adequacy_text = "whether the tests contradict it is not known" if adequacy is None else f"it {adequacy}"
-    if count == 1:
-        return f"only {best} was fitted; {adequacy_text}"
-    if ranking.decisive:
-        return f"decisive: {best}, of {count} laws tried; {adequacy_text}"
-    return f"not decisive: {_reason(ranking, names, adequacy_text)}"
-
-
-def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
+def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
     """Why a ranking of several laws is not decisive."""
-    best, count, adequacy = ranking.best.law.name, len(ranking.laws), ranking.adequacy
-    weight = f"weight {ranking.laws[0].weight:.2f} of the laws tried"
-    named = "; and ".join(challenge.sentence for challenge in ranking.challenges or ())
+    names, best, count = [r.fit.law.name for r in ranking.credible], ranking.best.law.name, len(ranking.laws)
+    adequacy, weight = ranking.adequacy, f"weight {ranking.laws[0].weight:.2f} of the laws tried"
+    named = unmet["challenges"] if ranking.challenges else ""
     if adequacy is not None and adequacy.rejects:
         if adequacy.lies_in_tests:
             first = adequacy.explanations[0].headline
@@ -194,24 +206,19 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
             others += f"; with {effect}, which nobody modelled, {remedied[0].law.name} would explain them"
         stated = f" as they are stated; {named}" if named else ""
         return f"none of {count} laws tried explains the tests{stated}; the best, {best} ({weight}{others}), {adequacy}"
-    if best in ranking.further and adequacy is not None and adequacy.explains:
+    if "asked" in unmet and adequacy is not None and adequacy.explains:
         asked, more = count - len(ranking.further), len(ranking.further)
         found = f"of {more} more that were tried, {best} is not contradicted by them ({weight})"
         none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
         return f"{none} the tests; {found}: plan tests that can refute it"
     if len(names) > 1:
-        found = f"{f'{named}; ' if named else ''}the best is {best}: {adequacy_text}"
+        found = f"{f'{named}; ' if named else ''}the best is {best}: {ranking.adequacy_text}"
         return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; {found}"
-    if ranking.challenges is None:
-        unexamined = "what else the tests allow was not examined"
-        return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}; {unexamined}"
-    if ranking.challenges:
-        only = "" if adequacy is None else adequacy.qualification
-        return (
-            f"of {count} laws tried {best} has nearly all the weight ({weight}) and is not contradicted by the tests"
-            f"{only}; but {named}"
-        )
-    return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}"
+    if named and ranking.singled_out and adequacy is not None:
+        explains = f"is not contradicted by the tests{adequacy.qualification}"
+        return f"of {count} laws tried {best} has nearly all the weight ({weight}) and {explains}; but {named}"
+    reasons = dict.fromkeys([ranking.adequacy_text, *unmet.values()])
+    return f"of {count} laws tried {best} is best ({weight}); {'; '.join(reasons)}"
 
 
 @checked
@@ -230,7 +237,7 @@ def rank(
     if not fits:
         raise FitError("there are no identifications to rank")
     if criterion not in ("bic", "aicc"):
-        raise FitError(f"rank(by={criterion!r}) is not known: identifications are ranked by 'bic' or 'aicc'")
+        raise FitError(f"criterion {criterion!r} is not known: identifications are ranked by 'bic' or 'aicc'")
     if len({fit.provenance.get("data") for fit in fits}) > 1:
         raise FitError(
             "the identifications were made from different histories, frames, nuisances or rupture times and "
@@ -239,9 +246,8 @@ def rank(
     common = under_common_covariance(fits)
     independent_frames, chi_square = common.independent_frames, common.chi_square
     penalty = bic_penalty if criterion == "bic" else aicc_penalty
-    score = chi_square + common.log_determinant
     counts = [determined_parameters(fit.linear_problem.residuals, fit.u.size) for fit in fits]
-    score = score + [penalty(count, independent_frames) for count in counts]
+    score = chi_square + common.log_determinant + [penalty(count, independent_frames) for count in counts]
     ranking = ranking_from_scores(
         fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed
     )
@@ -259,10 +265,9 @@ def challenged(ranking: Ranking) -> Ranking:
     fits = [ranked.fit for ranked in ranking.laws]
     if len(fits) < 2 or any(f.predictor is None or not f.histories for f in fits):
         return ranking
-    if ranking.singled_out:
-        return replace(ranking, challenges=challenges_of(fits))
-    named = explaining_effects(fits, np.array([ranked.weight for ranked in ranking.laws]))
-    return replace(ranking, challenges=named) if named else ranking
+    weights = np.array([ranked.weight for ranked in ranking.laws])
+    found = challenges_of(fits) if ranking.singled_out else explaining_effects(fits, weights)
+    return replace(ranking, challenges=found)
 
 
 def ranking_from_scores(

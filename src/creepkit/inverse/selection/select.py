@@ -44,14 +44,14 @@ def select(
     settings: IdentificationSettings | None = None,
     through: Predictor | None = None,
     sums: bool | None = None,
-    by: Criterion = "bic",
+    criterion: Criterion = "bic",
     progress: IterationCallback | None = None,
 ) -> Ranking:
     """Identify every candidate from the same histories by likelihood, and rank them; see identify.describing.
 
     sums : also sums of two candidates: True, False, or None for sums of the best law where it does not explain the
         tests to their noise, and then richer registered laws, at most settings.further_laws of both together.
-    by : "bic" or "aicc".
+    criterion : "bic" or "aicc".
     A law that cannot be identified is named in `failed`; FitError if none can.
     """
     asked = settings or IdentificationSettings()
@@ -72,7 +72,7 @@ def select(
     if not fits:
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
-    ranking = rank(fits, by, failed)
+    ranking = rank(fits, criterion, failed)
     shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
     laws = [replace(one, fit=_as_shown(one.fit, asked, through)) if id(one) in shown else one for one in ranking.laws]
     return replace(ranking, laws=tuple(laws), further=tried_further)
