@@ -34,8 +34,8 @@ LIKELIHOOD_TOLERANCE = 1e-5
 and above what the steps of a solver leave."""
 
 
-MOST_LAST_STEPS, LAST_STEP = 4, 0.02
-"""Last steps of values by likelihood, and the largest one left out, in standard deviations."""
+MOST_LAST_STEPS, LAST_STEP, MOST_HALVINGS = 10, 0.02, 4
+"""Last steps of values by likelihood, the largest one left out, in standard deviations, and halvings of each."""
 
 
 CONVERGED_GAIN = 0.02
@@ -153,18 +153,31 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         residuals = problem.residuals(linear.x).with_test_weights(residuals.test_weights)
         linear = replace(problem.linearised(linear.x, residuals), free=free)
         errors = errors_of_tests(problem, linear.x, linear, noise)
-        solution = linear.solve(CovarianceFactor.of_residuals(linear.with_errors(errors).residuals, expected))
+        factor = CovarianceFactor.of_residuals(linear.with_errors(errors).residuals, expected)
+        solution = linear.solve(factor)
         found = replace(found, problem=problem, linear=linear, errors=errors)
         target = linear.x.copy()
         target[free] += solution.step
         x = problem.constrained(linear.x, target, free, solution.covariance)
         if (np.abs(x - linear.x)[free] <= LAST_STEP * np.sqrt(np.diag(solution.covariance))).all():
             break
-        moved = problem.residuals(x).with_test_weights(residuals.test_weights)
-        if not is_finite(moved):
+        for _ in range(MOST_HALVINGS):
+            moved = problem.residuals(x).with_test_weights(residuals.test_weights)
+            further = replace(problem.linearised(x, moved), free=free)
+            if is_finite(moved) and _chi_square(further, factor) < _chi_square(linear, factor):
+                break
+            x = 0.5 * (x + linear.x)
+        else:  # curves that run away are not linear in the values: what no shorter step improves stays
             break
-        linear = replace(problem.linearised(x, moved), free=free)
+        linear = further
     return found
+
+
+def _chi_square(linear: LinearisedProblem, factor: CovarianceFactor) -> float:
+    """Of residuals and priors, at the values of a linear problem."""
+    return float(
+        (factor.whiten(linear.residuals.values) ** 2).sum() + (linear.precision * linear.prior_residual**2).sum()
+    )
 
 
 def within_bounds(found: EstimationResult) -> EstimationResult:
@@ -220,8 +233,7 @@ def _expected_gain(linear: LinearisedProblem, noise: NoiseModel) -> float:
     """Growth of the log-likelihood, to first order, if the values moved to the optimum under this noise."""
     residuals = linear.residuals
     factor = CovarianceFactor.of_residuals(residuals, noise)
-    chi_square = (factor.whiten(residuals.values) ** 2).sum() + (linear.precision * linear.prior_residual**2).sum()
-    return 0.5 * float(chi_square - linear.solve(factor).chi_square)
+    return 0.5 * (_chi_square(linear, factor) - linear.solve(factor).chi_square)
 
 
 def _log_likelihood(problem: LeastSquaresProblem, linear: LinearisedProblem, noise: NoiseModel) -> float:

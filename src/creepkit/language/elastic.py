@@ -10,6 +10,11 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import LawError
 from creepkit.language.symbols import temperature
 
+STATE_MODULUS = (
+    "state Young's modulus: modulus_GPa = 150 in tests.toml or the head of its file, elastic=Elastic(E=150e3) in Python"
+)
+"""What to write where a simulation needs it."""
+
 
 @checked
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ import numpy as np
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
+from creepkit.language.elastic import STATE_MODULUS
 from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ranges_text
 from creepkit.quality.frames import decreasing_frames, outlier_frames, unloading_frames
 from creepkit.quality.idle_time import idle_flags
@@ -30,7 +31,7 @@ from creepkit.quality.rig import (
     rate_change_flag,
     record_flags,
 )
-from creepkit.records import History
+from creepkit.records import History, known_specimens
 
 __all__ = [
     "ACTIVATION_ENERGY",
@@ -99,6 +100,14 @@ def _large_strains(histories: Sequence[History]) -> Iterator[QualityFlag]:
             yield QualityFlag((history.name,), "unit", (), reason)
 
 
+def _unstated_moduli(histories: Sequence[History]) -> Iterator[QualityFlag]:
+    """Tests whose specimen needs Young's modulus, which nothing states: one flag."""
+    needing = {name for name, one in known_specimens().items() if "modulus" in one.conditions}
+    names = [history.name for history in histories if history.elastic is None and history.specimen in needing]
+    if names:
+        yield QualityFlag(tuple(names), "modulus", (), "no simulation goes without it", proposal=STATE_MODULUS)
+
+
 _EXCLUDED = re.compile(
     r"(?:do not|don.?t|not to be|never) use|not usable|^\W*void\W*$|\b(?:test|result) (?:is )?(?:void|invalid)\b"
     r"|\b(?:void|invalid) (?:test|result)|ungültig|nicht (?:verwenden|verwertbar|auswerten)|à (?:exclure|écarter)"
@@ -123,6 +132,7 @@ TEST_RULES: tuple[Callable[[Sequence[History]], Iterable[QualityFlag]], ...] = (
     _copy_flags,
     _replicate_flags,
     _large_strains,
+    _unstated_moduli,
     remark_flags,
 )
 """What questions whole tests, each by itself or beside the others."""

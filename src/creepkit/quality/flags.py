@@ -18,6 +18,7 @@ FlagKind = Literal[
     "replicate",
     "loading",
     "unit",
+    "modulus",
     "record",
     "jump",
     "idle",

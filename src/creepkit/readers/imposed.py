@@ -335,7 +335,12 @@ def _recorded(
     tolerance = TEMPERATURE_RECORD_TOLERANCE if is_temperature else LOAD_RECORD_TOLERANCE * float(np.abs(column).max())
     if start is not None and start < column.size - 2 and not _drifts(column[start:], tolerance):
         held = np.maximum(column, 0.0)
-        return _ramp_and_hold(frames.times, held, start) if start else float(held.mean())
+        if not start:
+            return float(held.mean())
+        if frames.times[0] == 0.0:
+            return _ramp_and_hold(frames.times, held, start)
+        conditions.record_assumption(f"strain 0 at time 0 (the ramp is read from {frames.times[0]:g} s on)")
+        return _ramp_and_hold(np.append(0.0, frames.times), np.append(0.0, held), start + 1)
     starts = _level_starts(column, tolerance)
     if not starts:
         begun, record = _from_rest(frames.times, column) if quantity == "strain" else (frames.times, column)

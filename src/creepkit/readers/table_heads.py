@@ -20,6 +20,7 @@ from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.questions import ANSWERS_FILE
 from creepkit.readers.table import CellTable, SourceText, TableRow, without_ignored
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit, split_written_name, unit_suffix, words_of
+from creepkit.records import known_specimens
 from creepkit.records.quantities import LENGTH
 
 _MOST_ROWS, _MOST_BELOW = 60, 6
@@ -148,10 +149,13 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
 
 def _with_stated(table: CellTable, stated: Mapping[str, tuple[str, str]]) -> CellTable:
     """The table with what a file of answers states of its tests, {key: text and place}, in its head."""
+    header = dict(table.header)
     for key, (text, place) in stated.items():
-        if key in table.header and table.header[key].text != text:
-            raise HistoryError(f"{place}: {key} is '{quoted(text)}', and {table.header[key].location} says another one")
-    return replace(table, header={**table.header, **{key: SourceText(*one) for key, one in stated.items()}})
+        if key == "specimen" and key in header and header[key].text.casefold() not in known_specimens():
+            header["label specimen"] = header.pop(key)
+        elif key in header and header[key].text != text:
+            raise HistoryError(f"{place}: {key} is '{quoted(text)}', and {header[key].location} says another one")
+    return replace(table, header={**header, **{key: SourceText(*one) for key, one in stated.items()}})
 
 
 def _with_comments(table: CellTable, names_line: int, known: Terms) -> CellTable:

@@ -56,9 +56,11 @@ class TabulatedTest:
     table: CellTable
 
 
-def refuse_twice(entries: Mapping[str, SourceText], header: Mapping[str, SourceText], known: Terms) -> None:
-    """HistoryError where what the header states is stated anew."""
+def refuse_twice(entries: dict[str, SourceText], header: Mapping[str, SourceText], known: Terms) -> None:
+    """HistoryError where what the header states is stated anew; the mark of a test piece is a label."""
     given = {known.condition(key) for key in header}
+    if "specimen" in given and "specimen" in entries and entries["specimen"].text.casefold() not in known.outputs:
+        entries["label specimen"] = entries.pop("specimen")
     for key, entry in entries.items():
         if key in given:
             raise HistoryError(f"{entry.location}: '{key}' was already given; keep one of them")

@@ -189,7 +189,8 @@ def tests_text(fit: Identification) -> str:
 def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQuality | None = None) -> list[str]:
     """What to mind, the most serious first, a sentence each without a full stop."""
     others = [one.fit for one in ranking.laws if one.fit is not fit] if ranking is not None else []
-    of_law = [*_held([fit]), *_contradictions(fit), *_choice(ranking), *_precision(fit)]
+    choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
+    of_law = [*_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
     return list(dict.fromkeys([*of_law, *_held(others), *_data(quality)]))
 
 
@@ -226,8 +227,7 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         unit = "%" if percent else output_unit(worst.output)
         size = abs(worst.deviation) * (100.0 if percent else 1.0)
         side = "too large" if worst.deviation > 0 else "too small"
-        what = worst.output.replace("_", " ")
-        amount = f"{size:.2g} {unit}".strip()
+        what, amount = worst.output.replace("_", " "), f"{size:.2g} {unit}".strip()
         yield f"it is worst in '{worst.test}': {what} {amount} {side} at {time_text(worst.time)}"
     if adequacy.remedies and not adequacy.explanations:
         yield f"it would explain the tests with {adequacy.remedies[0]}, which nobody modelled"
@@ -332,21 +332,18 @@ def answer(
     )
 
 
-def answer_text(fit: Identification) -> str:
-    """The answer of one law."""
-    return as_text([answer(fit)])
-
-
-def ranking_answer_text(ranking: Ranking) -> str:
-    """The same of the best law of a ranking, with the weights of all."""
-    return as_text([answer(ranking.best, ranking)])
+def answer_text(fit: Identification, ranking: Ranking | None = None) -> str:
+    """The answer of one law, or of the best of a ranking with the weights of all."""
+    return as_text([answer(fit, ranking)])
 
 
 def chosen_text(ranking: Ranking) -> str:
-    """Whether the choice of the law is decisive, and the weights of the laws."""
+    """Whether the choice of the law is decisive, and the weights of the laws; weights do not say why one is not."""
     weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED])
     more = len(ranking.laws) - MOST_NAMED
     decided = "decisive" if ranking.decisive else "not decisive"
+    if len(ranking.credible) == 1 and ranking.singled_out and ranking.challenges:
+        decided += f", for the tests allow {ranking.challenges[0].subject} as well"
     return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}"
 
 

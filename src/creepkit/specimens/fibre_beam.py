@@ -22,6 +22,7 @@ from creepkit.arrays import Floats, frozen
 from creepkit.errors import SolveError
 from creepkit.integration import FibreInput, FibreModel, FibreTest, IntegrationSettings
 from creepkit.integration.time_discretisation import SDIRK4_TEXT
+from creepkit.language.elastic import STATE_MODULUS
 from creepkit.records import History, NuisanceValues, Prediction, Program, Status
 from creepkit.specimens.bar import SEARCH_TOLERANCE
 from creepkit.specimens.run import Run, run_from_outputs
@@ -246,7 +247,7 @@ class FibreBeam(TestPiece, ABC):
         if tested.elastic is None:
             raise SolveError(
                 f"{tested.origin}: a {self.name} specimen needs elastic data, for stress spreads over its sections as "
-                "creep and elastic strain share it; set elastic=Elastic(E=150e3), in MPa"
+                f"creep and elastic strain share it; {STATE_MODULUS}"
             )
         return _modulus_program(tested.elastic, tested.temperature_program())
 

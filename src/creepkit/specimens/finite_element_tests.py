@@ -16,6 +16,7 @@ from creepkit.fem.finite_element_model import FiniteElementModel, SensitivityDir
 from creepkit.fem.simulation import LoadHistory, Simulation, sensitivity_directions, simulate
 from creepkit.fem.solver import SolvableModel, SolverSettings
 from creepkit.integration.time_discretisation import SDIRK2_TEXT
+from creepkit.language.elastic import STATE_MODULUS
 from creepkit.records import (
     History,
     NuisanceValues,
@@ -165,7 +166,7 @@ def _load_history_of(
     if end <= 0.0:
         raise SolveError(f"{where}: the last time is 0 s, where the load only begins; ask for a time after it")
     if elastic is None:
-        raise SolveError(f"{where}: specimen '{piece.name}' needs elastic data; set elastic=Elastic(E=...), E in MPa")
+        raise SolveError(f"{where}: specimen '{piece.name}' needs elastic data; {STATE_MODULUS}")
     load = loading.program()
     if {each.name: each.quantity for each in piece.loads}[quantity] == "pressure" and load.values.min() < 0.0:
         raise SolveError(f"{where}: the pressure falls to {load.values.min():g} MPa; it must not be negative")

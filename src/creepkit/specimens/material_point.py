@@ -21,6 +21,7 @@ from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
 from creepkit.integration.tensor_point import von_mises
 from creepkit.integration.time_discretisation import SDIRK2_TEXT
+from creepkit.language.elastic import STATE_MODULUS
 from creepkit.records import (
     TENSOR_COMPONENTS,
     History,
@@ -284,9 +285,7 @@ def elastic_von_mises(loading: PointLoading, elastic: tuple[float, float] | None
         stress[:, TENSOR_COMPONENTS.index(name)] = program.at(marks)
     if loading.strain:
         if elastic is None:
-            raise SolveError(
-                "a material point under prescribed strain needs elastic data; set elastic=Elastic(E=150e3)"
-            )
+            raise SolveError(f"a material point under prescribed strain needs elastic data; {STATE_MODULUS}")
         strain_controlled = [TENSOR_COMPONENTS.index(name) for name in loading.strain]
         flexibility = compliance(elastic)
         elastic_residual = (

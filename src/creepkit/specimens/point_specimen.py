@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from creepkit.errors import SolveError
+from creepkit.language.elastic import STATE_MODULUS
 from creepkit.records import History
 from creepkit.specimens.settings_checks import check_ranges
 from creepkit.specimens.test_piece import TestPiece
@@ -50,10 +51,7 @@ def isothermal_elasticity(history: History, specimen: str) -> tuple[float, float
     """E, MPa, and nu of a test whose strain is prescribed: they must be the same at all its temperatures."""
     where = history.origin
     if history.elastic is None:
-        raise SolveError(
-            f"{where}: a {specimen} specimen under prescribed strain needs elastic data; set elastic=Elastic(E=150e3), "
-            "in MPa"
-        )
+        raise SolveError(f"{where}: a {specimen} specimen under prescribed strain needs elastic data; {STATE_MODULUS}")
     result = [history.elastic.at(float(T)) for T in np.unique(history.temperature_program().values)]
     moduli = [float(one.E) for one in result]
     if max(moduli) - min(moduli) > 1e-12 * max(moduli):

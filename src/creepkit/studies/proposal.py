@@ -70,6 +70,7 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
         if any(ANSWERS_FILE in one for one in problems):
             problems.append(f"'creepkit read {folder} --ask' puts what is open as questions")
         quality = ck.check_data_quality([history for history in tests if history.outputs])
+        problems += [str(one) for one in quality if one.kind == "modulus"]
         summary, left_out = DataSummary.of(tests), left_out_lines(quality)
         lines = (*summary.lines, *left_out, *cameras.summary, *problems)
         known |= {
@@ -77,7 +78,9 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
             "reader": reader, "summary": summary, "left_out": left_out, "problems": problems,
             "copies": [one for one in quality if one.kind == "copy"],
             "flags": [
-                one for one in quality if len(one.tests) == 1 and one.kind not in ("copy", *FRAME_FLAG_KINDS)
+                one
+                for one in quality
+                if len(one.tests) == 1 and one.kind not in ("copy", "modulus", *FRAME_FLAG_KINDS)
             ][:MOST_REMARKS],
             **(_identification(summary) if summary.framed else {}),
         }  # fmt: skip

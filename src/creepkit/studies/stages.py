@@ -335,10 +335,11 @@ def _design_stage(study: StageInputs, group: TestGroup) -> Stage:
 
 
 def export_name(file: StudyFile, number: int) -> str:
-    """The file of the export of this number; StudyError for a target that there is not."""
-    part = file.model.export[number]
+    """The file of the export of this number, by the study's name; StudyError for a target that there is not."""
+    part, stem = file.model.export[number], file.path.stem
+    of_study = "" if stem == "study" else f"{stem}_"  # of several studies in a folder
     with file.at("export", number, "target"):
-        return part.file or f"law{default_registry().one(kinds.EXPORTERS, part.target).suffix}"
+        return part.file or f"{of_study}law{default_registry().one(kinds.EXPORTERS, part.target).suffix}"
 
 
 def _export_stage(study: StageInputs, number: int, group: TestGroup) -> Stage:

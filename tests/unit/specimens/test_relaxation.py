@@ -144,7 +144,7 @@ def test_planted_values_are_found_from_relaxation_and_creep_together():
     ("changes", "said"),
     [
         ({"loading": ck.constant_stress(100.0)}, "loaded by strain, found stress; use StrainSteps or constant_strain"),
-        ({"elastic": None}, "a relaxation specimen under prescribed strain needs elastic data; set elastic="),
+        ({"elastic": None}, "under prescribed strain needs elastic data; state Young's modulus: "),
         (
             {"elastic": ck.Elastic(wachtman(2e5, 60.0, 300.0)), "temperature": Program.steps([(0, 900), (9, 1000)])},
             "the modulus changes from .* with the temperature of the test",

@@ -5,7 +5,8 @@ are therefore asked before an answer is called decisive:
 
 1. May a share of the rate come from another law? The best law and each other law tried are added, the second carrying
    SHARE of the rate at the reference point, and the sum is fitted: where its chi-square is not larger by more than
-   3.84 (95 %, one degree of freedom), the tests do not exclude it; where it is smaller by more, it fits better. Both
+   3.84 (95 %, one degree of freedom), the tests do not exclude it; where it is smaller by more than its further
+   parameters give by chance, it fits better. Both
    are the least under the covariance of the best law's identification.
 2. May there be a threshold? The stress s in the terms of the best law is replaced by s - s_0, with s_0 THRESHOLD of
    the reference stress, and judged likewise.
@@ -114,7 +115,9 @@ def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -
         return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
     if found is None or found.excess > NOT_EXCLUDED:
         return None
-    return Challenge(kind, found.problem.law.name, f"{found.description} {_comparison_text(found.excess)}")
+    return Challenge(
+        kind, found.problem.law.name, f"{found.description} {_comparison_text(found.excess, found.further)}"
+    )
 
 
 # ---- shares of other laws --------------------------------------------------------------------------------------------
@@ -191,7 +194,7 @@ class AlteredLaw:
 
     x : (unknowns,) its values. excess : its chi-square above that of the best law.
     constraints : (rows, unknowns) derivatives over tolerances of what was held, such as the share of a second law.
-    description : what it is, for people.
+    further : its parameters beyond those of the best law, of which one is held. description : what it is, for people.
     """
 
     kind: Kind
@@ -199,6 +202,7 @@ class AlteredLaw:
     x: Floats
     excess: float
     constraints: Floats
+    further: int
     description: str
 
 
@@ -219,7 +223,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     if _are_one_function(problem, x, own_terms):
         return None
     description = f"its sum with {other.law.name}, tried with {100 * SHARE:.0f} % of the rate carried by it,"
-    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), description)
+    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.u.size, description)
 
 
 def above_threshold(best: FittedLaw) -> AlteredLaw:
@@ -237,12 +241,15 @@ def above_threshold(best: FittedLaw) -> AlteredLaw:
     excess, x = _least_excess(best, problem, x, fixed={position: threshold})
     held = np.zeros((1, x.size))
     held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
-    return AlteredLaw("threshold", problem, x, excess, held, f"{law.name} of {threshold:.3g} MPa")
+    return AlteredLaw("threshold", problem, x, excess, held, 1, f"{law.name} of {threshold:.3g} MPa")
 
 
-def _comparison_text(excess: float) -> str:
-    """How an altered law compares with the best one, from its chi-square above that of the best."""
-    if excess < -NOT_EXCLUDED:
+def _comparison_text(excess: float, further: int = 1) -> str:
+    """How an altered law compares with the best one, from its chi-square above that of the best.
+
+    further : its parameters beyond those of the best law: by chance chi-square falls with each that is not held.
+    """
+    if excess < -chi2.ppf(0.95, max(further - 1, 1)):
         return f"fits better (its chi-square is {-excess:.1f} lower)"
     if abs(excess) < SMALLEST_SHOWN:
         return "explains them as well (its chi-square is the same)"

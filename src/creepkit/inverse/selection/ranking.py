@@ -179,9 +179,9 @@ class Ranking(Presentable, Plotted, Tabulated):
         return ranking_figure, draw_misfits
 
     def __str__(self) -> str:
-        from creepkit.reports.answer import ranking_answer_text
+        from creepkit.reports.answer import answer_text
 
-        return ranking_answer_text(self)
+        return answer_text(self.best, self)
 
     def details(self) -> str:
         """Everything that there is to say, as text."""

@@ -9,6 +9,7 @@ from sympy import log
 import creepkit as ck
 from creepkit.errors import HistoryError, LawError, SolveError
 from creepkit.language import stress, time
+from creepkit.language.elastic import STATE_MODULUS
 from creepkit.readers.history_csv import write_history
 from creepkit.records import Loading, Program, RecordedLoading, Status
 from creepkit.specimens.bulge.run import BulgeRun
@@ -124,7 +125,7 @@ def program(*pressures: float) -> RecordedLoading:
 
 MISTAKES = [
     (SolveError, {"elastic": None},
-     f"{WHERE}: specimen 'bulge' needs elastic data; set elastic=Elastic(E=...), E in MPa"),
+     f"{WHERE}: specimen 'bulge' needs elastic data; {STATE_MODULUS}"),
     (SolveError, {"loading": ck.constant_stress(100.0)},
      f"{WHERE}: specimen 'bulge' is loaded by pressure (MPa), found stress; use PressureJump"),
     (SolveError, {"using": "uniaxial"},
