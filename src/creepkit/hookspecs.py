@@ -1,6 +1,7 @@
 """The hooks: everything a plugin can add, one typed function and one sentence each.
 
-A new kind of plugin is a function here and a row in registry/kinds.py.
+A new kind of plugin is a function here and a row in registry/kinds.py; a kit `check_...` in testing/kits.py checks more
+of it than its name and title.
 """
 
 from __future__ import annotations

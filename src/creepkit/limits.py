@@ -94,6 +94,10 @@ HOURS = numbers(1e-9, 1e9)
 SECONDS = numbers(0, 1e12, above=True)
 RAMP = numbers(0, 1e12)
 PROBABILITY = numbers(0.5, 0.999999)
+SIGNIFICANCE = 0.003
+"""p-value below which a hypothesis is rejected: three standard deviations of a normal one."""
+
+
 HOTTEST = 4500.0
 """K, above which nothing is solid: hafnium carbonitride, which melts last, does so at about 4300 K."""
 

@@ -16,7 +16,7 @@ import numpy as np
 from creepkit.errors import CreepkitError, FitError, quoted
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.reference_conditions import ReferencePoint
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, ReferencePoint
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.language import CreepLaw, temperature
@@ -186,14 +186,10 @@ def usual_end(page_law: PageLaw, stress: float, kelvin: float) -> float:
     return 3600.0 * hours
 
 
-SAME_TEMPERATURE = 5.0
-"""K, up to which tests are at one temperature."""
-
-
 def temperature_warning(law: CreepLaw, histories: Sequence[History]) -> str:
     """A sentence where a law without temperature is laid over tests at several temperatures; "" where it is not."""
     temperatures = [history.mean_temperature for history in histories]
-    if law.uses(temperature) or not temperatures or max(temperatures) - min(temperatures) <= SAME_TEMPERATURE:
+    if law.uses(temperature) or not temperatures or max(temperatures) - min(temperatures) <= ISOTHERMAL_RANGE:
         return ""
     span = celsius_text(min(temperatures), max(temperatures), digits=0)
     return (

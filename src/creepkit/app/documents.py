@@ -13,7 +13,6 @@ from creepkit.app.contents import (
     KINDS,
     RATE_STRAIN,
     RATE_TIME,
-    SAME_TEMPERATURE,
     USUAL_STRESS,
     PageContents,
     PageLaw,
@@ -26,6 +25,7 @@ from creepkit.exporters.documents import expression_mathml, latex_unit, law_equa
 from creepkit.exporters.javascript import law_expression
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.minimum_rates import measured_minimum_rate
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import LatexLawPrinter, latex_equations
 from creepkit.language.symbols import POINT_VARIABLES
@@ -77,7 +77,7 @@ def contents_document(contents: PageContents, models: Collection[str] = ()) -> d
         "specimens": specimens,
         "tests": tests,
         "temperature": contents.temperature,
-        "same_temperature": SAME_TEMPERATURE,
+        "same_temperature": ISOTHERMAL_RANGE,
     }
 
 

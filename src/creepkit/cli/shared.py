@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from creepkit.errors import LawError
-from creepkit.limits import Limits
+from creepkit.limits import SEED, Limits
 from creepkit.options import Option
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ Law = Annotated[str, typer.Argument(metavar="LAW|RESULT.json", help="A law's nam
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Reader = Annotated[str | None, Option(help="Reader of the files; by default the one that accepts them.")]
 Values = Annotated[dict[str, float] | None, Option(help="A parameter's value.", flag="set", example="n=5.2")]
-Seed = Annotated[int, Option(help="Of random draws.", limits=Limits(0, 2**63 - 1))]
+Seed = Annotated[int, Option(help="Of random draws.", limits=SEED)]
 Workers = Annotated[int | None, Option(help="Processes; one for each core by default.", limits=Limits(1, 1024))]
 Only = Annotated[
     dict[str, tuple[str, ...]] | None,

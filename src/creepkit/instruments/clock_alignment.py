@@ -24,7 +24,7 @@ from creepkit.instruments.response_likelihood import (
     trial_models,
 )
 from creepkit.records import ClockAlignment, InstrumentRecord
-from creepkit.records.recorded_programs import noise_of_readings
+from creepkit.records.reading_noise import noise_of_readings
 
 FEWEST_FRAMES = 8
 UNIX_TIME = 1e8

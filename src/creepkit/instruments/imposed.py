@@ -11,10 +11,10 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.records import Channel, ClockAlignment, InstrumentRecord, Program
 from creepkit.records.presentable import Presentable
+from creepkit.records.reading_noise import noise_of_readings
 from creepkit.records.recorded_programs import (
     LOAD_RECORD_TOLERANCE,
     TEMPERATURE_RECORD_TOLERANCE,
-    noise_of_readings,
     recorded_program,
     running_median,
 )

@@ -8,6 +8,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.records import History
+from creepkit.records.reading_noise import noise_of_readings
 
 
 def usable_frames(history: History, output: str) -> Bools:
@@ -17,27 +18,9 @@ def usable_frames(history: History, output: str) -> Bools:
 
 @lru_cache(maxsize=4096)
 def frame_noise(history: History, output: str) -> float:
-    """Standard deviation of one output from frame to frame, in its unit; 0 for under 6 frames.
-
-    From third differences, robustly, in time or in its logarithm, whichever calls less of the curve noise.
-    """
+    """Standard deviation of one output from frame to frame, in its unit; 0 for under 6 frames."""
     used = usable_frames(history, output)
-    times, values = history.times[used], history.outputs[output][used]
-    if times.size < 6:
-        return 0.0
-    return min(_noise_from_third_differences(x, values) for x in (times, np.log(times)))
-
-
-def _noise_from_third_differences(x: Floats, y: Floats) -> float:
-    """Standard deviation of one frame, in the unit of y, from residuals of parabolas through four neighbours.
-
-    x, y : (frames,).
-    """
-    windows = np.lib.stride_tricks.sliding_window_view(x, 4)
-    differences = windows[:, :, None] - windows[:, None, :] + np.eye(4)
-    weights = 1.0 / differences.prod(axis=2)
-    remainders = (weights * np.lib.stride_tricks.sliding_window_view(y, 4)).sum(axis=1)
-    return float(1.4826 * np.median(np.abs(remainders / np.sqrt((weights**2).sum(axis=1)))))
+    return 0.0 if used.sum() < 6 else noise_of_readings(history.outputs[output][used], history.times[used], order=3)
 
 
 def noise_standard_deviation(history: History, output: str) -> Floats:

@@ -39,14 +39,11 @@ from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, LinearSolution
+from creepkit.limits import SIGNIFICANCE
 from creepkit.records import History, is_logarithmic
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
-
-SIGNIFICANCE = 0.003
-"""p-value below which a law does not explain the tests: three standard deviations of a normal one."""
-
 
 LOCAL_FRAMES = 5
 """Frames whose mean deviation says when a law misses a test."""

@@ -16,7 +16,7 @@ from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
 from creepkit.records import ZERO_CELSIUS, History, Predictor, growing_output, is_logarithmic, specimen_of
 
-LOAD_TOLERANCE = 0.02
+HELD_LOAD = 0.02
 """Relative change of a load within which it is held."""
 
 
@@ -69,7 +69,7 @@ def distinct_loads(histories: Sequence[History]) -> list[float]:
     for history in histories:
         program = history.loading.program()
         for load in np.interp(history.times[history.used], program.times, program.values):
-            if load > 0 and not any(abs(load - level) <= LOAD_TOLERANCE * level for level in loads):
+            if load > 0 and not any(abs(load - level) <= HELD_LOAD * level for level in loads):
                 loads.append(float(load))
     return loads
 
@@ -81,7 +81,7 @@ def _load_holds(history: History, used: Bools) -> Iterator[Ints]:
     load = np.interp(history.times[frames], program.times, program.values)
     start = 0
     for k in range(1, frames.size + 1):
-        if k == frames.size or abs(load[k] - load[start]) > LOAD_TOLERANCE * abs(load[start]):
+        if k == frames.size or abs(load[k] - load[start]) > HELD_LOAD * abs(load[start]):
             if k - start >= MINIMUM_FRAMES:
                 yield frames[start:k]
             start = k

@@ -29,6 +29,7 @@ from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, RUPTURE_OUT
 from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, MixtureDistribution
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
+from creepkit.limits import SIGNIFICANCE
 from creepkit.records import History, Predictor, constant_stress
 
 if TYPE_CHECKING:
@@ -37,9 +38,6 @@ if TYPE_CHECKING:
 EXTRAPOLATION_FACTOR = 1000.0
 """How far beyond the longest measured test, or its own last time, a test is followed to its rupture; the predictor's
 own horizon comes on top."""
-
-SIGNIFICANCE = 0.003
-"""p-value below which values contradict one another, as for adequacy."""
 
 FEWEST_VALUES = 5
 """Tests that are judged; and as many as the regression has columns, and three more."""

@@ -18,15 +18,12 @@ import numpy as np
 from scipy.stats import t as student
 
 from creepkit.arrays import Floats, Ints
+from creepkit.limits import SIGNIFICANCE
 from creepkit.quality.frames import block_means, load_segments
 from creepkit.records import History, growing_output
 
 LEAST_RISE = 1.5
 """Rate at the end over the smallest, of the fitted curve, from which on it is called tertiary creep."""
-
-
-SIGNIFICANCE = 0.003
-"""Probability by which a test without tertiary creep may seem to have it: of all parts of the curve together."""
 
 
 PARTS = ((0.0, 1.0), (0.25, 1.0), (0.5, 1.0), (0.7, 1.0), (0.0, 0.6), (0.2, 0.8))

@@ -11,6 +11,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.quality.flags import QualityFlag
 from creepkit.records import History, growing_output, output_named
+from creepkit.records.reading_noise import noise_of_readings
 from creepkit.records.recorded_programs import running_median
 from creepkit.records.units import time_text, times_text
 
@@ -48,8 +49,12 @@ OPPOSITE_NEIGHBOUR_FRACTION = 0.3
 """Fraction of a frame's residual that its neighbours must have with the other sign if it is to be a single outlier."""
 
 
-_ROUNDING_FRACTION = 0.5
-"""Fraction of the smallest step between values, below which noise cannot be seen."""
+TIES = 0.1
+"""Fraction of readings that are the same as those before, above which the readings are rounded."""
+
+
+ROUNDING_FRACTION, SHAPE_FRACTION = 0.5, 1e-5
+"""Fractions of the step to which values are rounded, and of their range, below which noise cannot be seen."""
 
 
 _MOST_OUTLIERS = 0.05
@@ -204,18 +209,22 @@ def load_segments(history: History) -> list[LoadSegment]:
 
 
 def noise_standard_deviation(times: Floats, values: Floats) -> float:
-    """Standard deviation of white noise, robust, from the residuals of the cubic through each frame's neighbours.
+    """Standard deviation of white noise (see records.reading_noise), but no less than can be seen of it.
 
     times : (frames,) s. values : (frames,) mm or strain, whose unit the result has.
     """
-    residuals, _ = _interpolation_residuals(times, values)
-    differences = np.abs(np.diff(values))
-    rounding = (
-        _ROUNDING_FRACTION * float(differences[differences > 0].min(initial=np.inf))
-        if (differences > 0).any()
-        else 1e-12
-    )
-    return max(float(1.4826 * np.median(np.abs(residuals))), min(rounding, float(np.ptp(values)) or rounding))
+    least = max(SHAPE_FRACTION * float(np.ptp(values)), 1e-12)
+    return max(noise_of_readings(values, times, order=3), ROUNDING_FRACTION * rounding_step(values), least)
+
+
+def rounding_step(values: Floats) -> float:
+    """The step to which readings are rounded, in their unit; 0 where few are the same as those before.
+
+    values : (readings,).
+    """
+    steps = np.abs(np.diff(values))
+    is_rounded = steps.size > 0 and 1.0 > (steps == 0.0).mean() > TIES
+    return float(steps[steps > 0.0].min()) if is_rounded else 0.0
 
 
 def _interpolation_residuals(times: Floats, values: Floats) -> tuple[Floats, Floats]:

@@ -14,9 +14,9 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.quality.flags import QualityFlag
-from creepkit.quality.frames import grows, load_segments
+from creepkit.quality.frames import grows, load_segments, rounding_step
 from creepkit.records import History, growing_output
-from creepkit.records.recorded_programs import noise_of_readings
+from creepkit.records.reading_noise import noise_of_readings
 from creepkit.records.units import time_text, times_text
 
 FRAMES_BESIDE, SHORTEST_BESIDE = 5, 0.2
@@ -30,10 +30,6 @@ WIDTHS = (*range(1, 40), *(int(40 * 1.2**k) for k in range(20)))
 LARGEST_GROWTH, THRESHOLD, RATE_THRESHOLD, RATE_RATIO = 0.25, 8.0, 5.0, 4.0
 """Of the growth that the rates lead to; standard deviations by which it falls short, and of the rates themselves; ratio
 of the rates before and after, above which the curve bends too sharply to say anything."""
-
-
-TIES = 0.1
-"""Fraction of readings that are the same as those before, above which the readings are rounded."""
 
 
 class IdlePart(NamedTuple):
@@ -82,9 +78,7 @@ def idle_parts(times: Floats, values: Floats) -> list[IdlePart]:
 
     times, values : (frames,) s, and the unit of the output.
     """
-    steps = np.abs(np.diff(values))
-    is_rounded = steps.size > 0 and (steps == 0.0).mean() > TIES
-    sigma = max(noise_of_readings(values), float(steps[steps > 0.0].min(initial=np.inf)) if is_rounded else 0.0)
+    sigma = max(noise_of_readings(values), rounding_step(values))
     found: list[tuple[float, IdlePart]] = []
     rates_over = cache(partial(_rates, times, values, sigma))
     for width in WIDTHS:

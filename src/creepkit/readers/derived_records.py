@@ -45,7 +45,7 @@ from creepkit.readers.imposed import hold_begins
 from creepkit.readers.table import SourceText
 from creepkit.readers.vocabulary import unit_suffix
 from creepkit.records.quantities import TIME
-from creepkit.records.recorded_programs import noise_of_readings
+from creepkit.records.reading_noise import noise_of_readings
 from creepkit.records.units import time_text
 
 # ---- load and extension of a plain bar -------------------------------------------------------------------------------

@@ -19,12 +19,8 @@ from creepkit.readers.frames import TableFrames
 from creepkit.readers.vocabulary import COMPONENT_LOADING_KINDS, Terms
 from creepkit.records import Loading, PointLoading, Program, TwoLevels, loading_of
 from creepkit.records.quantities import TEMPERATURE, QuantityKind
-from creepkit.records.recorded_programs import (
-    LOAD_RECORD_TOLERANCE,
-    TEMPERATURE_RECORD_TOLERANCE,
-    noise_of_readings,
-    recorded_program,
-)
+from creepkit.records.reading_noise import noise_of_readings
+from creepkit.records.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATURE_RECORD_TOLERANCE, recorded_program
 from creepkit.records.units import time_text
 
 _PROGRAM_FORMS = ("steps", "program")

@@ -14,12 +14,8 @@ LabelValues = str | float | Sequence[str | float]
 """A value of a label, or several, of which a test has one."""
 
 
-TEMPERATURE_TOLERANCE = 1.0
-"""K; 1073 means 1073.15 as well."""
-
-
-LOAD_TOLERANCE = 1e-3
-"""Relative."""
+LABEL_TEMPERATURE, LABEL_LOAD = 1.0, 1e-3
+"""K, and relative, by which a test may be off a label: 1073 means 1073.15 as well."""
 
 
 MOST_NAMED = 12
@@ -72,7 +68,7 @@ def _matches(label: str, labels: Mapping[str, str | float], value: str | float) 
         number = float(value)
     except ValueError:
         raise HistoryError(f"{label}={value} is not a number; write one, as in {label}={found:g}") from None
-    tolerance = TEMPERATURE_TOLERANCE if label == "temperature" else LOAD_TOLERANCE * abs(found)
+    tolerance = LABEL_TEMPERATURE if label == "temperature" else LABEL_LOAD * abs(found)
     return math.isclose(found, number, rel_tol=0.0, abs_tol=tolerance)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.records.loading import Program
+from creepkit.records.reading_noise import noise_of_readings
 
 TEMPERATURE_RECORD_TOLERANCE, LOAD_RECORD_TOLERANCE = 0.25, 0.002
 """K, and fraction of the largest load, by which a program may be off its record: 1 % of a creep rate at 400 kJ/mol and
@@ -72,15 +73,6 @@ def _least_squares(times: Floats, values: Floats, kept: Ints) -> Floats:
     beside = np.bincount(piece, left * right, count - 1)
     sums = np.bincount(piece, left * values, count) + np.bincount(piece + 1, right * values, count)
     return np.asarray(solveh_banded(np.stack([np.append(0.0, beside), diagonal]), sums), dtype=float)
-
-
-def noise_of_readings(values: Floats) -> float:
-    """Standard deviation of white noise by the median of second differences; 0 of fewer than three values.
-
-    values : (frames,) in any unit.
-    """
-    differences = np.abs(np.diff(values, 2))
-    return float(1.4826 * np.median(differences) / 6**0.5) if differences.size else 0.0
 
 
 def running_median(values: Floats) -> Floats:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from creepkit.inverse.held_levels import holds, is_isothermal, last_data_time, temperature_holds
-from creepkit.inverse.reference_conditions import LOAD_TOLERANCE
+from creepkit.inverse.reference_conditions import HELD_LOAD
 from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program, load_unit
 from creepkit.records.units import time_text
 
@@ -45,7 +45,7 @@ def kind_of_test(history: History) -> str:
         prescribed = [name for name, one in (("stress", loading.stress), ("strain", loading.strain)) if one]
         return f"prescribed components of {' and '.join(prescribed)}"
     program, last = loading.program(), last_data_time(history)
-    pieces = holds(program, last, LOAD_TOLERANCE * float(np.abs(program.values).max()))
+    pieces = holds(program, last, HELD_LOAD * float(np.abs(program.values).max()))
     levels = "constant" if len(pieces) == 1 else "stepwise" if pieces else "changing"
     if loading.quantity == "strain":
         return f"{levels} strain{', at which the stress relaxes' if pieces else ''}"
@@ -56,7 +56,7 @@ def kind_of_test(history: History) -> str:
 
 
 def _level_text(program: Program, last: float, unit: str) -> str:
-    tolerance = LOAD_TOLERANCE * float(np.abs(program.values).max())
+    tolerance = HELD_LOAD * float(np.abs(program.values).max())
     return _holds_text(holds(program, last, tolerance), unit, lambda v: f"{v:g}")
 
 

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import sympy
 
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
-from creepkit.inverse.judging import SIGNIFICANCE
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
 from creepkit.inverse.observation_vector import FLOOR_NOISES, FLOOR_SHARE, MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
 from creepkit.inverse.output_transforms import LogTransform
@@ -21,6 +20,7 @@ from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, NOISE_PRI
 from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
 from creepkit.language.printing import arrhenius_exponent
 from creepkit.laws.paper import PAPER
+from creepkit.limits import SIGNIFICANCE
 from creepkit.reports.blocks import number, plural, printable, sentence, typeset
 from creepkit.reports.compared_values import compared_observations, reading_counts
 from creepkit.reports.design import order_text

@@ -17,6 +17,7 @@ from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import duration_known, followed_duration
 from creepkit.inverse.held_levels import held_temperatures
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.curve_shapes import shows_tertiary_creep
 from creepkit.quality.flags import frame_ranges_text
@@ -224,10 +225,6 @@ FEWEST_RUPTURES = 5
 """For methods of rupture times."""
 
 
-SAME_TEMPERATURE = 5.0
-"""K."""
-
-
 @dataclass(frozen=True)
 class DataSummary:
     """What tests hold that decides which stages make sense.
@@ -249,7 +246,7 @@ class DataSummary:
         """The summary of tests."""
         levels: list[float] = []
         for temperature in sorted(value for history in tests for value in held_temperatures(history)):
-            if not levels or temperature > levels[-1] + SAME_TEMPERATURE:
+            if not levels or temperature > levels[-1] + ISOTHERMAL_RANGE:
                 levels.append(temperature)
         return cls(
             tuple(tests),
@@ -272,7 +269,7 @@ class DataSummary:
         levels = list[tuple[float, int]]()
         for test in sorted(self.framed, key=lambda one: one.mean_temperature):
             count = FEWEST_RATES if test.outputs else 1
-            if levels and test.mean_temperature <= levels[-1][0] + SAME_TEMPERATURE:
+            if levels and test.mean_temperature <= levels[-1][0] + ISOTHERMAL_RANGE:
                 levels[-1] = levels[-1][0], levels[-1][1] + count
             else:
                 levels.append((test.mean_temperature, count))

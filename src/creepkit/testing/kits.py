@@ -7,6 +7,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -222,9 +223,13 @@ def check_temperature_form(form: Callable[..., Any]) -> ConformanceReport:
     return ConformanceReport(form, tuple(run([check_form], form)), "temperature form")
 
 
-_KITS: dict[str, Callable[..., ConformanceReport]] = {
-    kind.label: globals()[f"check_{kind.label.replace(' ', '_')}"] for kind in kinds.KINDS
-}
+def kit_of(kind: kinds.PluginKind[Any]) -> Callable[..., ConformanceReport]:
+    """The kit of a kind; of one that has none the check of name and title."""
+    kit = globals().get(f"check_{kind.label.replace(' ', '_')}")
+    return kit or partial(_report, kind=kind.label, checks=[])
+
+
+_KITS = {kind.label: kit_of(kind) for kind in kinds.KINDS}
 
 
 _KINDS = " or ".join([", ".join([*_KITS][:-1]), [*_KITS][-1]])

@@ -11,8 +11,9 @@ from creepkit.inverse.minimum_rates import apparent_exponent, least_slope, with_
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.single_values import SIGNIFICANCE, SingleValue, contradicting_values
+from creepkit.inverse.single_values import SingleValue, contradicting_values
 from creepkit.laws.norton import NORTON
+from creepkit.limits import SIGNIFICANCE
 from creepkit.records import UNKNOWN_DURATION, History, Nuisance, constant_stress
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.literature_laws import EQUATIONS

@@ -14,8 +14,9 @@ import pytest
 import creepkit as ck
 from creepkit.errors import ArgumentError, HistoryError
 from creepkit.records import typical_history
-from creepkit.registry import default_registry
+from creepkit.registry import default_registry, kinds
 from creepkit.testing import ConformanceReport
+from creepkit.testing.kits import kit_of
 from helpers.command_line import creepkit, one_line
 from helpers.steady_rate_predictor import Steady
 
@@ -439,3 +440,9 @@ def test_a_specimen_of_one_law_refuses_the_others() -> None:
 def test_a_specimen_that_can_be_changed_is_told() -> None:
     assert "write @dataclass(frozen=True)" in failed(ck.check_specimen(Changeable()))["frozen"]
     assert "unhashable type: 'list'; a specimen is a key" in failed(ck.check_specimen(OfList()))["frozen"]
+
+
+def test_a_kind_without_a_kit_is_checked_by_name_and_title() -> None:
+    check = kit_of(replace(kinds.LAWS, label="furnace"))
+    assert check(ck.law("norton")).passed
+    assert not check(replace(ck.law("norton"), name="No Name")).passed
