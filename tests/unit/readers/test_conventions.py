@@ -309,6 +309,13 @@ def test_relaxation_with_its_ramp(tmp_path: Path, kind: str) -> None:
     np.testing.assert_allclose(test.outputs["stress"], relaxing_stress(BAR_TIMES, 1.5e-3), atol=0.5)
 
 
+def test_a_ramp_that_is_read_after_its_start_begins_unloaded(tmp_path: Path) -> None:
+    times = [20.0, 40, 60, 80, 100, 120, *np.geomspace(180, 36000, 20)]
+    rows = [(t, min(t / 120, 1.0) * 1.5e-3, min(t / 120, 1.0) * 240 * (max(t, 120) / 120) ** -0.05) for t in times]
+    test = read_bar(tmp_path, creep("time_s,strain_1,stress_MPa", rows, "# modulus_GPa: 160\n"))
+    np.testing.assert_allclose(test.loading.program().at(np.array([0.0, 10, 60, 3e4])), [0, 1.25e-4, 7.5e-4, 1.5e-3])
+
+
 def creep(names: str, rows: list[tuple[float, ...]], head: str = "") -> str:
     body = "".join(",".join(f"{value:.8g}" for value in row) + "\n" for row in rows)
     return f"# temperature_C: 600\n{head}{names}\n{body}"

@@ -477,3 +477,15 @@ def test_the_spans_of_a_beam_are_read_by_their_usual_names_and_never_silently_by
     assert read("Outer span,60").labels["assumed"].endswith("lengths by default: inner_span 20 mm")
     with pytest.raises(HistoryError, match=r"'Major span' is a label, and no span .* span_mm = 60 \(or span_mm = 25\)"):
         read("Major span,60", "Minor span,25")
+
+
+def test_a_specimen_that_is_stated_stands_beside_the_mark_of_a_piece_and_a_modulus_is_asked_for(tmp_path):
+    (tmp_path / "beam.csv").write_text(
+        BEAM.format("Outer span,60,mm\nInner span,25,mm").replace("four-point-bend", "B1") + "0,0\n1,0.001\n2,0.002\n"
+    )
+    (tmp_path / "tests.toml").write_text('["*.csv"]\nspecimen = "four-point-bend-midspan"\n')
+    (test,) = ck.read_histories(tmp_path / "beam.csv")
+    assert (test.specimen, test.labels["specimen"]) == ("four-point-bend-midspan", "B1")
+    assert [flag.kind for flag in ck.check_data_quality([test])] == ["modulus"]
+    tube = test.replace(geometry={"outer_diameter": 9.5}, outputs={"diameter_growth": test.times / 3.6e5 + 9.51})
+    assert [flag.kind for flag in ck.check_data_quality([tube])] == ["unit", "modulus"]

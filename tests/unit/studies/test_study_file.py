@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import creepkit as ck
 from creepkit.errors import StudyError
+from creepkit.studies.stages import export_name
 from creepkit.studies.study_file import key_lines, known_keys, parse_study
 from helpers.paths import ROOT
 
@@ -66,6 +67,8 @@ def test_the_page_has_the_name_of_its_study_where_none_is_given():
     named = {"study": "report.html", "blades": "blades.html"}
     found = {name: parse_study(Path(f"{name}.toml"), text).model.report for name in named}
     assert {name: report.file for name, report in found.items()} == named
+    exported = parse_study(Path("blades.toml"), text + '[[export]]\ntarget = "latex"\n')
+    assert export_name(exported, 0) == "blades_law.tex"
 
 
 def test_a_misspelt_key_is_refused_with_its_line_and_nearly_always_the_right_one():
