@@ -99,6 +99,21 @@ class FourPointBend(RectangularBeam):
 
 
 @dataclass(frozen=True)
+class FourPointBendMidspan(FourPointBend):
+    """Four-point bending whose deflection is read in the middle, where it is larger than under the loading rollers."""
+
+    name: ClassVar[str] = "four-point-bend-midspan"
+    title: ClassVar[str] = "Four-point bending, deflection read in the middle, small deflections"
+    outputs: ClassVar[tuple[ck.Output, ...]] = deflection_of("the middle")
+
+    def beam_stations(self) -> BeamStations:
+        """Those of four-point bending; a unit force in the middle gives x/2 up to there, over the inner stretch too."""
+        beam = super().beam_stations()
+        inner = 0.25 * (0.5 * (self.span - self.inner_span) + 0.5 * self.span)
+        return BeamStations(beam.moments, beam.lengths, virtual=np.append(beam.moments[:-1], inner))
+
+
+@dataclass(frozen=True)
 class Cantilever(RectangularBeam):
     """A beam that is clamped at one end and pressed at the other."""
 
@@ -165,6 +180,7 @@ def creepkit_specimens() -> list[FibreBeam]:
     return [
         ThreePointBend(),
         FourPointBend(),
+        FourPointBendMidspan(),
         Cantilever(),
         ThreePointBendRelaxation(),
         FourPointBendRelaxation(),

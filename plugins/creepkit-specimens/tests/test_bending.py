@@ -8,6 +8,7 @@ from creepkit_specimens.bending import (
     Cantilever,
     CantileverRelaxation,
     FourPointBend,
+    FourPointBendMidspan,
     FourPointBendRelaxation,
     ThreePointBend,
     ThreePointBendRelaxation,
@@ -24,8 +25,13 @@ ELASTIC = ck.Elastic(E=150e3)
 E = 150e3
 WIDTH, HEIGHT = 8.0, 4.0
 INERTIA = WIDTH * HEIGHT**3 / 12
-FORCES = {"three-point-bend": 200.0, "four-point-bend": 300.0, "cantilever-bend": 60.0}
-BEAMS = [ThreePointBend(), FourPointBend(), Cantilever()]
+FORCES = {
+    "three-point-bend": 200.0,
+    "four-point-bend": 300.0,
+    "four-point-bend-midspan": 300.0,
+    "cantilever-bend": 60.0,
+}
+BEAMS = [ThreePointBend(), FourPointBend(), FourPointBendMidspan(), Cantilever()]
 HELD = [ThreePointBendRelaxation(), FourPointBendRelaxation(), CantileverRelaxation()]
 EVERY = pytest.mark.parametrize("beam", [*BEAMS, *HELD], ids=lambda beam: beam.name)
 LOADED = pytest.mark.parametrize("beam", BEAMS, ids=lambda beam: beam.name)
@@ -84,6 +90,8 @@ def elastic_compliance(beam):
         return L**3 / (3 * stiffness)
     if isinstance(beam, FourPointBend):
         arm = (L - beam.inner_span) / 2
+        if isinstance(beam, FourPointBendMidspan):
+            return arm * (3 * L**2 - 4 * arm**2) / (48 * stiffness)
         return arm**2 * (3 * L - 4 * arm) / (12 * stiffness)
     return L**3 / (48 * stiffness)
 
@@ -92,7 +100,7 @@ def steady_rate(beam, A, n, force):
     """Deflection rate A int (M/I_n)^n m dx, m the moment of a unit force: Boyle and Spence (1983), chapter 3.
 
     With I_n = b h^(2 + 1/n) / (2^(1 + 1/n) (2 + 1/n)) and M = m F; m = x/2 over each half of three-point bending, x
-    over a cantilever, and in four-point bending x/2 over each arm a, then a/2.
+    over a cantilever, and in four-point bending x/2 over each arm a, then a/2, or on to the middle, if read there.
     """
     second = WIDTH * HEIGHT ** (2 + 1 / n) / (2 ** (1 + 1 / n) * (2 + 1 / n))
     L = beam.span
@@ -100,7 +108,8 @@ def steady_rate(beam, A, n, force):
         geometry = L ** (n + 2) / (n + 2)
     elif isinstance(beam, FourPointBend):
         arm = (L - beam.inner_span) / 2
-        geometry = 2 * 0.5 ** (n + 1) * arm ** (n + 2) / (n + 2) + (arm / 2) ** (n + 1) * beam.inner_span
+        inner = (arm + L / 2) / 4 if isinstance(beam, FourPointBendMidspan) else arm / 2
+        geometry = 2 * 0.5 ** (n + 1) * arm ** (n + 2) / (n + 2) + (arm / 2) ** n * inner * beam.inner_span
     else:
         geometry = 2 * 0.5 ** (n + 1) * (L / 2) ** (n + 2) / (n + 2)
     return A * (force / second) ** n * geometry

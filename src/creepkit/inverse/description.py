@@ -83,7 +83,9 @@ def headline(fit: Identification) -> str:
     """How well the law describes the tests, then whether it could be the true one: one sentence without a full stop."""
     described, adequacy = Description.of(fit).sentence, fit.adequacy
     useful = f"describes {described}" if described else "was fitted"
-    if adequacy is None or adequacy.verdict == "cannot be judged":
+    if not fit.converged:
+        truth = "but the search for its values did not converge"
+    elif adequacy is None or adequacy.verdict == "cannot be judged":
         truth = "whether it is the true law cannot be judged"
     elif adequacy.explains:
         truth = "the tests do not contradict it"

@@ -38,6 +38,10 @@ MOST_LAST_STEPS, LAST_STEP, MOST_HALVINGS = 10, 0.02, 4
 """Last steps of values by likelihood, the largest one left out, in standard deviations, and halvings of each."""
 
 
+DOUBTFUL_STEP = 0.5
+"""Standard deviations of a value, of a step that is left, from which on values have not converged."""
+
+
 CONVERGED_GAIN = 0.02
 """Gain of the log-likelihood, and change of a test's weight, that ends the rounds."""
 
@@ -144,7 +148,7 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
     Values are moved to the optimum under the covariance that holds the errors of tests, by Gauss-Newton steps with
     errors and residuals made linear at each.
     """
-    problem, linear, noise = found.problem, found.linear, found.noise
+    problem, linear, noise, was_converged = found.problem, found.linear, found.noise, found.converged
     free = linear.free
     for _ in range(MOST_LAST_STEPS):
         expected = with_expected_scatter(problem, linear, noise)
@@ -159,7 +163,9 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         target = linear.x.copy()
         target[free] += solution.step
         x = problem.constrained(linear.x, target, free, solution.covariance)
-        if (np.abs(x - linear.x)[free] <= LAST_STEP * np.sqrt(np.diag(solution.covariance))).all():
+        left = float((np.abs(x - linear.x)[free] / np.sqrt(np.diag(solution.covariance))).max(initial=0.0))
+        found = replace(found, converged=was_converged and left < DOUBTFUL_STEP)
+        if left <= LAST_STEP:
             break
         for _ in range(MOST_HALVINGS):
             moved = problem.residuals(x).with_test_weights(residuals.test_weights)

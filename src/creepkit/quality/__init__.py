@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from itertools import product
 from typing import get_args
 
 import numpy as np
@@ -91,13 +92,18 @@ def _replicate_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
             yield QualityFlag((histories[k].name,), "replicate", (), reason)
 
 
-def _large_strains(histories: Sequence[History]) -> Iterator[QualityFlag]:
-    """Histories whose strain exceeds one, as percent do that were read as fractions."""
-    for history in histories:
-        strain = np.abs(history.outputs.get("strain", np.zeros(1)))
-        if (strain > 1.0).any():
-            reason = f"the strain reaches {100 * np.nanmax(strain):.4g} %; look whether its unit is right"
-            yield QualityFlag((history.name,), "unit", (), reason)
+def _doubtful_units(histories: Sequence[History]) -> Iterator[QualityFlag]:
+    """Strains above one, as of percent read as fractions; growths that begin at a length of the test piece."""
+    for one in histories:
+        strain = float(np.nanmax(np.abs(one.outputs.get("strain", 0.0)), initial=0.0))
+        reasons = [f"the strain reaches {100 * strain:.4g} %; look whether its unit is right"] * (strain > 1.0)
+        reasons += [
+            f"{output} begins at the {name}; take the first reading off its column, for creep is what it grows"
+            for output, name in product(one.outputs, one.geometry)
+            if set(output.split("_")) & set(name.split("_"))
+            and abs(one.outputs[output][0] / one.geometry[name] - 1) < 0.1
+        ]
+        yield from (QualityFlag((one.name,), "unit", (), reason) for reason in reasons)
 
 
 def _unstated_moduli(histories: Sequence[History]) -> Iterator[QualityFlag]:
@@ -131,7 +137,7 @@ def remark_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
 TEST_RULES: tuple[Callable[[Sequence[History]], Iterable[QualityFlag]], ...] = (
     _copy_flags,
     _replicate_flags,
-    _large_strains,
+    _doubtful_units,
     _unstated_moduli,
     remark_flags,
 )

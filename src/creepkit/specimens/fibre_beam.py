@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -48,14 +48,18 @@ class BeamStations:
     """The sections of a beam. moments : (stations,) mm, N mm for each N of force; lengths : (stations,) mm of beam.
 
     A section stands for its length of the beam, all parts that are symmetric to it together. largest : mm, the largest
-    moment of the beam for each N, which no station need have; by default that of the stations.
+    moment of the beam for each N, which no station need have; by default that of the stations. virtual : (stations,)
+    mm, of a unit force where the deflection is read, the mean over the length; by default where the force acts.
     """
 
     moments: Floats
     lengths: Floats
     largest: float = 0.0
+    virtual: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
+        virtual = self.virtual if np.size(self.virtual) else self.moments
+        object.__setattr__(self, "virtual", frozen(np.atleast_1d(virtual)))
         if not self.largest:
             object.__setattr__(self, "largest", float(np.max(np.abs(self.moments))))
         object.__setattr__(self, "moments", frozen(np.atleast_1d(self.moments)))
@@ -108,10 +112,10 @@ class FibreBeam(TestPiece, ABC):
 
     @property
     def compliance(self) -> float:
-        """Elastic deflection for a unit of force, times the modulus, 1/mm: the sum of m^2 dx/I."""
+        """Elastic deflection for a unit of force, times the modulus, 1/mm: the sum of M m dx/I."""
         _, inertia = self._section_moments()
         beam = self.beam_stations()
-        return float(np.sum(beam.moments**2 * beam.lengths) / inertia)
+        return float(np.sum(beam.moments * beam.virtual * beam.lengths) / inertia)
 
     def for_search(self) -> Self:
         """The beam at the tolerance of a global search."""
@@ -144,7 +148,7 @@ class FibreBeam(TestPiece, ABC):
         plastic, inertia = piece._section_moments()
         beam = piece.beam_stations()
         shape = beam.moments / beam.largest
-        deflection = float(np.sum(np.abs(beam.moments * shape) * beam.lengths) * plastic / inertia)
+        deflection = float(np.sum(np.abs(beam.virtual * shape) * beam.lengths) * plastic / inertia)
         return deflection * float(piece._modulus(tested).values[0]) / piece.compliance if self.relaxes else deflection
 
     def reference_strain(self, history: History) -> float:
@@ -285,7 +289,7 @@ def _models(piece: FibreBeam) -> tuple[FibreModel, ...]:
     They record the deflection by creep that the force alone would allow.
     """
     section = FibreModel.section(*piece.section())
-    sections = tuple(_under_force(section, float(m), float(dx)) for m, dx in zip(*_stations(piece), strict=True))
+    sections = tuple(_under_force(section, *map(float, one)) for one in zip(*_stations(piece), strict=True))
     if not piece.relaxes:
         return sections
     # Held at its point of load, the beam springs back elastically by what creep would add: one more mode.
@@ -302,24 +306,24 @@ def _models(piece: FibreBeam) -> tuple[FibreModel, ...]:
     )
 
 
-def _stations(piece: FibreBeam) -> tuple[Floats, Floats]:
+def _stations(piece: FibreBeam) -> tuple[Floats, Floats, Floats]:
     beam = piece.beam_stations()
     if beam.moments.shape != beam.lengths.shape or beam.moments.ndim != 1 or not (beam.lengths > 0).all():
         raise SolveError(
             f"specimen '{piece.name}': beam_stations() gave {beam.moments.size} moments and {beam.lengths.size} "
             "lengths; as many of both are needed, and lengths above zero"
         )
-    return beam.moments, beam.lengths
+    return beam.moments, beam.virtual, beam.lengths
 
 
-def _under_force(section: FibreModel, moment: float, length: float) -> FibreModel:
+def _under_force(section: FibreModel, moment: float, virtual: float, length: float) -> FibreModel:
     """A section that the force of its beam bends, for a length of it; it records its part of the deflection."""
     return FibreModel(
         moment * section.stress[1:],
         section.strain[1:],
         section.modes,
         section.projection,
-        moment * length * section.projection[1:],
+        virtual * length * section.projection[1:],
     )
 
 

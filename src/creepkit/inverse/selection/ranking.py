@@ -89,12 +89,15 @@ class Ranking(Presentable, Plotted, Tabulated):
     def unmet(self) -> Mapping[str, str]:
         """{condition of a decisive answer that is not met: why, in words}, most telling first.
 
-        "alternatives": two laws or more were fitted. "adequacy": the best one explains the tests, with nuisances of
-        plausible size. "weight": it has more than 95 %. "asked": it was asked for. "challenges": it stands every one.
+        "alternatives": two laws or more were fitted. "convergence": of the values of the best one. "adequacy": it
+        explains the tests, with nuisances of plausible size. "weight": it has more than 95 %. "asked": it was asked
+        for. "challenges": it stands every one.
         """
         adequacy, unmet = self.adequacy, dict[str, str]()
         if len(self.laws) == 1:
             unmet["alternatives"] = f"only {self.best.law.name} was fitted"
+        if not self.best.converged:
+            unmet["convergence"] = "the search for its values did not converge"
         if adequacy is None or not adequacy.explains_plausibly:
             unmet["adequacy"] = self.adequacy_text
         if not self.laws[0].weight > DECISIVE_WEIGHT:

@@ -187,7 +187,7 @@ DRIFT = Challenge("unmodelled effect", "temperature drift", "a temperature drift
 
 
 def fit(name, adequacy=EXPLAINS, **more):
-    values = {"predictor": None, "histories": (), **more}
+    values = {"predictor": None, "histories": (), "converged": True, **more}
     return SimpleNamespace(law=SimpleNamespace(name=name), adequacy=adequacy, **values)
 
 
