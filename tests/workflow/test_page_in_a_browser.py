@@ -41,7 +41,7 @@ def histories():
 
 @pytest.fixture(scope="module")
 def fit(histories):
-    return ck.identify("norton", histories, starts=1, usual_errors="none")  # loads are exact
+    return ck.identify("norton", histories, starts=1, nuisances=[], usual_errors="none")  # loads are exact
 
 
 def norton_strain(n, stress, time):

@@ -11,6 +11,7 @@ import pickle
 import re
 from collections.abc import Mapping
 from functools import lru_cache, partial
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -173,26 +174,42 @@ _POINT = (100.0, 0.01, 1e5, 1000.0, 100.0, 33.0)
 """Stress, strain, time, temperature, principal and mean stress at which internal variables are followed."""
 
 
+_GROWTH = [float(step) for step in np.geomspace(1e-3, 1e3, 61)]
+"""How far internal variables are followed from where they begin."""
+
+
+_STILL = 1e-9
+"""Share of its first rate at which an internal variable stands still."""
+
+
 @finding("internal variables without a limit")
 def check_unlimited_states(law: CreepLaw, _: LawSamples) -> str | None:
     """As far as an internal variable without a limit grows, no term is infinite, complex or negative."""
     exact, values, count = MultiprecisionLaw(law), [*law.center().values()], len(law.terms)
     initial = [state.initial for state in law.states.values()]
     unlimited = [(k, symbol) for k, (symbol, state) in enumerate(law.states.items()) if state.limit is None]
+
+    def rates(k: int, grown: float) -> tuple[list[Any], Any]:
+        point = [*_POINT, *initial[:k], initial[k] + grown, *initial[k + 1 :]]
+        try:
+            *terms, rate = exact.term_and_state_rates(point, values)[: count + k + 1]
+        except ArithmeticError:
+            return [mpmath.inf], None
+        return terms, rate if mpmath.im(rate) == 0 else 0.0
+
     for k, symbol in unlimited:
-        for step in np.geomspace(1e-3, 1e3, 61):
-            reached = [*initial[:k], initial[k] + float(step), *initial[k + 1 :]]
-            try:
-                *terms, rate = exact.term_and_state_rates([*_POINT, *reached], values)[: count + k + 1]
-            except ArithmeticError:
-                terms, rate = [mpmath.inf], 1.0
-            if not (mpmath.im(rate) == 0 and rate > 0):
+        first, last = rates(k, _GROWTH[0])[1] or 0.0, 0.0
+        for grown in _GROWTH:
+            terms, rate = rates(k, grown)
+            before = rates(k, last + 0.999 * (grown - last))[1] if rate is None else rate
+            if before is not None and not before > _STILL * first:
                 break  # it does not come so far
             sound = all(mpmath.im(one) == 0 and 0 <= one < mpmath.inf for one in terms)
             assert sound, (
-                f"'{symbol}' has no limit, and a term is infinite or changes its sign before it is {reached[k]:.3g}; "
-                f"state where the material ends, ck.State(..., limit={reached[k]:.1g})"
+                f"'{symbol}' has no limit, and a term is infinite or changes its sign before it is "
+                f"{initial[k] + grown:.3g}; state where the material ends, ck.State(..., limit=...)"
             )
+            last = grown
     return f"{len(unlimited)} followed" if unlimited else None
 
 
