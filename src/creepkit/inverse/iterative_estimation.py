@@ -46,6 +46,10 @@ CONVERGED_GAIN = 0.02
 """Gain of the log-likelihood, and change of a test's weight, that ends the rounds."""
 
 
+LARGEST_LOSS = 10.0
+"""Loss of the log-likelihood in a round about the rates of tests that ends the rounds at the one before."""
+
+
 MOST_RATE_STEPS = 3
 """Steps of the rates of tests at given values."""
 
@@ -134,6 +138,9 @@ def estimate_iteratively(
         moved = best is not None and (
             best.problem.log_factors is not problem.log_factors or best.problem.stopped is not problem.stopped
         )
+        if moved and gain < -LARGEST_LOSS and best is not None and best.problem.log_factors is not None and not robust:
+            best = replace(best, converged=False)  # curves that run away are not linear in the rates of tests
+            break
         best = current if best is None or gain > 0 or robust or moved else best
         if abs(gain) < CONVERGED_GAIN and np.abs(weights - previous_weights).max() < CONVERGED_GAIN:
             best = replace(best, converged=True)
@@ -148,8 +155,8 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
     Values are moved to the optimum under the covariance that holds the errors of tests, by Gauss-Newton steps with
     errors and residuals made linear at each.
     """
-    problem, linear, noise, was_converged = found.problem, found.linear, found.noise, found.converged
-    free = linear.free
+    problem, linear, noise = found.problem, found.linear, found.noise
+    free, first, left = linear.free, None, 0.0
     for _ in range(MOST_LAST_STEPS):
         expected = with_expected_scatter(problem, linear, noise)
         problem, residuals = about_own_rates(problem, linear.x, linear.residuals, expected)
@@ -164,7 +171,7 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         target[free] += solution.step
         x = problem.constrained(linear.x, target, free, solution.covariance)
         left = float((np.abs(x - linear.x)[free] / np.sqrt(np.diag(solution.covariance))).max(initial=0.0))
-        found = replace(found, converged=was_converged and left < DOUBTFUL_STEP)
+        first = first or found
         if left <= LAST_STEP:
             break
         for _ in range(MOST_HALVINGS):
@@ -176,7 +183,8 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         else:  # curves that run away are not linear in the values: what no shorter step improves stays
             break
         linear = further
-    return found
+    # values that steps drive to and fro are those that they began with
+    return found if first is None or left < DOUBTFUL_STEP else replace(first, converged=False)
 
 
 def _chi_square(linear: LinearisedProblem, factor: CovarianceFactor) -> float:
