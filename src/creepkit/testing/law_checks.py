@@ -190,8 +190,8 @@ def check_unlimited_states(law: CreepLaw, _: LawSamples) -> str | None:
     unlimited = [(k, symbol) for k, (symbol, state) in enumerate(law.states.items()) if state.limit is None]
 
     def rates(k: int, grown: float) -> tuple[list[Any], Any]:
-        point = [*_POINT, *initial[:k], initial[k] + grown, *initial[k + 1 :]]
         try:
+            point = [*_POINT, *initial[:k], initial[k] + grown, *initial[k + 1 :]]
             *terms, rate = exact.term_and_state_rates(point, values)[: count + k + 1]
         except ArithmeticError:
             return [mpmath.inf], None
@@ -201,13 +201,12 @@ def check_unlimited_states(law: CreepLaw, _: LawSamples) -> str | None:
         first, last = rates(k, _GROWTH[0])[1] or 0.0, 0.0
         for grown in _GROWTH:
             terms, rate = rates(k, grown)
-            before = rates(k, last + 0.999 * (grown - last))[1] if rate is None else rate
+            before, end = rates(k, last + 0.999 * (grown - last))[1] if rate is None else rate, initial[k] + grown
             if before is not None and not before > _STILL * first:
                 break  # it does not come so far
-            sound = all(mpmath.im(one) == 0 and 0 <= one < mpmath.inf for one in terms)
-            assert sound, (
-                f"'{symbol}' has no limit, and a term is infinite or changes its sign before it is "
-                f"{initial[k] + grown:.3g}; state where the material ends, ck.State(..., limit=...)"
+            assert all(mpmath.im(one) == 0 and 0 <= one < mpmath.inf for one in terms), (
+                f"'{symbol}' has no limit, and a term is infinite or changes its sign before it is {end:.3g}; "
+                f"state where the material ends, ck.State(..., limit={end:.1g})"
             )
             last = grown
     return f"{len(unlimited)} followed" if unlimited else None
