@@ -55,7 +55,7 @@ def command(
     ] = None,
     using: Annotated[Predictor | None, Option(help="Identify through a surrogate alone, such as dimple.")] = None,
     through: Annotated[
-        Predictor | None, Option(help="Search through a using, and end with the specimen itself.")
+        Predictor | None, Option(help="Search through a surrogate, and end with the specimen itself.")
     ] = None,
     confirm: Annotated[
         bool | None, Option(help="Simulate the best law by the specimen itself; a law may be a saved FIT.json.")
