@@ -202,11 +202,8 @@ class StatedConditions:
         unread += [(entry.location, entry.key or key) for key, entry in self._texts.items()]
         for location, key in unread:
             if self._vocabulary.synonyms.get(key, key) == "control":
-                raise HistoryError(
-                    f"{location}: '{key}' says whether a load or a true stress was held, and of this test neither was "
-                    "imposed: leave it out; a relaxation test, of which the strain is held and the stress measured, "
-                    "states strain_pct or steps of strain alone"
-                )
+                what = "neither a load nor a true stress was held in this test: leave it out, and state strain_pct"
+                raise HistoryError(f"{location}: '{key}': {what} or steps of strain where the strain was held")
             raise HistoryError(f"{location}: '{key}' has no meaning beside the others; {_ALLOWED_COMBINATIONS}")
         earlier = [self.labels["assumed"]] if self.labels.get("assumed") else []
         new = [one for one in self._assumptions if not earlier or one not in earlier[0]]

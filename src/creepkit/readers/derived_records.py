@@ -342,10 +342,8 @@ def without_loading(
     if includes_loading != "yes":
         return StrainRecord(strain, used, elastic == "yes")
     if elastic == "yes":
-        raise HistoryError(
-            f"{location}: includes_loading is yes, so the strain at the end of loading is subtracted and no elastic "
-            "strain is left; leave out includes_elastic: yes"
-        )
+        what = "includes_loading is yes, which leaves no elastic strain; leave out includes_elastic: yes"
+        raise HistoryError(f"{location}: {what}")
     if total is None and end is None and times[first] > 0.0:
         raise HistoryError(
             f"{location}: includes_loading is yes, but not by how much; state loading_strain_pct, the strain at the "

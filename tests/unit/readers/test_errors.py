@@ -69,7 +69,7 @@ CASES = [
     (HEAD + "# stress_MPa: 61\n" + BODY, "x.csv:3: 'stress_MPa' was already given in line 2; keep one of them"),
     (HEAD + "# temperature_K: 1123.15\n" + BODY, r"x.csv:3: 'temperature' is given twice \(perhaps in two units\)"),
     (HEAD + "# stress_steps: 0 s 60 MPa\n" + BODY,
-     "x.csv: the stress is given 2 times over, as a number, stress_steps or stress_program; keep one"),
+     "x.csv: the stress is given 2 times, as a number, stress_steps or stress_program; keep one"),
     (HEAD + "# pressure_MPa: 8\n" + BODY, "x.csv:3: 'pressure_MPa' has no meaning beside the others"),
     (HEAD + "time_s,strain_1,pressure_MPa\n0,0,8\n1,0,8\n",
      "x.csv:3: a column of pressure has no meaning beside strain, stress, temperature"),
