@@ -232,9 +232,9 @@ class History(NotebookCell, Plotted, Tabulated):
         return history_from_dataframe(frame, conditions)
 
     def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.histories import draw_history, history_figure
+        from creepkit.reports.histories import draw_tests, tests_figure
 
-        return history_figure, draw_history
+        return tests_figure, draw_tests
 
     def replace(self, **changes: Any) -> History:
         """The same history with some fields changed.
@@ -311,7 +311,11 @@ class History(NotebookCell, Plotted, Tabulated):
 
 
 class Histories(list[History], NotebookCell, Plotted, Tabulated):
-    """A list of tests, which notebooks show as a table."""
+    """A list of tests, which notebooks show as a table and a picture."""
+
+    def __repr__(self) -> str:
+        names = ", ".join(one.name for one in self[:4])
+        return f"<Histories: {len(self)} test{'s' * (len(self) != 1)}: {names}{', ...' * (len(self) > 4)}>"
 
     def _drawn_by(self) -> tuple[Any, Any]:
         from creepkit.reports.histories import draw_tests, tests_figure
