@@ -10,9 +10,10 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from typer.testing import CliRunner
 
 import creepkit as ck
+from creepkit import checked_arguments
 from creepkit.cli.app import built
 from creepkit.cli.command_options import checked
-from creepkit.errors import FitError
+from creepkit.errors import ArgumentError
 from creepkit.limits import Limits
 from creepkit.options import CELSIUS, HOURS, Options, option, options_of, table_of, values_of_table
 from creepkit.studies import tables
@@ -22,8 +23,9 @@ class Table(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+@checked_arguments.checked
 @dataclass(frozen=True)
-class Furnace(Options, title="settings of a furnace", error=FitError):
+class Furnace(Options, title="settings of a furnace"):
     runs: int = option(3, "Runs.", Limits(1, 10))
     atmosphere: Literal["air", "argon"] = option("air", "Around the test piece.")
     soak: float = option(7200.0, "Before the load.", Limits(0, 100, whole=False), **HOURS)
@@ -68,7 +70,7 @@ def test_what_is_not_allowed_is_refused_in_all_three() -> None:
     wrong = {"runs": (11, "11"), "atmosphere": ("neon", "neon"), "soak": (-3600.0, "-1")}
     for name, (value, text) in wrong.items():
         one = next(one for one in options_of(Furnace) if one.name == name)
-        with pytest.raises(FitError, match=name):
+        with pytest.raises(ArgumentError, match=name):
             Furnace(**{name: value})
         assert one.flag in answered(Furnace, f"{one.flag}={text}")
         with pytest.raises(ValidationError):
@@ -99,5 +101,5 @@ def test_a_field_more_is_an_argument_an_option_and_a_key() -> None:
 
 
 def test_a_misspelt_option_is_answered_by_the_nearest() -> None:
-    with pytest.raises(FitError, match="settings of a furnace have no 'run'; did you mean 'runs'"):
+    with pytest.raises(ArgumentError, match="settings of a furnace have no 'run'; did you mean 'runs'"):
         Furnace().changed({"run": 2})

@@ -54,7 +54,7 @@ LARGEST_CONSTANT = 1e7
 
 @checked
 @dataclass(frozen=True)
-class RuptureSettings(Options, title="settings of an assessment", error=FitError):
+class RuptureSettings(Options, title="settings of an assessment"):
     """How rupture tests are assessed.
 
     degrees : of polynomials of log10 of the stress that are tried.
@@ -74,7 +74,6 @@ class RuptureSettings(Options, title="settings of an assessment", error=FitError
     def __post_init__(self) -> None:
         if not self.degrees:
             raise FitError("degrees are (); give whole numbers from 1 to 5, such as (1, 2, 3)")
-        super().__post_init__()
         for method, constants in self.fixed.items():
             if method not in METHODS:
                 raise FitError(f"fixed= names a method '{method}'; {nearest(method, METHODS)}")
@@ -88,8 +87,9 @@ class RuptureSettings(Options, title="settings of an assessment", error=FitError
                     )
 
 
+@checked
 @dataclass(frozen=True)
-class RuptureQuestion(Options, title="arguments of an assessment", error=FitError):
+class RuptureQuestion(Options, title="arguments of an assessment"):
     """What rupture() is asked beside its settings, as its arguments of these names have it; K, h, MPa."""
 
     methods: tuple[str, ...] | None = option(
