@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 import numbers as kinds_of_numbers
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, quoted_value
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,13 @@ def numbers(low: float = -math.inf, high: float = math.inf, *, above: bool = Fal
 
 
 FINITE, ANY_NUMBER = numbers(), numbers(nan=True, infinite=True)
+
+
+def check_fields(record: Any, allowed: Mapping[str, Limits], of: str, error: type[CreepkitError]) -> None:
+    """Raise `error`, which begins with `of`, for a field of a record that is not within its limits."""
+    for name, limits in allowed.items():
+        if (value := getattr(record, name)) not in limits:
+            raise error(f"{of}{name} is {quoted_value(value)}; allowed is {limits}")
 
 
 def check_numbers(name: str, values: Any, limits: Limits, error: type[CreepkitError]) -> None:

@@ -25,22 +25,11 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
 from types import UnionType
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    ClassVar,
-    Literal,
-    Self,
-    TypeVar,
-    Union,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from creepkit.checked_arguments import Kind, kind_of
 from creepkit.errors import ArgumentError, nearest
-from creepkit.limits import Limits
+from creepkit.limits import FINITE, Limits
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -79,14 +68,14 @@ class Option:
     python_only: bool = False
 
     @property
-    def words(self) -> tuple[str, ...]:
-        """Those that the type allows; () for another type."""
-        return tuple(w for one in _alternatives(self.type) if get_origin(one) is Literal for w in get_args(one))
-
-    @property
     def is_optional(self) -> bool:
         """Whether None is a value."""
         return type(None) in _alternatives(self.type)
+
+    @property
+    def kind(self) -> Kind:
+        """What a value of a command or a study file may be."""
+        return kind_of(self.type, self.limits or FINITE)
 
     def named(self, name: str, type: Any) -> Option:
         """The option of a field or an argument of this name and type, with its key and its flag."""

@@ -1,8 +1,8 @@
 """One declaration of an option is found in Python, on the command line and in a study."""
 
 import inspect
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, is_dataclass
+from typing import Annotated, Any, Literal, get_args
 
 import pytest
 import typer
@@ -86,7 +86,7 @@ def test_a_field_more_is_an_argument_an_option_and_a_key() -> None:
         wrong += [one.name] if not keys or one.flag not in flags else []
         known = [inspect.signature(verb).parameters[one.name].default for verb in (ck.identify, ck.select)]
         wrong += [] if known == [one.default] * 2 else [f"{one.name} as an argument"]
-        allowed = one.words if one.limits is None else (int(one.limits.low), int(one.limits.high))
+        allowed = get_args(one.type) if one.limits is None else (int(one.limits.low), int(one.limits.high))
         refused = ("neon",) if one.limits is None else (int(one.limits.low) - 1, int(one.limits.high) + 1)
         if one.name in ("nuisances", "weights", "usual_errors"):  # which are more than words
             continue
@@ -103,3 +103,10 @@ def test_a_field_more_is_an_argument_an_option_and_a_key() -> None:
 def test_a_misspelt_option_is_answered_by_the_nearest() -> None:
     with pytest.raises(ArgumentError, match="settings of a furnace have no 'run'; did you mean 'runs'"):
         Furnace().changed({"run": 2})
+
+
+def test_every_record_of_options_is_checked() -> None:
+    built("identify")  # which imports every command, and with them all records
+    records = [one for one in Options.__subclasses__() if one.__module__.startswith("creepkit") and is_dataclass(one)]
+    assert len(records) > 15
+    assert [one.__name__ for one in records if inspect.unwrap(one.__init__) is one.__init__] == []

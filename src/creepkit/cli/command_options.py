@@ -24,10 +24,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import typer
 
-from creepkit.checked_arguments import kind_of
 from creepkit.errors import ArgumentError, CreepkitError, quoted
 from creepkit.files.writing import check_folder_target, check_target, overwriting
-from creepkit.limits import FINITE
 from creepkit.options import Option, Options, options_of
 
 
@@ -165,12 +163,6 @@ class TextForm:
     several: bool = False
 
 
-def _words(words: Sequence[str], text: str) -> str:
-    if text not in words:
-        raise ValueError(text)
-    return text
-
-
 NEXT_NAME = re.compile(r",(?=\s*\w[\w.-]*\s*=)")
 """The comma before another NAME=VALUE."""
 
@@ -229,7 +221,7 @@ def text_form(hint: Any) -> TextForm:
             return TextForm(f"{'|'.join(words)}|NAME=NUMBER,...", functools.partial(_output_weights, words))
         return text_form(others[0])
     if origin is Literal:
-        return TextForm("|".join(parts), functools.partial(_words, parts))
+        return TextForm("|".join(parts), str)
     if origin is tuple and Ellipsis in parts and get_origin(parts[0]) is tuple:
         item = text_form(parts[0])
         return TextForm(item.metavar, lambda texts: tuple(item.parse(text) for text in texts), several=True)
@@ -341,13 +333,11 @@ def given_value(one: Option, text: Any) -> Any:
     shown = quoted(" ".join(text) if isinstance(text, list) else text)
     try:
         value = form.parse(text)
-    except ValueError as problem:
+    except (CreepkitError, ValueError) as problem:
         if isinstance(problem, CreepkitError):
             raise ArgumentError(f"{one.flag} {shown}: {problem}") from None
         example = f", such as {one.example}" if one.example else ""
         raise ArgumentError(f"{one.flag} {shown} is not known; write {one.metavar or form.metavar}{example}") from None
-    except CreepkitError as problem:
-        raise ArgumentError(f"{one.flag} {shown}: {problem}") from None
-    if wrong := kind_of(one.type, one.limits or FINITE).mismatch(value):
+    if wrong := one.kind.mismatch(value):
         raise ArgumentError(wrong.sentence(one.flag))
     return one.converted(value)

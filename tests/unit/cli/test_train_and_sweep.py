@@ -74,7 +74,7 @@ def test_what_cannot_be_is_one_line(file: Path, tmp_path: Path) -> None:
     train, sweep, to = "surrogate train", "surrogate sweep", tmp_path / "m.safetensors"
     missing = "there are not 900 samples to learn from: the data set has 60 accepted ones, of which 12"
     table = [
-        (f"{train} {file} --to {to} --target sqrt", "--target sqrt is not known; write value|log"),
+        (f"{train} {file} --to {to} --target sqrt", "--target is 'sqrt'; allowed is 'value' or 'log'"),
         (f"{train} {to} --to {to}", "no such"),
         (f"{sweep} {file} --to {to} --hidden '64;128'", "--hidden 64;128 is not known; write INTEGER,..."),
         (f"{sweep} {file} --to {to} --samples 900", missing),
