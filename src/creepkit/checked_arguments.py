@@ -233,11 +233,10 @@ def kind_of(annotation: Any, limits: Limits = FINITE) -> Kind:
     if annotation is Array or getattr(origin or annotation, "__name__", "") == "ndarray":
         return Kind("an array of numbers", _is_array)
     if origin in (Union, types.UnionType):
-        members = tuple(kind_of(one, limits) for one in args if one is not str or Path not in args)  # a text is a path
-        return Kind(_listed(one.words for one in members), members=members)
+        kinds = [kind_of(one, limits) for one in args if one is not str or Path not in args]  # a text is a path
+        return _union(part for one in kinds for part in one.members or (one,))
     if origin is Literal:
-        is_one_of_a_type = _instance_test(*map(type, args))
-        return Kind(_listed(map(repr, args)), lambda value: is_one_of_a_type(value) and value in args)
+        return _union(Kind(repr(one), functools.partial(_is_word, one)) for one in args)
     if origin is tuple and args[1:] != (...,):
         items = [kind_of(one, ANY_NUMBER if limits == FINITE else limits) for one in args if one != ()]
         return Kind(
@@ -272,6 +271,15 @@ def kind_of(annotation: Any, limits: Limits = FINITE) -> Kind:
     if not getattr(kind, "_is_runtime_protocol", False):  # whose name tells a user nothing
         words = "a function" if "__call__" in wanted else f"an object with {' and '.join(wanted)}"
     return Kind(words, lambda value: not isinstance(value, type) and all(hasattr(value, one) for one in wanted))
+
+
+def _union(kinds: Iterable[Kind]) -> Kind:
+    members = tuple(kinds)
+    return Kind(_listed(one.words for one in members), members=members)
+
+
+def _is_word(word: Any, value: Any) -> bool:
+    return isinstance(value, type(word)) and bool(value == word)
 
 
 def _instance_test(*kinds: Any) -> Callable[[Any], bool]:

@@ -212,8 +212,9 @@ def _frame_flags(history: History, kinds: Collection[str]) -> list[QualityFlag]:
     """Suspect frames of a history; each check uses the frames that those before it have left."""
     result: list[QualityFlag] = []
     for kind, search in zip(FRAME_FLAG_KINDS, (unloading_frames, decreasing_frames, outlier_frames), strict=True):
-        if kind in kinds:
-            result += search(_with_frames_unused(history, [k for flag in result for k in flag.frames]))
+        if kind in kinds and (found := list(search(history))):
+            history = _with_frames_unused(history, [k for flag in found for k in flag.frames])
+            result += found
     return result
 
 

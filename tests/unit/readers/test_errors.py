@@ -47,6 +47,7 @@ CASES = [
     (HEAD + "time_s,strain_1\n0,0\n1,1e999\n", "x.csv:5: 'strain_1' is '1e999', too large"),
     (HEAD + "time_s,strain_1\n0,0\n1,a lot\n", "x.csv:5: 'strain_1' is 'a lot'; write a finite number"),
     (HEAD + "time_s,strain_1\n0,0\n1_000,0\n", "x.csv:5: 'time_s' is '1_000'; write a finite number"),
+    (HEAD + "time_s,strain_1\n1'25,0\n2.25,.2\n3,.3\n", "x.csv:4: 'time_s' is '1'25', with digits in groups"),
     (HEAD + "time_s,strain_1\n0,0\n1,\n", "x.csv:5: 'strain_1' is empty; write a finite number"),
     (HEAD + "time_s,strain_1\n0,0\n\n1\n", "x.csv:6: number of cells 1, of columns 2; write one cell a column"),
     (HEAD + "time_s,strain_1\n0,0,0\n", "x.csv:4: number of cells 3, of columns 2"),

@@ -48,6 +48,12 @@ def test_a_strain_and_its_time_in_the_row_of_a_test_are_no_frames(read):
         read(SHEET.replace(";Observations", "") + "E1;600;180;5,2;1200\nE2;650;120;3,3;900\n")
 
 
+def test_a_clock_that_begins_just_before_zero(read):
+    (test,) = read("# temperature_C: 850\n# stress_MPa: 60\ntime_s,strain_pct\n-0.5,0\n100,.1\n900,.3\n")
+    assert test.times[0] == 0.0
+    assert "times just below zero are zero" in test.labels["assumed"]
+
+
 def test_logarithms(read):
     first, second = read(LOGARITHMS)
     assert (first.rupture_time, second.rupture_time) == (pytest.approx(10**2.5 * 3600), 3.6e6)
