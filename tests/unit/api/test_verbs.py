@@ -176,7 +176,5 @@ def test_a_predictor_to_search_through_is_auto_or_an_object() -> None:
     run = ck.simulate(
         "norton", "uniaxial", {"A": 1e-16, "n": 4.0}, loading=ck.constant_stress(80.0), times=np.linspace(0.0, 1e4, 9)
     )
-    with pytest.raises(
-        ArgumentError, match=r"^through of identify.* is 'rom'; allowed is a predictor such as .*, 'auto' or None"
-    ):
+    with pytest.raises(ArgumentError, match="'rom'; allowed is a predictor such as .*, 'auto' or None"):
         ck.identify("norton", [run], through="rom")
