@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats, frozen
+from creepkit.arrays import ArrayLike, Floats, frozen, set_fields
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.surface_interpolation import (
     SurfaceInterpolation,
@@ -91,11 +91,10 @@ class Observation:
             return
         if len(self.radii):
             raise SolveError(f"observation: a {self.form} has a window and no radii; write form='rings' for these")
-        if self.points is None:
-            object.__setattr__(self, "points", DEFAULT_RADII[self.form])
+        points = DEFAULT_RADII[self.form] if self.points is None else self.points
+        set_fields(self, points=points)
         check_fields(self, ALLOWED, "observation: ", SolveError)
-        object.__setattr__(self, "window", float(self.window))
-        object.__setattr__(self, "points", int(self.points))
+        set_fields(self, window=float(self.window), points=int(points))
 
     def _check_rings(self) -> None:
         if self.window != DEFAULT_WINDOW or self.points is not None:
