@@ -97,8 +97,8 @@ class FibreBeam(TestPiece, ABC):
         return (
             f"The beam has {len(self.beam_stations().moments)} sections of {len(self.section()[0])} fibres each, all "
             "of them uniaxial material points; plane sections stay plane, deflections are small, shear is left out, "
-            "and deflections follow from the curvatures by virtual work. Fibres are integrated in time together by "
-            f"{SDIRK4_TEXT}, with a local error of at most {self.tolerance:g} in a step; the beam ruptures where a "
+            "and deflections follow from the curvatures by virtual work. Fibres are integrated together by "
+            f"{SDIRK4_TEXT}. The local error of a step is at most {self.tolerance:g}; the beam ruptures where a "
             f"fibre reaches a creep strain of {self.strain_limit:g}."
         )
 

@@ -146,7 +146,8 @@ class ResultFolder:
         path = self.path(stage)
         with suppress(CreepkitError):
             content = check_heading(read_json(path, STAGE_RESULT.kind), str(path), STAGE_RESULT)
-            return content.get("result") if content.get("key") == f"{key} {code_fingerprint()}" else None
+            is_wanted = (content.get("stage"), content.get("key")) == (stage, f"{key} {code_fingerprint()}")
+            return content.get("result") if is_wanted else None
         return None
 
     def save(self, stage: str, key: str, result: Any) -> None:

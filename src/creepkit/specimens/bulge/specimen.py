@@ -145,7 +145,7 @@ class Bulge(FiniteElementSpecimen):
             held = " and ".join(_CLAMPED[edge] for edge in self.geometry.clamped)
             held = f"all displacements are zero {held}"
             named = (f"{n.replace('_', ' ')} {getattr(self.geometry, n):g} mm" for n in DimpleGeometry.lengths)
-            lengths = f"The dimple has, unless a test states a length of its own, {', '.join(named)}. "
+            lengths = f"Lengths of the dimple that a test does not state: {', '.join(named)}. "
         return (
             f"{lengths}Boundary conditions: {held}; radial displacements are zero on the axis; the gas presses on the "
             "underside, normal to its deformed surface. Compared is what the operator of a test, by default "
