@@ -97,10 +97,8 @@ def read_frames(
         values["strain"] = -values["strain"]
     if "x" in map(str.casefold, found.values()) and (np.diff(values["time"]) < 0.0).any():
         order = np.argsort(values["time"], kind="stable")
-        values, notes = (
-            {name: one[order] for name, one in values.items()},
-            [*notes, "points of a plot in order of time"],
-        )
+        values = {name: one[order] for name, one in values.items()}
+        notes.append("points of a plot in order of time")
     table = table.assuming(*notes)
     imposed = [values[name] for name in (*terms.number_kinds, "temperature") if name in values]
     return _strictly_increasing(_without_readings_before_steps(TableFrames(table, values, table.lines), imposed))
@@ -152,7 +150,8 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
             what = f"'{written}' and '{others[0]}' seem to be several sensors of the {sensor}; which counts?"
             raise column_question(table, what, *counts[:3])
         present = {(split_unit(other, kinds) or ("",))[0] for other in table.columns}
-        if sensor == "temperature" and sensor not in present and unit_suffix(unit) in kinds[sensor].units:
+        is_known = sensor in ("temperature", "diameter") and unit_suffix(unit) in kinds[sensor].units
+        if is_known and sensor not in present:
             return sensor, unit_suffix(unit) or ""
         if sensor and sensor not in present:
             what = f"'{written}' seems to be a sensor of the {sensor}; is it?"

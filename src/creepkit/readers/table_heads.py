@@ -75,12 +75,12 @@ def test_and_column(cell: str, known: Terms) -> tuple[str, str]:
     ):
         return "", cell
     written, unit = split_written_name(cell)
-    words = written.replace(":", " ").replace("_", " ").split()
+    words = re.sub(r"^([DØ⌀])(?=\d)", r"\1 ", written.replace(":", " ").replace("_", " ")).split()
     for size in range(min(len(words) - 1, 3), 0, -1):
         for first, rest in ((words[:size], words[size:]), (words[-size:], words[:-size])):
-            name, column = " ".join(rest).strip("-–, "), " ".join(first)
+            name, column = " ".join(rest).strip("-–, "), " ".join(first) + (f" ({unit})" if unit else "")
             if name and known.quantity(column) and not _NOT_TESTS.search(name.lower()):
-                return name, f"{column} ({unit})" if unit else column
+                return name, column
     return "", cell
 
 
