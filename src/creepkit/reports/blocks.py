@@ -191,7 +191,7 @@ def listed(words: Sequence[str]) -> str:
 
 
 def ends(values: Sequence[float] | Floats, digits: int = 4) -> str:
-    """The least and the largest of numbers, '140 to 230'; one where they are the same."""
+    """The least and the largest of values (numbers,), '140 to 230'; one where they are the same."""
     return " to ".join(dict.fromkeys(number(end, digits) for end in (min(values), max(values))))
 
 
