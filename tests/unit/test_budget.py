@@ -25,7 +25,7 @@ BUDGET = {
     "exporters": 2700,
     "extraction": 1300,
     "fem": 1450,
-    "files": 1400,
+    "files": 1350,
     "forecasts": 1350,
     "instruments": 1225,
     "integration": 800,

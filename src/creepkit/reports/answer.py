@@ -23,7 +23,7 @@ from creepkit.language import strain, temperature, time
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.blocks import Answer, Rich, as_text, number, plural, printable
+from creepkit.reports.blocks import Answer, Rich, as_text, ends, listed, number, plural, printable
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
     rate_figure = _with_interval("creep rate", f"{at}{of_state}", rate, PERCENT_PER_HOUR, "%/h")
     included = any(one.included for one in fit.unmodelled)
-    return [*figures, replace(rate_figure, remark="usual errors included") if included else rate_figure]
+    return [*figures, replace(rate_figure, remark="with usual errors") if included else rate_figure]
 
 
 def _with_interval(name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "") -> KeyFigure:
@@ -176,9 +176,7 @@ def strength_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
 
 def _range(fit: Identification) -> str:
     """Stresses and temperatures of the tests."""
-    low, high = fit.ranges["stress"]
-    stresses = f"{low:.3g} MPa" if f"{low:.3g}" == f"{high:.3g}" else f"{low:.3g} to {high:.3g} MPa"
-    return f"{stresses}, {celsius_text(*fit.ranges['temperature'], digits=0)}"
+    return f"{ends(fit.ranges['stress'], 3)} MPa, {celsius_text(*fit.ranges['temperature'], digits=0)}"
 
 
 def tests_text(fit: Identification) -> str:
@@ -281,10 +279,8 @@ def _data(quality: DataQuality | None) -> Iterator[str]:
 def _named(names: Sequence[str], noun: str, *, quoted: bool = True) -> str:
     """Some names, and how many more there are."""
     marks = "'" if quoted and noun == "test" else ""
-    listed = [f"{marks}{name}{marks}" for name in names[:MOST_NAMED]]
-    more = len(names) - len(listed)
-    listed += [f"{more} more {noun}{'s' * (more > 1)}"] if more > 0 else []
-    return listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])} and {listed[-1]}"
+    more = [f"{plural(len(names) - MOST_NAMED, f'more {noun}')}"] if len(names) > MOST_NAMED else []
+    return listed([*(f"{marks}{name}{marks}" for name in names[:MOST_NAMED]), *more])
 
 
 # ---- next ------------------------------------------------------------------------------------------------------------
@@ -408,7 +404,7 @@ def held_quantities(fit: Identification) -> str:
     law = fit.law
     held = [word for word, symbol in (("time", time), ("strain", strain)) if law.uses(symbol)]
     held += ["initial internal variables"] if law.states else []
-    return f"{', '.join(held[:-1])} and {held[-1]}" if len(held) > 1 else "".join(held)
+    return listed(held) if held else ""
 
 
 def reference_sentences(fit: Identification) -> list[str]:
