@@ -113,7 +113,7 @@ def assemble_history(
         if stated == "no" and not any(name.startswith("strain") for name in outputs):
             what = f"the elastic part in {' and '.join(outputs)} all the same; that of a {specimen} always includes it"
             conditions.record_assumption(what.replace(",", ";"))
-    outputs = without_steps(conditions, frames.times, outputs, used)
+    outputs = without_steps(conditions, frames.times, outputs, used, temperature)
     merged = {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
     rupture_time, unruptured = _end_of_test(conditions, frames, used, name, loading.quantity != "strain")
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)

@@ -205,10 +205,8 @@ def _check_bare_strain(conditions: StatedConditions, quantity: str, kind: Quanti
     if "pct" not in kind.units or number.unit:
         return
     if abs(number.value) > LARGEST_BARE_STRAIN:
-        raise HistoryError(
-            f"{number.location}: '{number.key}' is {number.value:g} without a unit; write {quantity}_pct for a "
-            f"percentage, or {quantity}_steps: 0 s {number.value:g} for a fraction"
-        )
+        what = f"'{number.key}' is {number.value:g} without a unit; write {quantity}_pct for a percentage"
+        raise HistoryError(f"{number.location}: {what}, or {quantity}_steps: 0 s {number.value:g} for a fraction")
     conditions.record_assumption(f"{quantity} {number.value:g} as a fraction")
 
 

@@ -192,8 +192,14 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
     """What to mind, the most serious first, a sentence each without a full stop."""
     others = [one.fit for one in ranking.laws if one.fit is not fit] if ranking is not None else []
     choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
-    of_law = [*_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
+    of_law = [*_of_tests(fit), *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
     return list(dict.fromkeys([*of_law, *_held(others), *_data(quality)]))
+
+
+def _of_tests(fit: Identification) -> Iterator[str]:
+    """Tests that do not agree with all others, with the error that would make it."""
+    found = fit.adequacy.explanations[:1] if fit.adequacy is not None else ()
+    yield from (one.caution if one.kind == "one test" else one.headline for one in found if not one.is_of_law)
 
 
 def _held(fits: Sequence[Identification]) -> Iterator[str]:
@@ -219,17 +225,15 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         yield f"it does not predict every reading of {_named(adequacy.unpredicted, 'test')}"
     if adequacy.contradicting is not None:
         yield "minimum rates and rupture times of the tests contradict one another by this law"
-    if adequacy.is_explained:
+    if adequacy.is_explained and not adequacy.lies_in_tests:
         yield adequacy.explanations[0].headline
     if adequacy.mentioned is not None:
         yield adequacy.mentioned.caution
     if adequacy.misses_shape() and adequacy.largest is not None:
         worst = adequacy.largest
-        percent = is_logarithmic(worst.output)
-        unit = "%" if percent else output_unit(worst.output)
-        size = abs(worst.deviation) * (100.0 if percent else 1.0)
+        factor, unit = (100.0, "%") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
+        what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
         side = "too large" if worst.deviation > 0 else "too small"
-        what, amount = worst.output.replace("_", " "), f"{size:.2g} {unit}".strip()
         yield f"it is worst in '{worst.test}': {what} {amount} {side} at {time_text(worst.time)}"
     if adequacy.remedies and not adequacy.explanations:
         yield f"it would explain the tests with {adequacy.remedies[0]}, which nobody modelled"
@@ -316,10 +320,8 @@ def answer(
     """
     symbols = symbols_of(fit.law)
     remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
-    if ranking is not None and len(ranking.laws) > 1:
-        remarks.append(chosen_text(ranking))
-    if fit.sparsity is not None:
-        remarks.append(fit.sparsity.verdict)
+    remarks += [chosen_text(ranking)] if ranking is not None and len(ranking.laws) > 1 else []
+    remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
     return Answer(
         fit.headline,
         titled_law(fit.law),
