@@ -275,10 +275,8 @@ def apparent_exponent(stresses: Floats, rates: Floats, temperatures: Floats) -> 
     if not squares > LEAST_SPREAD * max(x.size, 1):
         return float("nan"), float("nan")
     exponent = float((x * y).sum()) / squares
-    if freedom < 1:
-        return exponent, float("nan")
-    variance = float(((y - exponent * x) ** 2).sum()) / freedom
-    return exponent, float(student.ppf(0.975, freedom)) * (variance / squares) ** 0.5
+    variance = float(((y - exponent * x) ** 2).sum()) / freedom if freedom > 0 else float("nan")
+    return exponent, float(student.ppf(0.975, max(freedom, 1))) * (variance / squares) ** 0.5
 
 
 LEAST_SPREAD = 0.03**2
