@@ -103,12 +103,13 @@ def _written_out(value: float, digits: int) -> str:
 def key_figures(fit: Identification) -> list[KeyFigure]:
     """Stress exponent, activation energy and creep rate at the tests; of a rejected law what was measured."""
     rates = compared_minimum_rates(fit)
-    measured, predicted = exponents(rates) if rates else (math.nan, math.nan)
+    measured, half, predicted = exponents(rates) if rates else (math.nan, math.nan, math.nan)
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
         if not math.isfinite(measured):
             return []
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
-        return [KeyFigure("stress exponent of measured minimum rates", _range(fit), measured, remark=by_law)]
+        interval = (measured, measured - half, measured + half)
+        return [KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law)]
     r = fit.reference
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}"
     rate, exponent = rate_and_exponent(fit)

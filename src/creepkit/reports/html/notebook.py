@@ -81,9 +81,8 @@ def _(law: CreepLaw) -> Sequence[Block]:
 @_blocks.register
 def _(tests: Histories) -> Sequence[Block]:
     caption = f"{plural(len(tests), 'test')} over time; hollow: readings that are not used."
-    measured = [one for one in tests if one.outputs]
-    drawn = [_figures().picture(lambda: tests_figure(measured), "Tests", caption, caption)] if measured else []
-    return [*history_blocks(tests), *drawn]
+    drawn = [_figures().picture(lambda: tests_figure(tests), "Tests", caption, caption)]
+    return [*history_blocks(tests), *(drawn if any(one.outputs for one in tests) else [])]
 
 
 _blocks.register(History)(lambda history: _blocks(Histories([history])))
