@@ -342,8 +342,10 @@ _PLACES = {"middle": re.compile(r"mid|cent(?:re|er|ral)|mitte|mitten"), "load po
 
 def _record_place(conditions: StatedConditions, table: CellTable, specimen: str) -> None:
     """Say where an output was read, if another specimen of the kind has it of another place; HistoryError for that."""
-    own, known = known_specimens().get(specimen), known_specimens()
-    for name, other in known.items() if own is not None else ():
+    own = known_specimens().get(specimen)
+    if own is None:
+        return
+    for name, other in known_specimens().items():
         is_kin = own is not other and (isinstance(other, type(own)) or isinstance(own, type(other)))
         for one, two in zip(own.outputs, other.outputs, strict=False) if is_kin else ():
             if one != two or one.long_name == two.long_name:

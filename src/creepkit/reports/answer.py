@@ -217,7 +217,7 @@ def _contradictions(fit: Identification) -> Iterator[str]:
     """What keeps the law from describing the tests."""
     adequacy = fit.adequacy
     if not fit.converged:
-        yield "the search did not converge: repeat it with more starts"
+        yield "the search did not converge: these values may not be its best"
     if adequacy is None:
         yield "whether the tests contradict the law is not known"
         return
@@ -289,17 +289,20 @@ def _named(names: Sequence[str], noun: str, *, quoted: bool = True) -> str:
 
 def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
     """What to do now, in one sentence without a full stop."""
-    adequacy = fit.adequacy
+    adequacy, weak = fit.adequacy, [e.name for e in fit.estimates if e.verdict in (NOT_DETERMINED, POORLY_DETERMINED)]
+    if not fit.converged:
+        held = f" and bounds for {_named(weak, 'parameter', quoted=False)}" if weak else ""
+        return f"repeat the search with more starts (--starts {2 * fit.settings.starts}, or starts in a study){held}"
     if adequacy is not None and adequacy.in_tests is not None:
         return adequacy.in_tests.next_step
     if adequacy is not None and (adequacy.rejects or adequacy.verdict == "cannot be judged"):
         if ranking is None or len(ranking.laws) < 2:
             return "compare it with other laws that suit the tests (creepkit init)"
         return "use it within the range of the tests alone; try further laws for more"
-    if ranking is not None and len(ranking.laws) > 1 and not ranking.decisive:
-        return "make a test that tells the laws apart (creepkit design says which)"
-    if any(e.verdict in (NOT_DETERMINED, POORLY_DETERMINED) for e in fit.estimates):
-        return "make a test that determines more (creepkit design says which)"
+    undecided = ranking is not None and len(ranking.laws) > 1 and not ranking.decisive
+    if undecided or weak:
+        what = "tells the laws apart" if undecided else "determines more"
+        return f"make a test that {what} (creepkit design says which)"
     return "forecast (creepkit predict), or export the law to your code (creepkit export)"
 
 
