@@ -428,8 +428,8 @@ def expansion_flags(history: History) -> Iterator[QualityFlag]:
         kelvin, alpha = ", ".join(f"{one:+.3g} K" for one in changes), float(sizes @ changes / (changes @ changes))
         reason = f"{name} steps by {jumps} at {at}, as the temperature does by {kelvin}: thermal expansion"
         advice = f"take off that of the alloy: 'thermal_expansion = \"{alpha:.2g} 1/K\"' in tests.toml"
-        reason, steps = f"{reason} of about {alpha:.2g}/K, which is no creep", {history.name: sizes[0]}
-        yield QualityFlag((history.name,), "jump", (), reason, time=times[0], jumps=steps, proposal=advice)
+        reason, first = f"{reason} of about {alpha:.2g}/K, which is no creep", {history.name: float(sizes[0])}
+        yield QualityFlag((history.name,), "jump", (), reason, time=times[0], jumps=first, proposal=advice)
 
 
 def record_flags(history: History, activation_energy: float) -> Iterator[QualityFlag]:

@@ -147,10 +147,8 @@ def _control(conditions: StatedConditions, *, varies: bool) -> str:
         return meant
     control = conditions.take_choice("control", ("load", "stress"), required=True)
     if varies and meant and control != meant:
-        raise HistoryError(
-            f"{location}: stress_measure is {measure} and control is {control}, but steps and records of an "
-            "engineering stress are a load, and those of a true stress a stress; keep one of the two"
-        )
+        what = f"stress_measure is {measure} and control is {control}, but an engineering stress that changes is a load"
+        raise HistoryError(f"{location}: {what}, and a true one a stress; keep one of the two")
     return control
 
 

@@ -472,10 +472,10 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
         what = f"{' and '.join(map(repr, axes[0]))} are columns of a plot; what are they?"
         raise column_question(headed.table, what, *choices)
     if not headed.times:
-        raise HistoryError(
-            f"{headed.place}: missing column: no time among {some_of(list(filter(None, headed.names)))}; name one "
-            "time_s, time_min or time_h in that row, behind its '#' where it has one"
+        what = (
+            f"missing column: no time among {some_of(list(filter(None, headed.names)))}; name one time_s, time_min or"
         )
+        raise HistoryError(f"{headed.place}: {what} time_h in that row, behind its '#' where it has one")
     head = HeadOfTest(headed.table, headed.known)
     for row in headed.whole:
         head.read(row)

@@ -118,6 +118,11 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("od", "o.d.", "outside diameter", "tube diameter", "mean od", "mean outer diameter", "aussendurchmesser"),
         *("außendurchmesser", "diamètre extérieur"),
     ),
+    "deflection": (
+        *("midspan deflection", "deflection at midspan", "centre deflection", "center deflection", "durchbiegung"),
+        *("central deflection", "mid span deflection", "durchbiegung mitte", "mittendurchbiegung", "flèche"),
+        *("flèche au centre", "load point deflection", "load point displacement", "deflection at load points"),
+    ),
     "notch_diameter": ("minimum diameter", "root diameter", "notch root diameter", "kerbdurchmesser"),
     "span": (
         *("outer span", "support span", "outer support span", "lower span", "outer roller spacing", "support distance"),
