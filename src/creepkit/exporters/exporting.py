@@ -109,8 +109,9 @@ def _units(units: Units | Mapping[str, str]) -> Units:
     return Units(**units)
 
 
+@checked
 @dataclass(frozen=True)
-class ExportOptions(Options, title="options of an export", error=ExportError):
+class ExportOptions(Options, title="options of an export"):
     """What is said of an export beside its target. temperature : K, modulus : MPa."""
 
     name: str = option("", "What the target is to call the law.")

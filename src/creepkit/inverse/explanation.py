@@ -93,7 +93,7 @@ class Explanation:
     def sentence(self) -> str:
         """What it is, for people, without a full stop."""
         if self.is_of_law:
-            return f"{self.headline} over the tests, more than this law lets it"
+            return f"{self.headline}, more than this law lets it"
         speed = f"{np.exp(self.size):.3g} times as fast"
         if self.kind == "two groups":
             named = ", ".join(self.tests[:MOST_NAMED])

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from itertools import product
 from typing import get_args
 
 import numpy as np
@@ -32,7 +31,7 @@ from creepkit.quality.rig import (
     rate_change_flag,
     record_flags,
 )
-from creepkit.records import History, known_specimens
+from creepkit.records import History, known_specimens, output_named
 
 __all__ = [
     "ACTIVATION_ENERGY",
@@ -99,8 +98,8 @@ def _doubtful_units(histories: Sequence[History]) -> Iterator[QualityFlag]:
         reasons = [f"the strain reaches {100 * strain:.4g} %; look whether its unit is right"] * (strain > 1.0)
         reasons += [
             f"{output} begins at the {name}; take the first reading off its column, for creep is what it grows"
-            for output, name in product(one.outputs, one.geometry)
-            if set(output.split("_")) & set(name.split("_"))
+            for output in one.outputs
+            if (name := output_named(output, one.specimen).change_of.lstrip("-")) in one.geometry
             and abs(one.outputs[output][0] / one.geometry[name] - 1) < 0.1
         ]
         yield from (QualityFlag((one.name,), "unit", (), reason) for reason in reasons)
@@ -212,8 +211,9 @@ def _frame_flags(history: History, kinds: Collection[str]) -> list[QualityFlag]:
     """Suspect frames of a history; each check uses the frames that those before it have left."""
     result: list[QualityFlag] = []
     for kind, search in zip(FRAME_FLAG_KINDS, (unloading_frames, decreasing_frames, outlier_frames), strict=True):
-        if kind in kinds:
-            result += search(_with_frames_unused(history, [k for flag in result for k in flag.frames]))
+        if kind in kinds and (found := list(search(history))):
+            history = _with_frames_unused(history, [k for flag in found for k in flag.frames])
+            result += found
     return result
 
 

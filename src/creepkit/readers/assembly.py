@@ -25,6 +25,7 @@ from creepkit.readers.derived_records import (
     as_plain_bar,
     from_loading_on,
     modulus_of_ramp,
+    with_changes_of_lengths,
     without_loading,
     without_steps,
 )
@@ -78,7 +79,8 @@ def assemble_history(
     conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
-    frames = as_plain_bar(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
+    frames = with_changes_of_lengths(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
+    frames = as_plain_bar(conditions, frames)
     frames = from_loading_on(conditions, frames)
     for assumption in frames.table.assumptions[len(table.assumptions) :]:
         conditions.record_assumption(assumption)

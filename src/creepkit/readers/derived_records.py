@@ -40,15 +40,20 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.readers.conditions import StatedConditions
-from creepkit.readers.frames import TableFrames
+from creepkit.readers.frames import UNUSED, TableFrames, column_question
 from creepkit.readers.imposed import hold_begins
 from creepkit.readers.table import SourceText
 from creepkit.readers.vocabulary import unit_suffix
-from creepkit.records.quantities import TIME
+from creepkit.records.quantities import STRAIN, TIME
 from creepkit.records.reading_noise import noise_of_readings
+from creepkit.records.specimen_record import Output
 from creepkit.records.units import time_text
 
 # ---- load and extension of a plain bar -------------------------------------------------------------------------------
+
+
+OF_BAR = frozenset(("elongation", "strain", "stress", "force"))
+"""What columns hold of a plain bar."""
 
 
 PLAIN = ("", "uniaxial", "relaxation")
@@ -71,15 +76,64 @@ FEWEST_RAMP_FRAMES, RAMP_FROM = 3, 0.2
 """Before the end of a ramp; part of the stress that is held at which a ramp that loading shows begins at most."""
 
 
+NEAR_LENGTH = 0.1
+"""Of a stated length, by which the first reading of it may differ."""
+
+
+def with_changes_of_lengths(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
+    """The frames with the change of a length in the place of its readings, or of its relative change.
+
+    A diameter of a plain bar is a strain at constant volume, (d0/d)^2 - 1, whose sign is that of the test. A length
+    counts from its first reading where that was taken at time zero, else from what is stated.
+    """
+    values = dict(frames.values)
+    for name in [one for one in values if one in conditions.terms.length_kinds]:
+        output, is_relative = _change_of(conditions, frames, name), conditions.terms.length_kinds[name] is STRAIN
+        if not output and conditions.text_of("specimen") not in PLAIN:
+            continue
+        column, length = values.pop(name), output.change_of.lstrip("-") if output else "diameter"
+        stated, first = conditions.geometry.get(length), float(column[0])
+        if is_relative and not output:
+            column = -abs(column)
+        elif stated is None and (is_relative or frames.times[0] > 0.0):
+            what = f"the {name} counts from the {length} before the test, which is not stated; how many mm is it?"
+            raise conditions.question(what, f"{length}_mm", *([] if is_relative else [first]))
+        elif not is_relative and abs(first - (stated or first)) >= NEAR_LENGTH * (stated or first):
+            columns = enumerate(frames.table.columns)
+            written = frames.table.as_written(next(k for k, c in columns if name in c or c[0] in "DØ⌀"))
+            what = f"'{written}' begins at {first:g} mm, which is no {length}; what does it hold?"
+            choices = [{written: f"{output or 'elongation'} (mm)"}, {written: UNUSED}]
+            raise column_question(frames.table, what, *choices)
+        initial = first if not is_relative and (stated is None or frames.times[0] == 0.0) else stated or 1.0
+        relative = column if is_relative else column / initial - 1.0
+        if output:
+            values[output] = (-initial if output.change_of.startswith("-") else initial) * relative
+        else:
+            strain = (1.0 + relative) ** -2 - 1.0
+            strain *= np.sign(strain[np.argmax(abs(strain))])
+            is_true = conditions.text_of("strain_measure") == "logarithmic"
+            values["strain"] = np.log1p(strain) if is_true else strain
+        conditions.geometry.setdefault(length, initial)
+        what = name if is_relative else f"{name} from {initial:g} mm on"
+        conditions.record_assumption(f"{output or 'strain at constant volume'} by the {what}")
+    return replace(frames, values=values)
+
+
+def _change_of(conditions: StatedConditions, frames: TableFrames, name: str) -> Output | None:
+    """The output that is the change of a length; a force alone is that of a plain bar, where no specimen is named."""
+    for specimen, output in conditions.terms.changes:
+        length, loads = output.change_of.lstrip("-"), {*conditions.terms.loads.get(specimen, ())} - {"force"}
+        is_meant = f"_{length}".endswith(f"_{'diameter' if name == 'diametral_strain' else name}")
+        is_loaded = any(conditions.states_load(load) or load in frames.values for load in loads)
+        if is_meant and (conditions.terms.own_outputs or length in conditions.geometry or is_loaded):
+            return output
+    return None
+
+
 def as_plain_bar(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
     """The frames with stress and strain in the place of load and extension; HistoryError for lengths that lack."""
     values, terms = dict(frames.values), conditions.terms
-    foreign = {name for outputs in terms.outputs.values() for name in outputs} - {
-        "elongation",
-        "strain",
-        "stress",
-        "force",
-    }
+    foreign = {name for outputs in terms.outputs.values() for name in outputs} - OF_BAR
     notch = {name for name in conditions.geometry if name.startswith("notch")}
     has_load = "force" in values or conditions.states("force")
     if conditions.text_of("specimen") not in PLAIN or notch or foreign & values.keys():
@@ -131,10 +185,8 @@ def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict
     if "stress" not in values and nominal is not None and column is not None and held and held >= FEWEST_RAMP_FRAMES:
         # A load that was raised in sight is recorded better than the one number that says what was held.
         if area is None:
-            area, how = (
-                float(np.median(column[held:])) / nominal.value,
-                f" by which the load that was held is {nominal.value:g} MPa",
-            )
+            area = float(np.median(column[held:])) / nominal.value
+            how = f" by which the load that was held is {nominal.value:g} MPa"
     elif "stress" in values or conditions.states_load("stress"):
         return ["the load beside the stress not used"]
     if area is None:
@@ -290,10 +342,8 @@ def without_loading(
     if includes_loading != "yes":
         return StrainRecord(strain, used, elastic == "yes")
     if elastic == "yes":
-        raise HistoryError(
-            f"{location}: includes_loading is yes, so the strain at the end of loading is subtracted and no elastic "
-            "strain is left; leave out includes_elastic: yes"
-        )
+        what = "includes_loading is yes, which leaves no elastic strain; leave out includes_elastic: yes"
+        raise HistoryError(f"{location}: {what}")
     if total is None and end is None and times[first] > 0.0:
         raise HistoryError(
             f"{location}: includes_loading is yes, but not by how much; state loading_strain_pct, the strain at the "

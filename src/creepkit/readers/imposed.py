@@ -126,10 +126,8 @@ def _stated_form(
     steps, breakpoints = (conditions.take_pairs(f"{quantity}_{form}", kind) for form in ("steps", "program"))
     forms = [form for form in (number, steps, breakpoints) if form is not None]
     if len(forms) > 1:
-        raise HistoryError(
-            f"{conditions.location}: the {quantity} is given {len(forms)} times over, as a number, {quantity}_steps "
-            f"or {quantity}_program; keep one"
-        )
+        what = f"{quantity} is given {len(forms)} times, as a number, {quantity}_steps or {quantity}_program; keep one"
+        raise HistoryError(f"{conditions.location}: the {what}")
     if number is not None:
         _check_bare_strain(conditions, quantity, kind, number)
         return number.value

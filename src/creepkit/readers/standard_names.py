@@ -248,9 +248,7 @@ def _times_of(
     for row, match in zip(table.rows, elapsed, strict=True):
         if match is None:
             place = table.location(row.line, clock)
-            raise HistoryError(
-                f"{place}: '{name}' is '{quoted(row.cells[clock])}'; write h:mm:ss as in the rows before"
-            )
+            raise HistoryError(f"{place}: '{name}' is '{quoted(row.cells[clock])}'; write h:mm:ss as above")
         seconds.append(3600.0 * int(match[1]) + 60.0 * int(match[2]) + float(match[3].replace(",", ".")))
     times = np.array(seconds)
     meant = synonyms.get(name, name)

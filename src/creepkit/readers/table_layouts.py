@@ -113,11 +113,7 @@ def with_groups(table: CellTable, known: Terms) -> CellTable:
     A group begins where time falls. Groups that no name tells apart, but a condition does, get numbers.
     """
     keys = [k for k, name in enumerate(table.columns) if names_tests(name) or words_of(name) == "specimen"]
-    stated = keys + [
-        k
-        for k, name in enumerate(table.columns)
-        if known.quantity(name) in (None, "temperature", *known.number_kinds) and known.is_condition(name)
-    ]
+    stated = keys + [k for k, name in enumerate(table.columns) if known.may_state(name) and known.is_condition(name)]
     filled = {k: [row for row, cell in enumerate(cells_of(table.rows, k)) if not is_missing(cell)] for k in stated}
     sparse = [k for k, rows in filled.items() if rows and rows[0] == 0 and len(rows) < len(table.rows)]
     time = next((k for k, name in enumerate(table.columns) if known.quantity(name) == "time"), None)
@@ -145,7 +141,9 @@ def with_groups(table: CellTable, known: Terms) -> CellTable:
 def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Terms) -> list[TabulatedTest]:
     """The tests of a table in which a column of names tells them apart; columns of words state conditions of a test."""
     foreign = [
-        k for k, column in enumerate(table.columns) if column not in known.declared and not known.quantity(column)
+        k
+        for k, column in enumerate(table.columns)
+        if column not in known.declared and known.quantity(column) in (None, *known.length_kinds)
     ]
     keys = [k for k in foreign if names_tests(table.columns[k])]
     keys += [k for k in foreign if not keys and _names_specimens(table, k, known)]

@@ -28,7 +28,7 @@ from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rate
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
-    from creepkit.forecasts.forecast_of_test import TestForecast
+    from creepkit.forecasts.forecast_of_test import TestForecast, TimeForecast
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.laplace_approximation import Estimate
@@ -131,12 +131,16 @@ def _with_interval(name: str, where: str, values: Sequence[float], factor: float
 
 def asked_figures(forecast: Forecast) -> list[KeyFigure]:
     """What a forecast says of each test: its life, or what it shows at the end, with the interval of a single test."""
-    return [figure for test in forecast.tests if (figure := _of_test(test)) is not None]
+    level = "" if forecast.level == 0.95 else f"{100 * forecast.level:g} % interval"
+    shown = ((_shown(test), "extrapolated beyond the tests" if test.extrapolation else "") for test in forecast.tests)
+    return [replace(one, remark=", ".join(filter(None, (level, far)))) for one, far in shown if one is not None]
 
 
-def _of_test(test: TestForecast) -> KeyFigure | None:
-    figure = _shown(test)
-    return replace(figure, remark="extrapolated beyond the tests") if figure and test.extrapolation else figure
+def event_text(one: TimeForecast) -> str:
+    """What comes at a time: strains in per cent."""
+    if not (one.output and is_logarithmic(one.output)):
+        return one.event
+    return f"{100 * one.target:g} % {one.event.rpartition(' ')[0]}"
 
 
 def _shown(test: TestForecast) -> KeyFigure | None:
@@ -144,9 +148,8 @@ def _shown(test: TestForecast) -> KeyFigure | None:
     where = condition if test.name in condition else f"{test.name}: {condition}"
     for one in test.times:
         if math.isfinite(one.median):
-            of_strain = is_logarithmic(one.output) if one.output else False
-            event = f"{100 * one.target:g} % {one.output}" if of_strain else one.event
-            return _with_interval(f"time to {event}", where, (one.median, one.low, one.high), 1 / SECONDS_PER_HOUR, "h")
+            times = (one.median, one.low, one.high)
+            return _with_interval(f"time to {event_text(one)}", where, times, 1 / SECONDS_PER_HOUR, "h")
     for name, output in test.outputs.items():
         alive = np.flatnonzero(np.isfinite(output.value))
         if alive.size:
@@ -256,7 +259,8 @@ def _precision(fit: Identification) -> Iterator[str]:
             yield f"the tests {words} {_named(names, 'parameter', quoted=False)}"
     exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
-    if far is not None and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
+    rejected = fit.adequacy is not None and fit.adequacy.rejects  # whose exponents are not those of the tests
+    if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
         yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
     change = combined_change_text(fit.unmodelled)
     if change:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.inverse.adequacy import UNDETECTED_SCATTER
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER, noises_text
 from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration_known, rests_on_durations
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_parameters import nuisance_unit
@@ -378,7 +378,7 @@ def noise_blocks(fit: Identification) -> list[Block]:
 def scatter_of_rates(fit: Identification) -> str:
     """One standard deviation of ln rate between tests, in per cent; whether an estimate of it found none."""
     rate = fit.noise_model.rate
-    return "none detected" if 0.0 < rate <= UNDETECTED_SCATTER else f"{100 * rate:.2g} %"
+    return "none detected" if 0.0 < rate <= UNDETECTED_SCATTER else f"{noises_text(100 * rate)} %"
 
 
 def rate_scatter_sentence(fit: Identification) -> str:

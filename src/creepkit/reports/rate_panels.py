@@ -189,7 +189,7 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
             axes.errorbar(measured, predicted, yerr=ends, fmt=marker, ms=4.5, lw=0.7, color=colour, mfc=face)
     if any(r.censored for r, _ in ruptures):
         axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped: broke\nlater, if at all")
-    axes.set(xlabel="measured time to rupture, h", ylabel="identified time to rupture, h")
+    axes.set(xlabel="measured time to rupture, h", ylabel="predicted time to rupture, h")
     place_legend_right(axes)
     axes.set_title(
         "time to rupture; bars: 95 % of a single test\n(if the law is right; with scatter between tests)", fontsize=9

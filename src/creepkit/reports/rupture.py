@@ -74,15 +74,8 @@ def _lives(assessment: RuptureAssessment) -> Table:
         for one in assessment.lives
     ]
     level = f"{100 * assessment.settings.level:g} %"
-    columns = (
-        "stress, MPa",
-        "temperature",
-        "median, h",
-        f"{level} of the mean",
-        "of a new heat",
-        "of one test",
-        "remarks",
-    )
+    of = (f"{level} of the mean", "of a new heat", "of one test")
+    columns = ("stress, MPa", "temperature", "median, h", *of, "remarks")
     return Table("times to rupture in h, with bounds in brackets", columns, rows, numeric=(0, 2))
 
 
@@ -263,11 +256,8 @@ def rupture_figure(assessment: RuptureAssessment) -> Figure:
     """
     figure = empty_figure(12.5, 6.2)
     grid = figure.add_gridspec(2, 2, width_ratios=[1.7, 1.0])
-    isotherms, master, compared = (
-        figure.add_subplot(grid[:, 0]),
-        figure.add_subplot(grid[0, 1]),
-        figure.add_subplot(grid[1, 1]),
-    )
+    places = (grid[:, 0], grid[0, 1], grid[1, 1])
+    isotherms, master, compared = map(figure.add_subplot, places)
     colours = _colours(assessment)
     draw_isotherms(isotherms, assessment)
     _draw_master_curve(master, assessment, colours)

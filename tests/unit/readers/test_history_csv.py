@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import HistoryError
+from creepkit.errors import CreepkitError, HistoryError
 from creepkit.language import Elastic, wachtman
 from creepkit.readers.history_csv import HISTORY_CSV, HistoryCsvReader, history_text, write_history
 from creepkit.readers.vocabulary import HeaderVocabulary
@@ -285,7 +285,7 @@ def test_by_the_call_in_every_file_that_has_them(tmp_path: Path):
     (tmp_path / "x.csv").write_text(LOGGER_HEAD + TABLE)
     found = ck.read_histories(tmp_path, ignore=["load, kN", "operator", "Date"])
     assert [history.name for history in found] == ["x", "y"]
-    with pytest.raises(HistoryError, match="ignore is 'Date'; give a list of names of columns"):
+    with pytest.raises(CreepkitError, match="ignore of .* is 'Date'; allowed is a list, each item a text"):
         ck.read_histories(tmp_path, ignore="Date")
 
 

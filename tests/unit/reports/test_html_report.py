@@ -122,6 +122,20 @@ def test_every_figure_has_words_for_those_who_do_not_see_it(page: str) -> None:
         assert any(tag(e) == "text" and e.text for e in figure.iter())  # letters, not outlines of letters
 
 
+def test_a_sentence_has_25_words_at_most() -> None:
+    """A colon and a semicolon end one as well; references of the methods text are none."""
+    texts = [
+        line
+        for e in elements(parsed(page_of(False)))
+        if tag(e) in ("p", "li", "figcaption", "caption", "dd") or "prose" in e.get("class", "")
+        for line in "".join(e.itertext()).splitlines()
+        if not line.startswith("[")
+    ]
+    sentences = [one for text in texts for one in re.split(r"(?<=[.;:?!])\s", text)]
+    assert len(sentences) > 100
+    assert [one for one in sentences if len(one.split()) > 25] == []
+
+
 def test_every_table_has_a_caption_and_heads(page: str) -> None:
     for table in (e for e in elements(parsed(page)) if tag(e) == "table"):
         assert "".join(table[0].itertext()).strip()

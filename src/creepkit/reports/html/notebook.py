@@ -15,7 +15,6 @@ from creepkit.reports.answer import equations, symbols_of, unit_text
 from creepkit.reports.blocks import Block, Formula, Paragraph, Table, Verbatim, number
 from creepkit.reports.catalogue import specimen_blocks
 from creepkit.reports.contents import ReportContents, ReportGroup
-from creepkit.reports.findings import findings_of, with_histories
 from creepkit.reports.forecast import forecast_blocks
 from creepkit.reports.histories import history_blocks
 from creepkit.reports.html.page import block_shown, findings_section, group_answer
@@ -40,11 +39,9 @@ _CELLS = count(1)
 def notebook_html(record: object) -> str:
     """A record as HTML for one cell; identifiers of its figures are those of no other cell."""
     block = template("blocks.html").module.block  # type: ignore[attr-defined]
-    fits = [record] if isinstance(record, Identification) else []
-    laws = [record] if isinstance(record, Ranking) else []
-    if isinstance(record, ReportContents):
-        laws = [one.result for one in record.groups if isinstance(one.result, Ranking)]
-    fits += [one.fit for ranking in laws for one in ranking.laws]
+    groups = [ReportGroup("", record)] if isinstance(record, Identification | Ranking) else []
+    groups += record.groups if isinstance(record, ReportContents) else ()
+    fits = [fit for group in groups for fit in group.fits]
     blocks = [block(block_shown(one, LawNames(fits))) for one in _blocks(record)]
     return f'<div class="creepkit"><style>{STYLE}</style>{"".join(blocks)}</div>'
 
@@ -62,8 +59,7 @@ def _blocks(record: object) -> Sequence[Block]:
 @_blocks.register(Identification)
 @_blocks.register(Ranking)
 def _(result: Identification | Ranking) -> Sequence[Block]:
-    found = findings_of(ReportGroup("", result))
-    assert found is not None
+    found = ReportGroup("", result)
     return [group_answer(found, _figures()), *([] if found.ranking is None else ranking_blocks(found.ranking))]
 
 
@@ -87,5 +83,4 @@ _blocks.register(RuptureAssessment)(lambda one: [*strength_blocks(one), *rupture
 
 @_blocks.register
 def _(contents: ReportContents) -> Sequence[Block]:
-    found = [one for one in map(findings_of, map(with_histories, contents.groups)) if one is not None]
-    return [Paragraph(contents.title, "lead"), *findings_section(contents, found, _figures()).blocks]
+    return [Paragraph(contents.title, "lead"), *findings_section(contents, _figures()).blocks]
