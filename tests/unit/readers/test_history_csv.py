@@ -246,10 +246,10 @@ def test_modulus_of_temperature_is_written_at_the_temperature_of_the_test(tmp_pa
         ({"alloy": " 617"}, "history 'a': ' 617' cannot be written in one line"),
         ({"specimen": "Round Bar"}, "history 'a': specimen 'Round Bar' is not a name in small letters"),
         ({"outputs": {"strain": [0, np.nan, 1]}}, "history 'a': 'strain_1' holds a number that is not finite"),
-        ({"outputs": {"sag": [0, 1, 1]}}, "history 'a': no unit is known for 'sag', for no registered specimen"),
+        ({"outputs": {"sag": [0, 1, 1]}}, "history 'a': no registered specimen has an output 'sag', whose"),
         (
             {"elastic": Elastic(wachtman(2e5, 80.0, 300.0)), "temperature": Program([0, 1], [900, 910])},
-            "history 'a': elastic data that change with the temperature",
+            "history 'a': elastic data that change during a test",
         ),
     ],
 )

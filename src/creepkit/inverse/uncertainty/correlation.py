@@ -49,6 +49,9 @@ class Correlation(Presentable):
     sd: Floats
     title: str = ""
 
+    def __repr__(self) -> str:
+        return f"<Correlation of {', '.join(self.names)}>"
+
     def between(self, first: str, second: str) -> float:
         """The correlation of two of the names."""
         for name in (first, second):
