@@ -112,7 +112,7 @@ def _tests(fits: Sequence[Identification]) -> Iterator[str]:
     if any("arsinh" in text for text in compared):
         yield f"The floor f is {100 * FLOOR_SHARE:g} % of the median end value, at least {FLOOR_NOISES:g} noises."
     if any(one is not None and one.followed_to_rupture.any() for one in map(compared_observations, fits)):
-        yield "Readings of tests followed to rupture have orthogonal residuals √2 |a b| / √(a² + b²), signed as a."
+        yield "Readings to rupture, or of a rising rate, have orthogonal residuals √2 |a b| / √(a² + b²), signed as a."
         yield "There a is predicted less measured transformed strain, b ln of the measured over the predicted time."
         yield "Tests stopped before rupture count only where they lasted longer than predicted."
 
