@@ -33,7 +33,7 @@ from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import USUAL_ERRORS
-from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
+from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.uncertainty.rate_scatter import SMALLEST_FACTOR, Evidence, rate_scatter, redundant_rates
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import temperature
@@ -59,6 +59,10 @@ OUTLYING_CHANCE = 0.05
 """That of any of the tests standing out so far by scatter (Bonferroni), below which one is a caution."""
 
 
+HELD = 1e10
+"""Times the precision of its prior, that of a value at its bound: it does not move with an explanation."""
+
+
 STEP = 0.01
 """Of ln of strain and time, for derivatives of the rate."""
 
@@ -81,6 +85,7 @@ class RateExplanations:
     def __init__(self, problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise: NoiseModel) -> None:
         self.problem, self.x = problem, x
         alike = replace(linear, residuals=linear.residuals.with_test_weights(np.ones(len(problem.histories))))
+        alike = replace(alike, precision=np.where(linear.free, linear.precision, HELD * linear.precision))
         self.scatter = replace(rate_scatter(problem, alike, noise), members={})
         self.stresses, self.temperatures = problem.conditions
         log_stress, activation = np.log(self.stresses), -1.0 / (GAS_CONSTANT * self.temperatures)  # -, mol/J
@@ -145,8 +150,42 @@ class RateExplanations:
         s, z = self.log_stress, self.activation
         if np.unique(s.round(2)).size >= 3:
             yield from self._change("stress exponent", s, EXPONENT_CHANGE)
+            yield from self._of_curves()
         if self.problem.law.uses(temperature) and np.unique((z / max(np.ptp(z), 1e-300)).round(2)).size >= 3:
             yield from self._change("activation energy", z, ENERGY_CHANGE)
+
+    @cached_property
+    def _by_rates(self) -> Evidence:
+        """Of a stress exponent of the rates of tests that is not the law's, which the shape of curves may hold."""
+        return self._evidence([self.log_stress], [EXPONENT_CHANGE])
+
+    def _of_curves(self) -> Iterable[Explanation]:
+        """The stress exponent of the rates of tests is another one than the shape of curves gives the law.
+
+        A law that is not that of the curves bends its exponent to them, as where the stress of a bar rises with strain
+        under a constant load. By a right law both are one exponent, and two estimates of it agree.
+        """
+        evidence, stress, kind = self._by_rates, self.problem.coordinates.reference.stress, "stress exponent"
+        change, sd = float(evidence.mean[0]), float(evidence.sd[0])
+        if abs(change) > SMALLEST_CHANGE[kind]:
+            own = float(local_exponent(self.problem.coordinates, stress)(self._moved(evidence)))
+            odds = evidence.log - self._as_it_is
+            yield Explanation("stress exponent", (), change, sd, odds, (own, own + change), (stress, stress))
+
+    @property
+    def second_moment(self) -> Floats:
+        """(parameters, parameters) of coordinates, by what rates of tests and shapes of curves say apart; or zeros.
+
+        The coordinates move with the rates of tests, and beside that as changes the law's exponent by as much and is
+        likeliest by the bounds alone.
+        """
+        u, width = self.x[: self.problem.parameter_count], self.problem.bounds.width[: self.problem.parameter_count]
+        if not any(e.is_of_curves for e in self.found):
+            return np.zeros((u.size, u.size))
+        exponent = local_exponent(self.problem.coordinates, self.problem.coordinates.reference.stress)
+        slope = gradient(exponent, u, np.ones(u.size)) * width
+        shift = self._moved(self._by_rates) - u + float(self._by_rates.mean[0]) * width * slope / float(slope @ slope)
+        return np.asarray(np.outer(shift, shift))
 
     def _change(self, kind: Kind, over: Floats, prior_sd: float) -> Iterable[Explanation]:
         """The slope of ln rate over ln stress, or over -1/(R T), changes in proportion to it or to its exponential.
