@@ -155,9 +155,17 @@ class RateExplanations:
             yield from self._change("activation energy", z, ENERGY_CHANGE)
 
     @cached_property
-    def _by_rates(self) -> Evidence:
-        """Of a stress exponent of the rates of tests that is not the law's, which the shape of curves may hold."""
-        return self._evidence([self.log_stress], [EXPONENT_CHANGE])
+    def _by_rates(self) -> tuple[Evidence, float]:
+        """Of a stress exponent of the rates of tests that is not the law's, and the odds of it.
+
+        Beside the one test whose rate is its own that makes it likeliest, if any: either may hide the other.
+        """
+        count, column = len(self.problem.histories), self.log_stress
+        further = [self._evidence([column, self._only(k)], [EXPONENT_CHANGE, FACTOR_SD]) for k in range(count)]
+        tried = [(0.0, self._evidence([column], [EXPONENT_CHANGE])), *((float(np.log(count)), one) for one in further)]
+        choice, evidence = max(tried, key=lambda one: one[1].log - one[0])
+        without = max(self._as_it_is, max(one.log for one in self._alone) - float(np.log(count)))
+        return evidence, evidence.log - choice - without
 
     def _of_curves(self) -> Iterable[Explanation]:
         """The stress exponent of the rates of tests is another one than the shape of curves gives the law.
@@ -165,11 +173,10 @@ class RateExplanations:
         A law that is not that of the curves bends its exponent to them, as where the stress of a bar rises with strain
         under a constant load. By a right law both are one exponent, and two estimates of it agree.
         """
-        evidence, stress, kind = self._by_rates, self.problem.coordinates.reference.stress, "stress exponent"
+        (evidence, odds), stress = self._by_rates, self.problem.coordinates.reference.stress
         change, sd = float(evidence.mean[0]), float(evidence.sd[0])
-        if abs(change) > SMALLEST_CHANGE[kind]:
+        if abs(change) > SMALLEST_CHANGE["stress exponent"]:
             own = float(local_exponent(self.problem.coordinates, stress)(self._moved(evidence)))
-            odds = evidence.log - self._as_it_is
             yield Explanation("stress exponent", (), change, sd, odds, (own, own + change), (stress, stress))
 
     @property
@@ -183,8 +190,8 @@ class RateExplanations:
         if not any(e.is_of_curves for e in self.found):
             return np.zeros((u.size, u.size))
         exponent = local_exponent(self.problem.coordinates, self.problem.coordinates.reference.stress)
-        slope = gradient(exponent, u, np.ones(u.size)) * width
-        shift = self._moved(self._by_rates) - u + float(self._by_rates.mean[0]) * width * slope / float(slope @ slope)
+        evidence, slope = self._by_rates[0], gradient(exponent, u, np.ones(u.size)) * width
+        shift = self._moved(evidence) - u + float(evidence.mean[0]) * width * slope / float(slope @ slope)
         return np.asarray(np.outer(shift, shift))
 
     def _change(self, kind: Kind, over: Floats, prior_sd: float) -> Iterable[Explanation]:
