@@ -41,8 +41,6 @@ ARRHENIUS = ck.arrhenius(T_ref=1050.0)
 LAWS = {
     "n(t)": ck.law("drifting-exponent").fix(m=0).times(ARRHENIUS),
     "Norton": ck.law("norton").times(ARRHENIUS),
-    "strain hardening": ck.law("strain-hardening").times(ARRHENIUS),
-    "time hardening": ck.law("time-hardening").times(ARRHENIUS),
     "hyperbolic sine": ck.law("hyperbolic-sine").times(ARRHENIUS),
 }
 HELD_OUT_LAWS = ("n(t)", "Norton")

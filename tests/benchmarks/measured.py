@@ -11,6 +11,7 @@ import inspect
 import os
 import platform
 import shlex
+import subprocess
 import sys
 from collections.abc import Iterable
 from datetime import date
@@ -71,10 +72,10 @@ FOLDERS = ("--keep", "--before", "--data", "--jobs", "--python")
 
 
 def write(name: str, title: str, text: str, command: str) -> Path:
-    """Write docs/measured/<name>.md: title, text, and a line with date, machine, versions and the command."""
+    """Write docs/measured/<name>.md: title, text, and a line with date, commit, machine, versions and the command."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     path = FOLDER / f"{name}.md"
-    footer = f"Measured on {date.today().isoformat()}: {machine()}. Repeat with `{command}`."
+    footer = f"Measured on {date.today().isoformat()}, commit {commit()}: {machine()}. Repeat with `{command}`."
     path.write_text(f"# {title}\n\n{text.strip()}\n\n{footer}\n", encoding="utf-8")
     return path
 
@@ -103,6 +104,16 @@ def command_line() -> str:
     words = sys.argv[1:]
     shown = [word for k, word in enumerate(words) if word not in FOLDERS and (k == 0 or words[k - 1] not in FOLDERS)]
     return shlex.join(["python", f"tests/benchmarks/{Path(sys.argv[0]).name}", *shown])
+
+
+def commit() -> str:
+    """The commit whose package was measured; with "and changes" where its sources have others."""
+
+    def answer(*words: str) -> str:
+        return subprocess.run(["git", *words], cwd=FOLDER, capture_output=True, text=True, check=True).stdout.strip()
+
+    changed = answer("status", "--porcelain", "--", ":/src", ":/plugins")
+    return answer("rev-parse", "--short=8", "HEAD") + (" and changes" if changed else "")
 
 
 def machine() -> str:

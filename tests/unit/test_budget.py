@@ -16,7 +16,7 @@ from helpers.paths import ROOT
 BUDGET = {
     "api": 300,
     "app": 600,
-    "cameras": 850,
+    "cameras": 835,
     "cli": 2200,
     "core": 100,
     "dataset": 750,
@@ -25,21 +25,21 @@ BUDGET = {
     "exporters": 2700,
     "extraction": 1300,
     "fem": 1450,
-    "files": 1400,
+    "files": 1350,
     "forecasts": 1350,
-    "instruments": 1250,
+    "instruments": 1225,
     "integration": 800,
-    "inverse": 10400,
-    "jobs": 300,
+    "inverse": 10500,
+    "jobs": 250,
     "kernels": 1750,
     "language": 1500,
     "laws": 150,
     "modules": 750,
-    "quality": 1300,
+    "quality": 1340,
     "readers": 5850,
     "records": 2250,
     "registry": 650,
-    "reports": 5500,
+    "reports": 5450,
     "rupture_assessment": 1800,
     "sampling": 1000,
     "screening": 600,
@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29_700
+TESTS = 29_900
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -30,8 +30,10 @@ class NotchedBar(ck.Axisymmetric):
 
     name, title = "notched-bar", "Notched round bar under axial force"
     outputs = (
-        ck.Output("elongation", "length", "elongation over the gauge length", noise=2e-3),
-        ck.Output("contraction", "length", "contraction of the diameter at the root", noise=2e-3),
+        ck.Output("elongation", "length", "elongation over the gauge length", noise=2e-3, change_of="gauge_length"),
+        ck.Output(
+            "contraction", "length", "contraction of the diameter at the root", noise=2e-3, change_of="-notch_diameter"
+        ),
     )
     loads = (ck.Load("force", "force", "axial force"),)
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(

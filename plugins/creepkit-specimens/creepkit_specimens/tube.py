@@ -26,7 +26,9 @@ class Tube(ck.Axisymmetric):
     closed: ClassVar[bool] = True
 
     name, title = "tube", "Tube under internal pressure with closed ends"
-    outputs = (ck.Output("diameter_growth", "length", "growth of the outer diameter", noise=1e-3),)
+    outputs = (
+        ck.Output("diameter_growth", "length", "growth of the outer diameter", noise=1e-3, change_of="outer_diameter"),
+    )
     loads = (ck.Load("pressure", "pressure"),)
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {"pressure": (5.0, 40.0), "modulus": (50e3, 300e3)}

@@ -313,7 +313,7 @@ def _extrapolated_times(fit: Identification, asked: Sequence[TimeForecast]) -> l
         if np.isfinite(one.value) and one.value > (1.0 + NEARBY["time"]) * longest:
             parts.append(f"{one.event} after {one.value / HOUR:.3g} h (the longest test: {longest / HOUR:.3g} h)")
         elif one.output == "strain" and one.target > (1.0 + NEARBY["strain"]) * largest:
-            parts.append(f"{one.event} (the tests reach {largest:.3g})")
+            parts.append(f"{one.event} (the tests reach {100 * largest:.3g} %)")
         elif not one.output and np.isfinite(one.value) and not broke:
             parts.append(f"{one.event} (no test broke)")
     return parts

@@ -105,8 +105,8 @@ The dense output is the one quartic that meets the conditions of order 3, and of
 
 
 SDIRK4_TEXT = (
-    "a singly diagonally implicit Runge-Kutta method of five stages and order 4 with an embedded one of order 3, "
-    "L-stable (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, Section IV.6)"
+    "an L-stable singly diagonally implicit Runge-Kutta method of five stages and order 4, with one of order 3 "
+    "embedded; see Hairer and Wanner, Solving Ordinary Differential Equations II, IV.6"
 )
 """SDIRK4 in words."""
 

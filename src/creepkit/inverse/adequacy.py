@@ -12,7 +12,7 @@ from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.inverse.single_values import ContradictingValues
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, SMALLEST_RATE_SCATTER
-from creepkit.records import output_unit
+from creepkit.records import is_logarithmic, output_unit
 from creepkit.records.units import time_text
 
 IMPLAUSIBLE_CHI_SQUARE = 0.05
@@ -79,17 +79,18 @@ class LargestDeviation:
     rms: float = 0.0
 
     def __str__(self) -> str:
-        unit = output_unit(self.output)
         side = "above" if self.deviation > 0 else "below"
-        rms = f" (rms {_amount(self.rms, unit)})" if self.rms > 0 else ""
+        rms = f" (rms {_amount(self.rms, self.output)})" if self.rms > 0 else ""
         return (
             f"{self.output} of '{self.test}'{rms} about {time_text(self.time)}, where it lies "
-            f"{_amount(abs(self.deviation), unit)} {side} what was measured"
+            f"{_amount(abs(self.deviation), self.output)} {side} what was measured"
         )
 
 
-def _amount(value: float, unit: str) -> str:
-    return f"{value:.2g}{' ' + unit if unit else ''}"
+def _amount(value: float, output: str) -> str:
+    """So much of an output, strains in per cent."""
+    percent = is_logarithmic(output)
+    return f"{(100.0 if percent else 1.0) * value:.2g} {'%' if percent else output_unit(output)}".strip()
 
 
 @dataclass(frozen=True)
@@ -285,8 +286,8 @@ class Adequacy:
         if self.contradicting is not None and not self.outputs:
             return f"is contradicted by the tests: {self.contradicting}"
         parts = [
-            f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "
-            f"({noises_text(o.discrepancy_in_noises)} times its {o.noise_source} noise)"
+            f"{_amount(o.discrepancy, o.output)} of {o.output} ({noises_text(o.discrepancy_in_noises)} times its "
+            f"{o.noise_source} noise)"
             for o in sorted(self.outputs, key=lambda o: -o.discrepancy_in_noises)
             if o.discrepancy > 0
         ]
@@ -300,8 +301,8 @@ class Adequacy:
         if self.explanations and not parts:
             curves = f"; curves agree with the noise ({self._p_value_text})" if self.outputs else ""
             return f"is contradicted by the rates of the tests: {self.explanation_text}{curves}"
-        judged = f"({self._chi_square_text}, {self._p_value_text})"
-        rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained {judged}{where}"
+        judged = f"{self._chi_square_text}, {self._p_value_text}"
+        rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained: {judged}{where}"
         beside = "" if self.is_explained else "of its rates, "
         return f"{rest}; {beside}{self.explanation_text}" if self.explanations else rest
 

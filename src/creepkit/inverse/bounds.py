@@ -11,6 +11,7 @@ from scipy.stats import qmc
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import LARGEST_EXPONENT, Coordinates
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.language import CreepLaw
 
 LOG_RATE_BOUNDS = (-12.0, 6.0)
@@ -107,6 +108,21 @@ def widened(law: CreepLaw, theta: Floats) -> CreepLaw | None:
         if param.widens:
             params[symbol] = replace(param, bounds=tuple(np.clip(bounds, *(param.limits or (-np.inf, np.inf)))))
     return replace(law, params=params) if params != dict(law.params) else None
+
+
+def with_determined(usual: CreepLaw, wider: CreepLaw, theta: Floats, deviations: Floats) -> CreepLaw:
+    """The law with those of its wider bounds within which the tests determine a value, and else its usual ones.
+
+    theta, deviations : (parameters,) internal values and their standard deviations within the wider bounds. A 95 %
+    interval, not cut at bounds, that is as wide as the usual bounds and holds one of them says less than these do: far
+    along a valley of values that describe the tests alike, others are predicted worse.
+    """
+    params = dict(usual.params)
+    for symbol, value, half in zip(usual.params, theta, NORMAL_QUANTILE * deviations, strict=True):
+        low, high = (params[symbol].to_internal(bound) for bound in params[symbol].bounds)
+        if 2.0 * half < high - low or value - half > high or value + half < low:
+            params[symbol] = wider.params[symbol]
+    return replace(usual, params=params)
 
 
 def widened_notes(law: CreepLaw, wider: CreepLaw) -> tuple[str, ...]:

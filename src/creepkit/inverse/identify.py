@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.bound_penalties import check_bounds
-from creepkit.inverse.bounds import MOST_WIDENINGS, widened, widened_notes
+from creepkit.inverse.bounds import MOST_WIDENINGS, widened, widened_notes, with_determined
 from creepkit.inverse.compared_tests import compared_tests, compares_rupture_times
 from creepkit.inverse.composite_predictor import predictors_for_law, through_for_law
 from creepkit.inverse.defect_correction import (
@@ -216,22 +216,41 @@ def _estimated(
     known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in outcome.starts]
     how, widenings = EstimationOptions(start.u is not None, through, judged, progress), MOST_WIDENINGS
+
+    def within(law: CreepLaw, stage: Callable[..., Any], found: EstimationResult) -> StageEnd:
+        settings, reference = found.problem.settings, problem.coordinates.reference
+        of_law = LeastSquaresProblem.from_histories(law, histories, using, settings, reference)
+        of_law = replace(of_law, evaluations=problem.evaluations)
+        return StageEnd(of_law, *stage(of_law, [found.x], None, how._replace(is_near=True)))
+
     for stage in (_cheaper_estimate, _last_estimate)[int(through is None or start.u is not None) :]:
-        best, numerical_error = stage(problem, starts, noise, how)
-        while widenings and (wider := _wider_law(best)) is not None:
-            settings, reference, widenings = best.problem.settings, problem.coordinates.reference, widenings - 1
-            wider_problem = LeastSquaresProblem.from_histories(wider, histories, using, settings, reference)
-            problem = replace(wider_problem, evaluations=problem.evaluations)
-            best, numerical_error = stage(problem, [best.x], None, how._replace(is_near=True))
-        problem, starts, noise = replace(problem, settings=best.problem.settings), [best.x], best.noise
-    _check_bounds(best)
-    return best, outcome, numerical_error
+        usual = end = StageEnd(problem, *stage(problem, starts, noise, how))
+        while widenings and (wider := _wider_law(end.best)) is not None:
+            end, widenings = within(wider, stage, end.best), widenings - 1
+        if end is not usual and (kept := _law_of_determined(usual, end)).params != end.problem.law.params:
+            end = usual if kept.params == usual.problem.law.params else within(kept, stage, usual.best)
+        problem, starts, noise = replace(end.problem, settings=end.best.problem.settings), [end.best.x], end.best.noise
+    _check_bounds(end.best)
+    return end.best, outcome, end.numerical_error
 
 
 def _wider_law(found: EstimationResult) -> CreepLaw | None:
     """The law within wider bounds, where an estimate needs them."""
     problem = found.problem
     return widened(problem.law, problem.coordinates.theta(found.x[: problem.parameter_count]))
+
+
+def _law_of_determined(usual: StageEnd, end: StageEnd) -> CreepLaw:
+    """The law within those wider bounds that the tests need, by intervals as they are reported."""
+    found, estimator = end.best, _working_estimator(end.best.problem, end.numerical_error)
+    problem, linear, noise = found.problem, found.linear, estimator.final(found.linear, found.noise)
+    working_noise = None if estimator.by_likelihood else with_single_value_weight(found.noise, problem.observations)
+    errors, expected = errors_of_tests(problem, found.x, linear, noise), with_expected_scatter(problem, linear, noise)
+    by_tests, of_errors, _ = covariances_of_values_with_errors(linear, expected, errors, working_noise)
+    u, covariance = np.split(found.x, [problem.parameter_count])[0], by_tests + of_errors
+    to_theta = problem.coordinates.jacobian(u)
+    deviations = np.sqrt(np.diag(to_theta @ covariance[: u.size, : u.size] @ to_theta.T))
+    return with_determined(usual.problem.law, problem.law, problem.coordinates.theta(u), deviations)
 
 
 def _check_bounds(found: EstimationResult) -> None:
@@ -254,6 +273,14 @@ class EstimationOptions(NamedTuple):
     through: Predictor | None
     judged: Sequence[History] | None
     progress: IterationCallback | None
+
+
+class StageEnd(NamedTuple):
+    """The end of a stage of an estimate: its problem, within the bounds of its law, and what the stage returns."""
+
+    problem: LeastSquaresProblem
+    best: EstimationResult
+    numerical_error: NumericalError | None
 
 
 def _cheaper_estimate(
@@ -445,8 +472,12 @@ def _reported(
 
 
 def refit(fit: Identification, histories: Sequence[History]) -> Identification:
-    """The same law on other histories, starting where `fit` ended (for cross-validation and resampling)."""
+    """The same law on other histories, starting where `fit` ended (for cross-validation and resampling).
+
+    Its bounds are those that `fit` ended within: beyond them it would be another law that is validated.
+    """
     if fit.predictor is None:
         raise FitError("cannot refit an identification that was loaded from a file without its specimen")
-    start = StartingEstimate.from_identification(fit)
-    return sampled_where_needed(identify(fit.law, histories, fit.predictor, settings=fit.settings, start=start))
+    start, law = StartingEstimate.from_identification(fit), fit.law
+    law = law.with_bounds(**{name: param.bounds for name, param in law.table.items()})
+    return sampled_where_needed(identify(law, histories, fit.predictor, settings=fit.settings, start=start))

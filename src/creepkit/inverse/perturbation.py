@@ -75,14 +75,14 @@ class Perturbation:
         spread = "" if self.tests == 1 else " (one standard deviation)"
         energy = ""
         if np.isfinite(self.per_kelvin):
-            whence = "assumed, as the law has no temperature" if self.assumed else "by the law"
+            whence = "assumed" if self.assumed else "by the law"
             energy = f" ({100 * float(np.expm1(self.per_kelvin)):.2g} % a kelvin, {whence})"
         return f"by {self.change_text}{spread} with {self._cause}{energy}"
 
     @property
     def _cause(self) -> str:
         one = self.tests == 1
-        each = "the test" if one else f"each of the {self.tests} tests"
+        each = "the test" if one else f"each of {self.tests} tests"
         if self.kind == DRIFT:
             drift = "a linear drift of" if one else "independent linear drifts of the temperature,"
             return f"{drift} {self.size:.2g} K over {each}"

@@ -17,7 +17,7 @@ import sympy
 
 from creepkit.errors import LawError, nearest
 from creepkit.language.law_record import LawRecord
-from creepkit.language.symbols import POINT_VARIABLES, Param, State, Symbol, strain, temperature, time
+from creepkit.language.symbols import POINT_VARIABLES, Param, State, Symbol, strain, stress, temperature, time
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
 
 Law = TypeVar("Law", bound=LawRecord)
@@ -361,11 +361,12 @@ def with_primary(law: Law) -> Law:
 
 
 def _substituted(law: Law, substitutions: Mapping[sympy.Symbol, sympy.Expr], name: str, title: str) -> Law:
-    terms = {label: term.subs(substitutions) for label, term in law.terms.items()}
+    never_negative = {sympy.Max(0, stress): stress}  # as where the largest principal stress has no share in a mean
+    terms = {label: term.subs(substitutions).xreplace(never_negative) for label, term in law.terms.items()}
     terms = {label: term for label, term in terms.items() if term != 0}
     if not terms:
         raise LawError(f"law '{law.name}': no term is left after setting {', '.join(map(str, substitutions))}")
-    states = {s: replace(z, rate=z.rate.subs(substitutions)) for s, z in law.states.items()}
+    states = {s: replace(z, rate=z.rate.subs(substitutions).xreplace(never_negative)) for s, z in law.states.items()}
     constraints = [c.subs(substitutions) for c in law.constraints]
     for relation, substituted in zip(law.constraints, constraints, strict=True):
         if substituted == sympy.false:

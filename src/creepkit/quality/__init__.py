@@ -4,14 +4,13 @@ Of frames: unloading, a creep output that decreases though its load does not, si
 readings of another, replicates that differ, strain of loading that nothing states, a strain above 100 %, a record of
 load or temperature that contradicts the stated program. What one test says against all others, a fit tells.
 Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load,
-idle time in which nothing crept.
+a step of a strain by thermal expansion, idle time in which nothing crept.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from itertools import product
 from typing import get_args
 
 import numpy as np
@@ -27,12 +26,13 @@ from creepkit.quality.repeats import copied_tests, repeated_rows, replicate_devi
 from creepkit.quality.rig import (
     ACTIVATION_ENERGY,
     common_rate_changes,
+    expansion_flags,
     find_jumps,
     jump_flags,
     rate_change_flag,
     record_flags,
 )
-from creepkit.records import History, known_specimens
+from creepkit.records import History, known_specimens, output_named
 
 __all__ = [
     "ACTIVATION_ENERGY",
@@ -99,8 +99,8 @@ def _doubtful_units(histories: Sequence[History]) -> Iterator[QualityFlag]:
         reasons = [f"the strain reaches {100 * strain:.4g} %; look whether its unit is right"] * (strain > 1.0)
         reasons += [
             f"{output} begins at the {name}; take the first reading off its column, for creep is what it grows"
-            for output, name in product(one.outputs, one.geometry)
-            if set(output.split("_")) & set(name.split("_"))
+            for output in one.outputs
+            if (name := output_named(output, one.specimen).change_of.lstrip("-")) in one.geometry
             and abs(one.outputs[output][0] / one.geometry[name] - 1) < 0.1
         ]
         yield from (QualityFlag((one.name,), "unit", (), reason) for reason in reasons)
@@ -189,6 +189,7 @@ def check_rig(histories: Sequence[History], *, activation_energy: float = ACTIVA
     flags += [flag for history in histories for flag in idle_flags(history)]
     jumps = find_jumps(histories)
     flags += jump_flags(histories, jumps)
+    flags += [flag for history in histories for flag in expansion_flags(history)]
     changes = common_rate_changes(histories, jumps)
     return [*flags, *(rate_change_flag(histories, change, activation_energy) for change in changes)]
 
@@ -212,8 +213,9 @@ def _frame_flags(history: History, kinds: Collection[str]) -> list[QualityFlag]:
     """Suspect frames of a history; each check uses the frames that those before it have left."""
     result: list[QualityFlag] = []
     for kind, search in zip(FRAME_FLAG_KINDS, (unloading_frames, decreasing_frames, outlier_frames), strict=True):
-        if kind in kinds:
-            result += search(_with_frames_unused(history, [k for flag in result for k in flag.frames]))
+        if kind in kinds and (found := list(search(history))):
+            history = _with_frames_unused(history, [k for flag in found for k in flag.frames])
+            result += found
     return result
 
 

@@ -99,8 +99,8 @@ def _unloaded_end(history: History, frames: Ints) -> Iterator[QualityFlag]:
     sigma = noise_standard_deviation(t, y)
     for count in range(min(MOST_UNLOADING_FRAMES, frames.size - FEWEST_FRAMES), 0, -1):
         before = slice(max(frames.size - count - END_FIT_FRAMES, 0), frames.size - count)
-        expected, standard_error = _extrapolate(t[before], y[before], t[-count])
-        sigma = max(sigma, _scatter_about_line(t[before], y[before]))  # noise may grow with the output
+        expected, standard_error = extrapolate(t[before], y[before], t[-count])
+        sigma = max(sigma, scatter_about_line(t[before], y[before]))  # noise may grow with the output
         shortfall = expected - y[-count]
         if shortfall > END_THRESHOLD * sigma * standard_error and (y[-count:] < y[-count - 1] - sigma).all():
             reason = (
@@ -112,14 +112,17 @@ def _unloaded_end(history: History, frames: Ints) -> Iterator[QualityFlag]:
             return
 
 
-def _scatter_about_line(t: Floats, y: Floats) -> float:
+def scatter_about_line(t: Floats, y: Floats) -> float:
     """Standard deviation of y (frames,) about a line in t (frames,), in the unit of y."""
     residuals = y - np.polyval(np.polyfit(t - t[0], y, 1), t - t[0])
     return float(np.sqrt((residuals**2).sum() / max(t.size - 2, 1)))
 
 
-def _extrapolate(t: Floats, y: Floats, time: float) -> tuple[float, float]:
-    """A line through frames, at a later time, and the standard deviation of y less it over that of y."""
+def extrapolate(t: Floats, y: Floats, time: float) -> tuple[float, float]:
+    """A line through frames, at a later time, and the standard deviation of y less it over that of y.
+
+    t, y : (frames,) s, and the output's unit.
+    """
     mean_time, time_variation = t.mean(), float(((t - t.mean()) ** 2).sum())
     slope = float(((t - mean_time) * (y - y.mean())).sum()) / time_variation
     return float(y.mean()) + slope * (time - mean_time), float(
@@ -252,8 +255,9 @@ def _local_scale(residuals: Floats) -> Floats:
     """The size of misses about each frame, without it and its neighbours: large where a curve bends sharply."""
     padded = np.pad(np.abs(residuals), 7, constant_values=np.nan)
     beside = np.r_[0:5, 10:15]  # from seven to three frames before and after
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 15)[:, beside]
-    return np.asarray(1.4826 * np.nanmedian(windows, axis=1))
+    windows = np.sort(np.lib.stride_tricks.sliding_window_view(padded, 15)[:, beside], axis=1)  # no frames come last
+    count, row = (~np.isnan(windows)).sum(axis=1), np.arange(len(windows))
+    return np.asarray(1.4826 * 0.5 * (windows[row, (count - 1) // 2] + windows[row, count // 2]))
 
 
 def _isolated(residuals: Floats) -> Bools:

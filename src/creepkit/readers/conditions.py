@@ -202,14 +202,9 @@ class StatedConditions:
         unread += [(entry.location, entry.key or key) for key, entry in self._texts.items()]
         for location, key in unread:
             if self._vocabulary.synonyms.get(key, key) == "control":
-                raise HistoryError(
-                    f"{location}: '{key}' says whether a load or a true stress was held, and of this test neither was "
-                    "imposed: leave it out; a relaxation test, of which the strain is held and the stress measured, "
-                    "states strain_pct or steps of strain alone"
-                )
-            raise HistoryError(
-                f"{location}: '{key}' has no meaning beside the other conditions; {_ALLOWED_COMBINATIONS}"
-            )
+                what = "neither a load nor a true stress was held in this test: leave it out, and state strain_pct"
+                raise HistoryError(f"{location}: '{key}': {what} or steps of strain where the strain was held")
+            raise HistoryError(f"{location}: '{key}' has no meaning beside the others; {_ALLOWED_COMBINATIONS}")
         earlier = [self.labels["assumed"]] if self.labels.get("assumed") else []
         new = [one for one in self._assumptions if not earlier or one not in earlier[0]]
         assumed = ", ".join(dict.fromkeys([*earlier, *new]))
@@ -244,7 +239,8 @@ class StatedConditions:
         else:
             _length(name, entry, self.terms, is_free=False)
             misspelt = self._misspelt(key) if key.strip() else ""
-            is_label = kind_of_column(key) in (*FIRM, "remark") or (columns_as_labels and not misspelt)
+            says_end = kind_of_column(key) in (*FIRM, "remark") and not misspelt.startswith("rupture_")
+            is_label = says_end or (columns_as_labels and not misspelt)
             if not (key.strip() and is_label):
                 meant = misspelt or self.terms.suggestion(key)
                 advice = f"did you mean '{meant}'? A label is written" if meant else "a label is written"
@@ -328,10 +324,8 @@ def _length(stem: str, entry: SourceText, terms: Terms, is_free: bool) -> tuple[
     length.
     """
     base, _, suffix = stem.rpartition("_")
-    has_unit, known = (
-        bool(base) and suffix in LENGTH.units,
-        terms.own_dimensions or (terms.dimensions if is_free else ()),
-    )
+    has_unit = bool(base) and suffix in LENGTH.units
+    known = terms.own_dimensions or (terms.dimensions if is_free else ())
     if has_unit and base in terms.dimensions:
         return terms.dimensions[base], LENGTH.convert(entry.number(entry.key or stem), suffix, entry.location, stem)
     if not is_free and any(stem == one or (base == one and not has_unit) for one in known):
@@ -354,13 +348,10 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, entry: SourceText)
         parts.append("")
     if len(parts) != 4 or (" " in parts[3] and unit_suffix(parts[3]) is None):
         example = f"0 s 100 {next(iter(kind.units))}" if "" not in kind.units else "0 s 0.002, or 0 s 0.2 pct"
-        raise HistoryError(
-            f"{location}: {key} holds '{item.strip()}'; write time and value with units, such as {example}"
-        )
+        raise HistoryError(f"{location}: {key} holds '{item.strip()}'; write time and value with units: {example}")
     time, value = (replace(entry, text=word).number(key) for word in (parts[0], parts[2]))
-    time_unit, unit = (
-        part if part in one.units else unit_suffix(part) or part for part, one in ((parts[1], TIME), (parts[3], kind))
-    )
+    units = ((parts[1], TIME), (parts[3], kind))
+    time_unit, unit = (one if one in of.units else unit_suffix(one) or one for one, of in units)
     return TIME.convert(time, time_unit, location, key), kind.convert(value, unit, location, key)
 
 

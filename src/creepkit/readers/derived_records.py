@@ -25,7 +25,8 @@ modulus or has no modulus beside it, is told by the check of data quality. A fil
 taken at its word.
 
 An extensometer that was bumped or set anew, as in an interruption, adds a step to all later readings. Its size is the
-distance, midway between the frames around it, of straight lines through the frames before and after it.
+distance, midway between the frames around it, of straight lines through the frames before and after it; where the
+temperature steps between them, at that time. A coefficient of thermal expansion takes off alpha (T - T at the start).
 """
 
 from __future__ import annotations
@@ -40,15 +41,21 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.readers.conditions import StatedConditions
-from creepkit.readers.frames import TableFrames
+from creepkit.readers.frames import UNUSED, TableFrames, column_question
 from creepkit.readers.imposed import hold_begins
 from creepkit.readers.table import SourceText
 from creepkit.readers.vocabulary import unit_suffix
-from creepkit.records.quantities import TIME
+from creepkit.records.loading import Program
+from creepkit.records.quantities import STRAIN, TIME
 from creepkit.records.reading_noise import noise_of_readings
+from creepkit.records.specimen_record import Output
 from creepkit.records.units import time_text
 
 # ---- load and extension of a plain bar -------------------------------------------------------------------------------
+
+
+OF_BAR = frozenset(("elongation", "strain", "stress", "force"))
+"""What columns hold of a plain bar."""
 
 
 PLAIN = ("", "uniaxial", "relaxation")
@@ -71,15 +78,64 @@ FEWEST_RAMP_FRAMES, RAMP_FROM = 3, 0.2
 """Before the end of a ramp; part of the stress that is held at which a ramp that loading shows begins at most."""
 
 
+NEAR_LENGTH = 0.1
+"""Of a stated length, by which the first reading of it may differ."""
+
+
+def with_changes_of_lengths(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
+    """The frames with the change of a length in the place of its readings, or of its relative change.
+
+    A diameter of a plain bar is a strain at constant volume, (d0/d)^2 - 1, whose sign is that of the test. A length
+    counts from its first reading where that was taken at time zero, else from what is stated.
+    """
+    values = dict(frames.values)
+    for name in [one for one in values if one in conditions.terms.length_kinds]:
+        output, is_relative = _change_of(conditions, frames, name), conditions.terms.length_kinds[name] is STRAIN
+        if not output and conditions.text_of("specimen") not in PLAIN:
+            continue
+        column, length = values.pop(name), output.change_of.lstrip("-") if output else "diameter"
+        stated, first = conditions.geometry.get(length), float(column[0])
+        if is_relative and not output:
+            column = -abs(column)
+        elif stated is None and (is_relative or frames.times[0] > 0.0):
+            what = f"the {name} counts from the {length} before the test, which is not stated; how many mm is it?"
+            raise conditions.question(what, f"{length}_mm", *([] if is_relative else [first]))
+        elif not is_relative and abs(first - (stated or first)) >= NEAR_LENGTH * (stated or first):
+            columns = enumerate(frames.table.columns)
+            written = frames.table.as_written(next(k for k, c in columns if name in c or c[0] in "DØ⌀"))
+            what = f"'{written}' begins at {first:g} mm, which is no {length}; what does it hold?"
+            choices = [{written: f"{output or 'elongation'} (mm)"}, {written: UNUSED}]
+            raise column_question(frames.table, what, *choices)
+        initial = first if not is_relative and (stated is None or frames.times[0] == 0.0) else stated or 1.0
+        relative = column if is_relative else column / initial - 1.0
+        if output:
+            values[output] = (-initial if output.change_of.startswith("-") else initial) * relative
+        else:
+            strain = (1.0 + relative) ** -2 - 1.0
+            strain *= np.sign(strain[np.argmax(abs(strain))])
+            is_true = conditions.text_of("strain_measure") == "logarithmic"
+            values["strain"] = np.log1p(strain) if is_true else strain
+        conditions.geometry.setdefault(length, initial)
+        what = name if is_relative else f"{name} from {initial:g} mm on"
+        conditions.record_assumption(f"{output or 'strain at constant volume'} by the {what}")
+    return replace(frames, values=values)
+
+
+def _change_of(conditions: StatedConditions, frames: TableFrames, name: str) -> Output | None:
+    """The output that is the change of a length; a force alone is that of a plain bar, where no specimen is named."""
+    for specimen, output in conditions.terms.changes:
+        length, loads = output.change_of.lstrip("-"), {*conditions.terms.loads.get(specimen, ())} - {"force"}
+        is_meant = f"_{length}".endswith(f"_{'diameter' if name == 'diametral_strain' else name}")
+        is_loaded = any(conditions.states_load(load) or load in frames.values for load in loads)
+        if is_meant and (conditions.terms.own_outputs or length in conditions.geometry or is_loaded):
+            return output
+    return None
+
+
 def as_plain_bar(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
     """The frames with stress and strain in the place of load and extension; HistoryError for lengths that lack."""
     values, terms = dict(frames.values), conditions.terms
-    foreign = {name for outputs in terms.outputs.values() for name in outputs} - {
-        "elongation",
-        "strain",
-        "stress",
-        "force",
-    }
+    foreign = {name for outputs in terms.outputs.values() for name in outputs} - OF_BAR
     notch = {name for name in conditions.geometry if name.startswith("notch")}
     has_load = "force" in values or conditions.states("force")
     if conditions.text_of("specimen") not in PLAIN or notch or foreign & values.keys():
@@ -131,10 +187,8 @@ def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict
     if "stress" not in values and nominal is not None and column is not None and held and held >= FEWEST_RAMP_FRAMES:
         # A load that was raised in sight is recorded better than the one number that says what was held.
         if area is None:
-            area, how = (
-                float(np.median(column[held:])) / nominal.value,
-                f" by which the load that was held is {nominal.value:g} MPa",
-            )
+            area = float(np.median(column[held:])) / nominal.value
+            how = f" by which the load that was held is {nominal.value:g} MPa"
     elif "stress" in values or conditions.states_load("stress"):
         return ["the load beside the stress not used"]
     if area is None:
@@ -290,15 +344,11 @@ def without_loading(
     if includes_loading != "yes":
         return StrainRecord(strain, used, elastic == "yes")
     if elastic == "yes":
-        raise HistoryError(
-            f"{location}: includes_loading is yes, so the strain at the end of loading is subtracted and no elastic "
-            "strain is left; leave out includes_elastic: yes"
-        )
+        what = "includes_loading is yes, which leaves no elastic strain; leave out includes_elastic: yes"
+        raise HistoryError(f"{location}: {what}")
     if total is None and end is None and times[first] > 0.0:
-        raise HistoryError(
-            f"{location}: includes_loading is yes, but not by how much; state loading_strain_pct, the strain at the "
-            "end of loading, or loading_time_s, when it ended"
-        )
+        what = "includes_loading is yes, but not by how much; state loading_strain_pct or loading_time_s, its end"
+        raise HistoryError(f"{location}: {what}")
     subtracted = strain[first] if total is None else total.value
     conditions.record_assumption(f"loading strain {subtracted:.3g} subtracted")
     return StrainRecord(strain - subtracted, used, includes_elastic=False)
@@ -385,14 +435,35 @@ FITTED_FRAMES = 6
 """Frames on either side of a step through which a straight line is laid."""
 
 
+_EXPANSION = re.compile(r"([\d.]+(?:[eE]-?\d+)?) ?([uµμ]m/m/K|ppm/K|(?:10\^?|1e)-6 ?/K|1?/K|K\^?-1|)")
+
+
+def _expansion(conditions: StatedConditions) -> float:
+    """The stated coefficient of thermal expansion, 1/K, 0 where none is; HistoryError for what cannot be one."""
+    if (entry := conditions.take_entry("thermal_expansion")) is None:
+        return 0.0
+    found = _EXPANSION.fullmatch(entry.text)
+    value = float(found[1]) * (1e-6 if found[2][:-2] not in ("", "1", "K", "K^") else 1.0) if found else 0.0
+    if not 0.0 < value < 1e-3:
+        what = f"thermal_expansion is '{entry.text}'; write it per kelvin, such as 14e-6 1/K"
+        raise HistoryError(f"{entry.location}: {what}")
+    return value
+
+
 def without_steps(
-    conditions: StatedConditions, times: Floats, outputs: Mapping[str, Floats], used: Bools
+    conditions: StatedConditions, times: Floats, outputs: Mapping[str, Floats], used: Bools, imposed: float | Program
 ) -> dict[str, Floats]:
-    """The outputs (frames,) without the steps that are to be taken off, each of which is recorded with its size.
+    """The outputs (frames,) without thermal expansion and steps that are to be taken off, which is recorded.
 
     times : (frames,) s. outputs : {name: (frames,)}. used : (frames,) those that a line may be laid through.
+    imposed : K, the temperature.
     """
-    results = dict(outputs)
+    results, alpha = dict(outputs), _expansion(conditions)
+    program = imposed if isinstance(imposed, Program) else Program.constant(imposed)
+    if alpha and np.ptp(program.values) > 0.0 and "strain" in results:
+        results["strain"] = results["strain"] - alpha * (program.at(times) - program.values[0])
+        conditions.record_assumption(f"thermal expansion of {alpha:.3g}/K from the first temperature on taken off")
+    steps = program.times[1:][np.diff(program.times) == 0.0]
     entry = conditions.take_entry("steps_taken_off")
     if entry is None:
         return results
@@ -401,6 +472,7 @@ def without_steps(
         if not 0 < first < times.size:
             raise HistoryError(f"{entry.location}: no frames lie before and after a step at {time_text(time)}")
         middle = 0.5 * (times[first - 1] + times[first])
+        middle = next((step for step in steps if times[first - 1] < step <= times[first]), middle)
         indices = np.arange(times.size)
         before, after = indices[used & (indices < first)], indices[used & (indices >= first)]
         sizes = list[str]()

@@ -19,6 +19,7 @@ from creepkit.readers.table import CellTable, some_of
 from creepkit.readers.vocabulary import HeaderVocabulary, NameTable, Terms, split_unit, split_written_name, unit_suffix
 from creepkit.records.quantities import FORCE, LENGTH, STRAIN, STRESS, TEMPERATURE, QuantityKind
 
+_COMPRESSION = "magnitudes of negative stress and strain (compression)"
 NOISE_OF_ZERO = 0.01
 """Of the largest reading of a load: a reading that is less below zero is one of none."""
 
@@ -78,7 +79,9 @@ def read_frames(
         found[quantity] = written
         values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
         if quantity == "stress" and (table.numbers(name) < 0.0).any() and not (table.numbers(name) > 0.0).any():
-            notes.append("magnitudes of negative stress and strain (compression)")
+            notes.append(_COMPRESSION)
+        if quantity == "time" and (table.numbers(name) < 0.0).any():
+            notes.append("times just below zero are zero")
         if quantity == "used":
             _check_marks(table, k, values[quantity])
 
@@ -90,14 +93,12 @@ def read_frames(
         place, names = table.location(table.columns_line), table.written or table.columns
         result = f"among {some_of(names)}" if names else "as every column is the same in all rows"
         raise HistoryError(f"{place}: missing column: no time {result}; name one time_s, time_min or time_h")
-    if notes and "strain" in values and values["strain"].max() <= 0.0:
+    if _COMPRESSION in notes and "strain" in values and values["strain"].max() <= 0.0:
         values["strain"] = -values["strain"]
     if "x" in map(str.casefold, found.values()) and (np.diff(values["time"]) < 0.0).any():
         order = np.argsort(values["time"], kind="stable")
-        values, notes = (
-            {name: one[order] for name, one in values.items()},
-            [*notes, "points of a plot in order of time"],
-        )
+        values = {name: one[order] for name, one in values.items()}
+        notes.append("points of a plot in order of time")
     table = table.assuming(*notes)
     imposed = [values[name] for name in (*terms.number_kinds, "temperature") if name in values]
     return _strictly_increasing(_without_readings_before_steps(TableFrames(table, values, table.lines), imposed))
@@ -149,7 +150,8 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
             what = f"'{written}' and '{others[0]}' seem to be several sensors of the {sensor}; which counts?"
             raise column_question(table, what, *counts[:3])
         present = {(split_unit(other, kinds) or ("",))[0] for other in table.columns}
-        if sensor == "temperature" and sensor not in present and unit_suffix(unit) in kinds[sensor].units:
+        is_known = sensor in ("temperature", "diameter") and unit_suffix(unit) in kinds[sensor].units
+        if is_known and sensor not in present:
             return sensor, unit_suffix(unit) or ""
         if sensor and sensor not in present:
             what = f"'{written}' seems to be a sensor of the {sensor}; is it?"
@@ -192,10 +194,8 @@ def _converted_column(table: CellTable, name: str, kind: QuantityKind, suffix: s
 def _check_marks(table: CellTable, k: int, marks: Floats) -> None:
     """Refuse what neither uses a frame nor leaves it out."""
     for row in np.flatnonzero((marks != 0.0) & (marks != 1.0))[:1]:
-        raise HistoryError(
-            f"{table.location(int(table.lines[row]), k)}: '{table.as_written(k)}' is {marks[row]:g}; allowed: 1 for a "
-            "frame that is used, 0 for one that is not"
-        )
+        what = f"'{table.as_written(k)}' is {marks[row]:g}; allowed: 1 for a frame that is used, 0 for one that is not"
+        raise HistoryError(f"{table.location(int(table.lines[row]), k)}: {what}")
 
 
 def _without_readings_before_steps(frames: TableFrames, imposed: Sequence[Floats]) -> TableFrames:

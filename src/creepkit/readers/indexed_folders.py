@@ -63,14 +63,12 @@ class IndexedFolderReader:
             }
         for key in [one for one in (parts or files) if one not in tests]:
             place = parts[key].location(parts[key].rows[0].line) if parts else files[key]
-            raise HistoryError(
-                f"{place}: test '{quoted(key)}' is not in {index.path}; add it there, or move its frames"
-            )
+            what = f"test '{quoted(key)}' is not in {index.path}; add it there, or move its frames"
+            raise HistoryError(f"{place}: {what}")
         for key, rows in tests.items():
             if key not in (parts or files):
-                where = (
-                    f"frames in {files['']}" if parts else f"file {self.frames_file.replace('{key}', key)} in {folder}"
-                )
+                file = f"file {self.frames_file.replace('{key}', key)} in {folder}"
+                where = f"frames in {files['']}" if parts else file
                 raise HistoryError(f"{index.location(rows[0].line)}: test '{key}' has no {where}")
         wanted = [key for key in tests if path not in files.values() or parts or files[key] == path]
         return [

@@ -69,12 +69,8 @@ def _unfolded(table: CellTable, at: int, said: Sequence[str], first: Sequence[st
     body = [row for row in table.rows[at + 1 :] if not only_text(row, dialect)]
     temperatures = _axis([row.cells[0] for row in body], TEMPERATURE)
     is_stress = stresses.unit or any(re.search(r"stress|spannung|contrainte|σ|MPa", text) for text in said)
-    if (
-        not is_stress
-        or (unit is None and not temperatures.unit)
-        or "" in temperatures.values
-        or len(temperatures.values) < len(body)
-    ):
+    is_whole = "" not in temperatures.values and len(temperatures.values) == len(body)
+    if not (is_stress and is_whole) or (unit is None and not temperatures.unit):
         return None
     of_rupture = [text for text in said if _OF_RUPTURE.search(text)]
     times, loads = _unit_in(of_rupture, TIME), stresses.unit or _unit_in(said, STRESS)
@@ -82,9 +78,8 @@ def _unfolded(table: CellTable, at: int, said: Sequence[str], first: Sequence[st
     names = [("Temperature", temperatures.unit or unit), ("Stress", loads), ("Rupture time", times)]
     head = ["Test", *(f"{name} ({unit})" if unit else name for name, unit in names), *["Heat"] * bool(heat)]
     notes = [row for row in table.rows if only_text(row, dialect) and row.line > table.rows[at].line]
-    legend = {
-        sign: end for row in notes for sign, end in legend_in(only_text(row, dialect).replace("( )", "()")).items()
-    }
+    texts = [only_text(row, dialect).replace("( )", "()") for row in notes]
+    legend = {sign: end for text in texts for sign, end in legend_in(text).items()}
     tests, count = list[TableRow](), Counter[str]()
     for row, temperature in zip(body, temperatures.values, strict=True):
         for stress, cell in zip(stresses.values, row.cells[1:], strict=False):

@@ -42,7 +42,7 @@ from creepkit.readers.table import (
 from creepkit.readers.table_heads import names_time
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.tests_file import SEPARATE
-from creepkit.readers.vocabulary import HeaderVocabulary, names_tests, words_of
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, words_of
 from creepkit.records import History
 
 SPREADSHEET_SUFFIXES = (".xlsx", ".xlsm")
@@ -75,10 +75,8 @@ def read_sheets(path: Path) -> list[CellTable]:
             warnings.simplefilter("ignore")  # of what a workbook holds beside its cells
             size, most = sum(part.file_size for part in archive.infolist()), raised(MAXIMUM_UNPACKED_BYTES)
             if size > most:
-                raise HistoryError(
-                    f"{path}: unpacks to {size / 1e6:.0f} MB, more than {most / 1e6:g} MB; save it as CSV, or "
-                    f"{how_to_raise(size, most)}"
-                )
+                what = f"unpacks to {size / 1e6:.0f} MB, more than {most / 1e6:g} MB"
+                raise HistoryError(f"{path}: {what}; save it as CSV, or {how_to_raise(size, most)}")
             book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
             # Counted from 1904, days come out as they are in the file; from 1900, the 59th and the 60th are one.
             first_day, book.epoch = book.epoch, _DAY_ZERO
@@ -164,10 +162,8 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str], fir
     """
     table = CellTable(path, [], str(sheet.title), Dialect("\t"), assumptions=(*notes.remarks(sheet.title), *aside))
     if notes.uncomputed:
-        raise HistoryError(
-            f"{table.place}, cell {notes.uncomputed}: a formula without a computed value; open the file in a "
-            "spreadsheet program and save it, or paste the values"
-        )
+        what = "a formula without a computed value; save the file in a spreadsheet program, or paste the values"
+        raise HistoryError(f"{table.place}, cell {notes.uncomputed}: {what}")
     rows, comments, texts, known = list[TableRow](), list[TableRow](), set[str](), dict[str, str]()
     sheet.reset_dimensions()
     for number, row in enumerate(sheet.iter_rows(), 1):
@@ -175,9 +171,9 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str], fir
         refuse_unprintable("".join(cells), partial(str.format, "{}, row {}", table.place, number))
         if any(cells):
             refuse_long_cells(table.location(number), cells)
-            texts.update(
-                cell for cell, one in zip(cells, row, strict=True) if "," in cell and isinstance(one.value, str)
-            )
+            texts |= {
+                text for text, cell in zip(cells, row, strict=True) if "," in text and isinstance(cell.value, str)
+            }
             (comments if is_comment(cells[0]) else rows).append(TableRow(number, cells))
     if not rows and not comments:
         return None
@@ -327,10 +323,8 @@ class SpreadsheetReader:
         """Return the histories in all sheets."""
         check_readable(path, SPREADSHEET_FILE)
         if parts_beside(path):
-            what = (
-                "is by its name a part of a test, and parts in spreadsheets are not joined: put their rows below one "
-            )
-            raise Question(path, str(path), f"{what}another in one sheet. Or is it a test?", "parts", (SEPARATE,))
+            what = "is by its name a part of a test, and parts in spreadsheets are not joined: put their rows below one"
+            raise Question(path, str(path), f"{what} another in one sheet. Or is it a test?", "parts", (SEPARATE,))
         left_out = {name.casefold() for name in self.vocabulary.ignored}
         sheets = [sheet for sheet in read_sheets(path) if sheet.sheet.casefold() not in left_out]
         framed = [sheet for sheet in sheets if holds_frames(sheet, self.vocabulary)]
@@ -339,12 +333,8 @@ class SpreadsheetReader:
             raise HistoryError(f"{path}: no sheet has a column of time (sheets: {listed}); name one time_h or Time (h)")
         tests = [test for sheet in framed for test in tests_in(sheet, self.vocabulary)]
         names = {name for test in tests for name in (test.table.sheet, test.name)}
-        stated: dict[str, dict[str, SourceText]] = {}
-        aside: list[str] = []
-        notes: dict[str, SourceText] = {}
-        for sheet in sheets:
-            if sheet in framed:
-                continue
+        stated, notes, aside = dict[str, dict[str, SourceText]](), dict[str, SourceText](), list[str]()
+        for sheet in (one for one in sheets if one not in framed):
             conditions = _conditions_by_test(sheet, self.vocabulary)
             states = any(not key.startswith("label ") for entries in conditions.values() for key in entries)
             if not states and not conditions.keys() & names:  # remarks
@@ -371,14 +361,10 @@ def _names_sheets(name: str) -> bool:
 
 def _conditions_by_test(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[str, dict[str, SourceText]]:
     """{test: its conditions} of a sheet with a column of tests; {} of any other sheet."""
-    head = [
-        k
-        for k, row in enumerate(sheet.rows[:_FILLED_ROWS])
-        if sum(map(bool, row.cells)) > 1 and any(map(_names_sheets, row.cells))
-    ]
-    if not head or head[0] + 1 >= len(sheet.rows):
+    named = [sum(map(bool, row.cells)) > 1 and any(map(_names_sheets, row.cells)) for row in sheet.rows[:_FILLED_ROWS]]
+    if True not in named[: len(sheet.rows) - 1]:
         return {}
-    sheet = replace(sheet, rows=sheet.rows[head[0] :])  # rows above the names are titles
+    sheet = replace(sheet, rows=sheet.rows[named.index(True) :])  # rows above the names are titles
     table, known = named_columns(without_ignored(sheet, 0, vocabulary.ignored)), vocabulary.terms()
     columns = [k for k, name in enumerate(table.columns) if _names_sheets(name)]
     tests: dict[str, dict[str, SourceText]] = {}
@@ -387,15 +373,17 @@ def _conditions_by_test(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[
         if not test or test in tests:
             raise HistoryError(f"{place}: the test is '{quoted(test)}', which is empty or named before; name each once")
         tests[test] = {
-            known.condition(name) if known.is_condition(name) else column_called(name).key or f"label {name}": replace(
-                entry, key=name
-            )
+            _key_of_condition(name, known): replace(entry, key=name)
             for name, entry in table.entries(row).items()
             if name != table.columns[columns[0]]
         }
         if empty := [name for name in table.empty_columns(row) if known.is_condition(name)]:
             tests[test]["label assumed"] = SourceText(", ".join(map(unknown_text, empty)), place)
     return tests
+
+
+def _key_of_condition(name: str, known: Terms) -> str:
+    return known.condition(name) if known.is_condition(name) else column_called(name).key or f"label {name}"
 
 
 def _note_of_sheet(sheet: CellTable) -> dict[str, SourceText]:
@@ -412,10 +400,8 @@ def _with_conditions(
     used = {test.name if test.name in stated else test.table.sheet for test in tests}
     if unused := sorted(stated.keys() - used):
         where = next((entry.location for entry in stated[unused[0]].values()), str(path))
-        raise HistoryError(
-            f"{where}: '{quoted(unused[0])}' has conditions, but no sheet or column of that name; correct the name, or "
-            "leave the sheet out by its name: --ignore, in Python ignore=[...]"
-        )
+        what = f"'{quoted(unused[0])}' has conditions, but no sheet or column of that name"
+        raise HistoryError(f"{where}: {what}; correct it, or leave the sheet out: --ignore, in Python ignore=[...]")
     for test in tests:
         extra = stated.get(test.name, stated.get(test.table.sheet, {}))
         for key in extra.keys() & test.entries.keys():

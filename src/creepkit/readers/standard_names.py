@@ -60,9 +60,8 @@ def in_standard_names(
     stated = in_standard_keys(entries, known)
     for key, entry in _stated_by_columns(table):
         if stated.setdefault(key, entry).text != entry.text:
-            raise HistoryError(
-                f"{stated[key].location}: {key} is '{stated[key].text}', but {entry.location} says {entry.text}"
-            )
+            what = f"{key} is '{stated[key].text}', but {entry.location} says {entry.text}"
+            raise HistoryError(f"{stated[key].location}: {what}")
     columns = [known.column(name) for name in table.columns]
     table = replace(table, columns=columns, written=table.columns) if columns != list(table.columns) else table
     table = with_elapsed_times(stated, table, known)
@@ -248,9 +247,7 @@ def _times_of(
     for row, match in zip(table.rows, elapsed, strict=True):
         if match is None:
             place = table.location(row.line, clock)
-            raise HistoryError(
-                f"{place}: '{name}' is '{quoted(row.cells[clock])}'; write h:mm:ss as in the rows before"
-            )
+            raise HistoryError(f"{place}: '{name}' is '{quoted(row.cells[clock])}'; write h:mm:ss as above")
         seconds.append(3600.0 * int(match[1]) + 60.0 * int(match[2]) + float(match[3].replace(",", ".")))
     times = np.array(seconds)
     meant = synonyms.get(name, name)

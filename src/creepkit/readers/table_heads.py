@@ -26,6 +26,9 @@ from creepkit.records.quantities import LENGTH
 _MOST_ROWS, _MOST_BELOW = 60, 6
 """Rows among which the names of the columns are looked for, and rows of a head below them."""
 
+_DIGITS = re.compile(r"[-+]?\d+(?:[\s.,'`´’·]\d+)+")
+"""Digits with signs between them, with which a file may write no numbers."""
+
 
 @dataclass(frozen=True)
 class HeadedTable:
@@ -72,12 +75,12 @@ def test_and_column(cell: str, known: Terms) -> tuple[str, str]:
     ):
         return "", cell
     written, unit = split_written_name(cell)
-    words = written.replace(":", " ").replace("_", " ").split()
+    words = re.sub(r"^([DØ⌀])(?=\d)", r"\1 ", written.replace(":", " ").replace("_", " ")).split()
     for size in range(min(len(words) - 1, 3), 0, -1):
         for first, rest in ((words[:size], words[size:]), (words[-size:], words[:-size])):
-            name, column = " ".join(rest).strip("-–, "), " ".join(first)
+            name, column = " ".join(rest).strip("-–, "), " ".join(first) + (f" ({unit})" if unit else "")
             if name and known.quantity(column) and not _NOT_TESTS.search(name.lower()):
-                return name, f"{column} ({unit})" if unit else column
+                return name, column
     return "", cell
 
 
@@ -123,10 +126,8 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
         raise HistoryError(f"{table.location(line)}: every column is left out by ignore; keep those of the test")
     names = table.rows[at]
     if is_frame(names, table):
-        raise HistoryError(
-            f"{table.location(line)}: the first row holds numbers, and none above it names the columns; write a row of "
-            "names such as time_h,strain_pct above it (behind '#' it is one, too)"
-        )
+        what = "the first row holds numbers, and none above it names the columns; write names such as time_h,strain_pct"
+        raise HistoryError(f"{table.location(line)}: {what} above it (behind '#' they count, too)")
     times = [k for k, cell in enumerate(names.cells) if is_time(cell, known)]
     body = at + 1
     while body < min(len(table.rows), at + _MOST_BELOW) and _is_of_head(table.rows[body], times, table, known):
@@ -176,8 +177,8 @@ def _is_of_head(row: TableRow, times: Sequence[int], table: CellTable, known: Te
     """Whether a row below the names is one of units, names, conditions or notes, and no frame."""
     filled = [cell for cell in row.cells if cell]
     at_times = [row.cells[k] for k in times if k < len(row.cells) and row.cells[k]]
-    if any(is_number(cell, table.dialect) or is_clock_time(cell) for cell in at_times):
-        return False
+    if any(is_number(cell, table.dialect) or is_clock_time(cell) or _DIGITS.fullmatch(cell) for cell in at_times):
+        return False  # of 1'25 as well: a frame whose numbers cannot be read
     if all(map(unit_suffix, filled)) and any(cell != "1" for cell in filled):
         return True
     if any(is_number(cell, table.dialect) for cell in filled):
@@ -245,10 +246,8 @@ class HeadOfTest:
             key, *cells = cells
             plain = key.rstrip(": ")
             if is_number(key, self.table.dialect):
-                raise HistoryError(
-                    f"{place}: the number {quoted(key)} stands above the names of the columns, and is that of a column "
-                    "without a name, or has no key before it; name every column of the table, or the condition"
-                )
+                what = f"the number {quoted(key)} stands above the names of the columns and has no key before it"
+                raise HistoryError(f"{place}: {what}; name every column of the table, or the condition")
             if "=" in key and conditions_in_text(key, place, known):
                 self.add_title(key, row)
             elif measured := conditions_of_head(key, known):

@@ -30,6 +30,7 @@ from creepkit.records.quantities import (
     TIME,
     QuantityKind,
 )
+from creepkit.records.specimen_record import Output
 from creepkit.records.units import CAPITALS_THAT_MATTER, UNITS, spellings
 
 
@@ -76,75 +77,57 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
     "strain": (
-        *(
-            "creep",
-            "total creep",
-            "total creep strain",
-            "creep strain",
-            "total strain",
-            "engineering strain",
-            "true strain",
-            "logarithmic strain",
-            "dehnung",
-        ),
+        *("creep", "total creep", "total creep strain", "creep strain", "total strain", "engineering strain"),
+        *("true strain", "logarithmic strain", "dehnung"),
         *("kriechdehnung", "gesamtdehnung", "zeitdehnung", "plastische dehnung", "bleibende dehnung", "déformation"),
         *("déformation de fluage", "allongement relatif", "deformation relative"),
     ),
+    "diametral_strain": (
+        *("diametrical strain", "diameter strain", "hoop strain", "circumferential strain", "umfangsdehnung"),
+        *("tangentialdehnung", "déformation diamétrale", "déformation circonférentielle"),
+    ),
+    "diameter_growth": ("diameter change", "change of diameter", "diameter increase", "durchmesseränderung"),
     "loading_strain": ("anfangsdehnung",),
     "force": (
         *("load", "applied load", "axial load", "axial force", "tensile load", "tensile force", "load cell", "kraft"),
         *("prüfkraft", "standardkraft", "last", "zugkraft", "effort", "force axiale"),
     ),
     "elongation": (
-        *(
-            "extension",
-            "extn",
-            "ext",
-            "creep extension",
-            "extensometer",
-            "gauge extension",
-            "axial extension",
-            "verlängerung",
-        ),
+        *("extension", "extn", "ext", "creep extension", "extensometer", "gauge extension", "axial extension"),
         *("tensile extension", "axial extensometer", "strain gauge extension", "extensometer extension"),
-        *("längenänderung", "allongement"),
+        *("längenänderung", "verlängerung", "allongement"),
     ),
     "modulus": (
         *("young's modulus", "youngs modulus", "elastic modulus", "e modul", "elastizitätsmodul", "module d'young"),
     ),
+    "thermal_expansion": ("coefficient of thermal expansion", "cte", "wärmeausdehnungskoeffizient"),
     "poisson": ("poisson's ratio", "poissons ratio", "poisson ratio"),
     "rupture": ("rupture time", "time to rupture", "rupture life", "bruchzeit", "standzeit", "temps à rupture"),
     "strain_sd": ("standard deviation of strain", "strain standard deviation"),
     "diameter": (
         *("specimen diameter", "sample diameter", "initial diameter", "gauge diameter", "durchmesser"),
-        *("probendurchmesser", "anfangsdurchmesser", "diamètre", "diamètre initial"),
+        *("probendurchmesser", "anfangsdurchmesser", "diamètre", "diamètre initial", "mean diameter", "dia", "diam"),
+        *("average diameter", "measured diameter", "mittlerer durchmesser", "diamètre moyen"),
     ),
     "gauge_length": (
         *("gage length", "initial gauge length", "original gauge length", "reference length", "messlänge"),
-        *(
-            "anfangsmesslänge",
-            "anfangsmesslänge le",
-            "anfangsmesslänge l0",
-            "messbasis",
-            "longueur utile",
-            "longueur de base",
-            "longueur de référence",
-        ),
+        *("anfangsmesslänge", "anfangsmesslänge le", "anfangsmesslänge l0", "messbasis", "longueur utile"),
+        *("longueur de base", "longueur de référence"),
     ),
     "outer_diameter": (
-        *("od", "o.d.", "outside diameter", "tube diameter", "aussendurchmesser", "außendurchmesser"),
-        *("diamètre extérieur",),
+        *("od", "o.d.", "outside diameter", "tube diameter", "mean od", "mean outer diameter", "aussendurchmesser"),
+        *("außendurchmesser", "diamètre extérieur"),
     ),
+    "deflection": (
+        *("midspan deflection", "deflection at midspan", "centre deflection", "center deflection", "durchbiegung"),
+        *("central deflection", "mid span deflection", "durchbiegung mitte", "mittendurchbiegung", "flèche"),
+        *("flèche au centre", "load point deflection", "load point displacement", "deflection at load points"),
+    ),
+    "notch_diameter": ("minimum diameter", "root diameter", "notch root diameter", "kerbdurchmesser"),
     "span": (
         *("outer span", "support span", "outer support span", "lower span", "outer roller spacing", "support distance"),
-        *(
-            "distance between supports",
-            "auflagerabstand",
-            "stützweite",
-            "äußere stützweite",
-            "portée",
-            "distance entre appuis",
-        ),
+        *("distance between supports", "auflagerabstand", "stützweite", "äußere stützweite", "portée"),
+        *("distance entre appuis",),
     ),
     "inner_span": (
         *("inner span", "load span", "loading span", "inner loading span", "inner support span", "upper span"),
@@ -175,7 +158,8 @@ SYMBOLS: Mapping[str, str] = {
     **{"F": "force", "ΔL": "elongation", "Δl": "elongation", "ΔL0": "elongation", "dL": "elongation"},
     **dict.fromkeys(("σ0", "σo", "σ₀", "R0", "Ro", "sig"), "stress"),
     **dict.fromkeys(("eps", "ε_c", "εc", "ε_cr"), "strain"),
-    **dict.fromkeys(("d0", "D0", "ø", "Ø", "⌀"), "diameter"),
+    **dict.fromkeys(("d0", "D0", "D", "ø", "Ø", "⌀"), "diameter"),
+    **dict.fromkeys(("ΔD", "Δd", "dD"), "diameter_growth"),
     **dict.fromkeys(("L0", "l0", "Lo", "Le", "Lr0"), "gauge_length"),
     **dict.fromkeys(("S0", "A0", "So", "Ao"), "area"),
 }
@@ -291,7 +275,7 @@ class NameTable:
         if not whole and len(text) > 3 and "time" in self.kinds and (suffix := unit_suffix(text)) in TIME.units:
             return f"time_{suffix}"
         name, unit = (text, "") if whole else split_written_name(text)
-        quantity = self.meaning(name)
+        quantity = self.meaning(name) if name != "D" or unit_suffix(unit) in LENGTH.units else None
         if quantity == "elongation" and unit_suffix(unit) in STRAIN.units:
             quantity = "strain"  # of its gauge length
         elif quantity == "strain" and unit_suffix(unit) in LENGTH.units and "elongation" in self.kinds:
@@ -352,7 +336,7 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 
 TEXT_KEYS = (
     *("name", "alloy", "specimen", "operator", "control", "strain_measure", "stress_measure"),
-    *("includes_elastic", "includes_loading", "ended", "noise_correlation", "steps_taken_off"),
+    *("includes_elastic", "includes_loading", "ended", "noise_correlation", "steps_taken_off", "thermal_expansion"),
     *("decimal", "columns", "ignore", "strain_unit", "date_order", "time_zone"),
 )
 """Words that stand once for a whole test, beside steps and programs; the last line says how its table is written."""
@@ -414,6 +398,7 @@ class HeaderVocabulary:
         known, specimen = known_specimens(), specimen or self.default_texts.get("specimen", "")
         outputs = {name: {str(o): o.kind for o in outputs_of(one)} for name, one in known.items()} | dict(self.outputs)
         named = {specimen: known[specimen]} if specimen in known else dict(known)
+        pieces = named if dimensions_of(known.get(specimen)) else known  # those of a bar give its stress and strain
         loads = {load.name: load.kind for one in (*known.values(), *named.values()) for load in loads_of(one)}
         return Terms(
             vocabulary=self,
@@ -422,8 +407,9 @@ class HeaderVocabulary:
             loads={specimen: [load.name for load in loads_of(one)] for specimen, one in known.items()},
             load_kinds={name: kind for name, kind in loads.items() if name != "components"},
             own_loads=[load.name for one in named.values() for load in loads_of(one) if specimen in known],
-            dimensions={name: d.name for one in named.values() for d in dimensions_of(one) for name in d.names},
+            dimensions={name: d.name for one in pieces.values() for d in dimensions_of(one) for name in d.names},
             own_dimensions=[name for d in dimensions_of(known.get(specimen)) for name in d.names],
+            changes=[(name, o) for name in named for o in outputs_of(known[name]) if o.change_of],
         )
 
 
@@ -435,6 +421,7 @@ class Terms:
     none. loads : {specimen: names}. load_kinds : {load: kind} of those that are stated by one number or program;
     own_loads : those of the specimen that the file names, none where it names none.
     dimensions : {name or alias: length of a test piece}; own_dimensions : of the specimen that the file names.
+    changes : specimens and their outputs that are the change of a length.
     """
 
     vocabulary: HeaderVocabulary
@@ -445,6 +432,7 @@ class Terms:
     own_loads: Sequence[str]
     dimensions: Mapping[str, str]
     own_dimensions: Sequence[str]
+    changes: Sequence[tuple[str, Output]]
 
     @cached_property
     def number_kinds(self) -> dict[str, QuantityKind]:
@@ -464,8 +452,14 @@ class Terms:
         return {
             **{"time": TIME, **self.output_kinds(), **self._standard_deviation_kinds(), **self.number_kinds},
             **self.own_outputs,
-            **{"temperature": TEMPERATURE, "used": FLAG},
+            **{"temperature": TEMPERATURE, "used": FLAG, **self.length_kinds},
         }
+
+    @cached_property
+    def length_kinds(self) -> dict[str, QuantityKind]:
+        """Lengths of a test piece that a column may hold over time, and the relative change of a diameter."""
+        lengths = dict.fromkeys((output.change_of.lstrip("-") for _, output in self.changes), LENGTH)
+        return {**lengths, "diameter": LENGTH, "diametral_strain": STRAIN}
 
     @cached_property
     def text_keys(self) -> set[str]:
@@ -492,6 +486,10 @@ class Terms:
         """The quantity of a column, None where its name means none."""
         found = split_unit(self.column(self.vocabulary.synonyms.get(name, name)), self.columns.kinds)
         return found[0] if found else None
+
+    def may_state(self, name: str) -> bool:
+        """Whether a column of frames may hold a condition, the same in all of them."""
+        return self.quantity(name) in (None, "temperature", *self.number_kinds, *self.length_kinds)
 
     def condition(self, name: str) -> str:
         """A name of a condition in creepkit's form, where it is understood."""

@@ -50,6 +50,8 @@ class Output(_OfQuantity, str):
     logarithmic : whether tests scatter, and are compared, by its logarithm, as creep strains of bars do.
     weight : its share in the paper's loss, where outputs have shares.
     visible : how much of it plainly shows creep, in its unit; ten times the noise by default.
+    change_of : the length of the test piece that grows by it, "-notch_diameter" of one that shrinks; "" for none. Files
+        may then hold that length itself, or its relative change.
     """
 
     long_name: str
@@ -58,6 +60,7 @@ class Output(_OfQuantity, str):
     logarithmic: bool
     weight: float | None
     visible: float | None
+    change_of: str
 
     def __new__(
         cls,
@@ -70,6 +73,7 @@ class Output(_OfQuantity, str):
         logarithmic: bool = False,
         weight: float | None = None,
         visible: float | None = None,
+        change_of: str = "",
     ) -> Output:
         """Check and keep what is said."""
         _check_name("output", name)
@@ -80,6 +84,7 @@ class Output(_OfQuantity, str):
         output = super().__new__(cls, name)
         output.quantity, output.long_name = quantity, long_name or name.replace("_", " ")
         output.grows, output.noise, output.logarithmic, output.weight = grows, noise, logarithmic, weight
+        output.change_of = change_of
         output.visible = visible if visible is not None else None if noise is None else VISIBLE_IN_NOISE * noise
         return output
 
@@ -90,8 +95,8 @@ class Output(_OfQuantity, str):
 
     def __getnewargs_ex__(self) -> tuple[tuple[str, ...], dict[str, Any]]:
         """Copies and other processes get all of it."""
-        known = {name: getattr(self, name) for name in ("grows", "noise", "logarithmic", "weight", "visible")}
-        return (str(self), self.quantity, self.long_name), known
+        names = ("grows", "noise", "logarithmic", "weight", "visible", "change_of")
+        return (str(self), self.quantity, self.long_name), {name: getattr(self, name) for name in names}
 
 
 @checked

@@ -55,7 +55,7 @@ def selection_sentence(counts: ReadingCounts, most: int) -> str:
     reasons = {
         "left out by the study, as suspect, or by their file": excluded,
         "at time zero or without a value": measured - excluded - usable,
-        f"beyond the {most} of a test, half of them even in time and half in its logarithm": usable - fitted,
+        f"beyond the {most} of a test, half even in time and half in its logarithm": usable - fitted,
     }
     others = ", ".join(f"{count} {reason}" for reason, count in reasons.items() if count)
     selected = f"{fitted} of {plural(measured, 'reading')} were selected for the fit"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-USED_SHARE, SAME, LABELS = 0.86, 1e-6, 5
+USED_SHARE, SAME, LABELS = 0.8, 1e-6, 5
 """Of a colour map, whose palest colours cannot be seen on white; the relative difference of conditions that are one;
 and labels along a colour bar, its ends among them."""
 

@@ -10,6 +10,10 @@ from importlib.metadata import PackageNotFoundError, version
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.selection.ranking import Ranking
+from creepkit.screening.results import AlloyResult
+
 if TYPE_CHECKING:
     from creepkit.discovery.discover import TemperatureStudy
     from creepkit.discovery.temperature_law import TemperatureLaw
@@ -17,12 +21,9 @@ if TYPE_CHECKING:
     from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
     from creepkit.instruments.imposed import Imposed
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection.ranking import Ranking
     from creepkit.quality.flags import DataQuality
     from creepkit.records import History
     from creepkit.rupture_assessment.assessment import RuptureAssessment
-    from creepkit.screening.results import AlloyResult
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,40 @@ class ReportGroup:
     result: Ranking | Identification | AlloyResult | None = None
     histories: tuple[History, ...] = ()
     failure: str = ""
+
+    def __post_init__(self) -> None:
+        if self.fits and not self.histories:
+            object.__setattr__(self, "histories", self.fit.histories)
+
+    @property
+    def fits(self) -> list[Identification]:
+        """Of all laws, the best first; none where nothing was identified."""
+        if self.result is None or isinstance(self.result, Identification):
+            return [] if self.result is None else [self.result]
+        return [one.fit for one in self.result.laws]
+
+    @property
+    def fit(self) -> Identification:
+        """The best law."""
+        return self.fits[0]
+
+    @property
+    def ranking(self) -> Ranking | None:
+        """Of all laws, None where one law alone was identified."""
+        if isinstance(self.result, AlloyResult):
+            return Ranking(self.result.laws, failed=self.result.failed_laws) if len(self.result.laws) > 1 else None
+        return self.result if isinstance(self.result, Ranking) else None
+
+    @property
+    def decisive(self) -> bool | None:
+        """Whether the verdict is that the best law is the one, None where no laws were compared."""
+        compared = self.result if self.ranking is not None else None
+        return compared.decisive if isinstance(compared, Ranking | AlloyResult) else None
+
+    @property
+    def of(self) -> str:
+        """The material in a caption."""
+        return f" of {self.name}" if self.name else ""
 
 
 @dataclass(frozen=True)
@@ -130,6 +165,11 @@ class ReportContents:
     attachments: tuple[Attachment, ...] = ()
     notes: tuple[str, ...] = ()
     data_citations: tuple[str, ...] = ()
+
+    @property
+    def identified(self) -> list[ReportGroup]:
+        """The groups of which a law was identified."""
+        return [group for group in self.groups if group.fits]
 
     def __post_init__(self) -> None:
         _freeze(self, "temperature", "forecasts", "design", "rupture", "extractions", "imposed")

@@ -288,20 +288,3 @@ def shortened(name: str, most: int = 32) -> str:
     """A name of a test on an axis; of a longer one the beginning and the end, which tells it from its neighbours."""
     end = 2 * most // 3
     return name if len(name) <= most else f"{name[: most - end - 1]}…{name[-end:]}"
-
-
-def place_legend_below(
-    figure: Figure, axes: Axes, *, columns: int = 3, size: float = 8.0, title: str | None = None
-) -> None:
-    """The legend of a panel below the figure, where it covers no data."""
-    handles, labels = axes.get_legend_handles_labels()
-    if labels:
-        figure.legend(
-            handles,
-            labels,
-            loc="outside lower center",
-            ncols=min(columns, len(labels)),
-            fontsize=size,
-            title=title,
-            title_fontsize=size,
-        )

@@ -13,11 +13,12 @@ from creepkit.errors import FitError
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, hours_number
+from creepkit.reports.answer import event_text
 from creepkit.reports.blocks import Block, Items, Paragraph, as_text
 from creepkit.reports.figures import panel_grid, span, wrapped
 from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.load_programs import kind_of_test
-from creepkit.reports.prediction_bands import axis_label
+from creepkit.reports.prediction_bands import axis_label, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,29 +84,29 @@ def misfit_sentence(misfit: LawMisfit) -> str:
     factor = math.exp(abs(misfit.log_factor))
     where = f"{misfit.stress:.4g} MPa and {celsius_text(misfit.temperature, digits=0)}"
     return (
-        f"the law misses the rate of the tests nearest to it, at {where}, by a factor of {factor:.3g} when the others "
-        f"predict it; what it misses here is in the intervals, as a factor of {misfit.factor:.3g} on the rate"
+        f"when the others predict them, the law misses the rate of the nearest tests, at {where}, by a factor of "
+        f"{factor:.3g}; what it misses here is in the intervals, as a factor of {misfit.factor:.3g} on the rate"
     )
 
 
 def _end_text(one: OutputForecast) -> str:
     alive = np.flatnonzero(np.isfinite(one.value) & np.isfinite(one.band.low))
-    unit = f" {output_unit(one.output)}" if output_unit(one.output) else ""
+    unit = f" {unit_of(one.output)}" if unit_of(one.output) else ""
     if not alive.size:
         return f"{one.output}: nothing is predicted"
     k = int(alive[-1])
-    high = f"{one.band.high[k]:.3g}" if math.isfinite(one.band.high[k]) else "ruptured"
-    return (
-        f"{one.output.replace('_', ' ')} at {hours_number(float(one.times[k]))} h: {one.value[k]:.3g}{unit} "
-        f"[{one.band.low[k]:.3g}, {high}]"
-    )
+    value, low, high = (_scaled(one) * v[k] for v in (one.value, one.band.low, one.band.high))
+    end = f"{high:.3g}" if math.isfinite(high) else "ruptured"
+    hours = hours_number(float(one.times[k]))
+    return f"{one.output.replace('_', ' ')} at {hours} h: {value:.3g}{unit} [{low:.3g}, {end}]"
 
 
 def _time_text(one: TimeForecast, end: float) -> str:
     """When something comes; end : the last time of the test, s, before which it was asked for."""
+    event = event_text(one)
     if not math.isfinite(one.low) and not math.isfinite(one.measured):
-        return f"{one.event}: not within the test of {hours_number(end)} h (probability of it {one.chance:.2g})"
-    text = f"{one.event}: median {hours_number(one.median)} [{hours_number(one.low)}, {hours_number(one.high)}] h"
+        return f"{event}: not within the test of {hours_number(end)} h (probability of it {one.chance:.2g})"
+    text = f"{event}: median {hours_number(one.median)} [{hours_number(one.low)}, {hours_number(one.high)}] h"
     if math.isfinite(one.measured):
         where = {True: "inside", False: "outside", None: ""}[one.inside]
         return f"{text}, measured {'> ' if one.censored else ''}{hours_number(one.measured)} h, {where}"

@@ -52,7 +52,7 @@ def posterior_text(samples: PosteriorSamples) -> str:
     for name, param in samples.coordinates.law.table.items():
         median, low, high = samples.interval(name)
         lines.append(f"  {name:{width}} = {median:.5g}  [{low:.4g}, {high:.4g}] {unit_text(param.unit)}".rstrip())
-    return "\n".join([*lines, *(f"  note: {note}" for note in samples.notes)])
+    return "\n".join(lines)
 
 
 def correlation_text(correlation: Correlation) -> str:

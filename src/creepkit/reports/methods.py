@@ -21,7 +21,7 @@ from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
 from creepkit.language.printing import arrhenius_exponent
 from creepkit.laws.paper import PAPER
 from creepkit.limits import SIGNIFICANCE
-from creepkit.reports.blocks import number, plural, printable, sentence, typeset
+from creepkit.reports.blocks import ends, listed, number, plural, printable, sentence, typeset
 from creepkit.reports.compared_values import compared_observations, reading_counts
 from creepkit.reports.design import order_text
 from creepkit.reports.identification import rate_scatter_sentence
@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.language import CreepLaw
     from creepkit.records import History
-    from creepkit.reports.contents import ReportContents
-    from creepkit.reports.findings import GroupFindings
+    from creepkit.reports.contents import ReportContents, ReportGroup
 
 
 CITATIONS = {
@@ -71,11 +70,12 @@ class References:
         return f" [{', '.join(map(str, numbers))}]" if numbers else ""
 
 
-def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
+def methods_text(contents: ReportContents) -> str:
     """Paragraphs on tests and laws, models, estimation, comparison and the other stages, then the references."""
     references = References()
     cite = references.cite
     source = f"The measured data are those of{cite(*contents.data_citations)}." if contents.data_citations else ""
+    found = contents.identified
     fits = [one.fit for one in found]
     paragraphs: list[Iterable[str]] = [[source]]
     if found:
@@ -85,7 +85,7 @@ def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> st
             [*_each(fits, lambda fit: _estimation(fit, cite)), *_each(found, _sparsity)],
             [*_each(found, lambda one: _comparison(one, cite)), *_adequacy(fits, cite)],
         ]
-    paragraphs += [*_stages(contents, cite), _software(contents, found, cite)]
+    paragraphs += [*_stages(contents, cite), _software(contents, cite)]
     texts = [" ".join(filter(None, one)) for one in paragraphs]
     numbered = "\n".join(f"[{k}] {text}" for text, k in references.texts.items())
     return f"{typeset(chr(10).join(f'{text}{chr(10)}' for text in texts if text))}\n{numbered}".strip() + "\n"
@@ -94,11 +94,6 @@ def methods_text(contents: ReportContents, found: Sequence[GroupFindings]) -> st
 def _each(found: Iterable[Any], sentences_of: Callable[[Any], Iterable[str]]) -> list[str]:
     """The sentences on all materials, each once."""
     return [*dict.fromkeys(text for one in found for text in sentences_of(one))]
-
-
-def listed(words: Sequence[str]) -> str:
-    """Words with commas, and 'and' before the last."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else "none"
 
 
 # ---- tests, laws and models ------------------------------------------------------------------------------------------
@@ -114,14 +109,16 @@ def _tests(fits: Sequence[Identification]) -> Iterator[str]:
     compared = _each(fits, _transforms)
     if compared:
         yield f"Compared were {listed(compared)}."
+    if any("arsinh" in text for text in compared):
+        yield f"The floor f is {100 * FLOOR_SHARE:g} % of the median end value, at least {FLOOR_NOISES:g} noises."
     if any(one is not None and one.followed_to_rupture.any() for one in map(compared_observations, fits)):
-        yield "Readings of tests followed to rupture have orthogonal residuals √2 |a b| / √(a² + b²), signed as a."
+        yield "Readings to rupture, or of a rising rate, have orthogonal residuals √2 |a b| / √(a² + b²), signed as a."
         yield "There a is predicted less measured transformed strain, b ln of the measured over the predicted time."
         yield "Tests stopped before rupture count only where they lasted longer than predicted."
 
 
 def _transforms(fit: Identification) -> Iterator[str]:
-    observations = compared_observations(fit)
+    observations, linear = compared_observations(fit), list[str]()
     for output, transform in (
         () if observations is None else zip(observations.outputs, observations.transforms, strict=True)
     ):
@@ -129,10 +126,11 @@ def _transforms(fit: Identification) -> Iterator[str]:
         if output in (RUPTURE_OUTPUT, MINIMUM_RATE_OUTPUT):
             yield f"{'rupture times' if output == RUPTURE_OUTPUT else 'minimum creep rates'} by their logarithms"
         elif isinstance(transform, LogTransform):
-            floor = f"{100 * FLOOR_SHARE:g} % of the median end value, at least {FLOOR_NOISES:g} noises"
-            yield f"{name} ε as arsinh(ε / 2f), a logarithm above the floor f ({floor})"
+            yield f"{name} ε as arsinh(ε / 2f), a logarithm above f"
         else:
-            yield f"{name} linearly, divided by the standard deviation of its readings"
+            linear.append(name)
+    if linear:
+        yield f"{listed(linear)} over the standard deviation of a reading"
 
 
 def _loading(fit: Identification) -> Iterator[str]:
@@ -145,20 +143,16 @@ def _loading(fit: Identification) -> Iterator[str]:
         yield f"Strains are {measure} and {'contain' if elastic else 'do not contain'} the elastic strain on loading."
     known = [h.elastic.at(h.mean_temperature) for h in fit.histories if h.elastic is not None]
     if known:
-        moduli, ratios = _range([1e-3 * float(one.E) for one in known]), _range([float(one.nu) for one in known])
+        moduli, ratios = ends([1e-3 * float(one.E) for one in known]), ends([float(one.nu) for one in known])
         yield f"Young's modulus is {moduli} GPa and Poisson's ratio {ratios} in {plural(len(known), 'test')}."
 
 
-def _range(values: Sequence[float]) -> str:
-    return " to ".join(dict.fromkeys(number(end, 4) for end in (min(values), max(values))))
-
-
-def laws_of(found: Sequence[GroupFindings]) -> dict[str, CreepLaw]:
+def laws_of(found: Sequence[ReportGroup]) -> dict[str, CreepLaw]:
     """{name: law} of all that were fitted, in the order in which their equations are numbered."""
     return {one.law.name: one.law for group in found for one in group.fits}
 
 
-def _laws(found: Sequence[GroupFindings], cite: Callable[..., str]) -> Iterator[str]:
+def _laws(found: Sequence[ReportGroup], cite: Callable[..., str]) -> Iterator[str]:
     """The laws by their titles and the numbers of their equations, with what they cite, and their T_ref."""
     named = [
         f"the {title_in_sentence(law)}, Eq. ({k}){cite(*law.references)}"
@@ -225,10 +219,9 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
         yield "Parameters have weak Gaussian priors, with the variance of a uniform distribution between their bounds."
     else:
         weighted = f"this weighted estimate{cite('weighted least squares')}, H⁻¹ (Jᵀ W C W J + P) H⁻¹"
-        yield f"95 % intervals are those of the covariance of {weighted} with H = Jᵀ W J + P, with {freedom}."
+        yield f"95 % intervals follow from the covariance of {weighted}. There H = Jᵀ W J + P, with {freedom}."
         yield "J are derivatives of residuals, W weights, C the covariance of the noise, P the precision of the priors."
-    nuisances = list(dict.fromkeys(one.kind for one in settings.nuisances))
-    if nuisances:
+    if nuisances := list(dict.fromkeys(one.kind for one in settings.nuisances)):
         yield f"Nuisance parameters of the tests with Gaussian priors are {listed(nuisances)}."
     yield rate_scatter_sentence(fit)
     chance = f"{100 * AUTOCORRELATION_CONFIDENCE:g} % of cases"
@@ -245,7 +238,7 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
         yield "Numerical errors of predictions were corrected at the optimum; a tenth of them stays in the covariance."
 
 
-def _sparsity(found: GroupFindings) -> Iterator[str]:
+def _sparsity(found: ReportGroup) -> Iterator[str]:
     """How terms of a sum were selected, where they were."""
     for sparse in [one.sparsity for one in found.fits if one.sparsity is not None][:1]:
         dropped = f"left out were {listed([*sparse.dropped_terms])}" if sparse.dropped_terms else "all terms stayed"
@@ -263,7 +256,7 @@ CRITERIA = {
 """{criterion: its name, and its penalty for K parameters and n readings}."""
 
 
-def _comparison(found: GroupFindings, cite: Callable[..., str]) -> Iterator[str]:
+def _comparison(found: ReportGroup, cite: Callable[..., str]) -> Iterator[str]:
     """How the laws of a material were compared."""
     if found.ranking is None:
         return
@@ -327,10 +320,10 @@ def _stages(contents: ReportContents, cite: Callable[..., str]) -> Iterator[list
         yield [f"{information}; they are listed {order_text(design)}."]
 
 
-def _software(contents: ReportContents, found: Sequence[GroupFindings], cite: Callable[..., str]) -> list[str]:
+def _software(contents: ReportContents, cite: Callable[..., str]) -> list[str]:
     versions = dict(contents.provenance.versions)
-    if not versions and found:
-        versions = {"creepkit": str(found[0].fit.provenance.get("creepkit", ""))}
+    if not versions and contents.identified:
+        versions = {"creepkit": str(contents.identified[0].fit.provenance.get("creepkit", ""))}
     named = [
         f"{name} {printable(text, 60)}{cite(*[name] * (name == 'creepkit'))}" for name, text in versions.items() if text
     ]

@@ -31,13 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.selection.ranking import RankedLaw, Ranking
     from creepkit.reports.svg import PageFigures
-
-
-CRITERIA = {"bic": "BIC", "aicc": "AICc"}
-"""Abbreviations of the criteria by which laws are ranked."""
 
 
 CHI_SQUARE_NOTE = (
@@ -48,8 +43,8 @@ CHI_SQUARE_NOTE = (
 
 def ranking_text(ranking: Ranking) -> str:
     """How well the best law describes the tests, the verdict, then all laws."""
-    equivalent = [] if ranking.decisive else [str(pair) for pair in equivalents_among_remaining(ranking)]
-    head: list[Block] = [Paragraph(ranking.best.headline), Paragraph(ranking.verdict), Items(equivalent)]
+    equivalents = equivalents_among_remaining(ranking)
+    head: list[Block] = [Paragraph(ranking.best.headline), Paragraph(ranking.verdict), Items(equivalents)]
     return as_text([*head, *ranking_blocks(ranking)])
 
 
@@ -105,7 +100,7 @@ def explanation(fit: Identification) -> str:
 
 def criterion_name(ranking: Ranking) -> str:
     """The abbreviation of the criterion by which laws are ranked."""
-    return CRITERIA.get(ranking.criterion, ranking.criterion)
+    return {"bic": "BIC", "aicc": "AICc"}[ranking.criterion]
 
 
 def _misfit_name(fit: Identification) -> str:
@@ -157,12 +152,14 @@ def separating_test(ranking: Ranking) -> list[str]:
     ]
 
 
-def equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
-    """Pairs of credible laws that the tests do not separate; none where the tests were not given."""
+def equivalents_among_remaining(ranking: Ranking) -> list[str]:
+    """Pairs of credible laws that the tests do not separate; none where one is decisive or the tests were not given."""
+    if ranking.decisive:
+        return []
     names = {r.fit.law.name for r in ranking.credible}
     if any(r.fit.predictor is None or not r.fit.histories for r in ranking.laws):
         return []
-    return [pair for pair in ranking.equivalents() if {pair.first, pair.second} <= names]
+    return [str(pair) for pair in ranking.equivalents() if {pair.first, pair.second} <= names]
 
 
 # ---- commands --------------------------------------------------------------------------------------------------------

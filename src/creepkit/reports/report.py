@@ -37,7 +37,6 @@ from creepkit.reports.contents import (
     ReportSource,
     versions_of,
 )
-from creepkit.reports.findings import findings_of
 from creepkit.reports.html import report_html
 from creepkit.reports.identified_files import identified_files
 from creepkit.rupture_assessment.assessment import RuptureAssessment
@@ -205,7 +204,7 @@ def _exclusions(histories: Sequence[History]) -> Iterator[Exclusion]:
 
 def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], tuple[str, ...]]:
     """The best law of each material for some targets, identifications and rankings; and what cannot be written."""
-    found = [one for one in map(findings_of, groups) if one is not None]
+    found = [one for one in groups if one.fits]
     if not 0 < len(found) <= MOST_EXPORTED_GROUPS:
         return (), ()
     files = identified_files({one.name: one.ranking for one in found if one.ranking is not None})
@@ -231,7 +230,7 @@ def _exports(groups: Sequence[ReportGroup]) -> tuple[tuple[ExportedFile, ...], t
 
 def _provenance(groups: Sequence[ReportGroup], histories: Sequence[History]) -> ReportProvenance:
 
-    found = [one for one in map(findings_of, groups) if one is not None]
+    found = [one for one in groups if one.fits]
     if not found:
         return ReportProvenance(versions=versions_of(PACKAGES))
     fit = found[0].fit

@@ -16,7 +16,7 @@ from creepkit.reports.figures import (
     make_folder,
     panel_grid,
     panels_of,
-    place_legend_below,
+    place_legend_right,
     save_figure,
     span,
 )
@@ -52,7 +52,7 @@ def training_curves(metadata: SurrogateMetadata, path: str | Path | None = None)
         axes.axvline(epoch, color="grey", lw=0.8, ls=":", label="rate falls" if k == 0 else None)
     axes.set(xlabel="epoch", ylabel="loss", title=f"{metadata.law.name}, {metadata.specimen.name}")
     span(axes, "y", *(curves[name] for name in drawn), logarithmic=True, most=8)
-    place_legend_below(figure, axes)
+    place_legend_right(axes)
     return save_figure(figure, path)
 
 

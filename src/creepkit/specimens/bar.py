@@ -46,10 +46,10 @@ class Bar(PointSpecimen):
     def model_text(self, histories: Sequence[History]) -> str:
         """How the bar is simulated, in sentences for a paper."""
         return (
-            f"A bar is one material point, whose creep rate is integrated in time by {SDIRK4_TEXT}; the step is chosen "
-            f"so that its local error is at most {self.tolerance:g} of the strain. {self.imposed_text} A bar is taken "
-            f"to rupture at a logarithmic creep strain of {self.strain_limit:g}, or where an internal variable reaches "
-            "its limit or the creep rate diverges."
+            f"A bar is one material point. Its creep rate is integrated by {SDIRK4_TEXT}. The step is chosen "
+            f"so that its local error is at most {self.tolerance:g} of the strain. {self.imposed_text} A bar ruptures "
+            f"at a logarithmic creep strain of {self.strain_limit:g}, or where an internal variable reaches its limit "
+            "or the creep rate diverges."
         )
 
     takes_values_of_tests: ClassVar[bool] = True

@@ -169,4 +169,5 @@ def _gap(a: Any, b: Any) -> str | None:
         if list(a) != list(b):
             return f" are {', '.join(a) or 'none'} and {', '.join(b) or 'none'}"
         return next((f" of '{name}'{gap}" for name in a if (gap := _gap(a[name], b[name])) is not None), None)
-    return None if a is b or a == b else f" is {a!r} and {b!r}"
+    is_same = a is b or (isinstance(a, np.ndarray) == isinstance(b, np.ndarray) and a == b)
+    return None if is_same else f" is {a!r} and {b!r}"

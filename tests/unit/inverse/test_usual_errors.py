@@ -182,8 +182,22 @@ def test_values_profiles_and_samples_are_one_estimate_whatever_errors_are_includ
         ck.identify(law.times(ck.arrhenius(T_ref=1073.15)), curves, weights="likelihood", starts=1, usual_errors=errors)
         for errors in ("none", {"temperature": 1e-6}, "usual")
     )
-    sampled = usual.sample(draws=1000).u.mean(axis=0)
-    shifts = [100.0 * (vanishing.u - none.u), usual.u - none.u, sampled - usual.u] / np.sqrt(np.diag(none.covariance))
-    for one in usual.by_tests_alone.estimates[1:3]:
+    sd, draws = np.sqrt(np.diag(usual.covariance)), usual.sample(draws=1000).u
+    shifts = [100.0 * (vanishing.u - none.u), usual.u - none.u, draws.mean(axis=0) - usual.u] / sd
+    for one in usual.estimates[1:3]:
         shifts = np.append(shifts, (usual.profile(one.name).best - one.value) / (one.high - one.low) * 3.92)
     assert np.abs(shifts).max() < 0.2
+    np.testing.assert_allclose(draws.std(axis=0), sd, rtol=0.2)
+
+
+def test_a_dimple_is_sampled_with_the_errors_that_its_values_were_found_with():
+    """Readings of 1.5 um are far more exact than dimensions: by the readings alone other values would be the likeliest,
+    and those that were found so unlikely that nothing could be drawn about them.
+    """
+    tests = ck.read_histories(ck.example_data("planted bulge test"))
+    fit = ck.identify("strain-hardening", tests, ck.specimen("bulge"), starts=1)
+    draws = fit.sample(draws=200)
+    np.testing.assert_allclose(draws.u.std(axis=0), np.sqrt(np.diag(fit.covariance)), rtol=0.2)
+    for name, truth in {"A": 4e-16, "n": 4.4, "m": -0.35}.items():
+        _, low, high = draws.interval(name)
+        assert low < truth < high

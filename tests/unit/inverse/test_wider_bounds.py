@@ -5,7 +5,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.inverse.identify import identify
+from creepkit.inverse.identify import identify, refit
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import constant_stress
 from helpers.planted_bars import BAR, bars
@@ -27,6 +27,41 @@ def test_a_search_goes_on_beyond_bounds_that_nobody_stated(truth, stresses):
             identify(stated, tests, BAR, settings=QUICK)
     else:
         assert identify(stated, tests, BAR, settings=QUICK).values["n"] < 8.0 + 1e-6
+
+
+def minimum_rates(n, highest, seed):
+    """Six minimum rates between 100 MPa and `highest` by a stress exponent n, with 15 % of scatter; their slope."""
+    stresses = np.geomspace(100.0, highest, 6)
+    rates = 1e-9 * (stresses / 100.0) ** n * np.exp(0.15 * np.random.default_rng(seed).standard_normal(6))
+    tests = [
+        ck.History(f"t{k}", np.array([1e6]), {}, constant_stress(stress), 900.0, minimum_rate=rate)
+        for k, (stress, rate) in enumerate(zip(stresses, rates, strict=True))
+    ]
+    return tests, np.polyfit(np.log(stresses), np.log(rates), 1)[0]
+
+
+@pytest.mark.parametrize("seed", [2, 5])
+def test_bounds_stay_where_the_tests_say_less_than_they_do(seed):
+    """Stresses within 4 % give slopes of 11 and 13 for a planted 6: 40 times the rate at twice the stress, or more."""
+    tests, slope = minimum_rates(6.0, 104.0, seed)
+    assert slope > 11.0
+    fit = ck.identify(NORTON, tests)
+    assert fit.values["n"] <= 8.0
+    assert {e.name: e.verdict for e in fit.estimates}["n"] == "not determined"
+    assert abs(np.log(fit.rate(200.0, warn=False)[0] / (1e-9 * 2.0**6))) < np.log(5.0)
+
+
+@pytest.mark.parametrize(("n", "seed"), [(9.0, 1), (9.0, 2), (12.0, 2), (12.0, 6)])
+def test_a_value_within_two_or_three_of_an_exponent_is_found_beyond_bounds(n, seed):
+    tests, slope = minimum_rates(n, 125.0, seed)
+    assert ck.identify(NORTON, tests).values["n"] == pytest.approx(slope, abs=0.02)
+
+
+def test_a_refit_keeps_the_bounds_of_its_fit():
+    """Held-out tests are predicted by the law that was identified, in the bounds that are printed with it."""
+    inside, (beyond, slope) = minimum_rates(6.0, 125.0, seed=0)[0], minimum_rates(12.0, 125.0, seed=0)
+    assert refit(ck.identify(NORTON, inside), beyond).values["n"] <= 8.0
+    assert refit(ck.identify(NORTON, beyond), beyond).values["n"] == pytest.approx(slope, abs=0.02)
 
 
 def test_values_at_a_bound_and_rates_are_of_one_point(tmp_path):

@@ -209,7 +209,7 @@ def test_stated_end_of_loading(read):
         read(LOADED + "# loading_time_h: 100\n" + total())
     with pytest.raises(HistoryError, match="includes_loading is yes, but not by how much; state loading_strain_pct"):
         read(LOADED + "# includes_loading: yes\ntime_s,strain_pct\n" + rows(AFTER, 100 * (3e-3 + CREEP)))
-    with pytest.raises(HistoryError, match="no elastic strain is left; leave out includes_elastic: yes"):
+    with pytest.raises(HistoryError, match="which leaves no elastic strain; leave out includes_elastic: yes"):
         read(LOADED + "# includes_loading: yes\n# includes_elastic: yes\n# loading_strain_pct: 0.3\n" + total())
 
 

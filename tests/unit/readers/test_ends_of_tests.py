@@ -254,7 +254,7 @@ def test_the_order_of_dates_is_asked_for(order: str, days: int, tmp_path: Path):
 REFUSED = [
     ("Time", ["08:30:00", "09:30:00"], "", "begins at 08:30:00, which may be elapsed or of the day; name the column"),
     ("Time (h)", ["0:30:00", "1:30:00"], "", "'Time .h.' is in h, and its first cell is '0:30:00', a time of a clock"),
-    ("Time", ["0:30:00", "2.5"], "", "'Time' is '2.5'; write h:mm:ss as in the rows before"),
+    ("Time", ["0:30:00", "2.5"], "", "'Time' is '2.5'; write h:mm:ss as above"),
     ("Time", ["0:30:00", "0:20:00"], "", "time falls from 1800 s to 1200 s"),
     ("time_s", ["0", "1"], "# date_order: day first\n", "x.csv:3: date_order says nothing here"),
     ("Time", ["0:30:00", "1:30:00"], "# date_order: mdy\n", "x.csv:3: date_order is 'mdy'; allowed: month first"),

@@ -48,6 +48,12 @@ def test_a_strain_and_its_time_in_the_row_of_a_test_are_no_frames(read):
         read(SHEET.replace(";Observations", "") + "E1;600;180;5,2;1200\nE2;650;120;3,3;900\n")
 
 
+def test_a_clock_that_begins_just_before_zero(read):
+    (test,) = read("# temperature_C: 850\n# stress_MPa: 60\ntime_s,strain_pct\n-0.5,0\n100,.1\n900,.3\n")
+    assert test.times[0] == 0.0
+    assert "times just below zero are zero" in test.labels["assumed"]
+
+
 def test_logarithms(read):
     first, second = read(LOGARITHMS)
     assert (first.rupture_time, second.rupture_time) == (pytest.approx(10**2.5 * 3600), 3.6e6)
@@ -116,3 +122,61 @@ def test_points_of_a_plot(tmp_path):
     first, second = ck.read_histories(tmp_path)
     assert (first.condition, second.condition) == ("650 °C, 100 MPa", "650 °C, 120 MPa")
     np.testing.assert_allclose(second.outputs["strain"], [0.0, 0.005, 0.009])
+
+
+READINGS = "0,{0}9.502\n100,{0}9.521\n1000,{0}9.564\n"
+TUBE = "# pressure_MPa: 12\n# temperature_C: 400\n# thickness_mm: 0.57\n# specimen: tube\n"
+
+
+@pytest.mark.parametrize("name", ["D1 (mm)", "Diameter (mm)", "OD (mm)", "mittlerer Durchmesser (mm)"])
+def test_diameters_of_a_tube_are_its_growth(read, name):
+    """From the first reading on, at time zero; what begins far from the stated diameter is asked about."""
+    stated, rows = TUBE + "# outer_diameter_mm: 9.5\n", f"Time (h),{name}\n" + READINGS
+    (test,) = read(stated + rows.format(""))
+    np.testing.assert_allclose(test.outputs["diameter_growth"], [0.0, 0.019, 0.062], atol=1e-12)
+    with pytest.raises(HistoryError, match=r'begins at 29.502 mm, which is no outer_diameter; .* "diameter_growth'):
+        read(stated + rows.format(2))
+    (alone,) = read(TUBE + rows.format(""))
+    assert alone.geometry["outer_diameter"] == 9.502
+    with pytest.raises(HistoryError, match=r"before the test, which is not stated.*outer_diameter_mm = 9.502"):
+        read(TUBE + rows.format("").replace("\n0,", "\n10,"))
+
+
+def test_relative_growths_and_diameters_of_bars(read):
+    """Of a bar at constant volume (1 + strain) d^2 = d0^2; two columns under two pressures are two tubes."""
+    (tube,) = read(TUBE + "# outer_diameter_mm: 9.5\nTime (h),Hoop strain (%)\n0,0\n100,0.2\n")
+    assert tube.outputs["diameter_growth"][-1] == pytest.approx(0.019)
+    bar = "# stress_MPa: 60\n# temperature_C: 700\n# specimen: uniaxial\n# diameter_mm: 10\nTime (h),Diameter (mm)\n"
+    (test,) = read(bar + "0,10.01\n9,9.91\n")
+    assert test.outputs["strain"][-1] == pytest.approx((10.01 / 9.91) ** 2 - 1.0)
+    tubes = "OD (mm),9.5,9.5\nWall (mm),1,1\nTemp (C),400,400\nPressure (MPa),12,{}\nTime (h),D1 (mm),D2 (mm)\n"
+    tubes = TUBE.splitlines()[-1] + "\n" + tubes + "0,9.5,9.5\n9,9.52,9.51\n"
+    assert [f"{one.condition}: {one.outputs['diameter_growth'][-1]:.3g}" for one in read(tubes.format(10))] == [
+        "400 °C, 12 MPa: 0.02",
+        "400 °C, 10 MPa: 0.01",
+    ]
+    with pytest.raises(HistoryError, match="no conditions above each, may be tests or sensors of one"):
+        read(tubes.format(12))
+
+
+def test_thermal_expansion_at_steps_of_temperature(read, tmp_path):
+    """Steps of 20 K multiply rates by 2.5, and 14e-6/K is planted: told, and taken off; a step of rate alone is not."""
+    hours, rng = np.arange(0.0, 300.1, 5.0), np.random.default_rng(2)
+    levels = np.minimum(hours // 100, 2)
+    creep = np.interp(hours, [0, 100, 200, 300], 1e-4 * np.cumsum([0, 1, 2.5, 6.25]))
+    rows = [creep + 14e-6 * 20 * part * levels + 2e-6 * rng.standard_normal(hours.size) for part in (0, 1)]
+    texts = (
+        "".join(f"{t},{600 + 20 * k},{100 * max(e, 0)}\n" for t, k, e in zip(hours, levels, one, strict=True))
+        for one in rows
+    )
+    plain, expanded = (read("# stress_MPa: 90\nTime (h),Temp (C),Strain (%)\n" + text, "a.csv") for text in texts)
+    assert ck.check_data_quality(plain).flags == ()
+    (flag,) = ck.check_data_quality(expanded)
+    assert "at 100 h; 200 h, as the temperature does by +20 K, +20 K: thermal expansion of about 1.4e-05/K" in str(flag)
+    for line in ('thermal_expansion = "14e-6 1/K"', "thermal_expansion = 14e-6", 'steps_taken_off = "100 h; 200 h"'):
+        (tmp_path / "tests.toml").write_text(f'["a.csv"]\n{line}\n')
+        (test,) = ck.read_histories(tmp_path / "a.csv")
+        np.testing.assert_allclose(test.outputs["strain"], creep, atol=2e-5)
+    (tmp_path / "tests.toml").write_text('["a.csv"]\nthermal_expansion = "14 K"\n')
+    with pytest.raises(HistoryError, match="is '14 K'; write it per kelvin, such as 14e-6 1/K"):
+        ck.read_histories(tmp_path / "a.csv")

@@ -31,6 +31,7 @@ from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
 from creepkit.reports.html import report_html
 from creepkit.reports.ranking import separating_test
 from creepkit.reports.rate_panels import plate_figure
+from helpers.rate_tables import whole_life_table
 from helpers.report_pages import contents, ranking
 from helpers.steady_rate_predictor import Steady, planted
 
@@ -122,6 +123,20 @@ def test_every_figure_has_words_for_those_who_do_not_see_it(page: str) -> None:
         assert any(tag(e) == "text" and e.text for e in figure.iter())  # letters, not outlines of letters
 
 
+def test_a_sentence_has_25_words_at_most() -> None:
+    """A colon and a semicolon end one as well; references of the methods text are none."""
+    texts = [
+        line
+        for e in elements(parsed(page_of(False)))
+        if tag(e) in ("p", "li", "figcaption", "caption", "dd") or "prose" in e.get("class", "")
+        for line in "".join(e.itertext()).splitlines()
+        if not line.startswith("[")
+    ]
+    sentences = [one for text in texts for one in re.split(r"(?<=[.;:?!])\s", text)]
+    assert len(sentences) > 100
+    assert [one for one in sentences if len(one.split()) > 25] == []
+
+
 def test_every_table_has_a_caption_and_heads(page: str) -> None:
     for table in (e for e in elements(parsed(page)) if tag(e) == "table"):
         assert "".join(table[0].itertext()).strip()
@@ -185,7 +200,7 @@ def test_a_record_is_one_line_and_a_cell_of_html() -> None:
     found = ranking()
     fit = found.best
     tests = Histories(fit.histories)
-    records = [found, fit, tests[0], fit.forecast(tests[0]), fit.predict(tests)]
+    records = [found, fit, tests[0], fit.forecast(tests[0]), fit.predict(tests), tests, fit.correlation()]
     assert [repr(one) for one in records if len(repr(one)) > 300 or "\n" in repr(one)] == []
     shown = (found, fit, fit.law, tests[0], fit.forecast(tests[0]), tests, ck.specimen("bulge"))
     cells = [one._repr_html_() for one in shown]
@@ -193,10 +208,12 @@ def test_a_record_is_one_line_and_a_cell_of_html() -> None:
         html5lib.HTMLParser(strict=True).parseFragment(cell)
         assert "<script" not in cell
     assert "strain hardening" in cells[1].lower().replace("-", " ")
+    assert all("<svg" in cell for cell in (*cells[:2], *cells[3:6]))
 
 
 def test_the_answer_has_a_dozen_lines_of_a_hundred_characters() -> None:
-    for answer in (str(ranking()), str(ranking().best)):
+    damaged = ck.identify("kachanov-rabotnov", whole_life_table(np.random.default_rng(1)), starts=1)  # seven parameters
+    for answer in (str(ranking()), str(ranking().best), str(damaged)):
         lines = answer.splitlines()
         assert len(lines) <= 12
         assert max(map(len, lines)) <= 100

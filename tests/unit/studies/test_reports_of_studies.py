@@ -85,7 +85,7 @@ def test_the_source_of_the_data_is_cited_and_kept(study: Path, plain_pages: None
     result = ck.Study.load(study).run()
     contents = result.report_contents()
     assert contents.data_citations == (source,)
-    text = methods_text(contents, [])
+    text = methods_text(contents)
     assert text.startswith("The measured data are those of [1].")
     assert f"\n[1] {source}" in text
     assert contents.provenance.settings["data"]["citation"] == [source]

@@ -76,6 +76,15 @@ def test_other_code_of_the_package_makes_results_again_and_the_lock_compares_the
     assert made(ck.Study.load(study).run()) == set()
 
 
+def test_a_result_of_another_stage_is_made_again(study: Path) -> None:
+    ck.Study.load(study).run(only="quality")
+    (path,) = [
+        one for one in (study.parent / "study.results").glob("*.json") if '"stage": "quality"' in one.read_text()
+    ]
+    path.write_text(path.read_text().replace('"stage": "quality"', '"sage": "quality"'))
+    assert "quality" in made(ck.Study.load(study).run(only="quality"))
+
+
 def test_a_result_that_cannot_be_stored_says_so(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from creepkit.files.record_codec import RecordError
     from creepkit.studies.kept_results import ResultFolder

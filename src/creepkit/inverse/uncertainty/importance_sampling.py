@@ -12,21 +12,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.special import softmax
-from scipy.stats import chi2, multivariate_t, norm, qmc
+from scipy.stats import chi2, norm, qmc
 
 from creepkit import limits
 from creepkit.arrays import ArrayLike, Floats, single_threaded_blas
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import lies_at_bound
 from creepkit.inverse.uncertainty.mixture_distribution import INTERVAL_PROBABILITIES
-from creepkit.inverse.uncertainty.posterior import TESTS_ALONE, Posterior
+from creepkit.inverse.uncertainty.posterior import Posterior
 from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals, quadratic_terms
 from creepkit.inverse.uncertainty.quantities import (
     DerivedQuantity,
@@ -63,6 +65,13 @@ SAMPLED_WIDTH = 0.8
 """Width of an interval, before bounds cut it, over that of the bounds from which on it is sampled."""
 
 
+NOT_SAMPLED = (
+    "values lie at their bounds or are not determined, and their posterior could not be sampled: intervals of rates "
+    "may be too narrow"
+)
+"""The note on a fit whose posterior is none that can be sampled."""
+
+
 def needs_samples(fit: Identification) -> bool:
     """Whether some value lies at its bound, or its interval nearly fills the bounds."""
     for one in fit.estimates:
@@ -89,10 +98,7 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     samples = _samples_by_quadratic_residuals(posterior, centre, shape, seed)
     samples = posterior_samples(posterior, centre, shape, seed) if samples is None else samples
     if samples is None:
-        note = (
-            "values lie at their bounds or are not determined, and their posterior could not be sampled: intervals of "
-        )
-        return replace(fit, notes=(*fit.notes, f"{note}rates may be too narrow"))
+        return replace(fit, notes=(*fit.notes, NOT_SAMPLED))
     return replace(fit, samples=samples)
 
 
@@ -107,7 +113,6 @@ class PosteriorSamples(RateStatements, Presentable, Tabulated):
     coordinates: Coordinates
     u: Floats
     ranges: Mapping[str, tuple[float, float]]
-    notes: tuple[str, ...] = ()
 
     @property
     def stated_laws(self) -> tuple[CreepLaw, ...]:
@@ -147,24 +152,34 @@ class PosteriorSamples(RateStatements, Presentable, Tabulated):
         return posterior_text(self)
 
 
+@checked
 def sample_posterior(
-    fit: Identification, *, draws: int = 1000, seed: int = 0, using: Predictor | None = None
+    fit: Identification,
+    *,
+    draws: Annotated[int, limits.DRAWS_OF_POSTERIOR] = 1000,
+    seed: int = 0,
+    using: Predictor | None = None,
 ) -> PosteriorSamples:
     """Draws from the posterior of an identification's values, by population Monte Carlo.
+
+    The errors of the tests that its intervals include are added to each, to first order.
 
     draws : how many, worth half as many independent ones at least. using : another predictor of the same tests than
         the fit's, such as a surrogate where the fit's is a finite element model.
     """
-    limits.check_number("draws", draws, limits.DRAWS_OF_POSTERIOR, FitError)
-    sampled = fit if using is None else fit.with_histories(fit.histories, using.for_law(fit.law))
+    fit = fit if using is None else fit.with_histories(fit.histories, using.for_law(fit.law))
     with single_threaded_blas():
-        posterior = Posterior.from_identification(sampled)
+        posterior = Posterior.from_identification(fit)
         shape = _first_shape(fit, posterior)
-        u = posterior_samples(posterior, np.array(fit.u), shape, seed, draws=draws, least=0.5 * draws)
+        u = posterior_samples(posterior, posterior.optimum, shape, seed, draws=draws, least=0.5 * draws)
     if u is None:
         raise FitError(f"law '{fit.law.name}': its posterior could not be sampled; profile(name) follows it")
-    notes = () if fit.error_covariance is None else (TESTS_ALONE,)
-    return PosteriorSamples(fit.coordinates, u, fit.ranges, notes)
+    if fit.error_covariance is not None:
+        sd = np.sqrt(np.diag(fit.covariance))
+        scaled = fit.error_covariance / np.outer(sd, sd)
+        errors = np.random.default_rng(seed).multivariate_normal(np.zeros(sd.size), scaled, draws, method="eigh")
+        u = np.clip(u + sd * errors, posterior.lower, posterior.upper)
+    return PosteriorSamples(fit.coordinates, u, fit.ranges)
 
 
 def _first_shape(fit: Identification, posterior: Posterior) -> Floats:
@@ -192,7 +207,7 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
             return None
         weights = np.exp(0.5 * np.maximum(log_density[usable] - log_density.max(), LEAST_LOG_WEIGHT))
         surface = QuadraticResiduals.fitted(u[usable], residuals[usable], weights, centre, shape)
-        density = _corrected(replace(posterior, quadratic=surface), u[usable], log_density[usable], weights)
+        density = _corrected(replace(posterior, quadratic=surface, errors=0.0), u[usable], log_density[usable], weights)
         samples = posterior_samples(density, centre, shape, seed + k, least=2.0 * SAMPLES)
         if samples is None:
             return None
@@ -265,7 +280,7 @@ def posterior_samples(
         drawn = _drawn(centre, shape, seed + k)
         points = np.concatenate([points, drawn])
         log_density = np.concatenate([log_density, density(drawn)])
-        log_proposal = np.stack([multivariate_t.logpdf(points, m, s, df=PROPOSAL_FREEDOM) for m, s in proposals])
+        log_proposal = np.stack([_log_density_of_draws(points, *proposal) for proposal in proposals])
         mixture = np.logaddexp.reduce(log_proposal, axis=0) - np.log(len(proposals))
         log_weight = log_density - mixture
         if not np.isfinite(log_weight).any():
@@ -331,3 +346,14 @@ def _drawn(centre: Floats, shape: Floats, seed: int, draws: int = DRAWS) -> Floa
     normal = norm.ppf(unit[:, :-1]) @ np.linalg.cholesky(shape).T
     mixing = chi2.ppf(unit[:, -1:], PROPOSAL_FREEDOM) / PROPOSAL_FREEDOM
     return np.asarray(centre + normal / np.sqrt(mixing))
+
+
+def _log_density_of_draws(points: Floats, centre: Floats, shape: Floats) -> Floats:
+    """(points,) ln of the density of that t, but for a constant; sizes of coordinates may differ by any factor.
+
+    scipy's multivariate_t leaves out coordinates whose variance is 1e-10 of another's: exponents beside an energy.
+    """
+    root = np.linalg.cholesky(shape)
+    distance = (solve_triangular(root, (points - centre).T, lower=True) ** 2).sum(axis=0)
+    size_of_tail = 0.5 * (PROPOSAL_FREEDOM + centre.size)
+    return np.asarray(-size_of_tail * np.log1p(distance / PROPOSAL_FREEDOM) - np.log(np.diag(root)).sum())

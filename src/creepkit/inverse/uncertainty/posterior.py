@@ -19,18 +19,42 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
+from creepkit.inverse.errors_of_tests import errors_of_tests, with_expected_scatter
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals
 
-TESTS_ALONE = "by the tests alone: their temperatures, loads and dimensions are taken as exactly known"
-"""What is said of intervals that do not include the errors which tests usually have."""
-
-
 REFIT_TOLERANCES = Tolerances(max_steps=25, tolerance=1e-7)
 """Of minima about an optimum that is known."""
+
+
+def residuals_with_errors(fit: Identification) -> tuple[Residuals, NoiseModel]:
+    """Residuals at the optimum, and the noise, under whose covariance values are found by likelihood.
+
+    It holds those errors of the tests that the intervals include; without them another point would be the optimum.
+    """
+    problem, noise = fit.least_squares_problem, fit.noise_model
+    residuals = fit.residuals_of(problem)
+    if fit.error_covariance is None:
+        return residuals, noise
+    linear = problem.linearised(fit.x, residuals)
+    errors = errors_of_tests(problem, fit.x, linear, noise)
+    return linear.with_errors(errors).residuals, with_expected_scatter(problem, linear, noise)
+
+
+def predicted_errors(fit: Identification, alone: CovarianceFactor) -> Floats:
+    """(tests, observations) of the residuals, what the errors of the tests did there: their best linear prediction.
+
+    With C = C0 + S S', C0 that of `alone`, it is S S' C^-1 r = r - C0 C^-1 r: under C0 the rest has the optimum that
+    values by likelihood have under C.
+    """
+    residuals, noise = residuals_with_errors(fit)
+    weighted = CovarianceFactor.of_residuals(residuals, noise).inverse_times(residuals.values)
+    rest = (alone.blocks @ weighted[..., None])[..., 0]
+    return np.where(residuals.present, residuals.values - rest, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +66,8 @@ class Posterior:
     at the optimum, what one standard deviation of a test's own rate does. parameter_bounds : (2, parameters) of the
     internal parameters.
     nuisance_basis : (data + nuisances, nuisances) Q. prior_residuals : (nuisances,) - of the priors, at the estimates.
-    degrees_of_freedom : nu; least_chi_square : at the optimum.
-    quadratic : residuals as functions of u, in the place of predictions.
+    degrees_of_freedom : nu. optimum : (parameters,) u, of least_chi_square. errors : (tests, observations) -, what the
+    errors of the tests did to the residuals. quadratic : residuals as functions of u, in the place of predictions.
     """
 
     problem: LeastSquaresProblem
@@ -55,12 +79,14 @@ class Posterior:
     nuisance_basis: Floats
     prior_residuals: Floats
     degrees_of_freedom: float
+    optimum: Floats
     least_chi_square: float
+    errors: Floats | float = 0.0
     quadratic: QuadraticResiduals | None = None
 
     @classmethod
     def from_identification(cls, fit: Identification) -> Posterior:
-        """The posterior of an identification, about its optimum."""
+        """The posterior of an identification, about its optimum, given what the errors of its tests are there."""
         problem, noise_model = fit.least_squares_problem, fit.noise_model
         residuals, nuisances, count = fit.residuals_of(problem), problem.nuisance_parameters, fit.u.size
         assert residuals.jacobian is not None
@@ -70,8 +96,8 @@ class Posterior:
         root_precision = np.diag(np.sqrt(nuisances.precision))
         nuisance_jacobian = _whitened(factor, rate_effect, np.moveaxis(residuals.jacobian[..., count:], -1, 0))
         nuisance_rows = nuisance_jacobian[:, problem.observations.present].T
-        whole = problem.with_covariance(CovarianceFactor.of_residuals(residuals, noise_model))
-        return cls(
+        all_noise = CovarianceFactor.of_residuals(residuals, noise_model)
+        found = cls(
             problem=problem.with_fixed_nuisances(e),
             rate_sd=noise_model.rate,
             test_weights=residuals.test_weights,
@@ -81,8 +107,15 @@ class Posterior:
             nuisance_basis=np.linalg.qr(np.concatenate([nuisance_rows, root_precision]))[0],
             prior_residuals=root_precision @ (e - nuisances.mean[: nuisances.size]),
             degrees_of_freedom=max(fit.freedom, 1.0),
-            least_chi_square=whole.chi_square(whole.minimise(fit.x).x),
+            optimum=fit.u,
+            least_chi_square=0.0,
         )
+        if fit.error_covariance is None or fit.settings.weights != "likelihood":
+            whole = problem.with_covariance(all_noise)
+            x = whole.minimise(fit.x).x
+            return replace(found, optimum=x[:count], least_chi_square=whole.chi_square(x))
+        found = replace(found, errors=predicted_errors(fit, all_noise))
+        return replace(found, least_chi_square=float(found.chi_square(*found.residuals(fit.u[None]))[0]))
 
     @property
     def lower(self) -> Floats:
@@ -136,10 +169,12 @@ class Posterior:
             len(coefficients) == len(law.terms) + len(law.states) and not problem.observations.followed_to_rupture.any()
         )
         if not (is_separable and self.rate_sd > 0):
-            return predicted.candidate_residuals(u), self.rate_effect
+            return predicted.candidate_residuals(u) - self.errors, self.rate_effect
         residuals, jacobian = predicted.candidate_jacobian(u)
         rate_scatter = self.rate_sd / np.sqrt(self.test_weights)[:, None]
-        return residuals, 0.5 * (self.rate_effect + jacobian[..., coefficients].sum(axis=-1) * rate_scatter)
+        return residuals - self.errors, 0.5 * (
+            self.rate_effect + jacobian[..., coefficients].sum(axis=-1) * rate_scatter
+        )
 
     def inside(self, u: Floats) -> Bools:
         """(candidates,) whether the bounds of u and of the law's parameters, and its constraints, hold.

@@ -27,7 +27,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, TESTS_ALONE
+from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, residuals_with_errors
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
 from creepkit.records.presentable import Presentable
 
@@ -73,6 +73,9 @@ class ProfileLikelihood(Presentable):
     laplace: tuple[float, float]
     notes: tuple[str, ...] = field(default=())
 
+    def __repr__(self) -> str:
+        return f"<ProfileLikelihood of {self}>"
+
     def __str__(self) -> str:
         from creepkit.reports.inference import profile_text
 
@@ -110,8 +113,8 @@ class _ProfileTrace:
     """Points of a profile, one after the other outwards from the optimum."""
 
     def __init__(self, fit: Identification, quantity: DerivedQuantity, root: float) -> None:
-        self.root, self.size, self.noise_model = root, fit.u.size, fit.noise_model
-        self.residuals = fit.residuals_of(fit.least_squares_problem)
+        self.root, self.size = root, fit.u.size
+        self.residuals, self.noise_model = residuals_with_errors(fit)
         covariance_factor = CovarianceFactor.of_residuals(self.residuals, self.noise_model)
         self.problem = fit.least_squares_problem.with_covariance(covariance_factor)
         self.function, self.covariance = quantity.function(fit.coordinates), fit.covariance
@@ -184,17 +187,17 @@ class _ProfileTrace:
 def profile(fit: Identification, quantity_or_name: str | DerivedQuantity, *, level: float = 0.95) -> ProfileLikelihood:
     """Profile a parameter, by its name, or another quantity such as rate_at(120) or exponent_at(120).
 
-    The interval holds the value with probability `level`, 0.95 by default, by the tests as they are stated.
+    The interval holds the value with probability `level`, 0.95 by default, with those errors of the tests that the
+    fit's intervals include.
     """
     if not 0.0 < level < 1.0:
         raise FitError(f"level is {level:g}; a probability between 0 and 1 is needed, such as 0.95")
     quantity = quantity_of(fit.coordinates, quantity_or_name)
     root = float(student.ppf(0.5 + 0.5 * level, max(fit.freedom, 1.0)))
     with single_threaded_blas():
-        trace = _ProfileTrace(fit.by_tests_alone, quantity, root)
+        trace = _ProfileTrace(fit, quantity, root)
         (below, low), (above, high) = trace.one_side(-1.0), trace.one_side(1.0)
-    made = _profile(quantity, trace, [*below[:0:-1], *above], (low, high), level)
-    return made if fit.error_covariance is None else replace(made, notes=(*made.notes, TESTS_ALONE))
+    return _profile(quantity, trace, [*below[:0:-1], *above], (low, high), level)
 
 
 def _profile(

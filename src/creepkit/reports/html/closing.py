@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.files.writing import file_stem
 from creepkit.quality.flags import frame_ranges_text
-from creepkit.reports.attachments import problem_of_names
 from creepkit.reports.blocks import (
     Block,
     Downloads,
@@ -24,29 +23,27 @@ from creepkit.reports.blocks import (
     sentence,
 )
 from creepkit.reports.compared_values import reading_counts, selection_sentence
-from creepkit.reports.findings import findings_of
 from creepkit.reports.histories import history_blocks, quality_blocks
 from creepkit.reports.identified_files import covariance_file
 from creepkit.reports.law_names import definition_blocks
 from creepkit.reports.methods import laws_of, methods_text
 
 if TYPE_CHECKING:
-    from creepkit.reports.contents import ExportedFile, ReportContents
-    from creepkit.reports.findings import GroupFindings
+    from creepkit.reports.contents import ExportedFile, ReportContents, ReportGroup
 
 
 MOST_FILES = 4
 """On the first screen."""
 
 
-def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -> list[PageSection]:
+def closing_sections(contents: ReportContents) -> list[PageSection]:
     """Exports, methods, provenance, and what is missing."""
     return [
-        _exports_section(contents, found),
+        _exports_section(contents),
         PageSection(
             "methods",
             "Methods text",
-            _methods_blocks(contents, found) if found or contents.rupture else [],
+            _methods_blocks(contents) if contents.identified or contents.rupture else [],
             result="for a paper, with equations and references",
         ),
         PageSection(
@@ -59,18 +56,16 @@ def closing_sections(contents: ReportContents, found: Sequence[GroupFindings]) -
 # ---- methods ---------------------------------------------------------------------------------------------------------
 
 
-def _methods_blocks(contents: ReportContents, found: Sequence[GroupFindings]) -> list[Block]:
+def _methods_blocks(contents: ReportContents) -> list[Block]:
     """The text to be copied, and the equations that it numbers: set, with their symbols, and as text."""
-    text = Verbatim(
-        "To be copied into a paper and shortened", printable_lines(methods_text(contents, found)), prose=True
-    )
-    return [text, *definition_blocks(laws_of(found).values())]
+    text = Verbatim("To be copied into a paper and shortened", printable_lines(methods_text(contents)), prose=True)
+    return [text, *definition_blocks(laws_of(contents.identified).values())]
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
 
 
-def _covariances(found: Sequence[GroupFindings]) -> list[ExportedFile]:
+def _covariances(found: Sequence[ReportGroup]) -> list[ExportedFile]:
     """The covariance of the best law of each material."""
     files = [(one, covariance_file(one.fit)) for one in found if one.fit.estimates]
     if len(found) == 1:
@@ -81,22 +76,22 @@ def _covariances(found: Sequence[GroupFindings]) -> list[ExportedFile]:
     ]
 
 
-def files_to_download(contents: ReportContents, found: Sequence[GroupFindings]) -> list[tuple[str, str, str]]:
+def files_to_download(contents: ReportContents) -> list[tuple[str, str, str]]:
     """(name, address, what it is) of exports and covariances; the address holds the content.
 
     Laws as text come first, then what is kept of single identifications.
     """
-    files = [*contents.exports, *_covariances(found)]
+    files = [*contents.exports, *_covariances(contents.identified)]
     return [
         (file_name(one.name), _address(one.text), f"{one.target}, {_size(one.text)}")
         for one in sorted(files, key=lambda one: one.name.endswith(".json"))
     ]
 
 
-def _exports_section(contents: ReportContents, found: Sequence[GroupFindings]) -> PageSection:
+def _exports_section(contents: ReportContents) -> PageSection:
     """The files that do not stand on the first screen."""
-    files = files_to_download(contents, found)
-    files = files[MOST_FILES:] if len(found) == 1 else files
+    files = files_to_download(contents)
+    files = files[MOST_FILES:] if len(contents.identified) == 1 else files
     blocks = [Downloads(files)] if files else []
     return PageSection("exports", "Files to download", blocks, result=plural(len(files), "further file"))
 
@@ -140,13 +135,10 @@ def _provenance_blocks(contents: ReportContents) -> list[Block]:
     if provenance.versions:
         rows = [(k, v) for k, v in provenance.versions.items()]
         blocks.append(Table("Versions", ("package", "version"), rows))
-    if provenance.inputs:
-        rows = [(name, digest) for name, digest in provenance.inputs.items()]
-        blocks.append(Table("Input files", ("file", "sha256 of its content"), rows))
-    carried = [one.name for one in contents.attachments if not problem_of_names([one.name])]
-    if carried:
-        blocks.append(Paragraph("Files that the page carries:"))
-        blocks.append(Items(carried))
+    inputs = dict(provenance.inputs)
+    files = {one.name: inputs.pop(one.name.rpartition("/")[2], "") for one in contents.attachments} | inputs
+    if files:
+        blocks.append(Table("Files of the study", ("file", "sha256 of its content"), [*files.items()]))
     return blocks
 
 
@@ -180,7 +172,7 @@ MOST_LISTED = 400
 """Rows of a table of tests."""
 
 
-def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) -> PageSection:
+def data_section(contents: ReportContents) -> PageSection:
     """The tests as measured, what is suspect in them, and what was left out and why."""
     histories = [h for group in contents.groups for h in group.histories]
     blocks: list[Block] = []
@@ -190,7 +182,7 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
     blocks += [Paragraph(f"Source of the data: {text}") for text in contents.data_citations]
     if contents.quality is not None:
         blocks += quality_blocks(contents.quality, MOST_LISTED)
-    in_tests = [(one.name, one.fit.adequacy) for one in found if one.fit.adequacy is not None]
+    in_tests = [(one.name, one.fit.adequacy) for one in contents.identified if one.fit.adequacy is not None]
     texts = [(name, adequacy.explanation_text) for name, adequacy in in_tests if adequacy.lies_in_tests]
     blocks += [Paragraph(f"{name}: {text}" if name else text, "warning") for name, text in texts]
     left_out = _exclusion_blocks(contents) if histories or contents.exclusions else []
@@ -200,28 +192,22 @@ def data_section(contents: ReportContents, found: Sequence[GroupFindings] = ()) 
     return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)], result)
 
 
-def readings_text(frames: Sequence[int]) -> str:
-    """Numbers of readings: 'readings 97-191, 193'; of a bar that has no camera as of what has one."""
-    return frame_ranges_text(frames).replace("frame", "reading", 1)
-
-
 def _exclusion_blocks(contents: ReportContents) -> list[Block]:
     selected = [Paragraph(text) for text in _selections(contents)]
     if not contents.exclusions:
         return [Paragraph("No reading was excluded by hand or by the check of data quality."), *selected]
-    rows = [
-        (one.test, readings_text(one.frames) if one.frames else "the whole test", one.reason)
-        for one in contents.exclusions[:MOST_LISTED]
-    ]
+    rows = []
+    for one in contents.exclusions[:MOST_LISTED]:  # of a bar that has no camera as of what has one
+        readings = frame_ranges_text(one.frames).replace("frame", "reading", 1)
+        rows.append((one.test, readings if one.frames else "the whole test", one.reason))
     return [Table("Left out of the identification", ("test", "what", "reason"), rows), *selected]
 
 
 def _selections(contents: ReportContents) -> Iterator[str]:
     """How many frames of the tests of each group were selected for the fit."""
-    for group in contents.groups:
-        found = findings_of(group)
-        if found is None or not any(h.outputs for h in found.fit.histories):
+    for group in contents.identified:
+        if not any(h.outputs for h in group.fit.histories):
             continue
-        most = found.fit.settings.frames
-        text = selection_sentence(reading_counts(found.fit.histories, most), most)
+        most = group.fit.settings.frames
+        text = selection_sentence(reading_counts(group.fit.histories, most), most)
         yield f"{group.name}: {text}" if len(contents.groups) > 1 else text

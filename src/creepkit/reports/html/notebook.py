@@ -12,12 +12,11 @@ from creepkit.inverse.selection.ranking import Ranking
 from creepkit.language import CreepLaw
 from creepkit.records import Histories, History, Specimen
 from creepkit.reports.answer import equations, symbols_of, unit_text
-from creepkit.reports.blocks import Block, Formula, Paragraph, Table, Verbatim, number
+from creepkit.reports.blocks import Block, Formula, Paragraph, Table, Verbatim, number, plural
 from creepkit.reports.catalogue import specimen_blocks
 from creepkit.reports.contents import ReportContents, ReportGroup
-from creepkit.reports.findings import findings_of, with_histories
 from creepkit.reports.forecast import forecast_blocks
-from creepkit.reports.histories import history_blocks
+from creepkit.reports.histories import history_blocks, tests_figure
 from creepkit.reports.html.page import block_shown, findings_section, group_answer
 from creepkit.reports.html.templates import template
 from creepkit.reports.law_names import LawNames
@@ -28,8 +27,12 @@ from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 STYLE = (
     ".creepkit .answer{display:grid;grid-template-columns:minmax(0,1.75fr) minmax(16rem,1fr);gap:0 2rem}"
-    ".creepkit .lead{font-weight:600}.creepkit dd{margin:0 0 .4rem;font-weight:600}"
+    ".creepkit .law{grid-column:1/-1}.creepkit .formula math{width:fit-content;margin:0}"
+    ".creepkit .lead{font-weight:600}.creepkit dd{margin:0 0 .4rem;font-weight:600}.creepkit figure{margin:.5rem 0}"
     ".creepkit dl span{display:block;font-weight:400;opacity:.7}.creepkit .drawing svg{width:100%;height:auto}"
+    ".creepkit table{border-collapse:collapse}.creepkit caption{text-align:left;opacity:.7}"
+    ".creepkit th,.creepkit td{text-align:left;padding:.2rem 1rem .2rem 0;border-bottom:1px solid #8886}"
+    ".creepkit .n{text-align:right}"
 )
 """Of what stands in a cell."""
 
@@ -40,11 +43,9 @@ _CELLS = count(1)
 def notebook_html(record: object) -> str:
     """A record as HTML for one cell; identifiers of its figures are those of no other cell."""
     block = template("blocks.html").module.block  # type: ignore[attr-defined]
-    fits = [record] if isinstance(record, Identification) else []
-    laws = [record] if isinstance(record, Ranking) else []
-    if isinstance(record, ReportContents):
-        laws = [one.result for one in record.groups if isinstance(one.result, Ranking)]
-    fits += [one.fit for ranking in laws for one in ranking.laws]
+    groups = [ReportGroup("", record)] if isinstance(record, Identification | Ranking) else []
+    groups += record.groups if isinstance(record, ReportContents) else ()
+    fits = [fit for group in groups for fit in group.fits]
     blocks = [block(block_shown(one, LawNames(fits))) for one in _blocks(record)]
     return f'<div class="creepkit"><style>{STYLE}</style>{"".join(blocks)}</div>'
 
@@ -62,8 +63,7 @@ def _blocks(record: object) -> Sequence[Block]:
 @_blocks.register(Identification)
 @_blocks.register(Ranking)
 def _(result: Identification | Ranking) -> Sequence[Block]:
-    found = findings_of(ReportGroup("", result))
-    assert found is not None
+    found = ReportGroup("", result)
     return [group_answer(found, _figures()), *([] if found.ranking is None else ranking_blocks(found.ranking))]
 
 
@@ -78,8 +78,14 @@ def _(law: CreepLaw) -> Sequence[Block]:
     return [Paragraph(law.title or law.name, "lead"), *map(Formula, equations(law)), table]
 
 
-_blocks.register(History)(lambda history: history_blocks([history]))
-_blocks.register(Histories)(history_blocks)
+@_blocks.register
+def _(tests: Histories) -> Sequence[Block]:
+    caption = f"{plural(len(tests), 'test')} over time; hollow: readings that are not used."
+    drawn = [_figures().picture(lambda: tests_figure(tests), "Tests", caption, caption)]
+    return [*history_blocks(tests), *(drawn if any(one.outputs for one in tests) else [])]
+
+
+_blocks.register(History)(lambda history: _blocks(Histories([history])))
 _blocks.register(Specimen)(specimen_blocks)
 _blocks.register(Forecast)(lambda forecast: forecast_blocks(forecast, _figures()))
 _blocks.register(RuptureAssessment)(lambda one: [*strength_blocks(one), *rupture_blocks(one, _figures())])
@@ -87,5 +93,4 @@ _blocks.register(RuptureAssessment)(lambda one: [*strength_blocks(one), *rupture
 
 @_blocks.register
 def _(contents: ReportContents) -> Sequence[Block]:
-    found = [one for one in map(findings_of, map(with_histories, contents.groups)) if one is not None]
-    return [Paragraph(contents.title, "lead"), *findings_section(contents, found, _figures()).blocks]
+    return [Paragraph(contents.title, "lead"), *findings_section(contents, _figures()).blocks]

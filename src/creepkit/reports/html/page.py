@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -40,7 +41,6 @@ from creepkit.reports.blocks import (
 )
 from creepkit.reports.design import design_blocks
 from creepkit.reports.extraction import extraction_figure, extraction_text
-from creepkit.reports.findings import GroupFindings, findings_of, with_histories
 from creepkit.reports.forecast import forecast_blocks
 from creepkit.reports.html.closing import MOST_FILES, closing_sections, data_section, files_to_download
 from creepkit.reports.html.templates import resource, template
@@ -55,17 +55,18 @@ from creepkit.reports.identification import (
 from creepkit.reports.identification_plot import summary_figure
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.law_names import LawNames
-from creepkit.reports.ranking import explanation, ranking_blocks
+from creepkit.reports.ranking import equivalents_among_remaining, explanation, ranking_blocks
 from creepkit.reports.rate_panels import plate_figure, rupture_rows
 from creepkit.reports.rupture import rupture_blocks, strength_blocks
 from creepkit.reports.svg import PageFigures
 from creepkit.reports.temperature_law import law_blocks, study_blocks
+from creepkit.screening.results import AlloyResult
 
 if TYPE_CHECKING:
     from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
     from creepkit.instruments.imposed import Imposed
-    from creepkit.reports.contents import ReportContents
+    from creepkit.reports.contents import ReportContents, ReportGroup
 
 MOST_TEST_FIGURES = 160
 """Figures of single tests in one page; of more tests those of largest misfit are drawn."""
@@ -80,21 +81,19 @@ def report_html(contents: ReportContents) -> str:
 
     It holds everything itself, loads nothing, runs no scripts, and is the same text for the same contents.
     """
-    contents = dataclasses.replace(contents, groups=tuple(map(with_histories, contents.groups)))
-    figures = PageFigures()
-    found = [one for one in map(findings_of, contents.groups) if one is not None]
+    figures, found = PageFigures(), contents.identified
     names = LawNames(fit for one in found for fit in one.fits)
     sections = [
-        findings_section(contents, found, figures),
+        findings_section(contents, figures),
         *_group_sections(found, figures),
-        data_section(contents, found),
+        data_section(contents),
         *_stage_sections(contents, figures, identified=bool(found)),
-        *closing_sections(contents, found),
+        *closing_sections(contents),
     ]
     shown = [section_shown(one, names) for one in sections]
     return template("page.html").render(
         title=printable(contents.title, 200) or "Report",
-        summary=_summary(contents, found),
+        summary=_summary(contents),
         sections=[one for one in shown if one.blocks or one.sections],
         style=Markup(resource("style.css")),
         attachments=Markup(embed(contents.attachments)),
@@ -102,13 +101,12 @@ def report_html(contents: ReportContents) -> str:
     )
 
 
-def _summary(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
-    tests = sum(len(group.histories) for group in contents.groups) or sum(len(one.fit.tests) for one in found)
+def _summary(contents: ReportContents) -> str:
+    tests = sum(len(one.histories) or len(one.fit.tests if one.fits else ()) for one in contents.groups)
     parts = [plural(tests, "test")] if tests else []
     if len(contents.groups) > 1:
         parts.append(plural(len(contents.groups), "material"))
-    days = [str(one.fit.provenance.get("when", ""))[:10] for one in found]
-    dates = sorted({day for day in days if day})
+    dates = sorted({str(one.fit.provenance.get("when", ""))[:10] for one in contents.identified} - {""})
     parts += [f"identified {dates[0]}" if len(dates) == 1 else f"identified {dates[0]} to {dates[-1]}"] if dates else []
     return ", ".join(parts)
 
@@ -124,7 +122,7 @@ def section_shown(section: PageSection, names: LawNames) -> PageSection:
         title=printable(section.title, 120),
         blocks=[block_shown(one, names) for one in section.blocks if not isinstance(one, Items) or one.items],
         sections=[one for one in inner if one.blocks or one.sections],
-        result=typeset(names.in_text(section.result)),
+        result=typeset(sentence(names.in_text(section.result)).removesuffix(".")) if section.result else "",
     )
 
 
@@ -163,8 +161,9 @@ def block_shown(block: Block, names: LawNames) -> Block:
 # ---- findings --------------------------------------------------------------------------------------------------------
 
 
-def findings_section(contents: ReportContents, found: Sequence[GroupFindings], figures: PageFigures) -> PageSection:
+def findings_section(contents: ReportContents, figures: PageFigures) -> PageSection:
     """The answer of one group; of several groups a map, and their answers in sections of their own."""
+    found = contents.identified
     missing = [printable(one.stage, 80) for one in contents.failures]
     missing += [f"identification of {printable(g.name, 80)}" for g in contents.groups if g.failure]
     blocks: list[Block] = []
@@ -176,7 +175,7 @@ def findings_section(contents: ReportContents, found: Sequence[GroupFindings], f
         blocks.append(Paragraph(reasons.format(listed), "warning"))
     if len(found) == 1:
         asked = [figure for forecast in contents.forecasts.values() for figure in asked_figures(forecast)]
-        files = files_to_download(contents, found)[:MOST_FILES]
+        files = files_to_download(contents)[:MOST_FILES]
         blocks.append(group_answer(found[0], figures, asked=asked, quality=contents.quality, files=files))
     elif not found:
         failed = any(group.failure or group.result is not None for group in contents.groups)
@@ -189,31 +188,33 @@ def findings_section(contents: ReportContents, found: Sequence[GroupFindings], f
         title = f"Creep rates of {plural(len(found), 'material')}"
         caption = f"{title}, by law, with 95 % intervals; open marks: the tests contradict the law."
         drawn = [(one.name, one.fit) for one in _by_law(found)]
-        blocks.append(Paragraph(_overview(contents, found), "lead"))
+        blocks.append(Paragraph(_overview(contents), "lead"))
         blocks.append(
             figures.picture(lambda: plate_figure(drawn), title, f"{title}; the table holds the numbers.", caption)
         )
     return PageSection("findings", "Findings", blocks)
 
 
-def group_answer(found: GroupFindings, figures: PageFigures, *, asked: Sequence[KeyFigure] = (), **page: Any) -> Answer:
+def group_answer(found: ReportGroup, figures: PageFigures, *, asked: Sequence[KeyFigure] = (), **page: Any) -> Answer:
     """The first screen of one material. asked : what forecasts say; page : quality of its data, files to download."""
     fit, picture = found.fit, None
     if fit.histories and fit.predictor is not None:
-        rupture = ", and times to rupture, identified over measured" if rupture_rows(fit) else ""
+        rupture = ", and times to rupture, predicted over measured" if rupture_rows(fit) else ""
         title = f"The law over the tests{found.of}"
         description = f"Curves of {plural(len(fit.tests), 'test')} over time, creep rate over stress{rupture}."
         picture = figures.picture(lambda: summary_figure(fit), title, description, f"{title}: {tests_text(fit)}.")
     return answer(fit, found.ranking, asked=asked, picture=picture, **page)
 
 
-def _by_law(found: Sequence[GroupFindings]) -> list[GroupFindings]:
-    """Groups of one law together, the commonest law first, then by name."""
+def _by_law(found: Sequence[ReportGroup]) -> list[ReportGroup]:
+    """Groups of one law together, the commonest law first, then by name, numbers in it by their size."""
     laws = [one.fit.law.name for one in found]
-    return sorted(found, key=lambda one: (-laws.count(one.fit.law.name), one.fit.law.name, one.name))
+    parts = {one.name: [int(p) if p.isdecimal() else p for p in re.split(r"(\d+)", one.name)] for one in found}
+    return sorted(found, key=lambda one: (-laws.count(one.fit.law.name), one.fit.law.name, parts[one.name]))
 
 
-def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
+def _overview(contents: ReportContents) -> str:
+    found = contents.identified
     explained = sum(one.fit.adequacy is not None and one.fit.adequacy.explains for one in found)
     laws = [one.fit.law.name for one in found]
     counts = sorted({name: laws.count(name) for name in laws}.items(), key=lambda pair: (-pair[1], pair[0]))
@@ -230,7 +231,7 @@ def _overview(contents: ReportContents, found: Sequence[GroupFindings]) -> str:
 # ---- materials -------------------------------------------------------------------------------------------------------
 
 
-def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> Iterator[PageSection]:
+def _group_sections(found: Sequence[ReportGroup], figures: PageFigures) -> Iterator[PageSection]:
     """The sections of one material; of several a table of all, and one for each."""
     drawn, most = len(found) <= MOST_RANKINGS_DRAWN, max(MOST_TEST_FIGURES // max(len(found), 1), 1)
     if len(found) == 1:
@@ -244,21 +245,25 @@ def _group_sections(found: Sequence[GroupFindings], figures: PageFigures) -> Ite
 
 
 def _sections_of(
-    found: GroupFindings, figures: PageFigures, prefix: str, most: int, *, drawn: bool
+    found: ReportGroup, figures: PageFigures, prefix: str, most: int, *, drawn: bool
 ) -> Iterator[PageSection]:
     """What was found of one material behind its answer; most : tests that are drawn, drawn : whether its ranking is."""
     fit, ranking = found.fit, found.ranking
     determined = sum(e.verdict == "determined" for e in fit.estimates)
     said = f"{determined} of {plural(len(fit.estimates), 'value')} determined by these tests"
-    values = value_blocks(fit, found.verdict, found.equivalents)
-    values.append(Items(found.remarks))
+    if isinstance(found.result, AlloyResult):
+        values = [*value_blocks(fit, found.result.verdict, found.result.equivalents), Items(found.result.notes)]
+    elif ranking is None:
+        values = value_blocks(fit)
+    else:
+        values = value_blocks(fit, ranking.verdict, equivalents_among_remaining(ranking))
     yield PageSection(f"{prefix}values", "Values and verdict", values, result=said)
     worst = worst_tests(fit)[:1]
     far = f"; farthest from the law: {printable(fit.tests[worst[0]].name, 60)}" if len(fit.tests) > 1 and worst else ""
     tests = blocks_of_tests(fit, figures, of=found.of, most=most)
     yield PageSection(f"{prefix}tests", "Tests", tests, result=f"{tests_text(fit)}{far}")
     if ranking is not None:
-        none = ", none of which explains the tests" if rejected(fit) else f": weight {found.weight:.2f}"
+        none = ", none of which explains the tests" if rejected(fit) else f": weight {ranking.laws[0].weight:.2f}"
         blocks = ranking_blocks(ranking, figures if drawn else None, found.of)
         said = f"best of {plural(len(ranking.laws), 'law')}{none}"
         yield PageSection(f"{prefix}ranking", "Laws compared", blocks, result=said)
@@ -267,7 +272,7 @@ def _sections_of(
     yield PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", noise_blocks(fit), result=said)
 
 
-def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
+def _table_of_groups(found: Sequence[ReportGroup]) -> Table:
     rows = []
     for one in found:
         fit = one.fit
@@ -290,10 +295,9 @@ def _table_of_groups(found: Sequence[GroupFindings]) -> Table:
     )
     caption = (
         "materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests, of laws that fit "
-        "the tests. Not in the interval: by how much the rate would move with what no nuisance parameter models, such "
-        "as errors of temperature and load common to all tests, each of the size that the findings state (root sum of "
-        "squares). Decisive: one law has more than 95 % of the weight, the tests do not contradict it, and no other "
-        "law or effect that was tried does as well; the verdict of each material says what is missing"
+        "the tests. Not in the interval: what errors common to all tests would move the rate by, such as of "
+        "temperature and load (root sum of squares). Decisive: one law has more than 95 % of the weight, the tests do "
+        "not contradict it, and nothing else that was tried does as well; the verdict of each material says the rest"
     )
     return Table(caption, columns, rows, numeric=(2, 5, 6, 7, 8))
 
@@ -362,15 +366,13 @@ def _asked_text(forecast: Forecast) -> str:
 
 
 def _extraction_blocks(extraction: Extraction, figures: PageFigures, of: str) -> list[Block]:
-    outputs = ", ".join(output.replace("_", " ") for output in extraction.outputs)
-    picture = figures.picture(
-        lambda: extraction_figure(extraction),
-        f"Extraction{of}",
+    outputs, frames = ", ".join(extraction.outputs).replace("_", " "), extraction.times.size
+    description = (
         f"Maps of height of some frames, and over time {outputs}, rigid motion and residuals; "
-        f"{int(extraction.used.sum())} of {extraction.times.size} frames were used, "
-        f"{plural(len(extraction.flags), 'flag')}.",
-        f"Extraction{of}: maps of height, outputs with 95 % bands, rigid motion and residuals; flagged frames in red.",
+        f"{int(extraction.used.sum())} of {plural(frames, 'frame')} were used, {plural(len(extraction.flags), 'flag')}."
     )
+    caption = "Maps of height, outputs with 95 % bands, rigid motion and residuals; flagged frames in red."
+    picture = figures.picture(lambda: extraction_figure(extraction), f"Extraction{of}", description, caption)
     return [picture, Verbatim("What was extracted, and how well", printable_lines(extraction_text(extraction)))]
 
 

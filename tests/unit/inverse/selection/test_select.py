@@ -285,9 +285,9 @@ APART = "not decisive: of 3 laws tried these tests cannot tell apart norton and 
 SENTENCES = [
     (
         ranking_of([1.0, 0.0, 0.0], [LEFT] * 3),
-        f"{NONE.format(3)}; the best, norton (weight 1.00 of the laws tried), leaves 4e-05 of strain (2 times its "
+        f"{NONE.format(3)}; the best, norton (weight 1.00 of the laws tried), leaves 0.004 % of strain (2 times its "
         "stated noise) unexplained",
-        "most in strain of 'bar 1' about 1.5 h, where it lies 4e-05 above what was measured",
+        "most in strain of 'bar 1' about 1.5 h, where it lies 0.004 % above what was measured",
     ),
     (
         ranking_of([0.6, 0.35, 0.05], [LEFT] * 3),

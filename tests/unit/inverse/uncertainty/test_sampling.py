@@ -149,6 +149,13 @@ def test_a_covariance_that_is_far_too_narrow_is_made_wider():
     np.testing.assert_allclose(np.cov(samples.T), [[1.0, 0.9], [0.9, 1.0]], atol=0.2)
 
 
+def test_parameters_may_be_of_any_size():
+    """Exponents beside an activation energy in J/mol: variances of 1e-7 and 1e8, each with its own normal."""
+    sizes = np.array([4e-4, 8e-3, 8e3])
+    samples = sampled(lambda u: -0.5 * ((u / sizes) ** 2).sum(axis=1), np.zeros(3), np.diag(sizes**2))
+    np.testing.assert_allclose(samples.std(axis=0), sizes, rtol=0.12)
+
+
 def test_a_parameter_of_which_only_the_bounds_are_known_is_uniform():
     """Its standard deviation is that of the bounds: 1 / sqrt(12)."""
 
