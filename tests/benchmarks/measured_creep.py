@@ -4,9 +4,9 @@
                                               [--max-work 100] [--plots FOLDER] [--write]
 
 Columns: rms of ln(predicted/measured strain), each test's own loading strain subtracted; Z = 10^(2.5 s), s the standard
-deviation of log10(measured/predicted time to 1 % creep strain), of the fit and with each condition left out; standard
-deviation of the creep rate between tests; BIC above the best. No law can do better than tests repeated at one condition
-agree with each other: their own Z stands above each table.
+deviation of log10(measured/predicted time to 1 % creep strain), of the fit and, where tests times parameters are up to
+100, with each condition left out; standard deviation of the creep rate between tests; BIC above the best. No law can do
+better than tests repeated at one condition agree with each other: their own Z stands above each table.
 """
 
 import time
@@ -131,7 +131,7 @@ def table_of(page, title, histories, options):
             continue
         start = time.process_time()
         try:
-            fit = ck.identify(law, tests)
+            fit = ck.identify(law, tests, weights="likelihood")  # BIC compares likelihoods
         except ck.errors.FitError as error:
             page.paragraph(f"{name}: no identification: {error}.")
             continue
