@@ -14,14 +14,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from creepkit import kernels, limits, registry
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError, SolveError
+from creepkit.errors import SolveError
 from creepkit.files.writing import write_text
 from creepkit.language import Elastic
 from creepkit.readers.history_csv import write_history
@@ -116,13 +116,16 @@ class PlantedPlate:
 
 
 @checked
-def planted_plate(alloys: int = 47, seed: int = 7, *, thickness_known: bool = True) -> PlantedPlate:
+def planted_plate(
+    alloys: Annotated[int, limits.Limits(1, 10_000)] = 47,
+    seed: Annotated[int, limits.SEED] = 7,
+    *,
+    thickness_known: bool = True,
+) -> PlantedPlate:
     """Simulate the tests of so many alloys, one dimple each; the first alloys are the same however many there are.
 
     thickness_known : whether each test states the apex thickness of its dimple, to a micrometre.
     """
-    limits.check_number("alloys", alloys, limits.Limits(1, 10_000), FitError)
-    limits.check_number("seed", seed, limits.SEED, FitError)
     histories, atomic, truth = [], {}, {}
     for number in range(1, alloys + 1):
         name, rng = f"A{number:02d}", np.random.default_rng([seed, number])

@@ -24,11 +24,12 @@ import sys
 import types
 import typing
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeVar, Union
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union
 
 from creepkit.errors import ArgumentError, nearest, quoted_value
+from creepkit.limits import ANY_NUMBER, FINITE, Limits
 
 Anything = TypeVar("Anything", bound=Callable[..., Any])
 
@@ -43,51 +44,40 @@ WITHOUT_A_SENTENCE = (ArithmeticError, AttributeError, LookupError, OSError, Rec
 def checked(public: Anything) -> Anything:
     """The function, or the class with a constructor, that checks its arguments; signature and docstring stay.
 
-    Numbers must be finite, unless the default is not; those of pairs such as bounds may be infinite. What a constructor
-    itself says of a wrong value comes first.
+    Numbers must be finite, unless the default is not or the annotation has other limits; those of pairs such as bounds
+    may be infinite. What a constructor itself says of a wrong value comes first.
     """
-    return checked_with_own_words()(public)
+    if not inspect.isclass(public):
+        return typing.cast(Anything, _checked_function(public, public, [public]))
+    name = "__init__" if "__init__" in public.__dict__ else "__new__"
+    constructor = inspect.unwrap(getattr(public, name))
+    generated = is_dataclass(public) and not constructor.__code__.co_filename.endswith(".py")
+    sources = [one for one in reversed(public.__mro__) if is_dataclass(one)] if generated else [constructor]
+    replacement = _checked_function(constructor, public, sources)
+    setattr(public, name, replacement)  # of __new__ a static method, as Python takes it for one
+    return public
 
 
-def checked_with_own_words(*own: str) -> Callable[[Anything], Anything]:
-    """As checked, of a function or class that itself judges the arguments of these names; its own sentence comes first.
+def _checked_function(function: Any, public: Any, annotated: Sequence[Any]) -> Any:
+    """The function that checks; public : itself, or its class. annotated : what has its annotations.
 
-    What it accepts beyond its annotations is right; where it fails without a sentence, that of the check is raised.
+    Of records of options, whose fields are arguments of functions, errors name these alone.
     """
-
-    def decorate(public: Any) -> Any:
-        if not inspect.isclass(public):
-            return _checked_function(public, public.__qualname__, [public], own)
-        name = "__init__" if "__init__" in public.__dict__ else "__new__"
-        constructor = inspect.unwrap(getattr(public, name))
-        generated = is_dataclass(public) and not constructor.__code__.co_filename.endswith(".py")
-        sources = [one for one in reversed(public.__mro__) if is_dataclass(one)] if generated else [constructor]
-        replacement = _checked_function(constructor, public.__qualname__, sources, own, constructs=True)
-        setattr(public, name, replacement)  # of __new__ a static method, as Python takes it for one
-        return public
-
-    return decorate
-
-
-def _checked_function(
-    function: Any, name: str, annotated: Sequence[Any], own: tuple[str, ...], constructs: bool = False
-) -> Any:
-    """The function that checks; annotated : itself, or the records whose fields are its arguments."""
+    name, constructs = f"{public.__qualname__}()", public is not function
+    of = "" if hasattr(public, "fields_are_arguments") else f" of {name}"
 
     @functools.cache
     def arguments() -> _Arguments:
-        return _Arguments(f"{name}()", inspect.signature(function).parameters, annotations_of(annotated))
+        return _Arguments(name, of, inspect.signature(function).parameters, annotations_of(annotated))
 
     @functools.wraps(function)
     def checking(*args: Any, **kwargs: Any) -> Any:
         try:
             args, kwargs = arguments().checked(args, kwargs)
-        except ArgumentError as error:
-            if constructs or error.argument in own:
+        except ArgumentError:
+            if constructs:
                 with contextlib.suppress(*WITHOUT_A_SENTENCE):
-                    result = function(*args, **kwargs)
-                    if error.argument in own:
-                        return result
+                    function(*args, **kwargs)
             raise
         return function(*args, **kwargs)
 
@@ -101,23 +91,26 @@ class _Arguments:
     `further`, goes on for all that follow.
     """
 
-    def __init__(self, name: str, parameters: Mapping[str, inspect.Parameter], hints: Mapping[str, Any]) -> None:
+    def __init__(
+        self, name: str, of: str, parameters: Mapping[str, inspect.Parameter], hints: Mapping[str, Any]
+    ) -> None:
         several = {one.kind: one.name for one in parameters.values()}
-        self.name, self.parameters = name, parameters
+        self.name, self.of, self.parameters = name, of, parameters
         self.positional = [one.name for one in parameters.values() if one.kind <= one.POSITIONAL_OR_KEYWORD]
         self.further = several.get(inspect.Parameter.VAR_POSITIONAL, "")
         self.options = several.get(inspect.Parameter.VAR_KEYWORD, "")
-        self.kinds = {"": _with_several(kind_of(Any, True))}
+        self.kinds = {"": _with_several(kind_of(Any))}
         for one in parameters.values():
             infinite = isinstance(one.default, float) and not math.isfinite(one.default)
-            self.kinds[one.name] = _with_several(kind_of(hints.get(one.name, Any), not infinite))
+            kind = kind_of(hints.get(one.name, Any), ANY_NUMBER if infinite else FINITE)
+            self.kinds[one.name] = _with_several(kind)
 
     def checked(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[tuple[Any, ...], dict[str, Any]]:
         """The arguments of a call, with lists for generators; ArgumentError for a wrong one."""
         for argument in () if self.options else kwargs:
             if argument not in self.parameters:
                 known = [one for one in self.parameters if one not in ("self", "cls")]
-                raise ArgumentError(f"{self.name} takes no argument '{argument}'; {nearest(argument, known)}", argument)
+                raise ArgumentError(f"{self.name} takes no argument '{argument}'; {nearest(argument, known)}")
         further = [self.further] * (len(args) - len(self.positional))
         judged = tuple(map(self._judged, args, [*self.positional, *further][: len(args)]))
         return judged, {key: self._judged(value, key) for key, value in kwargs.items()}
@@ -127,8 +120,7 @@ class _Arguments:
         if several and isinstance(value, Iterator):
             value = list(value)
         if wrong := kind.mismatch(value):
-            where = f"{argument}{wrong.place} of {self.name}"
-            raise ArgumentError(f"{where} is {quoted_value(wrong.value)}; allowed is {wrong.allowed}", argument)
+            raise ArgumentError(wrong.sentence(argument, self.of))
         return value
 
 
@@ -141,6 +133,10 @@ class Mismatch(NamedTuple):
     place: str
     value: Any
     allowed: str
+
+    def sentence(self, argument: str, of: str = "") -> str:
+        """What is wrong with an argument; of : what it is an argument of."""
+        return f"{argument}{self.place}{of} is {quoted_value(self.value)}; allowed is {self.allowed}"
 
 
 class Kind(NamedTuple):
@@ -208,6 +204,9 @@ def annotations_of(sources: Sequence[Any]) -> dict[str, Any]:
     hints: dict[str, Any] = {}
     for source in sources:
         hints |= inspect.get_annotations(source, locals=_Names(vars(sys.modules[source.__module__])), eval_str=True)
+        for one in fields(source) if is_dataclass(source) else ():
+            if "limits" in one.metadata and one.name in hints:
+                hints[one.name] = Annotated[hints[one.name], one.metadata["limits"]]
     return {argument: hint for argument, hint in hints.items() if argument != "return"}
 
 
@@ -215,22 +214,31 @@ SERIES = (Sequence, Collection, Iterable, list, set, frozenset, tuple)
 
 
 @functools.cache
-def kind_of(annotation: Any, finite: bool) -> Kind:
-    """What a resolved annotation allows; finite : whether numbers must be, those of pairs such as bounds apart."""
+def kind_of(annotation: Any, limits: Limits = FINITE) -> Kind:
+    """What a resolved annotation allows; limits : of its numbers, but for finite ones those of pairs such as bounds.
+
+    Annotated[..., Limits(...)] has its own, and Annotated[..., "a text"] its own words.
+    """
     origin, args = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation in SCALARS:
         return SCALARS[annotation]
+    if origin is Annotated:
+        kind = kind_of(args[0], next((one for one in args[1:] if isinstance(one, Limits)), limits))
+        return kind._replace(words=next((one for one in args[1:] if isinstance(one, str)), kind.words))
     if annotation is float:
-        return Kind(f"a {'finite ' * finite}number", functools.partial(_is_number, finite=finite))
+        return Kind(str(limits), limits.__contains__)
+    if annotation is int:
+        test = _is_integer if not limits.whole else lambda value: _is_integer(value) and value in limits
+        return Kind(str(limits) if limits.whole else "a whole number below 2**63", test)
     if annotation is Array or getattr(origin or annotation, "__name__", "") == "ndarray":
         return Kind("an array of numbers", _is_array)
     if origin in (Union, types.UnionType):
-        members = tuple(kind_of(one, finite) for one in args if one is not str or Path not in args)  # a text is a path
-        return Kind(_listed(one.words for one in members), members=members)
-    if origin is Literal:  # which of them, the function itself says
-        return Kind(_listed(map(repr, args)), _instance_test(*map(type, args)))
+        kinds = [kind_of(one, limits) for one in args if one is not str or Path not in args]  # a text is a path
+        return _union(part for one in kinds for part in one.members or (one,))
+    if origin is Literal:
+        return _union(Kind(repr(one), functools.partial(_is_word, one)) for one in args)
     if origin is tuple and args[1:] != (...,):
-        items = [kind_of(one, False) for one in args if one != ()]
+        items = [kind_of(one, ANY_NUMBER if limits == FINITE else limits) for one in args if one != ()]
         return Kind(
             f"({', '.join(one.words for one in items)})",
             lambda value: _is_series(value) and len(value) == len(items),
@@ -239,12 +247,12 @@ def kind_of(annotation: Any, finite: bool) -> Kind:
     if origin in SERIES:
         if args[0] is Any:
             return Kind("a list", _is_series)
-        item = kind_of(args[0], finite)
+        item = kind_of(args[0], limits)
         return Kind(
             f"a list, each item {item.words}", _is_series, lambda value: ((k, one, item) for k, one in enumerate(value))
         )
     if isinstance(origin, type) and issubclass(origin, Mapping):
-        pair = [kind_of(one, finite) for one in args]
+        pair = [kind_of(one, limits) for one in args]
         return Kind(
             f"a mapping of {pair[0].words} to {pair[1].words}",
             _instance_test(Mapping),
@@ -265,6 +273,15 @@ def kind_of(annotation: Any, finite: bool) -> Kind:
     return Kind(words, lambda value: not isinstance(value, type) and all(hasattr(value, one) for one in wanted))
 
 
+def _union(kinds: Iterable[Kind]) -> Kind:
+    members = tuple(kinds)
+    return Kind(_listed(one.words for one in members), members=members)
+
+
+def _is_word(word: Any, value: Any) -> bool:
+    return isinstance(value, type(word)) and bool(value == word)
+
+
 def _instance_test(*kinds: Any) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, kinds)
 
@@ -272,17 +289,6 @@ def _instance_test(*kinds: Any) -> Callable[[Any], bool]:
 def _listed(allowed: Iterable[str]) -> str:
     unique = sorted(dict.fromkeys(allowed), key=lambda one: one == "None")
     return unique[0] if len(unique) == 1 else f"{', '.join(unique[:-1])} or {unique[-1]}"
-
-
-def _is_number(value: Any, finite: bool) -> bool:
-    if type(value) is not float:
-        number_of_numpy = getattr(value, "shape", None) == () and getattr(value.dtype, "kind", "") in "fiu"
-        if isinstance(value, bool) or not (number_of_numpy or isinstance(value, numbers.Real)):
-            return False
-    try:
-        return math.isfinite(value) or not finite
-    except OverflowError:
-        return False
 
 
 def _is_integer(value: Any) -> bool:
@@ -307,7 +313,7 @@ def _is_series(value: Any) -> bool:
 
 def _is_array(value: Any) -> bool:
     """Real numbers in an array, or what numpy makes one of."""
-    if isinstance(value, str | bytes | Mapping) or not (hasattr(value, "__len__") or _is_number(value, finite=False)):
+    if isinstance(value, str | bytes | Mapping) or not (hasattr(value, "__len__") or value in ANY_NUMBER):
         return False
     import numpy as np  # which the definition of a law does without
 
@@ -321,7 +327,6 @@ SCALARS: dict[Any, Kind] = {
     None: Kind("None", lambda value: value is None),
     type(None): Kind("None", lambda value: value is None),
     str: Kind("a text", _instance_test(str)),
-    int: Kind("a whole number below 2**63", _is_integer),
     bool: Kind("True or False", lambda value: isinstance(value, bool) or type(value).__name__ in ("bool_", "bool")),
     Path: Kind("a path", _is_path),
 }

@@ -66,11 +66,7 @@ def _message(text: str) -> str:
 
 
 class ArgumentError(CreepkitError, TypeError, ValueError):
-    """An argument of a public function or record is not what the annotation says. argument : its name."""
-
-    def __init__(self, sentence: str, argument: str = "") -> None:
-        super().__init__(sentence)
-        self.argument = argument
+    """An argument of a public function or record is not what the annotation says."""
 
 
 class LawError(CreepkitError):

@@ -1,4 +1,4 @@
-"""Bounds of numbers that a person gives: options of the command line and arguments that set an amount of work.
+"""Numbers that an argument, an option or a field of a file may be, and the words that say so.
 
 Those that several places share stand here once, so that `--starts` and IdentificationSettings(starts=...) allow the
 same.
@@ -7,61 +7,80 @@ same.
 from __future__ import annotations
 
 import math
+import numbers as kinds_of_numbers
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from creepkit.errors import CreepkitError, quoted
+from creepkit.errors import CreepkitError, quoted_value
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The finite numbers from `low` to `high`; above : without `low` itself; whole : whole numbers alone."""
+    """The finite numbers from `low` to `high`.
+
+    above : without `low` itself. whole : whole numbers alone. nan, infinite : whether NaN, and an infinity within the
+    bounds, are allowed too. As an annotation, Annotated[float, Limits(...)], they are those of an argument.
+    """
 
     low: float
     high: float
     whole: bool = True
     above: bool = False
+    nan: bool = False
+    infinite: bool = False
 
     def __contains__(self, value: object) -> bool:
-        if isinstance(value, bool) or not hasattr(value, "__float__"):
-            return False
         try:
-            number = float(value)
-        except (TypeError, ValueError, OverflowError):
+            number = value if type(value) is float else _as_float(value)
+        except OverflowError:
             return False
-        inside = math.isfinite(number) and self.low <= number <= self.high
-        return inside and not (self.whole and number != int(number)) and not (self.above and number == self.low)
+        if number is None or not math.isfinite(number):
+            return number is not None and (self.nan if math.isnan(number) else self.infinite and self._holds(number))
+        return self._holds(number) and not (self.whole and number != int(number))
+
+    def _holds(self, number: float) -> bool:
+        return self.low <= number <= self.high and not (self.above and number == self.low)
 
     def __str__(self) -> str:
-        if self.above:
-            return f"numbers above {self.low:.12g} up to {self.high:.12g}"
-        return f"{'whole ' if self.whole else ''}numbers from {self.low:.12g} to {self.high:.12g}"
+        kind = "whole number" if self.whole else "number"
+        low = "" if self.low == -math.inf else f" {'above' if self.above else 'from'} {self.low:.12g}"
+        high = "" if self.high == math.inf else f" {'to' if low and not self.above else 'up to'} {self.high:.12g}"
+        finite = "" if (low and high) or self.whole or self.infinite or self.nan else "finite "
+        return f"a {finite}{kind}{low}{high}" + " on" * (low != "" and high == "" and not self.above)
 
 
-def numbers(low: float, high: float, *, above: bool = False) -> Limits:
-    """Finite numbers from `low` to `high`, whole or not."""
-    return Limits(low, high, whole=False, above=above)
+def _as_float(value: Any) -> float | None:
+    """A number of Python's, sympy's or numpy's; None for anything else, OverflowError beyond every float."""
+    of_numpy = getattr(value, "shape", None) == () and getattr(value.dtype, "kind", "") in "fiu"
+    is_number = of_numpy or (isinstance(value, kinds_of_numbers.Real) and not isinstance(value, bool))
+    return float(value) if is_number else None
 
 
-def check_number(name: str, value: Any, limits: Limits, error: type[CreepkitError]) -> None:
-    """Raise `error` for a number that is not within its limits."""
-    if value not in limits:
-        try:
-            text = repr(value)
-        except ValueError:  # Python writes no integers of more than some thousand digits
-            text = "an integer of thousands of digits"
-        raise error(f"{name} is {quoted(text, 40)}; allowed are {limits}")
+def numbers(low: float = -math.inf, high: float = math.inf, *, above: bool = False, **further: bool) -> Limits:
+    """Finite numbers from `low` to `high`, whole or not; further : nan, infinite."""
+    return Limits(low, high, whole=False, above=above, **further)
+
+
+FINITE, ANY_NUMBER = numbers(), numbers(nan=True, infinite=True)
+
+
+def check_fields(record: Any, allowed: Mapping[str, Limits], of: str, error: type[CreepkitError]) -> None:
+    """Raise `error`, which begins with `of`, for a field of a record that is not within its limits."""
+    for name, limits in allowed.items():
+        if (value := getattr(record, name)) not in limits:
+            raise error(f"{of}{name} is {quoted_value(value)}; allowed is {limits}")
 
 
 def check_numbers(name: str, values: Any, limits: Limits, error: type[CreepkitError]) -> None:
-    """The same for a number or an array of numbers (...,)."""
+    """Raise `error` for a number, or one in an array (...,), that is not within its limits."""
     import numpy as np
 
     array = np.asarray(values, dtype=float)
     lowest = array > limits.low if limits.above else array >= limits.low
     within = np.isfinite(array) & lowest & (array <= limits.high)
     if not within.all():
-        check_number(name, float(array[~within].flat[0]), limits, error)
+        raise error(f"{name} is {float(array[~within].flat[0])!r}; allowed is {limits}")
 
 
 STARTS = Limits(1, 10_000)

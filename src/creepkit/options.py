@@ -2,7 +2,7 @@
 
     @checked
     @dataclass(frozen=True)
-    class IdentificationSettings(Options, title="settings of an identification", error=FitError):
+    class IdentificationSettings(Options, title="settings of an identification"):
         starts: int = option(8, "Starts of the search.", Limits(1, 10_000))
         rupture_times: Literal["auto", "use", "ignore"] = option("auto", "Whether rupture times are compared.")
 
@@ -25,22 +25,11 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
 from types import UnionType
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    ClassVar,
-    Literal,
-    Self,
-    TypeVar,
-    Union,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from creepkit.errors import ArgumentError, CreepkitError, nearest, quoted
-from creepkit.limits import Limits, check_number
+from creepkit.checked_arguments import Kind, kind_of
+from creepkit.errors import ArgumentError, nearest
+from creepkit.limits import FINITE, Limits
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -79,14 +68,14 @@ class Option:
     python_only: bool = False
 
     @property
-    def words(self) -> tuple[str, ...]:
-        """Those that the type allows; () for another type."""
-        return tuple(w for one in _alternatives(self.type) if get_origin(one) is Literal for w in get_args(one))
-
-    @property
     def is_optional(self) -> bool:
         """Whether None is a value."""
         return type(None) in _alternatives(self.type)
+
+    @property
+    def kind(self) -> Kind:
+        """What a value of a command or a study file may be."""
+        return kind_of(self.type, self.limits or FINITE)
 
     def named(self, name: str, type: Any) -> Option:
         """The option of a field or an argument of this name and type, with its key and its flag."""
@@ -103,52 +92,38 @@ class Option:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         return value * self.scale + self.offset if is_number and (self.scale, self.offset) != (1.0, 0.0) else value
 
-    def check(self, value: Any, error: type[CreepkitError], prefix: str = "") -> None:
-        """Raise `error` for a number beyond its limits, or a word that is not allowed."""
-        if value is None and self.is_optional:
-            return
-        if self.limits is not None:
-            low, high = self.converted(self.limits.low), self.converted(self.limits.high)
-            for number in value if isinstance(value, tuple | list) else (value,):
-                check_number(f"{prefix}{self.name}", number, replace(self.limits, low=low, high=high), error)
-        words = self.words
-        if words and isinstance(value, str) and value not in words and str not in _alternatives(self.type):
-            what = f"{prefix}{self.name} '{quoted(value)}' is not known"
-            raise error(f"{what}; allowed are {', '.join(words)}")
-
 
 def option(default: Any, help: str, limits: Limits | None = None, **further: Any) -> Any:
     """A field of a record with this default; further : as Option has it. A default that is called makes one."""
     declared = Option(help=help, limits=limits, **further)
+    metadata: dict[str, Any] = {"option": declared}
+    if limits is not None:
+        low, high = declared.converted(limits.low), declared.converted(limits.high)
+        metadata["limits"] = replace(limits, low=low, high=high)
     if default is MISSING:
-        return field(metadata={"option": declared})
+        return field(metadata=metadata)
     if callable(default):
-        return field(default_factory=default, metadata={"option": declared})
-    return field(default=default, metadata={"option": declared})
+        return field(default_factory=default, metadata=metadata)
+    return field(default=default, metadata=metadata)
 
 
 class Options:
-    """Base of the records: checks what the fields declare, and changes some of them by name."""
+    """Base of the records, which are @checked; changes some of their fields by name."""
 
     title: ClassVar[str] = ""
-    error: ClassVar[type[CreepkitError]] = ArgumentError
-    prefix: ClassVar[str] = ""
+    fields_are_arguments: ClassVar[bool] = True
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
-    def __init_subclass__(cls, title: str = "", error: type[CreepkitError] | None = None, prefix: str = "") -> None:
-        """Title : what the record is, in words. error : of wrong values. prefix : of their names in messages."""
-        cls.title, cls.error, cls.prefix = title or cls.title or cls.__name__, error or cls.error, prefix or cls.prefix
-
-    def __post_init__(self) -> None:
-        for one in options_of(type(self)):
-            one.check(getattr(self, one.name), self.error, self.prefix)
+    def __init_subclass__(cls, title: str = "") -> None:
+        """Title : what the record is, in words."""
+        cls.title = title or cls.title or cls.__name__
 
     def changed(self, changes: Mapping[str, Any]) -> Self:
         """The record with fields changed by name; None leaves a field as it is, but where None is a value of it."""
         known = {one.name: one for one in options_of(type(self))}
         for name in changes:
             if name not in known:
-                raise self.error(f"{self.title} have no '{name}'; {nearest(name, known)}")
+                raise ArgumentError(f"{self.title} have no '{name}'; {nearest(name, known)}")
         given = {name: value for name, value in changes.items() if value is not None or known[name].is_optional}
         return replace(self, **given) if given else self
 

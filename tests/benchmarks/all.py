@@ -47,7 +47,6 @@ BENCHMARKS = {
         30, (("--cases", "40000"),), short=("--cases", "1000", "--laws", "10", "--seed", "7", "--jobs", "2")
     ),
     "rendered_speckle": Benchmark(1, needs="pyvale 2026.10, here or in the Python of the option --python"),
-    "user_costs": Benchmark(2, needs=DATA),
     "studies": Benchmark(4, needs=DATA),
     "kernel_speed": Benchmark(1, needs="numba, for the hand-written code beside ours"),
     "dimple_accuracy": Benchmark(

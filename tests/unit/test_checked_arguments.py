@@ -11,14 +11,15 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, Unpack, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Unpack, get_origin
 
 import numpy as np
 import sympy
 
 import creepkit as ck
+from creepkit import limits
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.checked_arguments import KnownByName, annotations_of, checked, checked_with_own_words
+from creepkit.checked_arguments import KnownByName, annotations_of, checked
 from creepkit.errors import ArgumentError, CreepkitError
 from helpers.mistakes import said_otherwise
 from helpers.source_tree import public_classes
@@ -42,6 +43,9 @@ def rate(
     limit: float = math.inf,
     tests: Sequence[History] = (),
     cycles: int = 1,
+    method: Literal["a", "b"] | None = None,
+    share: Annotated[float, limits.numbers(0, 1, above=True)] | None = None,
+    workers: Annotated[int, limits.Limits(1, 8)] = 1,
     title: str = "",
     to: str | Path = "",
     quick: bool = False,
@@ -78,13 +82,6 @@ class Record(_Base):
             raise CreepkitError("size is 0; a record holds something")
 
 
-@checked_with_own_words("loose")
-def own(loose: float, strict: float = 1.0) -> float:
-    if loose == "x":
-        raise CreepkitError("loose is no letter")
-    return float(loose)
-
-
 HISTORY = ck.History("a", [0.0, 1.0], {"strain": [0.0, 0.1]}, ck.constant_stress(50.0), 1000.0)
 MISTAKES: list[tuple[Callable[[], Any], str]] = [
     (lambda: rate("abc"), "stress of rate() is 'abc'; allowed is a finite number"),
@@ -108,16 +105,26 @@ MISTAKES: list[tuple[Callable[[], Any], str]] = [
     (lambda: rate(outputs={"a": "x"}), "outputs['a'] of rate() is 'x'; allowed is a finite number or None"),
     (lambda: rate(outputs={3: 1.0}), "outputs[3] of rate() is 3; allowed is a text"),
     (lambda: rate(control=3), "control of rate() is 3; allowed is 'load' or 'stress'"),
+    (lambda: rate(control="force"), "control of rate() is 'force'; allowed is 'load' or 'stress'"),
+    (lambda: rate(method="c"), "method of rate() is 'c'; allowed is 'a', 'b' or None"),
+    (lambda: rate(share=1.5), "share of rate() is 1.5; allowed is a number above 0 up to 1 or None"),
+    (lambda: rate(share=math.nan), "share of rate() is nan; allowed is a number above 0 up to 1 or None"),
+    (lambda: rate(workers=0), "workers of rate() is 0; allowed is a whole number from 1 to 8"),
+    (lambda: rate(workers=2.5), "workers of rate() is 2.5; allowed is a whole number from 1 to 8"),
+    (lambda: rate(workers=10**400), "workers of rate() is 1000000000000000000000000000000000000...; allowed is a"),
     (lambda: rate(law=3), "law of rate() is 3; allowed is a CreepLaw, a text or None"),
     (lambda: rate(painter=3), "painter of rate() is 3; allowed is an object with paint or None"),
     (lambda: rate(progress=3), "progress of rate() is 3; allowed is a function or None"),
     (lambda: Record("x"), "level of Record() is 'x'; allowed is a finite number"),
     (lambda: Record("x", size=0), "size is 0; a record holds something"),
-    (lambda: own("x"), "loose is no letter"),
-    (lambda: own([]), "loose of own() is []; allowed is a finite number"),
-    (lambda: own(1.0, "1"), "strict of own() is '1'; allowed is a finite number"),
     (lambda: ck.Param("exponent", bound=(1, 8)), "Param() takes no argument 'bound'; did you mean 'bounds'"),
     (lambda: ck.constant_stress(stres=1.0), "constant_stress() takes no argument 'stres'; did you mean 'stress'"),
+    (
+        lambda: ck.Param("exponent", (1, 8), scale="logarithmic"),
+        "scale of Param() is 'logarithmic'; allowed is 'linear' or 'log'",
+    ),
+    (lambda: ck.law("norton").at("hot"), "temperature of CreepLaw.at() is 'hot'; allowed is a finite number"),
+    (lambda: ck.ClockAlignment.stated(math.nan), "lag of ClockAlignment.stated() is nan; allowed is a finite number"),
     (lambda: ck.wachtman(1e5, math.inf, 300.0), "b of wachtman() is inf; allowed is a finite number"),
 ]
 
@@ -148,7 +155,6 @@ def test_what_is_right_arrives_as_it_is() -> None:
                 assert arguments.keys() & {"stress", "tests", "times"} == set() or any(value is one for one in result)
     assert rate(tests=(one for one in [HISTORY]))[1] == [HISTORY]
     assert rate(names=(one for one in "ab"))[2] == ["a", "b"]
-    assert own("1.5") == 1.5
     assert inspect.signature(rate).parameters["stress"].default == 1.0
 
 

@@ -1,8 +1,8 @@
 """One declaration of an option is found in Python, on the command line and in a study."""
 
 import inspect
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, is_dataclass
+from typing import Annotated, Any, Literal, get_args
 
 import pytest
 import typer
@@ -10,9 +10,10 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from typer.testing import CliRunner
 
 import creepkit as ck
+from creepkit import checked_arguments
 from creepkit.cli.app import built
 from creepkit.cli.command_options import checked
-from creepkit.errors import FitError
+from creepkit.errors import ArgumentError
 from creepkit.limits import Limits
 from creepkit.options import CELSIUS, HOURS, Options, option, options_of, table_of, values_of_table
 from creepkit.studies import tables
@@ -22,8 +23,9 @@ class Table(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+@checked_arguments.checked
 @dataclass(frozen=True)
-class Furnace(Options, title="settings of a furnace", error=FitError):
+class Furnace(Options, title="settings of a furnace"):
     runs: int = option(3, "Runs.", Limits(1, 10))
     atmosphere: Literal["air", "argon"] = option("air", "Around the test piece.")
     soak: float = option(7200.0, "Before the load.", Limits(0, 100, whole=False), **HOURS)
@@ -68,7 +70,7 @@ def test_what_is_not_allowed_is_refused_in_all_three() -> None:
     wrong = {"runs": (11, "11"), "atmosphere": ("neon", "neon"), "soak": (-3600.0, "-1")}
     for name, (value, text) in wrong.items():
         one = next(one for one in options_of(Furnace) if one.name == name)
-        with pytest.raises(FitError, match=name):
+        with pytest.raises(ArgumentError, match=name):
             Furnace(**{name: value})
         assert one.flag in answered(Furnace, f"{one.flag}={text}")
         with pytest.raises(ValidationError):
@@ -84,7 +86,7 @@ def test_a_field_more_is_an_argument_an_option_and_a_key() -> None:
         wrong += [one.name] if not keys or one.flag not in flags else []
         known = [inspect.signature(verb).parameters[one.name].default for verb in (ck.identify, ck.select)]
         wrong += [] if known == [one.default] * 2 else [f"{one.name} as an argument"]
-        allowed = one.words if one.limits is None else (int(one.limits.low), int(one.limits.high))
+        allowed = get_args(one.type) if one.limits is None else (int(one.limits.low), int(one.limits.high))
         refused = ("neon",) if one.limits is None else (int(one.limits.low) - 1, int(one.limits.high) + 1)
         if one.name in ("nuisances", "weights", "usual_errors"):  # which are more than words
             continue
@@ -99,5 +101,12 @@ def test_a_field_more_is_an_argument_an_option_and_a_key() -> None:
 
 
 def test_a_misspelt_option_is_answered_by_the_nearest() -> None:
-    with pytest.raises(FitError, match="settings of a furnace have no 'run'; did you mean 'runs'"):
+    with pytest.raises(ArgumentError, match="settings of a furnace have no 'run'; did you mean 'runs'"):
         Furnace().changed({"run": 2})
+
+
+def test_every_record_of_options_is_checked() -> None:
+    built("identify")  # which imports every command, and with them all records
+    records = [one for one in Options.__subclasses__() if one.__module__.startswith("creepkit") and is_dataclass(one)]
+    assert len(records) > 15
+    assert [one.__name__ for one in records if inspect.unwrap(one.__init__) is one.__init__] == []

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.checked_arguments import checked_with_own_words
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.extraction.domes import Centers
 from creepkit.extraction.options import ClockOptions
@@ -31,7 +31,7 @@ WATCHED = "bulge"
 """The specimen that cameras are taken to watch where none is named."""
 
 
-@checked_with_own_words("centers")
+@checked
 def extract(
     frames: Frames,
     specimen: Specimen | str = WATCHED,

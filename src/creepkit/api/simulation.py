@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from creepkit.arrays import ArrayLike
-from creepkit.checked_arguments import checked_with_own_words
+from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError
 from creepkit.language import symbols
 from creepkit.records import History, Loading, Predictor, Program, Status, call_of_plugin
@@ -24,13 +24,13 @@ ROOM_TEMPERATURE = 293.15
 """K; stands where a law does not ask for a temperature."""
 
 
-@checked_with_own_words("values", "loading")
+@checked
 def simulate(
     law: CreepLaw | str,
     using: Predictor | str,
     values: Mapping[str, float],
     *,
-    loading: Loading,
+    loading: Annotated[Loading, "a loading such as constant_stress(50) or PressureJump(P1=8, P2=10, Tj=14400)"],
     times: ArrayLike,
     temperature: float | Program | None = None,
     elastic: Elastic | None = None,
@@ -46,8 +46,6 @@ def simulate(
     in `status`, `end_time` and `reason`. A specimen may return more, such as the stresses of a BulgeRun.
     """
     law, using = resolve_law(law), resolve_predictor(using)
-    if not hasattr(loading, "program"):
-        raise SolveError(f"loading is {loading!r}; write constant_stress(50) or PressureJump(P1=8, P2=10, Tj=14400)")
     if temperature is None and law.uses(symbols.temperature):
         raise SolveError(f"law '{law.name}' depends on temperature: give temperature= in K")
     planned_test = History(

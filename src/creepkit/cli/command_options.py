@@ -24,7 +24,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import typer
 
-from creepkit.errors import CreepkitError, quoted
+from creepkit.errors import ArgumentError, CreepkitError, quoted
 from creepkit.files.writing import check_folder_target, check_target, overwriting
 from creepkit.options import Option, Options, options_of
 
@@ -58,7 +58,7 @@ FORCE = Annotated[bool, typer.Option("--force", help="Overwrite files that creep
 def checked(command: Callable[..., None]) -> Callable[..., None]:
     """The command as typer takes it; it is called with values once what its options declare was checked."""
     parameters: list[inspect.Parameter] = []
-    generated: dict[str, tuple[str, Option, type[CreepkitError]]] = {}
+    generated: dict[str, tuple[str, Option]] = {}
     outputs: dict[str, OutputPath] = {}
     hints = get_type_hints(command, include_extras=True)
     for parameter in inspect.signature(command).parameters.values():
@@ -71,15 +71,15 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
         if record is not None:
             names = next((one for one in beside if isinstance(one, tuple)), None)
             own = [one for one in options_of(record) if not one.python_only and (names is None or one.name in names)]
-            generated |= {one.name: (parameter.name, one, record.error) for one in own}
+            generated |= {one.name: (parameter.name, one) for one in own}
         elif declared is not None:
             one = replace(declared.named(parameter.name, kind), default=parameter.default)
-            generated[parameter.name] = ("", one, CreepkitError)
+            generated[parameter.name] = ("", one)
         else:
             parameters.append(parameter.replace(annotation=hints[parameter.name]))
     parameters += [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=_default(one), annotation=_annotation(one))
-        for name, (_, one, _) in generated.items()
+        for name, (_, one) in generated.items()
     ]
     if outputs:
         parameters.append(inspect.Parameter("force", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=FORCE))
@@ -89,8 +89,8 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
     def run(**options: Any) -> None:
         force = bool(options.pop("force", False))
         given: dict[str, dict[str, Any]] = {name: {} for name in records}
-        for name, (group, one, error) in generated.items():
-            value = given_value(one, options.pop(name), error)
+        for name, (group, one) in generated.items():
+            value = given_value(one, options.pop(name))
             stated = None if value is NOTHING else value
             if not group:
                 options[name] = one.default if value is None else stated
@@ -163,12 +163,6 @@ class TextForm:
     several: bool = False
 
 
-def _words(words: Sequence[str], text: str) -> str:
-    if text not in words:
-        raise ValueError(text)
-    return text
-
-
 NEXT_NAME = re.compile(r",(?=\s*\w[\w.-]*\s*=)")
 """The comma before another NAME=VALUE."""
 
@@ -227,7 +221,7 @@ def text_form(hint: Any) -> TextForm:
             return TextForm(f"{'|'.join(words)}|NAME=NUMBER,...", functools.partial(_output_weights, words))
         return text_form(others[0])
     if origin is Literal:
-        return TextForm("|".join(parts), functools.partial(_words, parts))
+        return TextForm("|".join(parts), str)
     if origin is tuple and Ellipsis in parts and get_origin(parts[0]) is tuple:
         item = text_form(parts[0])
         return TextForm(item.metavar, lambda texts: tuple(item.parse(text) for text in texts), several=True)
@@ -326,10 +320,10 @@ def _without_unit(one: Option, text: Any) -> Any:
     return re.sub(rf"(?<=[\d.])\s?{re.escape(one.unit)}(?=,|:|$)", "", text)
 
 
-def given_value(one: Option, text: Any, error: type[CreepkitError]) -> Any:
+def given_value(one: Option, text: Any) -> Any:
     """The value of what was written, in creepkit's unit; None where the option was not given.
 
-    Raises `error`, which names the option, for what is not understood or beyond its limits.
+    ArgumentError, which names the option, for what is not understood or beyond its limits.
     """
     if text is None or text == [] or isinstance(text, bool):
         return text if isinstance(text, bool) else None
@@ -339,12 +333,11 @@ def given_value(one: Option, text: Any, error: type[CreepkitError]) -> Any:
     shown = quoted(" ".join(text) if isinstance(text, list) else text)
     try:
         value = form.parse(text)
-    except ValueError as problem:
+    except (CreepkitError, ValueError) as problem:
         if isinstance(problem, CreepkitError):
-            raise error(f"{one.flag} {shown}: {problem}") from None
+            raise ArgumentError(f"{one.flag} {shown}: {problem}") from None
         example = f", such as {one.example}" if one.example else ""
-        raise error(f"{one.flag} {shown} is not known; write {one.metavar or form.metavar}{example}") from None
-    except CreepkitError as problem:
-        raise error(f"{one.flag} {shown}: {problem}") from None
-    replace(one, name=one.flag, scale=1.0, offset=0.0).check(value, error)
+        raise ArgumentError(f"{one.flag} {shown} is not known; write {one.metavar or form.metavar}{example}") from None
+    if wrong := one.kind.mismatch(value):
+        raise ArgumentError(wrong.sentence(one.flag))
     return one.converted(value)

@@ -36,7 +36,7 @@ OF_COMMANDS = ("force", "load")
 """Names of options that every command has, or that are written by --load."""
 
 
-class LoadsAndLengths(Options, title="loads and lengths", error=SolveError):
+class LoadsAndLengths(Options, title="loads and lengths"):
     """Base of a record with a field for each load and length of all specimens."""
 
 

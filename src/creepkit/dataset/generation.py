@@ -19,7 +19,7 @@ from datetime import UTC, datetime
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import h5py
 import numpy as np
@@ -214,9 +214,6 @@ class ProgressRecord:
     done: dict[int, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, value in (("samples", self.samples), ("draws", self.draws)):
-            if value is not None:
-                limits.check_number(name, value, limits.SAMPLES, DatasetError)
         if (self.samples is None) == (self.draws is None):
             raise DatasetError("say either how many accepted samples are wanted (samples), or how many draws (draws)")
         if self.part is not None and not 1 <= self.part[0] <= self.part[1]:
@@ -318,11 +315,11 @@ POLL_INTERVAL = 0.5
 def generate(
     source: SamplingDomain | CreepLaw | str,
     using: Specimen | str,
-    samples: int | None = None,
+    samples: Annotated[int, limits.SAMPLES] | None = None,
     *,
-    seed: int,
+    seed: Annotated[int, limits.SEED],
     to: str | Path,
-    draws: int | None = None,
+    draws: Annotated[int, limits.SAMPLES] | None = None,
     execution: ParallelExecution | None = None,
     progress: ProgressCallback | None = None,
     **design: Any,
@@ -346,7 +343,6 @@ def generate(
         raise DatasetError(f"'{to}' is no name of a file; name the HDF5 file to write, such as combined.h5")
     folder = path.with_name(f"{path.name}.parts")
     rows = execution.shard_rows or rows_of_folder(folder) or _shard_rows(samples or draws)
-    limits.check_number("seed", seed, limits.SEED, DatasetError)
     job = GenerationJob(design_of_samples, specimen, int(seed), folder, rows)
     record = ProgressRecord(job, samples, draws, execution.part)
     if execution.part is None and is_complete(job, record, path):

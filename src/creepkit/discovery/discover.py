@@ -219,7 +219,7 @@ def _listed(forms: Any) -> Sequence[Any] | None:
 
 @checked
 @dataclass(frozen=True)
-class DiscoveryOptions(Options, title="options of a temperature study", error=FitError):
+class DiscoveryOptions(Options, title="options of a temperature study"):
     """What temperature_study() is asked beside the settings of its identifications.
 
     forms : names of registered temperature forms, or {parameter: names}; by default all that suit a parameter.

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 
@@ -62,7 +63,7 @@ def design(
     goal: Goal | None = None,
     budget: float | None = None,
     candidates: Sequence[History] | None = None,
-    seed: int = 0,
+    seed: Annotated[int, limits.SEED] = 0,
     progress: Progress | None = None,
 ) -> Design:
     """The next tests of an identification or of a ranking of laws, also of one that was loaded from its file.
@@ -73,7 +74,6 @@ def design(
     """
     if budget is not None and budget <= 0:
         raise FitError(f"the budget is {budget:g} h; it must be above zero")
-    limits.check_number("seed", seed, limits.SEED, FitError)
     task = DesignTask.of(source, goal, budget)
     rigs = rigs_for(task.laws[0], rig)
     if candidates is not None and not len(candidates):

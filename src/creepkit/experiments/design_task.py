@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.extrapolation import check_isothermal, check_kelvin, extrapolation_text
 from creepkit.inverse.identification import Identification
@@ -157,8 +158,9 @@ def _check_usable(fit: Identification) -> None:
         raise FitError(f"the identification of {fit.law.name} has no intervals; identify it again from its tests")
 
 
+@checked
 @dataclass(frozen=True)
-class GoalOptions(Options, title="options of a goal", error=FitError):
+class GoalOptions(Options, title="options of a goal"):
     """goal : by default the law where the tests allow more than one. at_stress : MPa, at_temperature : K, of a rate or
     an exponent that is asked for. budget : h of machine time for one run or several.
     """

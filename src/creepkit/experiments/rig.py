@@ -52,7 +52,7 @@ ROUNDED_TEMPERATURE = 5.0
 
 @checked
 @dataclass(frozen=True)
-class Rig(Options, title="settings of a rig", error=FitError):
+class Rig(Options, title="settings of a rig"):
     """What the equipment can do with one kind of specimen.
 
     specimen : its name, as histories have it. levels : (least, greatest) load, in its unit.
@@ -101,7 +101,6 @@ class Rig(Options, title="settings of a rig", error=FitError):
         object.__setattr__(self, "levels", (low, high))
         object.__setattr__(self, "temperatures", tuple(temperatures))
         object.__setattr__(self, "dimensions", dimensions)
-        super().__post_init__()
 
     def refusal(self, history: History) -> str:
         """Why this rig cannot make a planned test, in a sentence; "" where it can."""

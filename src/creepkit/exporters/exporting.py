@@ -35,7 +35,7 @@ def export(
     *,
     units: Units | Mapping[str, str] | None = None,
     temperature: float | None = None,
-    name: str = "",
+    elastic: Elastic | None = None,
     to: str | Path | None = None,
     force: bool = False,
 ) -> str:
@@ -43,16 +43,17 @@ def export(
 
     source : a law, which needs `values` {parameter: value}, or an identification or a temperature law, whose intervals
         and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or the
-        record of law_with_values(), which may have moduli and notes as well.
+        record of law_with_values(), which may have notes, and a name for the target, as well.
     target : one of `available("exporters")`, or an exporter itself. units : of stress and time in the text,
         Units("Pa", "h") or {"stress": "Pa"}.
     temperature : K, puts a number in the place of the temperature, for targets that know none.
-    name : what the target calls the law. to, force : the file to write, and whether one that exists may be replaced.
+    elastic : E in MPa, and nu, for targets that state them. to, force : the file to write, and whether one that exists
+        may be replaced.
 
     ExportError, with the reason, when the target cannot express the law.
     """
     exporter = default_registry().one(kinds.EXPORTERS, target) if isinstance(target, str) else target
-    record = law_with_values(source, values, name=name)
+    record = law_with_values(source, values, elastic=elastic)
     if units is not None:
         record = record.replace(units=_units(units))
     if temperature is not None:
@@ -74,8 +75,8 @@ def law_with_values(
 ) -> LawWithValues:
     """Return a law with its values and what goes with them into every export.
 
-    source, values, name : as export() takes them; notes say which values were set by hand in the place of others.
-    elastic : E in MPa, and nu, for targets that state them. notes : lines that become comments.
+    source, values, elastic : as export() takes them; notes say which values were set by hand in the place of others.
+    name : what a target calls the law. notes : lines that become comments.
     """
     if isinstance(source, (str, CreepLaw)):
         return LawWithValues(resolve_law(source), values or {}, tuple(notes), elastic=elastic, name=name)
@@ -109,8 +110,9 @@ def _units(units: Units | Mapping[str, str]) -> Units:
     return Units(**units)
 
 
+@checked
 @dataclass(frozen=True)
-class ExportOptions(Options, title="options of an export", error=ExportError):
+class ExportOptions(Options, title="options of an export"):
     """What is said of an export beside its target. temperature : K, modulus : MPa."""
 
     name: str = option("", "What the target is to call the law.")

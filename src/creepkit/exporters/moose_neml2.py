@@ -191,8 +191,8 @@ def _neml2_elasticity(source: LawWithValues) -> HitBlock:
     moduli = constant_elasticity(source)
     if moduli is None:
         raise ExportError(
-            f"law '{source.law.name}': a NEML2 model needs the moduli; give ck.law_with_values(..., "
-            "elastic=ck.Elastic(E=150e3, nu=0.3)), in a command --modulus-gpa"
+            f"law '{source.law.name}': a NEML2 model needs the moduli; give "
+            "export(..., elastic=ck.Elastic(E=150e3, nu=0.3)), in a command --modulus-gpa"
         )
     coefficients = f"{format_number(moduli.E)} {format_number(moduli.nu)}"
     types = "YOUNGS_MODULUS POISSONS_RATIO"

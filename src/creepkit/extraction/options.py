@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, quoted
 from creepkit.limits import CELSIUS as CELSIUS_LIMITS
 from creepkit.limits import GIGAPASCAL as GIGAPASCAL_LIMITS
@@ -15,8 +16,9 @@ from creepkit.limits import MEGAPASCAL, MILLIMETRE, SECONDS
 from creepkit.options import CELSIUS, GIGAPASCAL, Options, option
 
 
+@checked
 @dataclass(frozen=True)
-class ExtractionOptions(Options, title="options of an extraction", error=HistoryError):
+class ExtractionOptions(Options, title="options of an extraction"):
     """What is said of frames and of what they show; mm, s.
 
     columns : {quantity: column} of files of no known format. interval : between frames whose files hold no times.
@@ -70,8 +72,9 @@ class ExtractionOptions(Options, title="options of an extraction", error=History
         return slice(int(first), int(last) + 1)
 
 
+@checked
 @dataclass(frozen=True)
-class ClockOptions(Options, title="options of the clocks of camera and record", error=HistoryError):
+class ClockOptions(Options, title="options of the clocks of camera and record"):
     """What is known of the lag of a record's clock on the camera's; s. camera_start : of the camera's time zero."""
 
     lag: float | None = option(None, "By which the record's clock is ahead, where it is known.", unit="s", flag="lag")
@@ -104,8 +107,9 @@ class ClockOptions(Options, title="options of the clocks of camera and record", 
         return start.timestamp()
 
 
+@checked
 @dataclass(frozen=True)
-class ImposedOptions(Options, title="options of a test under a camera", error=HistoryError):
+class ImposedOptions(Options, title="options of a test under a camera"):
     """What was imposed on a test piece: by an instrument's record, or constant; MPa, K. modulus : of the history."""
 
     record: Path | None = option(None, "Instrument record of loads, temperatures.")

@@ -11,7 +11,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from types import GenericAlias, NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -24,10 +24,11 @@ from pydantic_core.core_schema import no_info_plain_validator_function as plain
 
 from creepkit.errors import CreepkitError, printable, quoted, steering
 from creepkit.files.json_documents import check_keys
+from creepkit.limits import FINITE, Limits
 
 Record = TypeVar("Record")
 
-_NEEDED = {"bool_type": "true or false", "dict_type": "an object", "list_type": "a list", "string_type": "a text"}
+_ALLOWED = {"bool_type": "true or false", "dict_type": "an object", "list_type": "a list", "string_type": "a text"}
 
 
 def misfit(message: str) -> PydanticCustomError:
@@ -48,18 +49,12 @@ def foreign_value(from_json: Callable[[Any, str], Any], data: Any) -> Any:
         raise misfit(": " + str(error).removeprefix(": ")) from None
 
 
-def number(kind: type[float], problem_of: Callable[[float], str], data: Any) -> float:
+def number(kind: type[float], limits: Limits, data: Any) -> float:
     """A number; null is NaN, and "inf" infinity, where numbers need not be whole."""
     special = {None: math.nan, "inf": math.inf, "-inf": -math.inf}
     value: Any = special.get(data, data) if kind is float and (data is None or type(data) is str) else data
-    if type(value) not in (int, kind):
-        raise misfit(f" {shown(data)}, where a {'' if kind is float else 'whole '}number is needed")
-    try:
-        problem = problem_of(float(value))
-    except OverflowError:
-        problem = "is a whole number too large"
-    if problem:
-        raise misfit(f" {problem}")
+    if type(value) not in (int, kind) or value not in limits:
+        raise misfit(f" {shown(data)}; allowed is {limits if kind is float else replace(limits, whole=True)}")
     return kind(value)
 
 
@@ -78,16 +73,16 @@ def shown_text(text: str) -> str:
 def as_tuple(length: int | None, data: Any) -> tuple[Any, ...]:
     """A list of a length as a tuple; None stands for any."""
     if not isinstance(data, list):
-        raise misfit(f" {shown(data)}, where a list is needed")
+        raise misfit(f" {shown(data)}; allowed is a list")
     if length not in (None, len(data)):
-        raise misfit(f" is a list of {len(data)}, where {length} are needed")
+        raise misfit(f" is a list of {len(data)}; allowed is one of {length}")
     return tuple(data)
 
 
 def built_record(record: type[Record], names: tuple[str, ...], data: Any, read: Callable[[Any], Any]) -> Record:
     """A record from an object, by `read` of its values."""
     if not isinstance(data, dict):
-        raise misfit(f" {shown(data)}, where an object is needed")
+        raise misfit(f" {shown(data)}; allowed is an object")
     if problem := check_keys(data, names, "", optional=True):
         raise misfit(problem)
     values = read(data)
@@ -110,11 +105,10 @@ def sentence(error: ValidationError, place: str) -> str:
         return where + first["msg"]
     if kind == "missing":
         return f"{where}: '{missing}' is missing"
-    if kind == "literal_error":
-        return f"{where} {found}; allowed are {first['ctx']['expected'].replace(' or ', ', ')}"
     if kind.startswith("union_tag"):
         return f"{where} {found}, which is none of its kinds"
-    return f"{where} {found}, " + (f"where {_NEEDED[kind]} is needed" if kind in _NEEDED else first["msg"])
+    allowed = first["ctx"]["expected"] if kind == "literal_error" else _ALLOWED.get(kind, "")
+    return f"{where} {found}" + (f"; allowed is {allowed}" if allowed else f", {first['msg']}")
 
 
 def shown(data: Any) -> str:
@@ -126,35 +120,6 @@ def shown(data: Any) -> str:
 
 class RecordError(CreepkitError):
     """Data do not fit a record; readers of files raise their own error with this message."""
-
-
-@dataclass(frozen=True)
-class NumberRange:
-    """Which numbers a field may have.
-
-    low, high : bounds, both allowed unless `open_low`, with which low itself is not. nan, infinite : whether NaN, and
-    an infinity within the bounds, may stand there.
-    """
-
-    low: float = -math.inf
-    high: float = math.inf
-    open_low: bool = False
-    nan: bool = False
-    infinite: bool = False
-
-    def problem(self, value: float) -> str:
-        """What is wrong with a number, in a few words; "" when nothing is."""
-        if math.isnan(value):
-            return "" if self.nan else "is null, where a number is needed"
-        if math.isinf(value) and not self.infinite:
-            return f"is {value}, where a finite number is needed"
-        if value < self.low or (self.open_low and value == self.low):
-            return f"is {value:g}, which must be {'above' if self.open_low else 'at least'} {self.low:g}"
-        return f"is {value:g}, which must be at most {self.high:g}" if value > self.high else ""
-
-
-FINITE = NumberRange()
-ANY_NUMBER = NumberRange(nan=True, infinite=True)
 
 
 @dataclass(frozen=True)
@@ -179,10 +144,10 @@ class RecordCodec:
     """
 
     omitted: Mapping[type, tuple[str, ...]] = field(default_factory=dict)
-    ranges: Mapping[type, Mapping[str, NumberRange]] = field(default_factory=dict)
+    ranges: Mapping[type, Mapping[str, Limits]] = field(default_factory=dict)
     values: Mapping[type, ValueCodec] = field(default_factory=dict)
     names: Mapping[str, Any] = field(default_factory=dict)
-    default_range: NumberRange = FINITE
+    default_range: Limits = FINITE
     _adapters: dict[Any, TypeAdapter[Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -242,13 +207,13 @@ class RecordCodec:
         except PydanticCustomError as error:
             raise RecordError((place or "the document") + error.message()) from None
 
-    def _read(self, hint: Any, allowed: NumberRange, data: Any, place: str) -> Any:
+    def _read(self, hint: Any, allowed: Limits, data: Any, place: str) -> Any:
         try:
             return self._adapter(hint, allowed).validate_python(data)
         except ValidationError as error:
             raise RecordError(sentence(error, place)) from None
 
-    def _adapter(self, hint: Any, allowed: NumberRange) -> TypeAdapter[Any]:
+    def _adapter(self, hint: Any, allowed: Limits) -> TypeAdapter[Any]:
         """What validates data of values with an annotation; made when the first is read."""
         if (hint, allowed) not in self._adapters:
             schema = GetPydanticSchema(lambda *_: self._schema(hint, allowed))
@@ -256,14 +221,14 @@ class RecordCodec:
             self._adapters[hint, allowed] = TypeAdapter(Annotated[Any, schema], config=config)
         return self._adapters[hint, allowed]
 
-    def _schema(self, hint: Any, allowed: NumberRange) -> CoreSchema:
+    def _schema(self, hint: Any, allowed: Limits) -> CoreSchema:
         """The schema of what JSON holds of values with an annotation."""
         hint = _without_alias(hint)
         origin, arguments = get_origin(hint), get_args(hint)
         if hint in self.values:
             return plain(partial(foreign_value, self.values[hint].from_json))
         if hint in (float, int):
-            return plain(partial(number, hint, allowed.problem))
+            return plain(partial(number, hint, allowed))
         if hint in _SCHEMAS:
             return _SCHEMAS[hint]
         if origin in (Union, UnionType):
@@ -306,7 +271,7 @@ class RecordCodec:
         data = schemas.typed_dict_schema(keys, config=CoreConfig(strict=True, extra_fields_behavior="forbid"))
         return schemas.no_info_wrap_validator_function(partial(built_record, record, tuple(keys)), data)
 
-    def _array(self, kind: np.dtype[Any], allowed: NumberRange, data: Any) -> Any:
+    def _array(self, kind: np.dtype[Any], allowed: Limits, data: Any) -> Any:
         """An array from lists, as deep within one another as the first of them are."""
         hint, first = GenericAlias(list, ({"f": float, "b": bool}.get(kind.kind, int),)), data
         for _ in range(_MAX_DIMENSIONS - 1):
@@ -316,7 +281,7 @@ class RecordCodec:
         try:
             return np.array(values, dtype=kind)
         except (ValueError, OverflowError):
-            raise misfit(" holds lists of different lengths, where an array is needed") from None
+            raise misfit(" holds lists of different lengths; allowed is an array") from None
 
     def _stored_fields(self, record: type) -> list[Field[Any]]:
         omitted = {name for kind, names in self.omitted.items() if issubclass(record, kind) for name in names}
@@ -325,7 +290,7 @@ class RecordCodec:
     def _hints(self, record: type) -> dict[str, Any]:
         return get_type_hints(record, localns=dict(self.names))
 
-    def _range(self, record: type, name: str) -> NumberRange:
+    def _range(self, record: type, name: str) -> Limits:
         tables = (table for kind, table in self.ranges.items() if issubclass(record, kind))
         return next((table[key] for table in tables for key in (name, "*") if key in table), self.default_range)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -86,7 +86,7 @@ def forecast(
     targets: Mapping[str, Sequence[float] | float] | None = None,
     tolerances: Mapping[str, float] | None = None,
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
-    draws: int | None = None,
+    draws: Annotated[int, limits.BAND_DRAWS] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Forecast:
     """What tests will show, by an identified law or over all laws of a ranking, with bands and intervals.
@@ -103,8 +103,6 @@ def forecast(
     """
     if not 0.5 <= level < 1.0:
         raise FitError(f"level is {level!r}; give a probability from 0.5 to below 1, such as 0.95")
-    if draws is not None:
-        limits.check_number("draws", draws, limits.BAND_DRAWS, FitError)
     histories = [tests] if isinstance(tests, History) else list(tests)
     if not histories:
         raise FitError("there is no test to forecast; give histories, measured or planned")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from creepkit import limits
+from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError
 from creepkit.language import Elastic, elastic_of
 from creepkit.options import GIGAPASCAL, HOURS, Options, option
@@ -31,8 +32,9 @@ if TYPE_CHECKING:
     from creepkit.records import Load
 
 
+@checked
 @dataclass(frozen=True)
-class PlannedTestOptions(Options, title="options of a test", error=SolveError):
+class PlannedTestOptions(Options, title="options of a test"):
     """What is said of a test that is planned, beside its load and lengths.
 
     temperature : (start in s, C) of its levels. end : s. modulus : MPa. control : of a bar under stress. ramp : s in
@@ -49,6 +51,7 @@ class PlannedTestOptions(Options, title="options of a test", error=SolveError):
     ramp: float | None = option(None, "s in which each level of a load is reached.", limits.RAMP, unit="s", flag="ramp")
 
 
+@checked
 @dataclass(frozen=True)
 class ForecastOptions(Options, title="options of a forecast"):
     """How a forecast is made."""

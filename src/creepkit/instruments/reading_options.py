@@ -15,7 +15,7 @@ from creepkit.options import Options, option
 
 @checked
 @dataclass(frozen=True)
-class RecordOptions(Options, title="options of a record", error=HistoryError):
+class RecordOptions(Options, title="options of a record"):
     """What a caller says about a record.
 
     channels : names of those that are kept; None keeps all. units : {channel:
@@ -39,6 +39,5 @@ class RecordOptions(Options, title="options of a record", error=HistoryError):
     missing: tuple[str, ...] = option((), "Texts that mean a lost reading.", flag="record-missing")
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         if self.time_unit and self.time_unit not in TIME_UNITS:
             raise HistoryError(f"time_unit is '{self.time_unit}'; {nearest(self.time_unit, TIME_UNITS)}")

@@ -135,6 +135,10 @@ FORCE_LIMIT = 1.0
 """Force of the data against the bounds of a coefficient, in units of misfit per frame and ln, that is an error."""
 
 
+AT_BOUND = 1e-6
+"""In ln from a bound of a coefficient, within which it lies there."""
+
+
 EXCESS_LIMIT = 0.1
 """In ln beyond the bounds of a coefficient: further than a penalty of the law's bounds ever lets a minimum lie."""
 
@@ -145,16 +149,12 @@ def check_bounds(bound_penalties: BoundPenalties, u: Floats, gradient: Floats, d
     u, gradient : (parameters,) estimate, and derivative of half the chi-square of the data to it; data : their number.
     """
     coordinates, law = bound_penalties.coordinates, bound_penalties.coordinates.law
-    theta = coordinates.theta(u)
-    force_limit = FORCE_LIMIT * data
-    for k, excess in zip(coordinates.penalised, bound_penalties.bound_excess(theta), strict=True):
-        name, param = law.names[k], law.table[law.names[k]]
-        excluded = bound_penalties.WEIGHT**2 * abs(excess) > force_limit and (
-            abs(gradient[k]) > force_limit or abs(excess) > EXCESS_LIMIT
-        )
-        if k in coordinates.coefficients and excluded:
-            low, high = param.bounds
-            side = "below" if excess < 0 else "above"
+    theta, force_limit = coordinates.theta(u), FORCE_LIMIT * data
+    distances = np.array([theta - law.internal_bounds[0], law.internal_bounds[1] - theta])
+    for k in coordinates.coefficients:
+        name, param, distance = law.names[k], law.table[law.names[k]], float(distances[:, k].min())
+        if distance < AT_BOUND and (abs(gradient[k]) > force_limit or -distance > EXCESS_LIMIT):
+            (low, high), side = param.bounds, ("below", "above")[int(np.argmin(distances[:, k]))]
             raise FitError(
                 f"law '{law.name}': the bounds exclude the data, which push {name} {side} them "
                 f"({low:g} to {high:g} {param.unit}); widen them or choose another law"

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.language import CreepLaw
@@ -13,8 +14,9 @@ from creepkit.options import Options, option
 from creepkit.records import History
 
 
+@checked
 @dataclass(frozen=True)
-class LawChanges(Options, title="changes of laws", error=FitError):
+class LawChanges(Options, title="changes of laws"):
     """temperature : "auto", a factor of Arrhenius where tests span several temperatures, or "none".
 
     fix, bounds : of parameters, in the laws' units, where a law has them.

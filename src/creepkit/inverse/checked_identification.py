@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError, quoted
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
@@ -28,6 +27,8 @@ from creepkit.registry.arguments import resolve_predictors
 if TYPE_CHECKING:
     from creepkit.option_keywords import IdentificationSettingsKeywords
 
+Through = Annotated[Predictor, "a predictor such as ck.surrogate('dimple')"] | Literal["auto"] | None
+
 
 @takes_options(IdentificationSettings)
 @checked
@@ -38,7 +39,7 @@ def identify(
     *,
     search: GlobalSearch | None = None,
     penalty: Literal["l2", "subsets"] | None = None,
-    through: Predictor | Literal["auto"] | None = "auto",
+    through: Through = "auto",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     **changes: Unpack[IdentificationSettingsKeywords],
@@ -80,7 +81,7 @@ def select(
     histories: Sequence[History],
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
-    through: Predictor | Literal["auto"] | None = "auto",
+    through: Through = "auto",
     sums: bool | None = None,
     criterion: Literal["bic", "aicc"] = "bic",
     settings: IdentificationSettings | None = None,
@@ -116,15 +117,9 @@ def select(
     return replace(ranking, laws=tuple(noted))
 
 
-def _resolve_through(
-    through: Predictor | Literal["auto"] | None, predictor: Predictor | Mapping[str, Predictor]
-) -> Predictor | None:
+def _resolve_through(through: Through, predictor: Predictor | Mapping[str, Predictor]) -> Predictor | None:
     """The predictor given; or the reduced-order model of the specimen, where it states how accurate it is."""
     if not isinstance(through, str):
         return through
-    if through != "auto":
-        raise FitError(
-            f"through is '{quoted(through)}'; give 'auto', None or a predictor such as ck.surrogate('dimple')"
-        )
     reduced = None if isinstance(predictor, Mapping) else predictor.reduced_order_model()
     return reduced if reduced is not None and reduced.error else None

@@ -131,8 +131,6 @@ def _folds(tests: Sequence[History], by: FoldBy) -> Iterator[tuple[list[History]
     if by == "time":
         yield list(tests), [_first_part(h) for h in tests]
         return
-    if by not in ("test", "condition"):
-        raise FitError(f"cross-validation by '{by}' is not known; allowed are test, condition and time")
     groups = [[h] for h in tests]
     if by == "condition":
         groups = [[h for h in tests if h.condition == c] for c in sorted({h.condition for h in tests})]

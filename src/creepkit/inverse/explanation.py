@@ -112,10 +112,12 @@ class Explanation:
 
     @property
     def caution(self) -> str:
-        """Where it is no verdict: of one test its size, as a rate and as what would make it; without a full stop."""
+        """Of tests their size, as a rate and as what would make it, else that it is no verdict; without a full stop."""
         if self.kind != "one test":
             return f"{self.headline}: {np.exp(self.odds):.2g} times likelier than scatter, too little for a verdict"
-        found = f"{self.tests[0]} creeps {np.exp(self.size):.2g} times as fast as the others lead to expect"
+        factors = " and ".join(f"{factor:.2g}" for factor in self.factors or (float(np.exp(self.size)),))
+        verb, named = ("creep", " and ".join(self.tests)) if len(self.tests) > 1 else ("creeps", self.tests[0])
+        found = f"{named} {verb} {factors} times as fast as the others lead to expect"
         kelvin = self.errors.get("temperature", 0.0)
         error = f"; {abs(kelvin):.2g} K {'less' if kelvin < 0 else 'more'} than stated would do it"
         return found + error * self.may_be_temperature

@@ -34,8 +34,6 @@ def relative_squared_error(
             "measured and predicted must have the values (frames,) of the same tests, found shapes "
             f"{quoted(shapes)} and {quoted(predicted_shapes)}"
         )
-    if about not in ("all", "test", "frame"):
-        raise FitError(f"about is {quoted(about)}; allowed are all, test and frame")
     squares = sum(float(((p - m) ** 2).sum()) for m, p in zip(measured_arrays, predicted_arrays, strict=True))
     return (
         squares / total_sum_of_squares(measured_arrays, about)

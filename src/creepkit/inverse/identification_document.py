@@ -15,7 +15,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
-from creepkit.files.record_codec import NumberRange, Record, RecordCodec, RecordError, ValueCodec
+from creepkit.files.record_codec import Record, RecordCodec, RecordError, ValueCodec
 from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.explanation import Explanation, LeftOut
@@ -32,6 +32,7 @@ from creepkit.inverse.sparsity.result import FitStatistics, Sparsity
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, RateScatter
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
+from creepkit.limits import numbers
 from creepkit.records import Nuisance
 
 IDENTIFICATION = DocumentFormat(
@@ -46,10 +47,10 @@ LARGEST = 1e12
 """Of a standard deviation, in any unit: larger ones are damage."""
 
 
-NOT_NEGATIVE, POSITIVE, SIZE = NumberRange(0.0), NumberRange(0.0, open_low=True), NumberRange(0.0, LARGEST)
-POSITIVE_SIZE, ANY_SIZE = NumberRange(0.0, LARGEST, open_low=True), NumberRange(-(LARGEST**2), LARGEST**2)
-NAN_ALLOWED, INFINITY_ALLOWED = NumberRange(nan=True), NumberRange(infinite=True)
-NOT_NEGATIVE_OR_NAN = NumberRange(0.0, nan=True, infinite=True)
+NOT_NEGATIVE, POSITIVE, SIZE = numbers(0.0), numbers(0.0, above=True), numbers(0.0, LARGEST)
+POSITIVE_SIZE, ANY_SIZE = numbers(0.0, LARGEST, above=True), numbers(-(LARGEST**2), LARGEST**2)
+NAN_ALLOWED, INFINITY_ALLOWED = numbers(nan=True), numbers(infinite=True)
+NOT_NEGATIVE_OR_NAN = numbers(0.0, nan=True, infinite=True)
 
 
 LAW_CODEC = ValueCodec(law_to_json, law_from_json)
@@ -68,7 +69,7 @@ CODEC = RecordCodec(
         RateScatter: {
             "*": ANY_SIZE,
             **dict.fromkeys(("weight", "stresses", "temperatures", "output_scales", "output_floors"), POSITIVE_SIZE),
-            "variance": NumberRange(0.0, LARGEST**2),
+            "variance": numbers(0.0, LARGEST**2),
             "known": SIZE,
         },
         Adequacy: {"*": NOT_NEGATIVE_OR_NAN},
@@ -83,8 +84,8 @@ CODEC = RecordCodec(
         OutputErrors: {"*": NOT_NEGATIVE_OR_NAN},
         OutputFit: {"noise": NOT_NEGATIVE},
         SingleValue: {"*": NOT_NEGATIVE_OR_NAN, "measured": POSITIVE},
-        TestFit: {"*": NAN_ALLOWED, "frames": NOT_NEGATIVE, "weight": POSITIVE, "rate_factor": NumberRange()},
-        Nuisance: {"sd": NumberRange(0.0, open_low=True, infinite=True), "bounds": INFINITY_ALLOWED},
+        TestFit: {"*": NAN_ALLOWED, "frames": NOT_NEGATIVE, "weight": POSITIVE, "rate_factor": numbers()},
+        Nuisance: {"sd": numbers(0.0, above=True, infinite=True), "bounds": INFINITY_ALLOWED},
         NuisanceEstimate: {"sd": NOT_NEGATIVE, "prior_sd": INFINITY_ALLOWED},
         FitStatistics: {"parameters": NOT_NEGATIVE},
         Sparsity: {"observations": NOT_NEGATIVE},

@@ -39,15 +39,13 @@ MOST_LAST_STEPS, LAST_STEP, MOST_HALVINGS = 10, 0.02, 4
 
 
 DOUBTFUL_STEP = 0.5
-"""Standard deviations of a value, of a step that is left, from which on values have not converged."""
+"""Standard deviations of a value, of a step that is left, from which on values have not converged: an interval of 95 %
+about a value that is off by so much holds the truth in 92 %."""
 
 
-CONVERGED_GAIN = 0.02
-"""Gain of the log-likelihood, and change of a test's weight, that ends the rounds."""
-
-
-LARGEST_LOSS = 10.0
-"""Loss of the log-likelihood in a round about the rates of tests that ends the rounds at the one before."""
+CONVERGED_GAIN, SMALL_STEP = 0.02, 0.2
+"""Gain of the log-likelihood, and change of a test's weight, that end the rounds; and the step of that gain, half its
+square, in standard deviations, which is left to the last steps."""
 
 
 MOST_RATE_STEPS = 3
@@ -119,18 +117,19 @@ def estimate_iteratively(
         residuals = problem.residuals(x).with_test_weights(residuals.test_weights)
         linear = problem.linearised(x, residuals)
         noise = estimator.estimate(residuals, noise, linear)
-        if by_likelihood and best is not None and _expected_gain(linear, noise) < CONVERGED_GAIN:
-            best = EstimationResult(problem, linear, noise, _log_likelihood(problem, linear, noise))
-            break
-        problem = problem.with_covariance(_covariance_factor(problem, residuals, noise, estimator))
-        # The covariance moves with the values: near the end each step is taken under its own.
-        by_steps = by_likelihood and (is_near or best is not None)
-        minimum = problem.minimise(x, tolerances=replace(tolerances, one_step=by_steps))
-        x, weights = minimum.x, residuals.test_weights
+        factor = _covariance_factor(problem, residuals, noise, estimator)
+        problem, weights = problem.with_covariance(factor), residuals.test_weights
+        if by_likelihood and (is_near or best is not None):
+            # The covariance moves with the values: near the end each step is taken under its own.
+            problem, linear, step = _stepped(problem, linear, factor, noise, SMALL_STEP)
+            x, converged = linear.x, step < DOUBTFUL_STEP
+        else:
+            minimum = problem.minimise(x, tolerances=tolerances)
+            x, converged = minimum.x, minimum.converged
         residuals = problem.residuals(x).with_test_weights(weights)
         problem = _with_priors_found(problem, residuals, noise, x)
         linear = problem.linearised(x, residuals)
-        current = EstimationResult(problem, linear, noise, _log_likelihood(problem, linear, noise), minimum.converged)
+        current = EstimationResult(problem, linear, noise, _log_likelihood(problem, linear, noise), converged)
         if progress is not None:
             progress("round", round_index + 1, limits.rounds)
         gain = np.inf if best is None else current.log_likelihood - best.log_likelihood
@@ -138,9 +137,6 @@ def estimate_iteratively(
         moved = best is not None and (
             best.problem.log_factors is not problem.log_factors or best.problem.stopped is not problem.stopped
         )
-        if moved and gain < -LARGEST_LOSS and best is not None and best.problem.log_factors is not None and not robust:
-            best = replace(best, converged=False)  # curves that run away are not linear in the rates of tests
-            break
         best = current if best is None or gain > 0 or robust or moved else best
         if abs(gain) < CONVERGED_GAIN and np.abs(weights - previous_weights).max() < CONVERGED_GAIN:
             best = replace(best, converged=True)
@@ -165,26 +161,39 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         linear = replace(problem.linearised(linear.x, residuals), free=free)
         errors = errors_of_tests(problem, linear.x, linear, noise)
         factor = CovarianceFactor.of_residuals(linear.with_errors(errors).residuals, expected)
-        solution = linear.solve(factor)
         found = replace(found, problem=problem, linear=linear, errors=errors)
-        target = linear.x.copy()
-        target[free] += solution.step
-        x = problem.constrained(linear.x, target, free, solution.covariance)
-        left = float((np.abs(x - linear.x)[free] / np.sqrt(np.diag(solution.covariance))).max(initial=0.0))
         first = first or found
-        if left <= LAST_STEP:
+        problem, linear, left = _stepped(problem, linear, factor, expected, LAST_STEP)
+        if left <= LAST_STEP or linear is found.linear:
             break
-        for _ in range(MOST_HALVINGS):
-            moved = problem.residuals(x).with_test_weights(residuals.test_weights)
-            further = replace(problem.linearised(x, moved), free=free)
-            if is_finite(moved) and _chi_square(further, factor) < _chi_square(linear, factor):
-                break
-            x = 0.5 * (x + linear.x)
-        else:  # curves that run away are not linear in the values: what no shorter step improves stays
-            break
-        linear = further
     # values that steps drive to and fro are those that they began with
-    return found if first is None or left < DOUBTFUL_STEP else replace(first, converged=False)
+    return replace(found, converged=True) if first is None or left < DOUBTFUL_STEP else replace(first, converged=False)
+
+
+def _stepped(
+    problem: LeastSquaresProblem, linear: LinearisedProblem, factor: CovarianceFactor, noise: NoiseModel, least: float
+) -> tuple[LeastSquaresProblem, LinearisedProblem, float]:
+    """A step of Gauss and Newton, halved until chi-square falls, and its size in standard deviations.
+
+    The rates of tests move with the values, so that a test whose rate is known creeps on as it was measured: at rates
+    that stay a curve that runs away would break, or not begin to. As it is where no halved step lowers chi-square, or
+    the step is smaller than `least`.
+    """
+    solution, free, residuals = linear.solve(factor), linear.free, linear.residuals
+    target = linear.x.copy()
+    target[free] += solution.step
+    x = problem.constrained(linear.x, target, free, solution.covariance)
+    size = float((np.abs(x - linear.x)[free] / np.sqrt(np.diag(solution.covariance))).max(initial=0.0))
+    assert residuals.jacobian is not None
+    for _ in range(MOST_HALVINGS if size > least else 0):
+        expected = replace(residuals, values=residuals.values + residuals.jacobian @ (x - linear.x))
+        moved = _about_predicted_rates(problem, x, expected, noise)
+        there = moved.residuals(x).with_test_weights(residuals.test_weights)
+        further = replace(moved.linearised(x, there), free=free)
+        if is_finite(there) and _chi_square(further, factor) < _chi_square(linear, factor):
+            return moved, further, size
+        x = 0.5 * (x + linear.x)
+    return problem, linear, size
 
 
 def _chi_square(linear: LinearisedProblem, factor: CovarianceFactor) -> float:
@@ -223,16 +232,21 @@ def about_own_rates(
     residuals : of the problem at x, with the weights of tests. As it is where its rates are those that are predicted.
     """
     for _ in range(MOST_RATE_STEPS):
-        log_factors = np.clip(predicted_random_effects(residuals, noise)[1], -LARGEST_FACTOR, LARGEST_FACTOR)
-        known = 0.0 if problem.log_factors is None else problem.log_factors
-        if np.abs(log_factors - known).max() < NOTEWORTHY_FACTOR:
-            break
-        moved = problem.about_rates(x, log_factors)
+        moved = _about_predicted_rates(problem, x, residuals, noise)
         there = moved.residuals(x).with_test_weights(residuals.test_weights)
-        if moved.log_factors is None or not is_finite(there):
+        if moved is problem or moved.log_factors is None or not is_finite(there):
             break
         problem, residuals = moved, there
     return problem, residuals
+
+
+def _about_predicted_rates(
+    problem: LeastSquaresProblem, x: Floats, residuals: Residuals, noise: NoiseModel
+) -> LeastSquaresProblem:
+    """The problem at x (unknowns,) about the rates of tests that residuals show; as it is where these are its own."""
+    log_factors = np.clip(predicted_random_effects(residuals, noise)[1], -LARGEST_FACTOR, LARGEST_FACTOR)
+    known = 0.0 if problem.log_factors is None else problem.log_factors
+    return problem.about_rates(x, log_factors) if np.abs(log_factors - known).max() >= NOTEWORTHY_FACTOR else problem
 
 
 def _covariance_factor(
@@ -241,13 +255,6 @@ def _covariance_factor(
     """The covariance under which the values of a round are found."""
     fitting_noise = noise if estimator.by_likelihood else with_single_value_weight(noise, problem.observations)
     return CovarianceFactor.of_residuals(residuals, fitting_noise)
-
-
-def _expected_gain(linear: LinearisedProblem, noise: NoiseModel) -> float:
-    """Growth of the log-likelihood, to first order, if the values moved to the optimum under this noise."""
-    residuals = linear.residuals
-    factor = CovarianceFactor.of_residuals(residuals, noise)
-    return 0.5 * (_chi_square(linear, factor) - linear.solve(factor).chi_square)
 
 
 def _log_likelihood(problem: LeastSquaresProblem, linear: LinearisedProblem, noise: NoiseModel) -> float:

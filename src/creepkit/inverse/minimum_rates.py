@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
@@ -258,10 +259,11 @@ def least_slope(times: Floats, strains: Floats, noise: Floats) -> float:
     return least
 
 
-def apparent_exponent(stresses: Floats, rates: Floats, temperatures: Floats) -> float:
-    """d ln rate / d ln stress by regression with a level of each temperature; NaN where the stresses do not differ.
+def apparent_exponent(stresses: Floats, rates: Floats, temperatures: Floats) -> tuple[float, float]:
+    """d ln rate / d ln stress by regression with a level of each temperature, and half of its 95 % interval.
 
-    stresses, rates, temperatures : (tests,) MPa, 1/s and K.
+    stresses, rates, temperatures : (tests,) MPa, 1/s and K. NaN where the stresses do not differ; an interval by
+    Student's t from the scatter of the rates, NaN where no test is left to show it.
     """
     known = np.isfinite(rates) & (rates > 0)
     x, y, levels = np.log(stresses[known]), np.log(rates[known]), np.round(temperatures[known] / ISOTHERMAL_RANGE)
@@ -269,8 +271,12 @@ def apparent_exponent(stresses: Floats, rates: Floats, temperatures: Floats) -> 
         same = levels == level
         x[same] -= x[same].mean()
         y[same] -= y[same].mean()
-    squares = float((x**2).sum())
-    return float((x * y).sum()) / squares if squares > LEAST_SPREAD * max(x.size, 1) else float("nan")
+    squares, freedom = float((x**2).sum()), x.size - np.unique(levels).size - 1
+    if not squares > LEAST_SPREAD * max(x.size, 1):
+        return float("nan"), float("nan")
+    exponent = float((x * y).sum()) / squares
+    variance = float(((y - exponent * x) ** 2).sum()) / freedom if freedom > 0 else float("nan")
+    return exponent, float(student.ppf(0.975, max(freedom, 1))) * (variance / squares) ** 0.5
 
 
 LEAST_SPREAD = 0.03**2

@@ -22,7 +22,7 @@ from creepkit.inverse.observation_series import ObservationSeries
 def _check(code: int) -> None:
     """Raise what a function of the core returned."""
     if code == 1:
-        raise np.linalg.LinAlgError("the covariance of the residuals is not positive definite")
+        raise FitError("the covariance of the residuals has no factors: a prediction is far beyond what was measured")
     if code:
         raise FitError("the likelihood of the noise needs more memory than there is" if code == 2 else "wrong counts")
 

@@ -27,6 +27,7 @@ from creepkit.inverse.output_transforms import (
     OutputTransform,
     RateTransform,
 )
+from creepkit.quality.curve_shapes import shows_tertiary_creep
 from creepkit.records import History, Prediction, Predictor, is_logarithmic
 from creepkit.records.history import correlation_matrix
 
@@ -175,7 +176,7 @@ class ObservationVector:
     noise : (outputs,) typical standard deviation of a frame, in the output's unit.
     relative_noise : (tests, observations) -, noise of each observation over that.
     stated : (outputs,) whether every history states the noise of its frames; else it is estimated from neighbours.
-    followed_to_rupture : (tests,) which tests are compared up to rupture.
+    followed_to_rupture : (tests,) which tests are compared up to rupture: their end is stated, or their rate rises.
     censored : (tests,) which of them were stopped before rupture.
     noise_correlation : (tests, outputs, outputs) - of the noise of two outputs in one frame, as histories state it.
     """
@@ -203,23 +204,26 @@ class ObservationVector:
         full: Sequence[History] | None = None,
         *,
         rupture_times: bool = True,
+        accelerating: bool = True,
     ) -> ObservationVector:
         """The observations of histories; noise is estimated from `full`, the same before frames were left out.
 
-        rupture_times : whether ends of tests without frames are among them.
+        rupture_times : whether ends of tests without frames are among them. accelerating : whether curves that show
+        tertiary creep are followed to their end where nobody states it.
         """
-        followed = np.array(
-            [
-                h.end_known and (rupture_times or bool(h.outputs)) and predictor.for_history(h).follows_to_rupture
-                for h in histories
-            ]
-        )
+        full = histories if full is None else full
+        follows = np.array([predictor.for_history(h).follows_to_rupture for h in histories])
+        ends = follows & [h.end_known and (rupture_times or bool(h.outputs)) for h in histories]
+        followed = ends | [
+            bool(accelerating and one and h.outputs and shows_tertiary_creep(h))
+            for one, h in zip(follows, full, strict=True)
+        ]
         rows = [
             {
                 name: ObservedOutput.of_history(h, whole, name)
-                for name in _observed_outputs(h, predictor, followed=bool(f))
+                for name in _observed_outputs(h, predictor, followed=bool(end))
             }
-            for h, whole, f in zip(histories, histories if full is None else full, followed, strict=True)
+            for h, whole, end in zip(histories, full, ends, strict=True)
         ]
         distinct = dict.fromkeys(name for row in rows for name in row)
         # Those of single values last: absent observations are padded as the first output, whose value may be zero.
@@ -256,7 +260,7 @@ class ObservationVector:
             relative_noise,
             np.array(stated),
             followed,
-            followed & np.array([h.unruptured for h in histories]),
+            ends & [h.unruptured for h in histories],
             np.stack([_correlation_matrix(h, outputs) for h in histories]),
         )
 

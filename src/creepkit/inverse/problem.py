@@ -153,10 +153,12 @@ class LeastSquaresProblem:
         check_minimum_rates(law, histories, predictor)
         tests = [thinned_history(h, settings.frames) for h in histories]
         coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor))
-        rupture_times = compares_rupture_times(law, settings)
-        observations = ObservationVector.from_histories(tests, predictor, histories, rupture_times=rupture_times)
         check_nuisance_law(settings.nuisances, law)
         nuisances = NuisanceParameters.from_histories(settings.nuisances, tests, predictor)
+        rupture_times, accelerating = compares_rupture_times(law, settings), not nuisances.nuisances
+        observations = ObservationVector.from_histories(
+            tests, predictor, histories, rupture_times=rupture_times, accelerating=accelerating
+        )
         check_creep(observations, tests)
         check_explicit_nuisances([n.kind for n in nuisances.nuisances], observations, tests, predictor)
         log_rate, log_internal_rate = median_log_strain_rate(tests, predictor), median_log_inverse_duration(tests)

@@ -14,11 +14,12 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind, sha256_of
-from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError
+from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import LAW_SIGNS, numbered_stems
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json, load
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.limits import numbers
 
 if TYPE_CHECKING:
     from creepkit.inverse.selection import Ranking
@@ -64,7 +65,7 @@ class RankingFile:
             raise FitError(f"the weights add up to {total:g}, which must be above 0 and at most 1")
 
 
-CODEC = RecordCodec(ranges={LawFile: {"weight": NumberRange(0.0, 1.0)}})
+CODEC = RecordCodec(ranges={LawFile: {"weight": numbers(0.0, 1.0)}})
 
 
 def stems_of_laws(laws: Iterable[CreepLaw], stem: str) -> list[str]:

@@ -3,9 +3,9 @@
 After a predicted rupture the transformed output grows on with ln of time over rupture time, so that residuals are
 finite and their derivatives lead back to values at which the specimen lasts.
 
-Of tests that were followed to rupture residuals are orthogonal: near rupture strain grows without limit within almost
-no time, and an error in strain has no meaning. What counts is the distance of a measured point from the predicted
-curve, in strain and in the logarithm of time, in units of both errors.
+Of tests that were followed to rupture, or whose rate rises, residuals are orthogonal: near rupture strain grows without
+limit within almost no time, and an error in strain has no meaning. What counts is the distance of a measured point from
+the predicted curve, in strain and in the logarithm of time, in units of both errors.
 """
 
 from __future__ import annotations

@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from creepkit.errors import FitError
+from creepkit.checked_arguments import checked
 from creepkit.options import Options, option
 
 if TYPE_CHECKING:
     from creepkit.inverse.search.global_search import GlobalSearch
 
 
+@checked
 @dataclass(frozen=True)
-class SearchOptions(Options, title="options of a search", error=FitError):
+class SearchOptions(Options, title="options of a search"):
     """What identify() and select() take as objects or arguments of their own.
 
     search : how to begin. penalty : on the terms of a sum. sums : whether sums of

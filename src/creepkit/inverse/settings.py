@@ -46,7 +46,7 @@ or displacement, a share, of an extensometer of class 1 by ISO 9513.
 
 @checked
 @dataclass(frozen=True)
-class IdentificationSettings(Options, title="settings of an identification", error=FitError):
+class IdentificationSettings(Options, title="settings of an identification"):
     """What a run can be repeated from.
 
     starts : of the multi-start search, half of them where two parameters beside rates are sought, two for one;
@@ -102,7 +102,6 @@ class IdentificationSettings(Options, title="settings of an identification", err
     def __post_init__(self) -> None:
         _check_weights(self.weights)
         _check_usual_errors(self.usual_errors)
-        super().__post_init__()
         for nuisance in self.nuisances:
             _check_nuisance(nuisance)
         for first, second in combinations(self.nuisances, 2):

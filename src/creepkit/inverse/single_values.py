@@ -202,8 +202,6 @@ def constant_stress_tests(
     stress, temperature : numbers or arrays that broadcast, MPa and K.
     """
     stresses, temperatures = np.broadcast_arrays(np.asarray(stress, float), np.asarray(temperature, float))
-    if control not in ("load", "stress"):
-        raise FitError(f"control is '{control}'; allowed are load and stress")
     if not (stresses > 0).all():
         raise FitError("a rupture time was asked for at a stress that is not above zero; give tensile stresses, in MPa")
     tests = [

@@ -202,7 +202,7 @@ def estimate_variance_components(
 
 def _minimised(likelihood: _Likelihood, x0: Floats, bounds: Sequence[tuple[float, float]]) -> OptimizeResult:
     inside = np.clip(x0, [low for low, _ in bounds], [high for _, high in bounds])
-    options = {"maxiter": 60, "ftol": 1e-7 if likelihood.restricted else 1e-9}
+    options = {"maxiter": 60, "ftol": 1e-9}
     return minimize(likelihood.cost, inside, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
 
 
@@ -221,7 +221,7 @@ class _Likelihood:
         stated = [start[output].stated if name == "noise" else 0.0 for output, name in free]
         self.has_prior = np.array(stated) > 0
         self.log_stated = np.log(np.where(self.has_prior, stated, 1.0))
-        self.restricted, self.fixed_cost = linear is not None, 0.0
+        self.fixed_cost = 0.0
         values, precision, prior_residual = residuals.values[..., None], np.zeros(0), np.zeros(0)
         if linear is not None:
             values = np.concatenate([linear.residuals.values[..., None], linear.jacobian], axis=-1)

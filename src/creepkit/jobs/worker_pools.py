@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 from creepkit import limits
 from creepkit.arrays import usable_cores
 from creepkit.checked_arguments import checked
-from creepkit.errors import CreepkitError, DatasetError, quoted
+from creepkit.errors import DatasetError, quoted
 from creepkit.jobs.worker_process import Job, TaskResult, run_task, send, setup_message, start_worker
 from creepkit.options import Options, option
 
@@ -53,7 +53,7 @@ _log = logging.getLogger("creepkit.jobs")
 
 @checked
 @dataclass(frozen=True)
-class ParallelExecution(Options, title="settings of an execution", error=DatasetError):
+class ParallelExecution(Options, title="settings of an execution"):
     """How the shards of a data set are divided among processes and machines.
 
     workers : processes of this machine, by default one for each core; of a cluster, its threads that are used at once.
@@ -77,14 +77,7 @@ class ParallelExecution(Options, title="settings of an execution", error=Dataset
         """The workers, which run in the context that is returned."""
         if self.cluster is not None:
             return cluster_workers(job, self.cluster, self.workers)
-        return ProcessWorkers(job, process_count(self.workers))
-
-
-def process_count(workers: int | None, error: type[CreepkitError] = DatasetError) -> int:
-    """How many processes are meant: `workers`, or one for each core; `error` for what is no number of them."""
-    if workers is not None:
-        limits.check_number("workers", workers, limits.WORKERS, error)
-    return workers or usable_cores()
+        return ProcessWorkers(job, self.workers or usable_cores())
 
 
 class ProcessWorkers:

@@ -6,14 +6,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from creepkit.checked_arguments import checked_with_own_words
+from creepkit.checked_arguments import checked
 from creepkit.language import algebra
 from creepkit.language.algebra import times
 from creepkit.language.law_record import LawRecord
 from creepkit.language.printing import LatexLawPrinter, latex_equations, law_text
 
 
-@checked_with_own_words("references")
+@checked
 @dataclass(frozen=True, eq=False)
 class CreepLaw(LawRecord):
     """A creep law: rate of equivalent creep strain, in 1/s, as a sum of named terms; its fields are LawRecord's.
@@ -82,7 +82,7 @@ class CreepLaw(LawRecord):
         """The law with parameters made functions of temperature, such as n=linear(T_ref=1073)."""
         return algebra.with_temperature(self, forms)
 
-    @checked_with_own_words("temperature")
+    @checked
     def at(self, temperature: float) -> CreepLaw:
         """The law at one temperature, in K; parameters that no longer matter there are dropped."""
         return algebra.at(self, temperature)

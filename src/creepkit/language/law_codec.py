@@ -11,10 +11,11 @@ import sympy
 from creepkit.errors import LawError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading
 from creepkit.files.reading import FileKind
-from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError
+from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.language.expression_trees import condition_from_tree, expression_from_tree, expression_to_tree
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, Param, ParameterScale, State, Symbol
+from creepkit.limits import numbers
 
 __all__ = ["LAW", "condition_from_tree", "expression_from_tree", "expression_to_tree", "law_from_json", "law_to_json"]
 
@@ -81,7 +82,7 @@ class LawDocument:
     references: tuple[str, ...]
 
 
-_CODEC = RecordCodec(ranges={ParamDocument: {"limits": NumberRange(infinite=True)}})
+_CODEC = RecordCodec(ranges={ParamDocument: {"limits": numbers(infinite=True)}})
 
 
 # ---- writing -------------------------------------------------------------------------------------------------------

@@ -220,7 +220,7 @@ class LawRecord:
     title: str = ""
     states: Mapping[sympy.Symbol, State] = field(default_factory=dict)
     constraints: Sequence[Boolean] = ()
-    references: Sequence[str] = ()
+    references: Sequence[str] | str = ()
     examples: Sequence[Mapping[str, float]] = ()
     falls_with_temperature: bool = False
 

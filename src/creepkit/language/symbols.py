@@ -158,8 +158,6 @@ class Param:
     widens: bool = False
 
     def __post_init__(self) -> None:
-        if self.scale not in ("linear", "log"):
-            raise LawError(f"parameter '{self.meaning}': scale is '{self.scale}'; allowed are 'linear' and 'log'")
         _check_text("parameter", self.meaning, self.unit)
         low, high = map(float, self.bounds)
         if not (math.isfinite(low) and math.isfinite(high)):

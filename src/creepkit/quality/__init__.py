@@ -4,7 +4,7 @@ Of frames: unloading, a creep output that decreases though its load does not, si
 readings of another, replicates that differ, strain of loading that nothing states, a strain above 100 %, a record of
 load or temperature that contradicts the stated program. What one test says against all others, a fit tells.
 Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load,
-idle time in which nothing crept.
+a step of a strain by thermal expansion, idle time in which nothing crept.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from creepkit.quality.repeats import copied_tests, repeated_rows, replicate_devi
 from creepkit.quality.rig import (
     ACTIVATION_ENERGY,
     common_rate_changes,
+    expansion_flags,
     find_jumps,
     jump_flags,
     rate_change_flag,
@@ -188,6 +189,7 @@ def check_rig(histories: Sequence[History], *, activation_energy: float = ACTIVA
     flags += [flag for history in histories for flag in idle_flags(history)]
     jumps = find_jumps(histories)
     flags += jump_flags(histories, jumps)
+    flags += [flag for history in histories for flag in expansion_flags(history)]
     changes = common_rate_changes(histories, jumps)
     return [*flags, *(rate_change_flag(histories, change, activation_energy) for change in changes)]
 

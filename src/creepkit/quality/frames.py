@@ -99,8 +99,8 @@ def _unloaded_end(history: History, frames: Ints) -> Iterator[QualityFlag]:
     sigma = noise_standard_deviation(t, y)
     for count in range(min(MOST_UNLOADING_FRAMES, frames.size - FEWEST_FRAMES), 0, -1):
         before = slice(max(frames.size - count - END_FIT_FRAMES, 0), frames.size - count)
-        expected, standard_error = _extrapolate(t[before], y[before], t[-count])
-        sigma = max(sigma, _scatter_about_line(t[before], y[before]))  # noise may grow with the output
+        expected, standard_error = extrapolate(t[before], y[before], t[-count])
+        sigma = max(sigma, scatter_about_line(t[before], y[before]))  # noise may grow with the output
         shortfall = expected - y[-count]
         if shortfall > END_THRESHOLD * sigma * standard_error and (y[-count:] < y[-count - 1] - sigma).all():
             reason = (
@@ -112,14 +112,17 @@ def _unloaded_end(history: History, frames: Ints) -> Iterator[QualityFlag]:
             return
 
 
-def _scatter_about_line(t: Floats, y: Floats) -> float:
+def scatter_about_line(t: Floats, y: Floats) -> float:
     """Standard deviation of y (frames,) about a line in t (frames,), in the unit of y."""
     residuals = y - np.polyval(np.polyfit(t - t[0], y, 1), t - t[0])
     return float(np.sqrt((residuals**2).sum() / max(t.size - 2, 1)))
 
 
-def _extrapolate(t: Floats, y: Floats, time: float) -> tuple[float, float]:
-    """A line through frames, at a later time, and the standard deviation of y less it over that of y."""
+def extrapolate(t: Floats, y: Floats, time: float) -> tuple[float, float]:
+    """A line through frames, at a later time, and the standard deviation of y less it over that of y.
+
+    t, y : (frames,) s, and the output's unit.
+    """
     mean_time, time_variation = t.mean(), float(((t - t.mean()) ** 2).sum())
     slope = float(((t - mean_time) * (y - y.mean())).sum()) / time_variation
     return float(y.mean()) + slope * (time - mean_time), float(

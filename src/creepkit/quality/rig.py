@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,14 @@ from scipy.special import chdtrc
 
 from creepkit.arrays import Floats
 from creepkit.quality.flags import QualityFlag
-from creepkit.quality.frames import FEWEST_FRAMES, LOAD_TOLERANCE, TEMPERATURE_TOLERANCE, load_segments
+from creepkit.quality.frames import (
+    FEWEST_FRAMES,
+    LOAD_TOLERANCE,
+    TEMPERATURE_TOLERANCE,
+    extrapolate,
+    load_segments,
+    scatter_about_line,
+)
 from creepkit.quality.repeats import duplicate_tests
 from creepkit.quality.smooth_curve import RateStep, SmoothCurve, robust_spread, smooth_curve
 from creepkit.records import History, growing_output, output_named
@@ -57,6 +65,11 @@ JUMP_THRESHOLD, FEW_POINTS_CORRECTION = 7.0, 10.0
 
 MOST_CHANGES, MOST_TIMES = 3, 300
 """Changes looked for in a group of tests, or in a part of one test; times at which changes of rate are sought."""
+
+
+LINE_FRAMES, EXPANSION, EXPANSION_THRESHOLD = (4, 6), (4e-6, 35e-6), 4.0
+"""Frames on a side of a step of temperature, at least and at most; 1/K, coefficients of thermal expansion that solids
+of creep tests have; standard deviations of a step."""
 
 
 SAME_TIMES_FRACTION = 0.8
@@ -381,6 +394,42 @@ def jump_flags(histories: Sequence[History], jumps: Sequence[Jump]) -> Iterator[
             proposal=f"take the step off if the observation moved (a bumped camera or extensometer): "
             f"'steps_taken_off = \"{time_text(first.time)}\"' in tests.toml; cut the frames from then on, or ignore it",
         )
+
+
+def expansion_flags(history: History) -> Iterator[QualityFlag]:
+    """A flag of a test whose strain steps with the temperature, under one load, by what thermal expansion does.
+
+    Each step is the distance of lines through the frames on either side, at both ends of the gap between them, for the
+    temperature may have changed at either; the test piece may follow the furnace one frame later.
+    """
+    name = growing_output(history)
+    if not history.outputs or output_named(name, history.specimen).quantity != "strain":
+        return
+    values, clock, found = history.outputs[name], history.times, dict[float, tuple[float, float]]()
+    temperature, parts = history.temperature_program().at(clock), load_segments(history)
+    sides = pairwise(part for part in parts if part.frames.size > LINE_FRAMES[0])
+    for (before, after), skipped in product(sides, (0, 1)):
+        early, late = before.frames[-LINE_FRAMES[1] :], after.frames[skipped : LINE_FRAMES[1] + skipped]
+        change, is_far = float(temperature[late[0]] - temperature[early[-1]]), late[0] - early[-1] > LINE_FRAMES[0]
+        is_loaded = abs(after.load - before.load) > LOAD_TOLERANCE * before.load
+        if is_far or is_loaded or abs(change) <= TEMPERATURE_TOLERANCE:
+            continue
+        gap = map(float, clock[[early[-1], late[0]]])
+        lines = [[extrapolate(clock[k], values[k], time) for k in (early, late)] for time in gap]
+        steps = [end[0] - start[0] for start, end in lines]
+        noise = max(scatter_about_line(clock[k], values[k]) for k in (early, late))
+        error = noise * max((start[1] ** 2 + end[1] ** 2 - 2.0) ** 0.5 for start, end in lines)  # those of the lines
+        is_expansion = all(EXPANSION[0] < step / change < EXPANSION[1] for step in steps)
+        if is_expansion and min(map(abs, steps)) > EXPANSION_THRESHOLD * error:
+            found.setdefault(float(clock[after.frames[0]]), (steps[1], change))
+    if found:
+        times, (sizes, changes) = list(found), np.array([*found.values()]).T
+        at, jumps = "; ".join(map(time_text, times)), ", ".join(f"{size:+.2g}" for size in sizes)
+        kelvin, alpha = ", ".join(f"{one:+.3g} K" for one in changes), float(sizes @ changes / (changes @ changes))
+        reason = f"{name} steps by {jumps} at {at}, as the temperature does by {kelvin}: thermal expansion"
+        advice = f"take off that of the alloy: 'thermal_expansion = \"{alpha:.2g} 1/K\"' in tests.toml"
+        reason, first = f"{reason} of about {alpha:.2g}/K, which is no creep", {history.name: float(sizes[0])}
+        yield QualityFlag((history.name,), "jump", (), reason, time=times[0], jumps=first, proposal=advice)
 
 
 def record_flags(history: History, activation_energy: float) -> Iterator[QualityFlag]:

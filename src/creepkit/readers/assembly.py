@@ -96,6 +96,7 @@ def assemble_history(
     assert temperature is not None
     is_named = conditions.states("specimen")
     specimen, outputs = _specimen_and_outputs(conditions, frames, loading.quantity, columns)
+    _record_place(conditions, table, specimen)
     _record_unstated(conditions, specimen, is_named)
     strain_measure = conditions.take_choice(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
@@ -113,7 +114,7 @@ def assemble_history(
         if stated == "no" and not any(name.startswith("strain") for name in outputs):
             what = f"the elastic part in {' and '.join(outputs)} all the same; that of a {specimen} always includes it"
             conditions.record_assumption(what.replace(",", ";"))
-    outputs = without_steps(conditions, frames.times, outputs, used)
+    outputs = without_steps(conditions, frames.times, outputs, used, temperature)
     merged = {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
     rupture_time, unruptured = _end_of_test(conditions, frames, used, name, loading.quantity != "strain")
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
@@ -336,6 +337,26 @@ def _record_unstated(conditions: StatedConditions, specimen: str, is_named: bool
         conditions.record_assumption(f"{what}{listed} mm", first=not is_named)
 
 
+_PLACES = {"middle": re.compile(r"mid|cent(?:re|er|ral)|mitte|mitten"), "load points": re.compile("load|last|roller")}
+
+
+def _record_place(conditions: StatedConditions, table: CellTable, specimen: str) -> None:
+    """Say where an output was read, if another specimen of the kind has it of another place; HistoryError for that."""
+    own, known = known_specimens().get(specimen), known_specimens()
+    for name, other in known.items() if own is not None else ():
+        is_kin = own is not other and (isinstance(other, type(own)) or isinstance(own, type(other)))
+        for one, two in zip(own.outputs, other.outputs, strict=False) if is_kin else ():
+            if one != two or one.long_name == two.long_name:
+                continue
+            written = next((table.as_written(k) for k, c in enumerate(table.columns) if c.startswith(one)), "")
+            said = next((place for place, words in _PLACES.items() if words.search(written.casefold())), "")
+            if said and said in two.long_name:
+                what = f"'{written}' is the {two.long_name}, and {specimen} has the {one.long_name}"
+                raise HistoryError(f"{conditions.location}: {what}; write 'specimen: {name}'")
+            if not said:
+                conditions.record_assumption(f"{one.long_name} ({name} has the {two.long_name})")
+
+
 _LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?mm")
 
 
@@ -454,9 +475,8 @@ def _end_of_test(
     if is_end:
         return None, True
     if time is not None and ended == "stopped":
-        raise HistoryError(
-            f"{time.location}: the test was stopped, and '{time.key}' says when it ruptured; keep one of them"
-        )
+        what = f"the test was stopped, and '{time.key}' says when it ruptured; keep one of them"
+        raise HistoryError(f"{time.location}: {what}")
     if time is not None or ended != "ruptured":
         return None if time is None else time.value, ended == "stopped"
     conditions.record_assumption("rupture at the last frame")

@@ -348,9 +348,7 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, entry: SourceText)
         parts.append("")
     if len(parts) != 4 or (" " in parts[3] and unit_suffix(parts[3]) is None):
         example = f"0 s 100 {next(iter(kind.units))}" if "" not in kind.units else "0 s 0.002, or 0 s 0.2 pct"
-        raise HistoryError(
-            f"{location}: {key} holds '{item.strip()}'; write time and value with units, such as {example}"
-        )
+        raise HistoryError(f"{location}: {key} holds '{item.strip()}'; write time and value with units: {example}")
     time, value = (replace(entry, text=word).number(key) for word in (parts[0], parts[2]))
     units = ((parts[1], TIME), (parts[3], kind))
     time_unit, unit = (one if one in of.units else unit_suffix(one) or one for one, of in units)

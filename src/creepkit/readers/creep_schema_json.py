@@ -182,10 +182,10 @@ def _history(
                 raise HistoryError(f"{entries[quantity].location}: it is not stated; a test needs its {quantity}")
         if not {"rupture", "ended"} & stated.keys():
             found = "the test piece broke" if entries["end"].text else "it is not stated"
-            raise HistoryError(
-                f"{entries['end'].location}: {found}, and there is no creepRuptureTime; state it, or the criterion by "
-                "which the test was stopped"
+            what = (
+                f"{found}, and there is no creepRuptureTime; state it, or the criterion by which the test was stopped"
             )
+            raise HistoryError(f"{entries['end'].location}: {what}")
         for key in ("name", "loading_strain", "strain_measure", *(["end_time"] if "rupture" in stated else [])):
             stated.pop(key, None)
         return assemble_without_frames(name, stated, vocabulary, location=str(path), source=str(path))

@@ -25,7 +25,8 @@ modulus or has no modulus beside it, is told by the check of data quality. A fil
 taken at its word.
 
 An extensometer that was bumped or set anew, as in an interruption, adds a step to all later readings. Its size is the
-distance, midway between the frames around it, of straight lines through the frames before and after it.
+distance, midway between the frames around it, of straight lines through the frames before and after it; where the
+temperature steps between them, at that time. A coefficient of thermal expansion takes off alpha (T - T at the start).
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ from creepkit.readers.frames import UNUSED, TableFrames, column_question
 from creepkit.readers.imposed import hold_begins
 from creepkit.readers.table import SourceText
 from creepkit.readers.vocabulary import unit_suffix
+from creepkit.records.loading import Program
 from creepkit.records.quantities import STRAIN, TIME
 from creepkit.records.reading_noise import noise_of_readings
 from creepkit.records.specimen_record import Output
@@ -345,10 +347,8 @@ def without_loading(
         what = "includes_loading is yes, which leaves no elastic strain; leave out includes_elastic: yes"
         raise HistoryError(f"{location}: {what}")
     if total is None and end is None and times[first] > 0.0:
-        raise HistoryError(
-            f"{location}: includes_loading is yes, but not by how much; state loading_strain_pct, the strain at the "
-            "end of loading, or loading_time_s, when it ended"
-        )
+        what = "includes_loading is yes, but not by how much; state loading_strain_pct or loading_time_s, its end"
+        raise HistoryError(f"{location}: {what}")
     subtracted = strain[first] if total is None else total.value
     conditions.record_assumption(f"loading strain {subtracted:.3g} subtracted")
     return StrainRecord(strain - subtracted, used, includes_elastic=False)
@@ -435,14 +435,35 @@ FITTED_FRAMES = 6
 """Frames on either side of a step through which a straight line is laid."""
 
 
+_EXPANSION = re.compile(r"([\d.]+(?:[eE]-?\d+)?) ?([uµμ]m/m/K|ppm/K|(?:10\^?|1e)-6 ?/K|1?/K|K\^?-1|)")
+
+
+def _expansion(conditions: StatedConditions) -> float:
+    """The stated coefficient of thermal expansion, 1/K, 0 where none is; HistoryError for what cannot be one."""
+    if (entry := conditions.take_entry("thermal_expansion")) is None:
+        return 0.0
+    found = _EXPANSION.fullmatch(entry.text)
+    value = float(found[1]) * (1e-6 if found[2][:-2] not in ("", "1", "K", "K^") else 1.0) if found else 0.0
+    if not 0.0 < value < 1e-3:
+        what = f"thermal_expansion is '{entry.text}'; write it per kelvin, such as 14e-6 1/K"
+        raise HistoryError(f"{entry.location}: {what}")
+    return value
+
+
 def without_steps(
-    conditions: StatedConditions, times: Floats, outputs: Mapping[str, Floats], used: Bools
+    conditions: StatedConditions, times: Floats, outputs: Mapping[str, Floats], used: Bools, imposed: float | Program
 ) -> dict[str, Floats]:
-    """The outputs (frames,) without the steps that are to be taken off, each of which is recorded with its size.
+    """The outputs (frames,) without thermal expansion and steps that are to be taken off, which is recorded.
 
     times : (frames,) s. outputs : {name: (frames,)}. used : (frames,) those that a line may be laid through.
+    imposed : K, the temperature.
     """
-    results = dict(outputs)
+    results, alpha = dict(outputs), _expansion(conditions)
+    program = imposed if isinstance(imposed, Program) else Program.constant(imposed)
+    if alpha and np.ptp(program.values) > 0.0 and "strain" in results:
+        results["strain"] = results["strain"] - alpha * (program.at(times) - program.values[0])
+        conditions.record_assumption(f"thermal expansion of {alpha:.3g}/K from the first temperature on taken off")
+    steps = program.times[1:][np.diff(program.times) == 0.0]
     entry = conditions.take_entry("steps_taken_off")
     if entry is None:
         return results
@@ -451,6 +472,7 @@ def without_steps(
         if not 0 < first < times.size:
             raise HistoryError(f"{entry.location}: no frames lie before and after a step at {time_text(time)}")
         middle = 0.5 * (times[first - 1] + times[first])
+        middle = next((step for step in steps if times[first - 1] < step <= times[first]), middle)
         indices = np.arange(times.size)
         before, after = indices[used & (indices < first)], indices[used & (indices >= first)]
         sizes = list[str]()

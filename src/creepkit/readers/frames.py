@@ -194,10 +194,8 @@ def _converted_column(table: CellTable, name: str, kind: QuantityKind, suffix: s
 def _check_marks(table: CellTable, k: int, marks: Floats) -> None:
     """Refuse what neither uses a frame nor leaves it out."""
     for row in np.flatnonzero((marks != 0.0) & (marks != 1.0))[:1]:
-        raise HistoryError(
-            f"{table.location(int(table.lines[row]), k)}: '{table.as_written(k)}' is {marks[row]:g}; allowed: 1 for a "
-            "frame that is used, 0 for one that is not"
-        )
+        what = f"'{table.as_written(k)}' is {marks[row]:g}; allowed: 1 for a frame that is used, 0 for one that is not"
+        raise HistoryError(f"{table.location(int(table.lines[row]), k)}: {what}")
 
 
 def _without_readings_before_steps(frames: TableFrames, imposed: Sequence[Floats]) -> TableFrames:

@@ -232,10 +232,8 @@ def _elastic_lines(history: History) -> Iterator[tuple[str, str]]:
     elastic = history.elastic
     if not (isinstance(elastic.E, float) and isinstance(elastic.nu, float)):
         if isinstance(history.temperature, Program):
-            raise HistoryError(
-                f"history '{history.name}': elastic data that change with the temperature during a test cannot be "
-                "written; replace them by elastic.at(T)"
-            )
+            what = "elastic data that change during a test cannot be written; replace them by elastic.at(T)"
+            raise HistoryError(f"history '{history.name}': {what}")
         elastic = elastic.at(history.temperature)
     yield "modulus_MPa", _number_text(float(elastic.E))
     yield "poisson", _number_text(float(elastic.nu))
@@ -248,10 +246,8 @@ def _frame_columns(history: History, terms: Terms) -> Iterator[tuple[str, Floats
     for name, values in {**history.outputs, **standard_deviations}.items():
         kind = kinds.get(name.removesuffix("_sd"))
         if kind is None:
-            raise HistoryError(
-                f"history '{history.name}': no unit is known for '{name}', for no registered specimen has such an "
-                f"output; known: {', '.join(kinds)}"
-            )
+            what = f"no registered specimen has an output '{name}', whose unit is not known; known: {', '.join(kinds)}"
+            raise HistoryError(f"history '{history.name}': {what}")
         # A strain is written with its unit, 1, for without one it may be a fraction or in per cent.
         unit = "1" if kind.is_ambiguous_without_unit else next(iter(kind.units))
         yield f"{name}_{unit}" if unit else name, values

@@ -147,10 +147,8 @@ def _control(conditions: StatedConditions, *, varies: bool) -> str:
         return meant
     control = conditions.take_choice("control", ("load", "stress"), required=True)
     if varies and meant and control != meant:
-        raise HistoryError(
-            f"{location}: stress_measure is {measure} and control is {control}, but steps and records of an "
-            "engineering stress are a load, and those of a true stress a stress; keep one of the two"
-        )
+        what = f"stress_measure is {measure} and control is {control}, but an engineering stress that changes is a load"
+        raise HistoryError(f"{location}: {what}, and a true one a stress; keep one of the two")
     return control
 
 
@@ -205,10 +203,8 @@ def _check_bare_strain(conditions: StatedConditions, quantity: str, kind: Quanti
     if "pct" not in kind.units or number.unit:
         return
     if abs(number.value) > LARGEST_BARE_STRAIN:
-        raise HistoryError(
-            f"{number.location}: '{number.key}' is {number.value:g} without a unit; write {quantity}_pct for a "
-            f"percentage, or {quantity}_steps: 0 s {number.value:g} for a fraction"
-        )
+        what = f"'{number.key}' is {number.value:g} without a unit; write {quantity}_pct for a percentage"
+        raise HistoryError(f"{number.location}: {what}, or {quantity}_steps: 0 s {number.value:g} for a fraction")
     conditions.record_assumption(f"{quantity} {number.value:g} as a fraction")
 
 

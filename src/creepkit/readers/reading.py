@@ -122,10 +122,8 @@ def reader_without(ignored: Collection[str], reader: Reader) -> Reader:
 
     ignored : names of columns as they are written, or but for capitals and unit.
     """
-    if isinstance(ignored, str) or not all(str(name).strip() for name in ignored):
-        raise HistoryError(
-            f"ignore is {quoted(repr(ignored), 60)}; give a list of names of columns, such as ['load_kN', 'date']"
-        )
+    if not all(str(name).strip() for name in ignored):
+        raise HistoryError(f"ignore is {quoted(repr(ignored), 60)}; give names of columns, such as ['load_kN', 'date']")
     return _with_vocabulary(reader, lambda vocabulary: replace(vocabulary, ignored=tuple(ignored)))
 
 

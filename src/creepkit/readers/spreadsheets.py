@@ -75,10 +75,8 @@ def read_sheets(path: Path) -> list[CellTable]:
             warnings.simplefilter("ignore")  # of what a workbook holds beside its cells
             size, most = sum(part.file_size for part in archive.infolist()), raised(MAXIMUM_UNPACKED_BYTES)
             if size > most:
-                raise HistoryError(
-                    f"{path}: unpacks to {size / 1e6:.0f} MB, more than {most / 1e6:g} MB; save it as CSV, or "
-                    f"{how_to_raise(size, most)}"
-                )
+                what = f"unpacks to {size / 1e6:.0f} MB, more than {most / 1e6:g} MB"
+                raise HistoryError(f"{path}: {what}; save it as CSV, or {how_to_raise(size, most)}")
             book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
             # Counted from 1904, days come out as they are in the file; from 1900, the 59th and the 60th are one.
             first_day, book.epoch = book.epoch, _DAY_ZERO
@@ -164,10 +162,8 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str], fir
     """
     table = CellTable(path, [], str(sheet.title), Dialect("\t"), assumptions=(*notes.remarks(sheet.title), *aside))
     if notes.uncomputed:
-        raise HistoryError(
-            f"{table.place}, cell {notes.uncomputed}: a formula without a computed value; open the file in a "
-            "spreadsheet program and save it, or paste the values"
-        )
+        what = "a formula without a computed value; save the file in a spreadsheet program, or paste the values"
+        raise HistoryError(f"{table.place}, cell {notes.uncomputed}: {what}")
     rows, comments, texts, known = list[TableRow](), list[TableRow](), set[str](), dict[str, str]()
     sheet.reset_dimensions()
     for number, row in enumerate(sheet.iter_rows(), 1):
@@ -404,10 +400,8 @@ def _with_conditions(
     used = {test.name if test.name in stated else test.table.sheet for test in tests}
     if unused := sorted(stated.keys() - used):
         where = next((entry.location for entry in stated[unused[0]].values()), str(path))
-        raise HistoryError(
-            f"{where}: '{quoted(unused[0])}' has conditions, but no sheet or column of that name; correct the name, or "
-            "leave the sheet out by its name: --ignore, in Python ignore=[...]"
-        )
+        what = f"'{quoted(unused[0])}' has conditions, but no sheet or column of that name"
+        raise HistoryError(f"{where}: {what}; correct it, or leave the sheet out: --ignore, in Python ignore=[...]")
     for test in tests:
         extra = stated.get(test.name, stated.get(test.table.sheet, {}))
         for key in extra.keys() & test.entries.keys():

@@ -60,9 +60,8 @@ def in_standard_names(
     stated = in_standard_keys(entries, known)
     for key, entry in _stated_by_columns(table):
         if stated.setdefault(key, entry).text != entry.text:
-            raise HistoryError(
-                f"{stated[key].location}: {key} is '{stated[key].text}', but {entry.location} says {entry.text}"
-            )
+            what = f"{key} is '{stated[key].text}', but {entry.location} says {entry.text}"
+            raise HistoryError(f"{stated[key].location}: {what}")
     columns = [known.column(name) for name in table.columns]
     table = replace(table, columns=columns, written=table.columns) if columns != list(table.columns) else table
     table = with_elapsed_times(stated, table, known)

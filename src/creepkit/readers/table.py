@@ -269,10 +269,9 @@ def without_ignored(table: CellTable, names_at: int, ignored: Collection[str]) -
         for name in [entry.text] if entry.text in cells else names:
             found = _columns_called(name, cells)
             if not found:
-                raise HistoryError(
-                    f"{entry.location}: ignore names '{quoted(name)}', which is no column; the columns are: "
-                    f"{some_of(list(filter(None, cells)))}"
-                )
+                columns = some_of(list(filter(None, cells)))
+                what = f"ignore names '{quoted(name)}', which is no column; the columns are: {columns}"
+                raise HistoryError(f"{entry.location}: {what}")
             left_out.update(found)
     header = {name: entry for name, entry in table.header.items() if name != key}
     if not left_out:
@@ -334,7 +333,5 @@ def cells_of_width(table: CellTable, row: TableRow, width: int, *, beside: bool 
     delimiter = str(table.dialect).partition(",")[0]  # a cell lost within a line of text moves those behind it
     advice = ", empty ones too" * (len(cells) < width)
     advice += "; decimal commas need another delimiter, such as ;" * (table.dialect.delimiter == ",")
-    raise HistoryError(
-        f"{place}: number of cells {len(cells)}, of columns {width}; write one cell a column, separated by "
-        f"{delimiter}{advice}"
-    )
+    what = f"number of cells {len(cells)}, of columns {width}; write one cell a column"
+    raise HistoryError(f"{place}: {what}, separated by {delimiter}{advice}")

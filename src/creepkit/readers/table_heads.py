@@ -126,10 +126,8 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
         raise HistoryError(f"{table.location(line)}: every column is left out by ignore; keep those of the test")
     names = table.rows[at]
     if is_frame(names, table):
-        raise HistoryError(
-            f"{table.location(line)}: the first row holds numbers, and none above it names the columns; write a row of "
-            "names such as time_h,strain_pct above it (behind '#' it is one, too)"
-        )
+        what = "the first row holds numbers, and none above it names the columns; write names such as time_h,strain_pct"
+        raise HistoryError(f"{table.location(line)}: {what} above it (behind '#' they count, too)")
     times = [k for k, cell in enumerate(names.cells) if is_time(cell, known)]
     body = at + 1
     while body < min(len(table.rows), at + _MOST_BELOW) and _is_of_head(table.rows[body], times, table, known):
@@ -248,10 +246,8 @@ class HeadOfTest:
             key, *cells = cells
             plain = key.rstrip(": ")
             if is_number(key, self.table.dialect):
-                raise HistoryError(
-                    f"{place}: the number {quoted(key)} stands above the names of the columns, and is that of a column "
-                    "without a name, or has no key before it; name every column of the table, or the condition"
-                )
+                what = f"the number {quoted(key)} stands above the names of the columns and has no key before it"
+                raise HistoryError(f"{place}: {what}; name every column of the table, or the condition")
             if "=" in key and conditions_in_text(key, place, known):
                 self.add_title(key, row)
             elif measured := conditions_of_head(key, known):

@@ -380,11 +380,9 @@ def _tests_of_columns(headed: HeadedTable) -> list[TabulatedTest]:
             tests[same] = TestColumns(test, {**tests[same].columns, k: column})
     beside = [[cell for k, cell in enumerate(row.cells) if cell and k >= first] for row in headed.rows]
     if all(one.test.isdigit() for one in tests) and not any(len(set(cells)) > 1 for cells in beside):
-        raise HistoryError(
-            f"{headed.place}: several columns of one quantity, and no conditions above each, may be tests or sensors "
-            "of one test; name the tests, such as 'A1 strain (%)', or keep one column, with '# ignore: NAME' for the "
-            "others"
-        )
+        what = "several columns of one quantity, and no conditions above each, may be tests or sensors of one; name"
+        advice = "the tests, such as 'A1 strain (%)', or keep one column, with '# ignore: NAME' for the others"
+        raise HistoryError(f"{headed.place}: {what} {advice}")
     return _tests_of_blocks(headed, tests, {*range(first), *shared})
 
 
@@ -398,10 +396,8 @@ def _test_and_strain(headed: HeadedTable, k: int) -> tuple[str, str]:
     if stated is None and unit_suffix(unit) in STRAIN.units and headed.rows:
         return name, f"strain ({unit})"
     if stated is None and not _are_conditions(headed):
-        raise HistoryError(
-            f"{headed.place}: the column '{quoted(cell)}' does not say what it holds; write '# columns: strain_pct' "
-            "above, or names such as 'A1 strain (%)'"
-        )
+        what = f"the column '{quoted(cell)}' does not say what it holds; write '# columns: strain_pct' above, or names"
+        raise HistoryError(f"{headed.place}: {what} such as 'A1 strain (%)'")
     return written, stated.text if stated else f"strain{cell.removeprefix(written)}"
 
 
@@ -476,10 +472,10 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
         what = f"{' and '.join(map(repr, axes[0]))} are columns of a plot; what are they?"
         raise column_question(headed.table, what, *choices)
     if not headed.times:
-        raise HistoryError(
-            f"{headed.place}: missing column: no time among {some_of(list(filter(None, headed.names)))}; name one "
-            "time_s, time_min or time_h in that row, behind its '#' where it has one"
+        what = (
+            f"missing column: no time among {some_of(list(filter(None, headed.names)))}; name one time_s, time_min or"
         )
+        raise HistoryError(f"{headed.place}: {what} time_h in that row, behind its '#' where it has one")
     head = HeadOfTest(headed.table, headed.known)
     for row in headed.whole:
         head.read(row)

@@ -100,6 +100,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "modulus": (
         *("young's modulus", "youngs modulus", "elastic modulus", "e modul", "elastizitätsmodul", "module d'young"),
     ),
+    "thermal_expansion": ("coefficient of thermal expansion", "cte", "wärmeausdehnungskoeffizient"),
     "poisson": ("poisson's ratio", "poissons ratio", "poisson ratio"),
     "rupture": ("rupture time", "time to rupture", "rupture life", "bruchzeit", "standzeit", "temps à rupture"),
     "strain_sd": ("standard deviation of strain", "strain standard deviation"),
@@ -116,6 +117,11 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "outer_diameter": (
         *("od", "o.d.", "outside diameter", "tube diameter", "mean od", "mean outer diameter", "aussendurchmesser"),
         *("außendurchmesser", "diamètre extérieur"),
+    ),
+    "deflection": (
+        *("midspan deflection", "deflection at midspan", "centre deflection", "center deflection", "durchbiegung"),
+        *("central deflection", "mid span deflection", "durchbiegung mitte", "mittendurchbiegung", "flèche"),
+        *("flèche au centre", "load point deflection", "load point displacement", "deflection at load points"),
     ),
     "notch_diameter": ("minimum diameter", "root diameter", "notch root diameter", "kerbdurchmesser"),
     "span": (
@@ -330,7 +336,7 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 
 TEXT_KEYS = (
     *("name", "alloy", "specimen", "operator", "control", "strain_measure", "stress_measure"),
-    *("includes_elastic", "includes_loading", "ended", "noise_correlation", "steps_taken_off"),
+    *("includes_elastic", "includes_loading", "ended", "noise_correlation", "steps_taken_off", "thermal_expansion"),
     *("decimal", "columns", "ignore", "strain_unit", "date_order", "time_zone"),
 )
 """Words that stand once for a whole test, beside steps and programs; the last line says how its table is written."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, frozen, set_fields
-from creepkit.checked_arguments import checked, checked_with_own_words
+from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.records.presentable import Presentable
 
@@ -37,7 +37,7 @@ class ClockAlignment(Presentable):
         set_fields(self, lags=frozen(self.lags), probability=frozen(self.probability))
 
     @classmethod
-    @checked_with_own_words("lag", "zero")
+    @checked
     def stated(cls, lag: float, zero: float = 0.0) -> ClockAlignment:
         """An alignment that is known: the record's time is t - zero + lag."""
         return cls(zero, lag, (lag, lag))

@@ -59,9 +59,18 @@ EVERY_FRAME: Bools = frozen([], dtype=bool)
 """The value of History.used that marks every frame."""
 
 
+class Measured(NotebookCell, Plotted, Tabulated):
+    """One or several tests, which notebooks show as a table and a picture of their outputs over time."""
+
+    def _drawn_by(self) -> tuple[Any, Any]:
+        from creepkit.reports.histories import draw_tests, tests_figure
+
+        return tests_figure, draw_tests
+
+
 @checked
 @dataclass(frozen=True, eq=False)
-class History(NotebookCell, Plotted, Tabulated):
+class History(Measured):
     """One measured (or planned) test: outputs over time, and everything known about how it was made.
 
     times : (frames,) s, strictly increasing.
@@ -231,11 +240,6 @@ class History(NotebookCell, Plotted, Tabulated):
 
         return history_from_dataframe(frame, conditions)
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.histories import draw_history, history_figure
-
-        return history_figure, draw_history
-
     def replace(self, **changes: Any) -> History:
         """The same history with some fields changed.
 
@@ -310,10 +314,8 @@ class History(NotebookCell, Plotted, Tabulated):
         return f"{celsius_text(*ends, digits=0)}, {loading_text(self.loading, load_unit(self))}"
 
 
-class Histories(list[History], NotebookCell, Plotted, Tabulated):
-    """A list of tests, which notebooks show as a table."""
+class Histories(list[History], Measured):
+    """A list of tests, which notebooks show as a table and a picture."""
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.histories import draw_tests, tests_figure
-
-        return tests_figure, draw_tests
+    def __repr__(self) -> str:
+        return f"<Histories: {len(self)}, {', '.join(one.name for one in self[:4])}{', ...' * (len(self) > 4)}>"

@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, frozen, set_fields
-from creepkit.checked_arguments import checked, checked_with_own_words
+from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, quoted
 
 Quantity: TypeAlias = str
@@ -116,8 +116,6 @@ class StressSteps:
         steps = _checked_steps("stress steps", self.steps)
         if any(not 0 <= s < 1e5 for _, s in steps):
             raise SolveError(f"stress must lie from 0 to 1e5 MPa in every step, found {[s for _, s in steps]}")
-        if self.control not in ("load", "stress"):
-            raise SolveError(f"control is '{self.control}'; allowed are 'load' and 'stress'")
         object.__setattr__(self, "steps", steps)
 
     def program(self) -> Program:
@@ -125,7 +123,7 @@ class StressSteps:
         return Program.steps(self.steps)
 
 
-@checked_with_own_words("stress")
+@checked
 def constant_stress(stress: float, control: Literal["load", "stress"] = "load") -> StressSteps:
     """One stress, MPa, held from time zero."""
     return StressSteps(((0.0, stress),), control)

@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from enum import IntEnum
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.checked_arguments import checked_with_own_words
+from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
+from creepkit.limits import numbers
 from creepkit.records.specimen_lookup import all_dimensions
 from creepkit.records.specimen_record import NAME_PATTERN
 
@@ -133,7 +134,7 @@ CLOSE_SPELLING = 0.8
 """Similarity above which an unknown kind is a misspelt one."""
 
 
-@checked_with_own_words("sd")
+@checked
 @dataclass(frozen=True)
 class Nuisance:
     """A nuisance parameter: something unknown about a test that is not part of the law, with its prior.
@@ -161,19 +162,13 @@ class Nuisance:
     scope: Literal["test", "alloy", "all"] = "test"
     output: str = ""
     mean: float = 0.0
-    sd: float | None = None
+    sd: Annotated[float, numbers(0, above=True, infinite=True)] | None = None
     bounds: tuple[float, float] = (-np.inf, np.inf)
     start: float = 0.0
     tests: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         _check_kind(self.kind)
-        if self.scope not in (scopes := ("test", "alloy", "all")):
-            raise SolveError(
-                f"nuisance '{self.kind}': scope '{self.scope}' is not known; {nearest(self.scope, scopes)}"
-            )
-        if self.sd is not None and not self.sd > 0:
-            raise SolveError(f"nuisance '{self.kind}': sd = {self.sd} must be above zero (or None to estimate it)")
         if not self.bounds[0] < self.bounds[1]:
             raise SolveError(f"nuisance '{self.kind}': bounds {self.bounds} are reversed")
         if self.kind in STEP_NUISANCES and not 0.0 < self.start < np.inf:

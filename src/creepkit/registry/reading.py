@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from creepkit.arrays import ArrayLike
 from creepkit.cameras import reading as camera_reading
-from creepkit.checked_arguments import checked_with_own_words
+from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError
 from creepkit.instruments import reading as instrument_files
 from creepkit.instruments.reading_options import RecordOptions
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from creepkit.option_keywords import RecordOptionsKeywords
 
 
-@checked_with_own_words("ignore")
+@checked
 def read_histories(paths: reading.PathsLike, reader: str | None = None, ignore: Collection[str] = ()) -> Histories:
     """Read measured histories from a file, a folder, a pattern such as "in625/*.csv", or several of these.
 
@@ -50,7 +50,7 @@ def read_those_that_can_be(
     return read, tests, errors
 
 
-@checked_with_own_words("times")
+@checked
 def read_frames(
     path: camera_reading.FramePath,
     format: camera_reading.FormatLike = None,
@@ -77,7 +77,7 @@ def frame_files(path: camera_reading.FramePath, format: camera_reading.FormatLik
 
 
 @takes_options(RecordOptions)
-@checked_with_own_words("options")
+@checked
 def read_record(
     path: str | Path, format: str | None = None, **options: Unpack[RecordOptionsKeywords]
 ) -> InstrumentRecord:

@@ -6,7 +6,8 @@ from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import CreepkitError, DatasetError, quoted
-from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
+from creepkit.files.record_codec import RecordCodec, RecordError
+from creepkit.limits import ANY_NUMBER
 from creepkit.registry.arguments import specimen_by_name
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from creepkit.language import strain, temperature, time
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.blocks import Answer, Rich, as_text, number, plural, printable
+from creepkit.reports.blocks import Answer, Rich, as_text, ends, listed, number, plural, printable
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
 
 if TYPE_CHECKING:
@@ -103,12 +103,13 @@ def _written_out(value: float, digits: int) -> str:
 def key_figures(fit: Identification) -> list[KeyFigure]:
     """Stress exponent, activation energy and creep rate at the tests; of a rejected law what was measured."""
     rates = compared_minimum_rates(fit)
-    measured, predicted = exponents(rates) if rates else (math.nan, math.nan)
+    measured, half, predicted = exponents(rates) if rates else (math.nan, math.nan, math.nan)
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
         if not math.isfinite(measured):
             return []
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
-        return [KeyFigure("stress exponent of measured minimum rates", _range(fit), measured, remark=by_law)]
+        interval = (measured, measured - half, measured + half)
+        return [KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law)]
     r = fit.reference
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}"
     rate, exponent = rate_and_exponent(fit)
@@ -120,7 +121,7 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
     rate_figure = _with_interval("creep rate", f"{at}{of_state}", rate, PERCENT_PER_HOUR, "%/h")
     included = any(one.included for one in fit.unmodelled)
-    return [*figures, replace(rate_figure, remark="usual errors included") if included else rate_figure]
+    return [*figures, replace(rate_figure, remark="with usual errors") if included else rate_figure]
 
 
 def _with_interval(name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "") -> KeyFigure:
@@ -176,9 +177,7 @@ def strength_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
 
 def _range(fit: Identification) -> str:
     """Stresses and temperatures of the tests."""
-    low, high = fit.ranges["stress"]
-    stresses = f"{low:.3g} MPa" if f"{low:.3g}" == f"{high:.3g}" else f"{low:.3g} to {high:.3g} MPa"
-    return f"{stresses}, {celsius_text(*fit.ranges['temperature'], digits=0)}"
+    return f"{ends(fit.ranges['stress'], 3)} MPa, {celsius_text(*fit.ranges['temperature'], digits=0)}"
 
 
 def tests_text(fit: Identification) -> str:
@@ -193,8 +192,14 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
     """What to mind, the most serious first, a sentence each without a full stop."""
     others = [one.fit for one in ranking.laws if one.fit is not fit] if ranking is not None else []
     choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
-    of_law = [*_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
+    of_law = [*_of_tests(fit), *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
     return list(dict.fromkeys([*of_law, *_held(others), *_data(quality)]))
+
+
+def _of_tests(fit: Identification) -> Iterator[str]:
+    """Tests that do not agree with all others, with the error that would make it."""
+    found = fit.adequacy.explanations[:1] if fit.adequacy is not None else ()
+    yield from (one.caution if one.kind == "one test" else one.headline for one in found if not one.is_of_law)
 
 
 def _held(fits: Sequence[Identification]) -> Iterator[str]:
@@ -220,17 +225,15 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         yield f"it does not predict every reading of {_named(adequacy.unpredicted, 'test')}"
     if adequacy.contradicting is not None:
         yield "minimum rates and rupture times of the tests contradict one another by this law"
-    if adequacy.is_explained:
+    if adequacy.is_explained and not adequacy.lies_in_tests:
         yield adequacy.explanations[0].headline
     if adequacy.mentioned is not None:
         yield adequacy.mentioned.caution
     if adequacy.misses_shape() and adequacy.largest is not None:
         worst = adequacy.largest
-        percent = is_logarithmic(worst.output)
-        unit = "%" if percent else output_unit(worst.output)
-        size = abs(worst.deviation) * (100.0 if percent else 1.0)
+        factor, unit = (100.0, "%") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
+        what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
         side = "too large" if worst.deviation > 0 else "too small"
-        what, amount = worst.output.replace("_", " "), f"{size:.2g} {unit}".strip()
         yield f"it is worst in '{worst.test}': {what} {amount} {side} at {time_text(worst.time)}"
     if adequacy.remedies and not adequacy.explanations:
         yield f"it would explain the tests with {adequacy.remedies[0]}, which nobody modelled"
@@ -277,10 +280,8 @@ def _data(quality: DataQuality | None) -> Iterator[str]:
 def _named(names: Sequence[str], noun: str, *, quoted: bool = True) -> str:
     """Some names, and how many more there are."""
     marks = "'" if quoted and noun == "test" else ""
-    listed = [f"{marks}{name}{marks}" for name in names[:MOST_NAMED]]
-    more = len(names) - len(listed)
-    listed += [f"{more} more {noun}{'s' * (more > 1)}"] if more > 0 else []
-    return listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])} and {listed[-1]}"
+    more = [f"{plural(len(names) - MOST_NAMED, f'more {noun}')}"] if len(names) > MOST_NAMED else []
+    return listed([*(f"{marks}{name}{marks}" for name in names[:MOST_NAMED]), *more])
 
 
 # ---- next ------------------------------------------------------------------------------------------------------------
@@ -319,10 +320,8 @@ def answer(
     """
     symbols = symbols_of(fit.law)
     remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
-    if ranking is not None and len(ranking.laws) > 1:
-        remarks.append(chosen_text(ranking))
-    if fit.sparsity is not None:
-        remarks.append(fit.sparsity.verdict)
+    remarks += [chosen_text(ranking)] if ranking is not None and len(ranking.laws) > 1 else []
+    remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
     return Answer(
         fit.headline,
         titled_law(fit.law),
@@ -406,7 +405,7 @@ def held_quantities(fit: Identification) -> str:
     law = fit.law
     held = [word for word, symbol in (("time", time), ("strain", strain)) if law.uses(symbol)]
     held += ["initial internal variables"] if law.states else []
-    return f"{', '.join(held[:-1])} and {held[-1]}" if len(held) > 1 else "".join(held)
+    return listed(held) if held else ""
 
 
 def reference_sentences(fit: Identification) -> list[str]:

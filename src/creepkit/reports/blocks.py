@@ -11,17 +11,20 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from textwrap import wrap
 from typing import Any, ClassVar, TypeAlias
 
 from markupsafe import Markup
 
+from creepkit.arrays import Floats
+
 LONGEST_TEXT = 4000
 """Characters of a cell or paragraph; an error message may hold a name of any length."""
 
 
-WIDTH = 100
-"""Characters of a line of an answer in a terminal."""
+MOST_LINES, WIDTH = 12, 100
+"""Of an answer in a terminal, and characters of a line."""
 
 
 @dataclass(frozen=True)
@@ -182,6 +185,16 @@ def plural(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
+def listed(words: Sequence[str]) -> str:
+    """Words with commas, and 'and' before the last."""
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0] if words else "none"
+
+
+def ends(values: Sequence[float] | Floats, digits: int = 4) -> str:
+    """The least and the largest of values (numbers,), '140 to 230'; one where they are the same."""
+    return " to ".join(dict.fromkeys(number(end, digits) for end in (min(values), max(values))))
+
+
 def number(value: float, digits: int = 4) -> str:
     """A number as programs write it, such as 4.2e-05; NaN as a dash."""
     return "–" if math.isnan(value) else f"{value:.{digits}g}"
@@ -250,19 +263,22 @@ def _lines(block: Block) -> list[str]:
 
 
 def _answer_lines(answer: Answer) -> list[str]:
-    """A dozen lines, none of which is longer than WIDTH."""
-    lines = wrap(answer.headline, WIDTH)
-    lines += [line for text in answer.remarks for line in _indented(text, "    ")]
-    lines += [f"  {equation}" for equation in answer.equations]
+    """MOST_LINES lines, none longer than WIDTH; cautions and figures without room among them stand in the details."""
     pieces = [f"{name} = {value} [{', '.join(ends)}] {unit}".strip() for name, value, ends, unit in answer.values]
-    lines += _indented("   ".join(piece.replace(" ", "\u00a0") for piece in pieces), "    ")
-    for name, where, value, remark in answer.figures:
-        lines += _indented(f"{name} at {where}: {value}{', ' if remark else ''}{remark}", "    ")
-    lines += [line for text in answer.cautions for line in _indented(f"- {text}", "    ")]
-    return [*lines, *_indented(f"next: {answer.next_step}; more: .details()")]
+    lines = wrap(answer.headline, WIDTH)
+    for text in (*answer.remarks, *map(str, answer.equations), "   ".join(p.replace(" ", "\u00a0") for p in pieces)):
+        lines += _indented(text)
+    figures = [f"{name} at {where}: {value}{remark and ', '}{remark}" for name, where, value, remark in answer.figures]
+    said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
+    end = _indented(f"next: {answer.next_step}; more: .details()")
+    end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), "  more: .details()"]
+    for parts in (warned, said):
+        while len(parts) > 1 and sum(map(len, (lines, *said, *warned, end))) > MOST_LINES:
+            parts.pop()
+    return [*lines, *chain(*said, *warned), *end]
 
 
-def _indented(text: str, hanging: str = "  ") -> list[str]:
-    """Lines of a text, the first indented by two; blanks that do not break hold the pieces of a value together."""
-    lines = wrap(text, WIDTH, initial_indent="  ", subsequent_indent=hanging, break_long_words=False)
+def _indented(text: str) -> list[str]:
+    """Lines of a text, indented by two and four; blanks that do not break hold the pieces of a value together."""
+    lines = wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_long_words=False)
     return [line.replace("\u00a0", " ") for line in lines]

@@ -181,29 +181,19 @@ def data_quality_to_json(quality: DataQuality) -> dict[str, Any]:
 # ---- over time -------------------------------------------------------------------------------------------------------
 
 
-def tests_figure(histories: Sequence[History]) -> Figure:
-    """A panel for each output of tests, over time; frames that are not used are drawn hollow."""
+def tests_figure(histories: History | Sequence[History]) -> Figure:
+    """A panel for each output of one or several tests, over time; frames that are not used are drawn hollow."""
     return over_time(_outputs(histories))
 
 
-def history_figure(history: History) -> Figure:
-    """The same of one test."""
-    return tests_figure([history])
-
-
-def draw_tests(axes: Axes, histories: Sequence[History]) -> None:
+def draw_tests(axes: Axes, histories: History | Sequence[History]) -> None:
     """The first output of tests over time."""
     draw_over_time(axes, _outputs(histories))
 
 
-def draw_history(axes: Axes, history: History) -> None:
-    """The same of one test."""
-    draw_tests(axes, [history])
-
-
-def _outputs(histories: Sequence[History]) -> Panels:
+def _outputs(tests: History | Sequence[History]) -> Panels:
     panels: dict[str, list[Course]] = {}
-    for history in histories:
+    for history in [tests] if isinstance(tests, History) else tests:
         hours, unused = history.times / SECONDS_PER_HOUR, ~np.asarray(history.used)
         for name, values in history.outputs.items():
             percent = is_logarithmic(name)

@@ -21,7 +21,7 @@ from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
 from creepkit.language.printing import arrhenius_exponent
 from creepkit.laws.paper import PAPER
 from creepkit.limits import SIGNIFICANCE
-from creepkit.reports.blocks import number, plural, printable, sentence, typeset
+from creepkit.reports.blocks import ends, listed, number, plural, printable, sentence, typeset
 from creepkit.reports.compared_values import compared_observations, reading_counts
 from creepkit.reports.design import order_text
 from creepkit.reports.identification import rate_scatter_sentence
@@ -96,11 +96,6 @@ def _each(found: Iterable[Any], sentences_of: Callable[[Any], Iterable[str]]) ->
     return [*dict.fromkeys(text for one in found for text in sentences_of(one))]
 
 
-def listed(words: Sequence[str]) -> str:
-    """Words with commas, and 'and' before the last."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else "none"
-
-
 # ---- tests, laws and models ------------------------------------------------------------------------------------------
 
 
@@ -117,7 +112,7 @@ def _tests(fits: Sequence[Identification]) -> Iterator[str]:
     if any("arsinh" in text for text in compared):
         yield f"The floor f is {100 * FLOOR_SHARE:g} % of the median end value, at least {FLOOR_NOISES:g} noises."
     if any(one is not None and one.followed_to_rupture.any() for one in map(compared_observations, fits)):
-        yield "Readings of tests followed to rupture have orthogonal residuals √2 |a b| / √(a² + b²), signed as a."
+        yield "Readings to rupture, or of a rising rate, have orthogonal residuals √2 |a b| / √(a² + b²), signed as a."
         yield "There a is predicted less measured transformed strain, b ln of the measured over the predicted time."
         yield "Tests stopped before rupture count only where they lasted longer than predicted."
 
@@ -148,12 +143,8 @@ def _loading(fit: Identification) -> Iterator[str]:
         yield f"Strains are {measure} and {'contain' if elastic else 'do not contain'} the elastic strain on loading."
     known = [h.elastic.at(h.mean_temperature) for h in fit.histories if h.elastic is not None]
     if known:
-        moduli, ratios = _range([1e-3 * float(one.E) for one in known]), _range([float(one.nu) for one in known])
+        moduli, ratios = ends([1e-3 * float(one.E) for one in known]), ends([float(one.nu) for one in known])
         yield f"Young's modulus is {moduli} GPa and Poisson's ratio {ratios} in {plural(len(known), 'test')}."
-
-
-def _range(values: Sequence[float]) -> str:
-    return " to ".join(dict.fromkeys(number(end, 4) for end in (min(values), max(values))))
 
 
 def laws_of(found: Sequence[ReportGroup]) -> dict[str, CreepLaw]:
@@ -230,8 +221,7 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
         weighted = f"this weighted estimate{cite('weighted least squares')}, H⁻¹ (Jᵀ W C W J + P) H⁻¹"
         yield f"95 % intervals follow from the covariance of {weighted}. There H = Jᵀ W J + P, with {freedom}."
         yield "J are derivatives of residuals, W weights, C the covariance of the noise, P the precision of the priors."
-    nuisances = list(dict.fromkeys(one.kind for one in settings.nuisances))
-    if nuisances:
+    if nuisances := list(dict.fromkeys(one.kind for one in settings.nuisances)):
         yield f"Nuisance parameters of the tests with Gaussian priors are {listed(nuisances)}."
     yield rate_scatter_sentence(fit)
     chance = f"{100 * AUTOCORRELATION_CONFIDENCE:g} % of cases"

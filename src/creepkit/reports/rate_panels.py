@@ -216,16 +216,19 @@ def compared_minimum_rates(fit: Identification) -> list[MinimumRate]:
     return rates if 2 * len(rates) >= len(fit.tests) else []
 
 
-def exponents(rates: Sequence[MinimumRate]) -> tuple[float, float]:
-    """The apparent stress exponents of measured and of predicted minimum rates; NaN of tests at one stress."""
+def exponents(rates: Sequence[MinimumRate]) -> tuple[float, float, float]:
+    """The apparent stress exponent of measured minimum rates with half of its 95 % interval, and of predicted ones.
+
+    NaN of tests at one stress.
+    """
     celsius, stresses, *columns = _columns(rates, "temperature", "stress", "measured", "predicted")
     measured, predicted = (apparent_exponent(stresses, one, celsius + ZERO_CELSIUS) for one in columns)
-    return measured, predicted
+    return *measured, predicted[0]
 
 
 def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
     """Both in words; "" where the stresses do not differ."""
-    measured, predicted = exponents(rates)
+    measured, _, predicted = exponents(rates)
     if not np.isfinite([measured, predicted]).all():
         return ""
     return f"apparent stress exponent: measured {measured:.2g}, by the law {predicted:.2g}"

@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
-from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, ends, plural
 from creepkit.reports.figures import draw_parity, empty_figure, span, wrapped
 from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.rupture_assessment.checks import BAND_FACTOR
@@ -49,7 +49,7 @@ def rupture_text(assessment: RuptureAssessment) -> str:
 def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
     """The tests, the verdict, and the strengths of the average method in a table."""
     tests = assessment.tests
-    span = f"{_range(tests.stress)} MPa, {_range(tests.temperature - ZERO_CELSIUS)} °C"
+    span = f"{ends(tests.stress)} MPa, {ends(tests.temperature - ZERO_CELSIUS)} °C"
     heats = "".join(f", {len(set(v))} {_plural(group)}" for group, v in tests.groups.items())
     head = (
         f"{len(tests)} rupture tests, {int(tests.censored.sum())} of them run-outs, {span}, up to "
@@ -124,11 +124,6 @@ def check_text(check: AssessmentCheck) -> str:
 
 def _plural(group: str) -> str:
     return "laboratories" if group == "laboratory" else f"{group}s"
-
-
-def _range(values: Any) -> str:
-    low, high = f"{float(np.min(values)):.4g}", f"{float(np.max(values)):.4g}"
-    return low if low == high else f"{low} to {high}"
 
 
 def _constants(fit: RuptureFit) -> Table:

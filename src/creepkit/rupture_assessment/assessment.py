@@ -17,10 +17,10 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
-from creepkit.files.record_codec import ANY_NUMBER, NumberRange, RecordCodec, RecordError
+from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import write_text
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
-from creepkit.limits import PROBABILITY, SEED, Limits, numbers
+from creepkit.limits import ANY_NUMBER, PROBABILITY, SEED, Limits, numbers
 from creepkit.options import CELSIUS, Options, option
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.records.presentable import Plotted, Presentable, Tabulated
@@ -54,7 +54,7 @@ LARGEST_CONSTANT = 1e7
 
 @checked
 @dataclass(frozen=True)
-class RuptureSettings(Options, title="settings of an assessment", error=FitError):
+class RuptureSettings(Options, title="settings of an assessment"):
     """How rupture tests are assessed.
 
     degrees : of polynomials of log10 of the stress that are tried.
@@ -74,7 +74,6 @@ class RuptureSettings(Options, title="settings of an assessment", error=FitError
     def __post_init__(self) -> None:
         if not self.degrees:
             raise FitError("degrees are (); give whole numbers from 1 to 5, such as (1, 2, 3)")
-        super().__post_init__()
         for method, constants in self.fixed.items():
             if method not in METHODS:
                 raise FitError(f"fixed= names a method '{method}'; {nearest(method, METHODS)}")
@@ -88,8 +87,9 @@ class RuptureSettings(Options, title="settings of an assessment", error=FitError
                     )
 
 
+@checked
 @dataclass(frozen=True)
-class RuptureQuestion(Options, title="arguments of an assessment", error=FitError):
+class RuptureQuestion(Options, title="arguments of an assessment"):
     """What rupture() is asked beside its settings, as its arguments of these names have it; K, h, MPa."""
 
     methods: tuple[str, ...] | None = option(
@@ -343,8 +343,8 @@ ASSESSMENT = DocumentFormat(
     remedy="assess the tests again",
 )
 
-POSITIVE = NumberRange(low=0.0, open_low=True)
-POSITIVE_OR_NAN = NumberRange(low=0.0, open_low=True, nan=True)
+POSITIVE = numbers(low=0.0, above=True)
+POSITIVE_OR_NAN = numbers(low=0.0, above=True, nan=True)
 
 CODEC = RecordCodec(
     ranges={
@@ -354,9 +354,9 @@ CODEC = RecordCodec(
             "tensile_strength": POSITIVE_OR_NAN,
             "minimum_rate": POSITIVE_OR_NAN,
         },
-        RankedRuptureFit: {"excess": NumberRange(low=0.0), "weight": NumberRange(low=0.0, high=1.0)},
+        RankedRuptureFit: {"excess": numbers(low=0.0), "weight": numbers(low=0.0, high=1.0)},
         RuptureFit: {"scale": POSITIVE, "scale_corrected": POSITIVE},
-        VarianceFreedom: {"most": NumberRange(low=1.0)},
+        VarianceFreedom: {"most": numbers(low=1.0)},
         RuptureParameter: dict.fromkeys(("value", "low", "high"), ANY_NUMBER),
         LifeEstimate: dict.fromkeys(("hours", *(f"bounds_of_{of}" for of in BOUND_KINDS)), ANY_NUMBER),
     }

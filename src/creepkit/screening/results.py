@@ -19,7 +19,7 @@ import numpy as np
 from creepkit.errors import FitError, nearest
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
-from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, ValueCodec
+from creepkit.files.record_codec import RecordCodec, RecordError, ValueCodec
 from creepkit.files.writing import write_text
 from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
 from creepkit.inverse.identification import Identification
@@ -27,6 +27,7 @@ from creepkit.inverse.identification_document import CODEC as FIT_CODEC
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
 from creepkit.inverse.selection import CREDIBLE_WEIGHT
 from creepkit.inverse.selection.ranking import RankedLaw
+from creepkit.limits import ANY_NUMBER
 from creepkit.records import History, Predictor
 from creepkit.records.presentable import Plotted, Presentable
 from creepkit.screening.alloys import UNKNOWN_CLASS, Alloy, Compositions

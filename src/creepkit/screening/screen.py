@@ -17,8 +17,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
+from creepkit.arrays import usable_cores
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, FitError, HistoryError
 from creepkit.files.writing import hashed_stem
@@ -33,9 +34,10 @@ from creepkit.inverse.selection.discrimination import equivalent_laws
 from creepkit.inverse.selection.select import select
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.jobs.progress import ProgressCallback, duration_text
-from creepkit.jobs.worker_pools import ProcessWorkers, process_count
+from creepkit.jobs.worker_pools import ProcessWorkers
 from creepkit.jobs.worker_process import TaskResult, run_task
 from creepkit.language import CreepLaw
+from creepkit.limits import WORKERS
 from creepkit.records import History, Predictor
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictors
@@ -192,8 +194,6 @@ class ScreeningOptions:
     confirm: bool | Literal["when in doubt"] = "when in doubt"
 
     def __post_init__(self) -> None:
-        if self.confirm not in (True, False, "when in doubt"):
-            raise FitError(f'confirm is {self.confirm!r}; allowed are True, False and "when in doubt"')
         self.settings.check_by_likelihood("screen()")
 
 
@@ -206,7 +206,7 @@ def screen(
     compositions: Compositions | str | Path | None = None,
     to: str | Path | None = None,
     options: ScreeningOptions | None = None,
-    workers: int | None = None,
+    workers: Annotated[int, WORKERS] | None = None,
     progress: ProgressCallback | None = None,
 ) -> ScreeningResult:
     """Identify the law of every alloy from its tests, and compare the alloys.
@@ -225,7 +225,7 @@ def screen(
     An alloy that cannot be identified is recorded with the reason, and the others go on.
     """
     tests, composition_table = resolve_tests(histories, compositions), resolve_compositions(compositions)
-    options, processes = options or ScreeningOptions(), process_count(workers, FitError)
+    options, processes = options or ScreeningOptions(), workers or usable_cores()
     tests, notes = sound_tests(tests, options.settings)
     predictors = resolve_predictors(using, tests)
     with ExitStack() as stack:

@@ -23,11 +23,11 @@ from creepkit.errors import SolveError
 from creepkit.integration import FibreInput, FibreModel, FibreTest, IntegrationSettings
 from creepkit.integration.time_discretisation import SDIRK4_TEXT
 from creepkit.language.elastic import STATE_MODULUS
+from creepkit.limits import Limits, check_fields, numbers
 from creepkit.records import History, NuisanceValues, Prediction, Program, Status
 from creepkit.specimens.bar import SEARCH_TOLERANCE
 from creepkit.specimens.run import Run, run_from_outputs
 from creepkit.specimens.separate_tests import TestResponse, predict_separately
-from creepkit.specimens.settings_checks import check_ranges
 from creepkit.specimens.test_piece import TestPiece
 
 if TYPE_CHECKING:
@@ -86,11 +86,11 @@ class FibreBeam(TestPiece, ABC):
     """Whether the deflection is prescribed and the force observed."""
 
     def __post_init__(self) -> None:
-        ranges = {
-            "stations": (1, 100), "fibres": (1, 100), "max_steps": (10, 10_000_000), "tolerance": (1e-13, 1e-2),
-            "strain_limit": (1e-6, 10.0),
+        allowed = {
+            "stations": Limits(1, 100), "fibres": Limits(1, 100), "max_steps": Limits(10, 10_000_000),
+            "tolerance": numbers(1e-13, 1e-2), "strain_limit": numbers(1e-6, 10.0),
         }  # fmt: skip
-        check_ranges(self, ranges, whole=("stations", "fibres", "max_steps"))
+        check_fields(self, allowed, f"{self.name} specimen: ", SolveError)
 
     def model_text(self, histories: Sequence[History]) -> str:
         """How the beam is simulated, in sentences for a paper."""

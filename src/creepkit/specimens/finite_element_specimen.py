@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.errors import SolveError
+from creepkit.limits import Limits, check_fields, numbers
 from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Prediction
-from creepkit.specimens.settings_checks import check_ranges
 from creepkit.specimens.test_piece import TestPiece
 
 if TYPE_CHECKING:
@@ -44,14 +45,14 @@ class FiniteElementSpecimen(TestPiece):
     max_steps: int = 1000
     threads: int | None = None
 
-    ranges: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
+    ranges: ClassVar[Mapping[str, Limits]] = MappingProxyType(
         {
-            "tolerance": (1e-6, 0.1),
-            "refinement": (0.1, 100.0),
-            "resolution": (1e-9, 1e3),
-            "deflection_limit": (1e-6, 1e6),
-            "strain_limit": (1e-3, 10.0),
-            "max_steps": (10, 100_000),
+            "tolerance": numbers(1e-6, 0.1),
+            "refinement": numbers(0.1, 100.0),
+            "resolution": numbers(1e-9, 1e3),
+            "deflection_limit": numbers(1e-6, 1e6),
+            "strain_limit": numbers(1e-3, 10.0),
+            "max_steps": Limits(10, 100_000),
         }
     )
     """What is allowed of each setting."""
@@ -62,8 +63,8 @@ class FiniteElementSpecimen(TestPiece):
     """s, the longest first step after a change of load; less where high stresses relax in less."""
 
     def __post_init__(self) -> None:
-        threads = {} if self.threads is None else {"threads": (1, 100_000)}
-        check_ranges(self, {**self.ranges, **threads})
+        threads = {} if self.threads is None else {"threads": Limits(1, 100_000)}
+        check_fields(self, {**self.ranges, **threads}, f"{self.name} specimen: ", SolveError)
 
     def refined(self) -> Self:
         """The same with twice as many elements in each direction, in steps of a tenth of the tolerance."""

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.checked_arguments import checked_with_own_words
 from creepkit.errors import CreepkitError, SolveError, quoted
 from creepkit.records import History, Prediction, Status
 from creepkit.specimens.separate_tests import TestResponse, predict_separately
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from creepkit.records import NuisanceValues
 
 
-@checked_with_own_words("outputs", "status")
 @dataclass(frozen=True)
 class OneTest:
     """What one candidate does in one test, where it does not reach the end.

@@ -9,8 +9,8 @@ import numpy as np
 
 from creepkit.errors import SolveError
 from creepkit.language.elastic import STATE_MODULUS
+from creepkit.limits import Limits, check_fields, numbers
 from creepkit.records import History
-from creepkit.specimens.settings_checks import check_ranges
 from creepkit.specimens.test_piece import TestPiece
 
 if TYPE_CHECKING:
@@ -36,8 +36,9 @@ class PointSpecimen(TestPiece):
     least_tolerance: ClassVar[float] = 1e-13
 
     def __post_init__(self) -> None:
-        ranges = {"tolerance": (self.least_tolerance, 1e-2), "strain_limit": (0.0, 10.0), "max_steps": (10, 10_000_000)}
-        check_ranges(self, ranges)
+        tolerances = numbers(self.least_tolerance, 1e-2)
+        most = {"strain_limit": numbers(0.0, 10.0, above=True), "max_steps": Limits(10, 10_000_000)}
+        check_fields(self, {"tolerance": tolerances, **most}, f"{self.name} specimen: ", SolveError)
 
     def integration_settings(self, more_steps: int = 0) -> IntegrationSettings:
         """The settings of the integration of one history."""

@@ -33,9 +33,9 @@ class Run(Presentable, History):
     reason: str = ""
 
     def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.histories import draw_history, run_figure
+        from creepkit.reports.histories import draw_tests, run_figure
 
-        return run_figure, draw_history
+        return run_figure, draw_tests
 
     def __str__(self) -> str:
         from creepkit.reports.simulation import run_text

@@ -12,13 +12,14 @@ from creepkit.errors import CreepkitError, StudyError
 from creepkit.extraction.extraction import Extraction
 from creepkit.files.json_documents import DocumentFormat, canonical_json, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
-from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, ValueCodec
+from creepkit.files.record_codec import RecordCodec, RecordError, ValueCodec
 from creepkit.files.writing import hashed_stem, write_text
 from creepkit.inverse.fingerprints import short_hash
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC
 from creepkit.inverse.kept_fits import code_fingerprint, history_digest, kept_from_json, kept_to_json
 from creepkit.language import CreepLaw, Elastic
+from creepkit.limits import ANY_NUMBER
 from creepkit.records import (
     History,
     Loading,

@@ -422,7 +422,7 @@ def _leave_one_out_distance(square: Floats, n: int) -> Floats:
 
 @checked
 @dataclass(frozen=True)
-class Training(Options, title="settings of a training", error=SurrogateError, prefix="training: "):
+class Training(Options, title="settings of a training"):
     """How a network is trained: with Adam, on batches of whole histories.
 
     epochs : passes over the training rows. batch : histories in a step. rate : Adam's, at the beginning.
@@ -474,7 +474,7 @@ class SurrogateMetadata:
 
 @checked
 @dataclass(frozen=True)
-class ParameterGru(Options, title="settings of a network", error=SurrogateError, prefix="ParameterGru: "):
+class ParameterGru(Options, title="settings of a network"):
     """A recurrent network whose inputs are a law's parameters and the load: the paper's, at its defaults.
 
     Its input at each frame is the load there, all that the paper uses; for grids that stretch with the test also the
@@ -555,8 +555,9 @@ def _is_constant(column: Tensor) -> bool:
     return not len(finite) or bool((finite - finite[0]).abs().max() <= 1e-6 * finite.abs().max())
 
 
+@checked
 @dataclass(frozen=True)
-class NetworkSizes(Options, title="sizes of networks", error=SurrogateError):
+class NetworkSizes(Options, title="sizes of networks"):
     """Values to be combined in a size study; what is () stays as the recipe has it.
 
     samples : numbers of samples to learn from.

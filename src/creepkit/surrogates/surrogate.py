@@ -15,10 +15,11 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, SurrogateError, nearest
 from creepkit.files.json_documents import DocumentFormat
 from creepkit.files.reading import FileKind
-from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, ValueCodec
+from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
+from creepkit.limits import ANY_NUMBER
 from creepkit.records import (
     History,
     HistoryPrediction,

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -84,13 +84,13 @@ NAME_OF_RECORD = re.compile(r"[a-z0-9]+([-_][a-z0-9]+)*")
 
 
 @checked
-def check_law(law: CreepLaw, samples: int = 64, seed: int = 0) -> ConformanceReport:
+def check_law(
+    law: CreepLaw, samples: Annotated[int, limits.SOBOL_POINTS] = 64, seed: Annotated[int, limits.SEED] = 0
+) -> ConformanceReport:
     """Run every check on a law; never raises for a law that fails one.
 
     samples : a power of two.
     """
-    limits.check_number("samples", samples, limits.SOBOL_POINTS, LawError)
-    limits.check_number("seed", seed, limits.SEED, LawError)
     try:
         lower(law, "numpy")
     except CreepkitError as error:

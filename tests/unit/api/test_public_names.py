@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import FitError, HistoryError
+from creepkit.errors import ArgumentError, FitError, HistoryError
 
 FUNCTIONS = [name for name in ck.__all__ if inspect.isfunction(getattr(ck, name))]
 
@@ -65,11 +65,11 @@ def test_settings_are_changed_by_name() -> None:
         settings.changed({"nuisances": [3]})
     assert settings.changed({"starts": 20}).sobol_points == 256
     assert settings.changed({"starts": 20, "sobol_points": 32}).sobol_points == 32
-    with pytest.raises(FitError, match="have no 'start'; did you mean 'starts'"):
+    with pytest.raises(ArgumentError, match="have no 'start'; did you mean 'starts'"):
         settings.changed({"start": 3})
-    with pytest.raises(FitError, match="suspect_frames 'drop' is not known; allowed are exclude, keep"):
+    with pytest.raises(ArgumentError, match="suspect_frames is 'drop'; allowed is 'exclude' or 'keep'"):
         settings.changed({"suspect_frames": "drop"})
-    with pytest.raises(FitError, match="have no 'tolerance'"):
+    with pytest.raises(ArgumentError, match="have no 'tolerance'"):
         ck.identify("norton", [ck.History("a", np.ones(1), {}, ck.constant_stress(1.0), 300.0)], tolerance=1)
 
 

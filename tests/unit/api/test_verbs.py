@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.errors import ExportError, FitError, HistoryError, LawError, SolveError
+from creepkit.errors import ArgumentError, ExportError, HistoryError, LawError, SolveError
 from creepkit.records import History, LawWithValues, Prediction, Status
 from creepkit.registry import default_registry
 from helpers.written_files import names_in
@@ -176,5 +176,5 @@ def test_a_predictor_to_search_through_is_auto_or_an_object() -> None:
     run = ck.simulate(
         "norton", "uniaxial", {"A": 1e-16, "n": 4.0}, loading=ck.constant_stress(80.0), times=np.linspace(0.0, 1e4, 9)
     )
-    with pytest.raises(FitError, match=r"^through is 'rom'; give 'auto', None or a predictor"):
+    with pytest.raises(ArgumentError, match="'rom'; allowed is a predictor such as .*, 'auto' or None"):
         ck.identify("norton", [run], through="rom")

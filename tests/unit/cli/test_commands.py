@@ -230,7 +230,7 @@ SENSELESS = [
     (f"{DIMPLE} --pressure 8 --every 9999", "--every 9999 s is not a step of a test of 7200 s (1 to 1000000 frames)"),
     (
         f"{DIMPLE} --pressure 8 --points 100000000000",
-        "--points is 100000000000; allowed are whole numbers from 2 to 1000000",
+        "--points is 100000000000; allowed is a whole number from 2 to 1000000",
     ),
     (f"{DIMPLE} --pressure 8 --picture none/section.png", "none/section.png: cannot be written"),
 ]

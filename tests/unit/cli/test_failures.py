@@ -239,11 +239,11 @@ GENERATE = "surrogate generate norton --dry-run"
 
 MEANINGLESS = [
     (f"{SIMULATION} --end-h 1_0", "--end-h 1_0 is not known; write NUMBER"),
-    (f"{SIMULATION} --end-h 1e-320", "--end-h is 1e-320; allowed are numbers from 1e-09"),
+    (f"{SIMULATION} --end-h 1e-320", "--end-h is 1e-320; allowed is a number from 1e-09"),
     (f"{SIMULATION} --end-h 10 --set n", "--set A=1e-16 n=4 n is not known; write NAME=NUMBER"),
     (f"{SIMULATION} --end-h 10 --set n=5", "n is given twice"),
     (f"{SIMULATION} --end-h 1 --modulus-gpa nan", "--modulus-gpa nan is not known; write NUMBER"),
-    (f"{SIMULATION} --end-h 1 --modulus-gpa 0", "allowed are numbers above 0 up to 1000000"),
+    (f"{SIMULATION} --end-h 1 --modulus-gpa 0", "allowed is a number above 0 up to 1000000"),
     (f"{GENERATE} --part -1", "--part -1 is not known; write K/N"),
     (f"{GENERATE} --cluster garbage", "'garbage' is no address of a dask scheduler"),
 ]

@@ -10,7 +10,7 @@ import creepkit as ck
 from creepkit.cli.command_options import given_value
 from creepkit.cli.identified_folder import check_identified_folder, write_ranking
 from creepkit.cli.shared import is_file_name, selected
-from creepkit.errors import FitError, HistoryError, LawError
+from creepkit.errors import CreepkitError, FitError, HistoryError, LawError
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.ranking_document import load_ranking
 from creepkit.inverse.selection import rank
@@ -23,7 +23,7 @@ from helpers.rupture_tests import BAR
 
 def change_laws(laws, fix, bound):
     given = {"fix": fix, "bounds": bound}
-    texts = {one.name: given_value(one, given.get(one.name), FitError) for one in options_of(LawChanges)}
+    texts = {one.name: given_value(one, given.get(one.name)) for one in options_of(LawChanges)}
     return LawChanges(temperature="none").changed(texts).applied(laws, [])
 
 
@@ -101,7 +101,7 @@ OPTIONS = {one.name: one for one in options_of(IdentificationSettings)}
 
 def read(option, text):
     if option in OPTIONS:
-        return given_value(OPTIONS[option], text, FitError)
+        return given_value(OPTIONS[option], text)
     return change_laws([NORTON, HARDENING], *(text if option == one else None for one in ("fix", "bound")))
 
 
@@ -142,7 +142,7 @@ CANNOT_BE_READ = [
 def test_what_cannot_be_read_is_one_sentence():
     wrong = []
     for option, text, words in CANNOT_BE_READ:
-        with pytest.raises(FitError) as raised:
+        with pytest.raises(CreepkitError) as raised:
             read(option, text)
         wrong += [] if words in str(raised.value) else [(text, str(raised.value))]
     assert wrong == []

@@ -74,7 +74,7 @@ def test_what_cannot_be_is_one_line(file: Path, tmp_path: Path) -> None:
     train, sweep, to = "surrogate train", "surrogate sweep", tmp_path / "m.safetensors"
     missing = "there are not 900 samples to learn from: the data set has 60 accepted ones, of which 12"
     table = [
-        (f"{train} {file} --to {to} --target sqrt", "--target sqrt is not known; write value|log"),
+        (f"{train} {file} --to {to} --target sqrt", "--target is 'sqrt'; allowed is 'value' or 'log'"),
         (f"{train} {to} --to {to}", "no such"),
         (f"{sweep} {file} --to {to} --hidden '64;128'", "--hidden 64;128 is not known; write INTEGER,..."),
         (f"{sweep} {file} --to {to} --samples 900", missing),
@@ -125,8 +125,8 @@ WRONG = {
     "--stress 80 --end-h 100": "the fitted tests were made at 750 to 850 °C: give --temperature-c",
     "--pressure 8 --end-h 1 --temperature-c 800": "'bulge' needs a modulus",
     "--stress 80 --end-h 1 --temperature-c 800 --target strain=x": "write NAME=NUMBER,..., such as strain=0.01,0.05",
-    "--stress 80 --end-h 1 --temperature-c 800 --level 2": "--level is 2.0; allowed are numbers from 0.5 to 0.999999",
-    "--stress 80 --end-h -1 --temperature-c 800": "--end-h is -1.0; allowed are numbers from 1e-09 to 1000000000",
+    "--stress 80 --end-h 1 --temperature-c 800 --level 2": "--level is 2.0; allowed is a number from 0.5 to 0.999999",
+    "--stress 80 --end-h -1 --temperature-c 800": "--end-h is -1.0; allowed is a number from 1e-09 to 1000000000",
     "--stress 80 --end-h 1 --temperature-c 800 --plot x.txt": "is no format of pictures",
 }
 
@@ -202,7 +202,7 @@ REFUSED = {
     "--rings '0;2'": "--rings 0;2 is not known; write NUMBER,...",
     "--rest 5": "rest is 5: write the first and the last frame at rest, counted from 0, as in 0-39",
     "--center 5": "a center has two numbers, x and y in mm, as in 12.5,-3",
-    "--interval-s -1": "--interval-s is -1.0; allowed are numbers above 0 up to",
+    "--interval-s -1": "--interval-s is -1.0; allowed is a number above 0 up to",
     "--specimen uniaxial": "specimen 'uniaxial' does not say how cameras see its surface",
     "--plot sheet.txt": "'.txt' is no format of pictures",
     "--lag 5": "--lag says something of a record; give --record FILE",

@@ -279,7 +279,7 @@ REFUSED = [
     ),
     ("code_aster", valued(HYPERBOLIC_SINE, B=40, **AT), "is a sinh of stress; export it as 'mfront'"),
     ("neml2", valued(TIME_HARDENING, m=-0.5, **AT), "steady power laws of stress only.*time exponent -0.5"),
-    ("neml2", valued(NORTON, **AT), r"needs the moduli; give ck.law_with_values\(..., elastic=ck.Elastic"),
+    ("neml2", valued(NORTON, **AT), r"needs the moduli; give export\(..., elastic=ck.Elastic"),
 ]
 
 
@@ -288,6 +288,12 @@ def test_refusals_give_the_reason(name, source, message):
     with pytest.raises(ExportError, match=message) as error:
         EXPORTERS[name].text(source)
     assert "\n" not in str(error.value)
+
+
+def test_moduli_are_an_argument():
+    assert ck.export(NORTON, "neml2", {"A": 1e-9, "n": 4.0}, elastic=STEEL) == Neml2Model().text(
+        LawWithValues(NORTON, {"A": 1e-9, "n": 4.0}, elastic=STEEL)
+    )
 
 
 def test_a_temperature_makes_a_card_possible():

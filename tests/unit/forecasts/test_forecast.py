@@ -274,7 +274,7 @@ def test_a_dimple_is_forecast_from_bars_with_the_tolerance_of_its_thickness(fit)
     ("options", "sentence"),
     [
         ({"level": 0.2}, "level is 0.2; give a probability"),
-        ({"draws": 3}, "draws is 3"),
+        ({"draws": 3}, "draws of forecast.. is 3; allowed is a whole number from 50"),
         ({"tolerances": {"thicknes": 0.1}}, "a tolerance of 'thicknes' is not known; did you mean 'thickness'"),
         ({"tolerances": {"thickness": 0.1}}, "means nothing to the specimens of these tests"),
         ({"tolerances": {"temperature": 5.0}}, "no law has a temperature; leave it out"),

@@ -12,6 +12,7 @@ import creepkit as ck
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.uncertainty.rate_scatter import log_prior, rate_scatter
 from creepkit.language.symbols import GAS_CONSTANT
+from creepkit.reports.answer import cautions
 
 HOUR, T_REF = 3600.0, 873.15
 STEEL = [(s, T) for T, levels in ((575, (110, 140, 170, 200)), (600, (95, 120, 150, 180))) for s in levels]
@@ -70,6 +71,7 @@ def test_a_temperature_that_is_15_K_too_high_is_named_with_its_size_and_what_the
     assert fit.adequacy.rejects
     assert "764.9 °C, 15 K less than stated" in str(fit.adequacy) or "765 °C" in str(fit.adequacy)
     assert "test 'test_3' does not agree with the others" in fit.headline
+    assert "lead to expect; 15 K less than stated would do it" in cautions(fit)[0]
     left = {one.test: one for one in fit.left_out}
     assert left["test_3"].exponent == pytest.approx(4.2, abs=0.05)
     assert abs(left["test_0"].exponent - 4.2) > 0.2

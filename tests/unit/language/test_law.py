@@ -80,7 +80,6 @@ BAD_PARAMS = {
     "infinite bounds": ({"bounds": (0, float("inf"))}, "must be finite"),
     "log of zero": ({"bounds": (0, 1), "scale": "log", "unit": "1/s"}, "a log scale needs bounds above zero"),
     "missing unit": ({"scale": "log"}, 'missing unit; write unit="1/s"'),
-    "unknown scale": ({"scale": "logarithmic"}, "allowed are 'linear' and 'log'"),
     "no meaning": ({"meaning": " "}, "empty meaning"),
     "meaning of two lines": ({"meaning": "a\nb"}, "one line of text"),
     "off not finite": ({"off": float("nan")}, "off = nan must be a finite number"),

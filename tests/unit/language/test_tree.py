@@ -204,16 +204,16 @@ BAD_FILES = {
     ),
     "number as text": (
         _changed("params", 1, "bounds", to=["1", 8]),
-        r"params.1.bounds.0 is '1', where a number is needed",
+        r"params.1.bounds.0 is '1'; allowed is a finite number",
     ),
     "three bounds": (
         _changed("params", 1, "bounds", to=[1, 2, 3]),
-        "params.1.bounds is a list of 3, where 2 are needed",
+        "params.1.bounds is a list of 3; allowed is one of 2",
     ),
     "reversed bounds": (_changed("params", 1, "bounds", to=[8, 1]), "bounds are reversed"),
     "unknown scale": (
         _changed("params", 1, "scale", to="cubic"),
-        "params.1.scale is 'cubic'; allowed are 'linear', 'log'",
+        "params.1.scale is 'cubic'; allowed is 'linear' or 'log'",
     ),
     "same name": (_changed("params", 1, "name", to="A"), "parameter or state name 'A' is used twice"),
     "no term": (_changed("terms", to=[]), "has no terms"),

@@ -79,7 +79,7 @@ CASES = [
      "x.csv:2: a pressure jump needs .* Tj after the first ramp"),
     (HEAD + "# jump_time_h: 3\n" + BODY, "x.csv:3: 'jump_time_h' has no meaning beside"),
     ("# temperature_C: 850\n# stress_steps: 0 s 60 MPa, 5 s 70 MPa\n" + BODY,
-     "x.csv:2: stress_steps holds '0 s 60 MPa, 5 s 70 MPa'; write time and value with units, such as 0 s 100 MPa"),
+     "x.csv:2: stress_steps holds '0 s 60 MPa, 5 s 70 MPa'; write time and value with units: 0 s 100 MPa"),
     ("# temperature_C: 850\n# stress_steps: 5 s 60 MPa\n" + BODY,
      "x.csv:2: the times of stress_steps are 5 s; they must start at 0 and never decrease"),
     ("# temperature_C: 850\n# stress_steps: 0 s 60 MPa; 0 s 61 MPa\n" + BODY,

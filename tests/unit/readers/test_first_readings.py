@@ -155,5 +155,28 @@ def test_relative_growths_and_diameters_of_bars(read):
         "400 °C, 12 MPa: 0.02",
         "400 °C, 10 MPa: 0.01",
     ]
-    with pytest.raises(HistoryError, match="no conditions above each, may be tests or sensors of one test"):
+    with pytest.raises(HistoryError, match="no conditions above each, may be tests or sensors of one"):
         read(tubes.format(12))
+
+
+def test_thermal_expansion_at_steps_of_temperature(read, tmp_path):
+    """Steps of 20 K multiply rates by 2.5, and 14e-6/K is planted: told, and taken off; a step of rate alone is not."""
+    hours, rng = np.arange(0.0, 300.1, 5.0), np.random.default_rng(2)
+    levels = np.minimum(hours // 100, 2)
+    creep = np.interp(hours, [0, 100, 200, 300], 1e-4 * np.cumsum([0, 1, 2.5, 6.25]))
+    rows = [creep + 14e-6 * 20 * part * levels + 2e-6 * rng.standard_normal(hours.size) for part in (0, 1)]
+    texts = (
+        "".join(f"{t},{600 + 20 * k},{100 * max(e, 0)}\n" for t, k, e in zip(hours, levels, one, strict=True))
+        for one in rows
+    )
+    plain, expanded = (read("# stress_MPa: 90\nTime (h),Temp (C),Strain (%)\n" + text, "a.csv") for text in texts)
+    assert ck.check_data_quality(plain).flags == ()
+    (flag,) = ck.check_data_quality(expanded)
+    assert "at 100 h; 200 h, as the temperature does by +20 K, +20 K: thermal expansion of about 1.4e-05/K" in str(flag)
+    for line in ('thermal_expansion = "14e-6 1/K"', "thermal_expansion = 14e-6", 'steps_taken_off = "100 h; 200 h"'):
+        (tmp_path / "tests.toml").write_text(f'["a.csv"]\n{line}\n')
+        (test,) = ck.read_histories(tmp_path / "a.csv")
+        np.testing.assert_allclose(test.outputs["strain"], creep, atol=2e-5)
+    (tmp_path / "tests.toml").write_text('["a.csv"]\nthermal_expansion = "14 K"\n')
+    with pytest.raises(HistoryError, match="is '14 K'; write it per kelvin, such as 14e-6 1/K"):
+        ck.read_histories(tmp_path / "a.csv")

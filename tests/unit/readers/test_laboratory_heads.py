@@ -479,6 +479,20 @@ def test_the_spans_of_a_beam_are_read_by_their_usual_names_and_never_silently_by
         read("Major span,60", "Minor span,25")
 
 
+@pytest.mark.parametrize("name", ["Midspan deflection (mm)", "Durchbiegung Mitte (mm)", "Centre deflection (mm)"])
+def test_where_the_deflection_of_a_beam_was_read_is_heard_or_said(tmp_path, name):
+    """Read as that of the load points, a deflection in the middle made rates of creep half as high again."""
+    text = BEAM.format("Outer span,60,mm\nInner span,25,mm") + "0,0\n1,0.001\n2,0.002\n"
+    (tmp_path / "b.csv").write_text(text)
+    (plain,) = ck.read_histories(tmp_path / "b.csv")
+    assert "deflection of the load points (four-point-bend-midspan has the" in plain.labels["assumed"]
+    (tmp_path / "b.csv").write_text(text.replace("deflection (mm)", name))
+    with pytest.raises(
+        HistoryError, match=r"is the deflection of the middle, and four-.*specimen: four-point-bend-mid"
+    ):
+        ck.read_histories(tmp_path / "b.csv")
+
+
 def test_a_specimen_that_is_stated_stands_beside_the_mark_of_a_piece_and_a_modulus_is_asked_for(tmp_path):
     (tmp_path / "beam.csv").write_text(
         BEAM.format("Outer span,60,mm\nInner span,25,mm").replace("four-point-bend", "B1") + "0,0\n1,0.001\n2,0.002\n"

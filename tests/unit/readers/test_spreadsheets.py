@@ -64,7 +64,7 @@ def test_a_sheet_of_remarks_is_left_out(tmp_path: Path):
     assert "sheet 'Auswertung' not read" in history.labels["assumed"]
     stated = [["Probe", "Stress (MPa)"], ["KZ02", 60]]
     path = workbook(tmp_path / "bars.xlsx", {"KZ01": CONDITIONS + FRAMES, "Auswertung": stated})
-    with pytest.raises(HistoryError, match=r"sheet 'Auswertung', row 2: 'KZ02' .* leave the sheet out .* --ignore"):
+    with pytest.raises(HistoryError, match=r"sheet 'Auswertung', row 2: 'KZ02' .* leave the sheet out: --ignore"):
         read(path)
     (history,) = ck.read_histories([path], ignore=["Auswertung"])
     assert history.name == "bars"

@@ -31,6 +31,7 @@ from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
 from creepkit.reports.html import report_html
 from creepkit.reports.ranking import separating_test
 from creepkit.reports.rate_panels import plate_figure
+from helpers.rate_tables import whole_life_table
 from helpers.report_pages import contents, ranking
 from helpers.steady_rate_predictor import Steady, planted
 
@@ -199,7 +200,7 @@ def test_a_record_is_one_line_and_a_cell_of_html() -> None:
     found = ranking()
     fit = found.best
     tests = Histories(fit.histories)
-    records = [found, fit, tests[0], fit.forecast(tests[0]), fit.predict(tests)]
+    records = [found, fit, tests[0], fit.forecast(tests[0]), fit.predict(tests), tests, fit.correlation()]
     assert [repr(one) for one in records if len(repr(one)) > 300 or "\n" in repr(one)] == []
     shown = (found, fit, fit.law, tests[0], fit.forecast(tests[0]), tests, ck.specimen("bulge"))
     cells = [one._repr_html_() for one in shown]
@@ -207,10 +208,12 @@ def test_a_record_is_one_line_and_a_cell_of_html() -> None:
         html5lib.HTMLParser(strict=True).parseFragment(cell)
         assert "<script" not in cell
     assert "strain hardening" in cells[1].lower().replace("-", " ")
+    assert all("<svg" in cell for cell in (*cells[:2], *cells[3:6]))
 
 
 def test_the_answer_has_a_dozen_lines_of_a_hundred_characters() -> None:
-    for answer in (str(ranking()), str(ranking().best)):
+    damaged = ck.identify("kachanov-rabotnov", whole_life_table(np.random.default_rng(1)), starts=1)  # seven parameters
+    for answer in (str(ranking()), str(ranking().best), str(damaged)):
         lines = answer.splitlines()
         assert len(lines) <= 12
         assert max(map(len, lines)) <= 100

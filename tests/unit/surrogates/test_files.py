@@ -36,7 +36,7 @@ def test_weights_and_header_come_back(tmp_path: Path) -> None:
         (lambda raw: raw.replace(b'\\"version\\": 3', b'\\"version\\": 9'), "written by a newer creepkit"),
         (lambda raw: raw.replace(b'\\"version\\": 3', b'\\"version\\":-1'), "in version -1 of the format"),
         (lambda raw: raw.replace(b"creepkit-surrogate", b"creepkit-something"), "this is not a surrogate that"),
-        (lambda raw: raw.replace(b"parameter-gru", b"hyper-network"), "allowed are 'parameter-gru'"),
+        (lambda raw: raw.replace(b"parameter-gru", b"hyper-network"), "allowed is 'parameter-gru'"),
     ],
 )  # fmt: skip
 def test_a_file_that_is_not_a_surrogate_says_why(tmp_path: Path, spoil, told: str) -> None:

@@ -154,10 +154,10 @@ def test_a_damaged_document_says_so() -> None:
     document = CODEC.to_json(ApplicabilityDomain.from_rows("ab", np.random.default_rng(6).normal(size=(9, 2))))
     for changes, message in (
         ({"low": [0.0]}, "its arrays do not belong to 2 inputs"),
-        ({"mean": "x"}, "mean is 'x', where a list is needed"),
-        ({"names": None}, "names is null, where a list is needed"),
+        ({"mean": "x"}, "mean is 'x'; allowed is a list"),
+        ({"names": None}, "names is null; allowed is a list"),
         ({"whitening": [[1.0, 0.0]]}, "its arrays do not belong to 2 inputs"),
-        ({"whitening": [[1.0], 0.0]}, "whitening.1 is 0.0, where a list is needed"),
+        ({"whitening": [[1.0], 0.0]}, "whitening.1 is 0.0; allowed is a list"),
         ({"limits": 1.0}, "unknown key 'limits'; did you mean 'limit'"),
     ):
         with pytest.raises(CreepkitError, match=message):

@@ -49,14 +49,10 @@ class Minimum:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """When a local refinement ends: after so many steps, or at this relative change of the cost.
-
-    one_step : also after the first step whose gain is near that of the linear problem.
-    """
+    """When a local refinement ends: after so many steps, or at this relative change of the cost."""
 
     max_steps: int = 30
     tolerance: float = 1e-5
-    one_step: bool = False
 
 
 def bounded_least_squares(
@@ -99,7 +95,7 @@ def bounded_least_squares(
         x_scale=scale[free],
         loss="soft_l1" if robust else "linear",
         max_nfev=tolerances.max_steps,
-        ftol=0.99 if tolerances.one_step else tolerances.tolerance,
+        ftol=tolerances.tolerance,
         xtol=10 * tolerances.tolerance,
         gtol=tolerances.tolerance,
     )

@@ -29,7 +29,7 @@ INTERNAL_RATE_RANGE = (-4.0, 0.0)
 
 @checked
 @dataclass(frozen=True)
-class MultiStart(Options, title="multi-start", error=FitError, prefix="multi-start: "):
+class MultiStart(Options, title="multi-start"):
     """Least squares from the centre of the bounds and the best of screened Sobol draws.
 
     starts, draws : None for those of the settings. For a sum of terms each term's own optimum is a start too.

@@ -32,7 +32,7 @@ MOST = limits.SEARCH_STEPS.high
 
 @checked
 @dataclass(frozen=True)
-class ParticleSwarm(Options, title="particle swarm", error=FitError, prefix="particle swarm: "):
+class ParticleSwarm(Options, title="particle swarm"):
     """A particle swarm; numbers of particles and iterations are the paper's.
 
     cognitive, social : c1, c2; max_velocity : the largest, in widths of the bounds. 2.05, 2.05, 0.15, constriction and
@@ -53,7 +53,6 @@ class ParticleSwarm(Options, title="particle swarm", error=FitError, prefix="par
     refined_candidates: int = option(3, "Particles that are refined by least squares.", Limits(0, MOST))
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         if self.cognitive + self.social <= 4:
             raise FitError(
                 f"particle swarm: cognitive and social are {self.cognitive:g} and {self.social:g}; they must be more "

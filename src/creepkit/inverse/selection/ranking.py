@@ -239,8 +239,6 @@ def rank(
     """
     if not fits:
         raise FitError("there are no identifications to rank")
-    if criterion not in ("bic", "aicc"):
-        raise FitError(f"criterion {criterion!r} is not known: identifications are ranked by 'bic' or 'aicc'")
     if len({fit.provenance.get("data") for fit in fits}) > 1:
         raise FitError(
             "the identifications were made from different histories, frames, nuisances or rupture times and "

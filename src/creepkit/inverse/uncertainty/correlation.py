@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED
@@ -48,6 +49,9 @@ class Correlation(Presentable):
     sd: Floats
     title: str = ""
 
+    def __repr__(self) -> str:
+        return f"<Correlation of {', '.join(self.names)}>"
+
     def between(self, first: str, second: str) -> float:
         """The correlation of two of the names."""
         for name in (first, second):
@@ -61,10 +65,9 @@ class Correlation(Presentable):
         return correlation_text(self)
 
 
+@checked
 def correlation(fit: Identification, coordinates: CoordinateSystem = "author") -> Correlation:
     """The correlation of a fit's estimates, in the author's parameters or in the conditioned coordinates."""
-    if coordinates not in ("author", "conditioned"):
-        raise FitError(f"coordinates is '{coordinates}'; allowed are 'author' and 'conditioned'")
     covariance = fit.covariance if coordinates == "conditioned" else _covariance_of_parameters(fit)
     sd = np.sqrt(np.diag(covariance))
     matrix = covariance / np.outer(sd, sd)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -21,6 +21,7 @@ from scipy.stats import chi2, norm, qmc
 
 from creepkit import limits
 from creepkit.arrays import ArrayLike, Floats, single_threaded_blas
+from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import with_cheaper_predictor
@@ -151,8 +152,13 @@ class PosteriorSamples(RateStatements, Presentable, Tabulated):
         return posterior_text(self)
 
 
+@checked
 def sample_posterior(
-    fit: Identification, *, draws: int = 1000, seed: int = 0, using: Predictor | None = None
+    fit: Identification,
+    *,
+    draws: Annotated[int, limits.DRAWS_OF_POSTERIOR] = 1000,
+    seed: int = 0,
+    using: Predictor | None = None,
 ) -> PosteriorSamples:
     """Draws from the posterior of an identification's values, by population Monte Carlo.
 
@@ -161,7 +167,6 @@ def sample_posterior(
     draws : how many, worth half as many independent ones at least. using : another predictor of the same tests than
         the fit's, such as a surrogate where the fit's is a finite element model.
     """
-    limits.check_number("draws", draws, limits.DRAWS_OF_POSTERIOR, FitError)
     fit = fit if using is None else fit.with_histories(fit.histories, using.for_law(fit.law))
     with single_threaded_blas():
         posterior = Posterior.from_identification(fit)

@@ -73,6 +73,9 @@ class ProfileLikelihood(Presentable):
     laplace: tuple[float, float]
     notes: tuple[str, ...] = field(default=())
 
+    def __repr__(self) -> str:
+        return f"<ProfileLikelihood of {self}>"
+
     def __str__(self) -> str:
         from creepkit.reports.inference import profile_text
 

@@ -192,19 +192,14 @@ def data_section(contents: ReportContents) -> PageSection:
     return PageSection("data", "Data", blocks, [PageSection("exclusions", "Left out", left_out)], result)
 
 
-def readings_text(frames: Sequence[int]) -> str:
-    """Numbers of readings: 'readings 97-191, 193'; of a bar that has no camera as of what has one."""
-    return frame_ranges_text(frames).replace("frame", "reading", 1)
-
-
 def _exclusion_blocks(contents: ReportContents) -> list[Block]:
     selected = [Paragraph(text) for text in _selections(contents)]
     if not contents.exclusions:
         return [Paragraph("No reading was excluded by hand or by the check of data quality."), *selected]
-    rows = [
-        (one.test, readings_text(one.frames) if one.frames else "the whole test", one.reason)
-        for one in contents.exclusions[:MOST_LISTED]
-    ]
+    rows = []
+    for one in contents.exclusions[:MOST_LISTED]:  # of a bar that has no camera as of what has one
+        readings = frame_ranges_text(one.frames).replace("frame", "reading", 1)
+        rows.append((one.test, readings if one.frames else "the whole test", one.reason))
     return [Table("Left out of the identification", ("test", "what", "reason"), rows), *selected]
 
 

@@ -12,11 +12,11 @@ from creepkit.inverse.selection.ranking import Ranking
 from creepkit.language import CreepLaw
 from creepkit.records import Histories, History, Specimen
 from creepkit.reports.answer import equations, symbols_of, unit_text
-from creepkit.reports.blocks import Block, Formula, Paragraph, Table, Verbatim, number
+from creepkit.reports.blocks import Block, Formula, Paragraph, Table, Verbatim, number, plural
 from creepkit.reports.catalogue import specimen_blocks
 from creepkit.reports.contents import ReportContents, ReportGroup
 from creepkit.reports.forecast import forecast_blocks
-from creepkit.reports.histories import history_blocks
+from creepkit.reports.histories import history_blocks, tests_figure
 from creepkit.reports.html.page import block_shown, findings_section, group_answer
 from creepkit.reports.html.templates import template
 from creepkit.reports.law_names import LawNames
@@ -27,8 +27,12 @@ from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 STYLE = (
     ".creepkit .answer{display:grid;grid-template-columns:minmax(0,1.75fr) minmax(16rem,1fr);gap:0 2rem}"
-    ".creepkit .lead{font-weight:600}.creepkit dd{margin:0 0 .4rem;font-weight:600}"
+    ".creepkit .law{grid-column:1/-1}.creepkit .formula math{width:fit-content;margin:0}"
+    ".creepkit .lead{font-weight:600}.creepkit dd{margin:0 0 .4rem;font-weight:600}.creepkit figure{margin:.5rem 0}"
     ".creepkit dl span{display:block;font-weight:400;opacity:.7}.creepkit .drawing svg{width:100%;height:auto}"
+    ".creepkit table{border-collapse:collapse}.creepkit caption{text-align:left;opacity:.7}"
+    ".creepkit th,.creepkit td{text-align:left;padding:.2rem 1rem .2rem 0;border-bottom:1px solid #8886}"
+    ".creepkit .n{text-align:right}"
 )
 """Of what stands in a cell."""
 
@@ -74,8 +78,14 @@ def _(law: CreepLaw) -> Sequence[Block]:
     return [Paragraph(law.title or law.name, "lead"), *map(Formula, equations(law)), table]
 
 
-_blocks.register(History)(lambda history: history_blocks([history]))
-_blocks.register(Histories)(history_blocks)
+@_blocks.register
+def _(tests: Histories) -> Sequence[Block]:
+    caption = f"{plural(len(tests), 'test')} over time; hollow: readings that are not used."
+    drawn = [_figures().picture(lambda: tests_figure(tests), "Tests", caption, caption)]
+    return [*history_blocks(tests), *(drawn if any(one.outputs for one in tests) else [])]
+
+
+_blocks.register(History)(lambda history: _blocks(Histories([history])))
 _blocks.register(Specimen)(specimen_blocks)
 _blocks.register(Forecast)(lambda forecast: forecast_blocks(forecast, _figures()))
 _blocks.register(RuptureAssessment)(lambda one: [*strength_blocks(one), *rupture_blocks(one, _figures())])

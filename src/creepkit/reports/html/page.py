@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -105,8 +106,7 @@ def _summary(contents: ReportContents) -> str:
     parts = [plural(tests, "test")] if tests else []
     if len(contents.groups) > 1:
         parts.append(plural(len(contents.groups), "material"))
-    days = [str(one.fit.provenance.get("when", ""))[:10] for one in contents.identified]
-    dates = sorted({day for day in days if day})
+    dates = sorted({str(one.fit.provenance.get("when", ""))[:10] for one in contents.identified} - {""})
     parts += [f"identified {dates[0]}" if len(dates) == 1 else f"identified {dates[0]} to {dates[-1]}"] if dates else []
     return ", ".join(parts)
 
@@ -122,7 +122,7 @@ def section_shown(section: PageSection, names: LawNames) -> PageSection:
         title=printable(section.title, 120),
         blocks=[block_shown(one, names) for one in section.blocks if not isinstance(one, Items) or one.items],
         sections=[one for one in inner if one.blocks or one.sections],
-        result=typeset(names.in_text(section.result)),
+        result=typeset(sentence(names.in_text(section.result)).removesuffix(".")) if section.result else "",
     )
 
 
@@ -207,9 +207,10 @@ def group_answer(found: ReportGroup, figures: PageFigures, *, asked: Sequence[Ke
 
 
 def _by_law(found: Sequence[ReportGroup]) -> list[ReportGroup]:
-    """Groups of one law together, the commonest law first, then by name."""
+    """Groups of one law together, the commonest law first, then by name, numbers in it by their size."""
     laws = [one.fit.law.name for one in found]
-    return sorted(found, key=lambda one: (-laws.count(one.fit.law.name), one.fit.law.name, one.name))
+    parts = {one.name: [int(p) if p.isdecimal() else p for p in re.split(r"(\d+)", one.name)] for one in found}
+    return sorted(found, key=lambda one: (-laws.count(one.fit.law.name), one.fit.law.name, parts[one.name]))
 
 
 def _overview(contents: ReportContents) -> str:
@@ -294,10 +295,9 @@ def _table_of_groups(found: Sequence[ReportGroup]) -> Table:
     )
     caption = (
         "materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests, of laws that fit "
-        "the tests. Not in the interval: by how much the rate would move with what no nuisance parameter models, such "
-        "as errors of temperature and load common to all tests, each of the size that the findings state (root sum of "
-        "squares). Decisive: one law has more than 95 % of the weight, the tests do not contradict it, and no other "
-        "law or effect that was tried does as well; the verdict of each material says what is missing"
+        "the tests. Not in the interval: what errors common to all tests would move the rate by, such as of "
+        "temperature and load (root sum of squares). Decisive: one law has more than 95 % of the weight, the tests do "
+        "not contradict it, and nothing else that was tried does as well; the verdict of each material says the rest"
     )
     return Table(caption, columns, rows, numeric=(2, 5, 6, 7, 8))
 
@@ -366,15 +366,13 @@ def _asked_text(forecast: Forecast) -> str:
 
 
 def _extraction_blocks(extraction: Extraction, figures: PageFigures, of: str) -> list[Block]:
-    outputs = ", ".join(output.replace("_", " ") for output in extraction.outputs)
-    picture = figures.picture(
-        lambda: extraction_figure(extraction),
-        f"Extraction{of}",
+    outputs, frames = ", ".join(extraction.outputs).replace("_", " "), extraction.times.size
+    description = (
         f"Maps of height of some frames, and over time {outputs}, rigid motion and residuals; "
-        f"{int(extraction.used.sum())} of {extraction.times.size} frames were used, "
-        f"{plural(len(extraction.flags), 'flag')}.",
-        f"Extraction{of}: maps of height, outputs with 95 % bands, rigid motion and residuals; flagged frames in red.",
+        f"{int(extraction.used.sum())} of {plural(frames, 'frame')} were used, {plural(len(extraction.flags), 'flag')}."
     )
+    caption = "Maps of height, outputs with 95 % bands, rigid motion and residuals; flagged frames in red."
+    picture = figures.picture(lambda: extraction_figure(extraction), f"Extraction{of}", description, caption)
     return [picture, Verbatim("What was extracted, and how well", printable_lines(extraction_text(extraction)))]
 
 

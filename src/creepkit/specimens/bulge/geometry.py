@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from numbers import Real
 from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
@@ -20,15 +19,16 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import Mesh, strip_mesh, strip_nodes
+from creepkit.limits import numbers
 
 EDGES = ("bottom", "rim")
 
 
-LENGTH_RANGE = (1e-3, 1e4)
+LENGTH_RANGE = numbers(1e-3, 1e4)
 """Least and greatest length, mm."""
 
 
-REFINEMENT_RANGE = (0.5, 16.0)
+REFINEMENT_RANGE = numbers(0.5, 16.0)
 """Least and greatest refinement of a mesh; below it two layers would be left, or columns too few for the roof."""
 
 
@@ -112,11 +112,10 @@ class DimpleGeometry:
         return DimpleDimensions(*(getattr(self, name) for name in self.lengths))
 
     def _layout(self, refinement: float) -> MeshLayout:
-        least, most = REFINEMENT_RANGE
-        if not _between(refinement, least, most):
+        if refinement not in REFINEMENT_RANGE:
             raise SolveError(
-                f"dimple: refinement is {refinement!r}; allowed is a number from {least:g} to {most:g}, 2 giving twice "
-                "as many elements each way as 1, the mesh for production"
+                f"dimple: refinement is {refinement!r}; allowed is {REFINEMENT_RANGE}, 2 giving twice as many elements "
+                "each way as 1, the mesh for production"
             )
         return mesh_layout(self._dimensions(), float(refinement))
 
@@ -133,15 +132,10 @@ def _nodes(size: DimpleDimensions, layout: MeshLayout) -> Floats:
     return strip_nodes(inner, outer, layout.breaks)
 
 
-def _between(value: object, least: float, most: float) -> bool:
-    return not isinstance(value, bool) and isinstance(value, Real) and least <= float(value) <= most
-
-
 def _checked_length(name: str, value: Any) -> float:
     """One length as a float."""
-    least, most = LENGTH_RANGE
-    if not _between(value, least, most):
-        raise SolveError(f"dimple: {name} is {value!r}; allowed is a number from {least:g} to {most:g}, a length in mm")
+    if value not in LENGTH_RANGE:
+        raise SolveError(f"dimple: {name} is {value!r}; allowed is {LENGTH_RANGE}, a length in mm")
     return float(value)
 
 

@@ -13,18 +13,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats, frozen
+from creepkit.arrays import ArrayLike, Floats, frozen, set_fields
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.surface_interpolation import (
     SurfaceInterpolation,
     checked_surface_radii,
     surface_interpolation_with_slopes,
 )
+from creepkit.limits import Limits, check_fields, numbers
 from creepkit.records import Output
 from creepkit.specimens.bulge.outputs import MOST_RINGS, OBSERVED, RING_OUTPUTS
 
@@ -48,7 +48,8 @@ _ANGLES = 6
 """Gauss points over an eighth of a turn; S_p from 40 radii by 6 angles lies within 5e-5 of that from 1000 by 40."""
 
 
-_FEWEST, _MOST = 8, 2000
+ALLOWED = {"window": numbers(1e-3, 1e4), "points": Limits(8, 2000)}
+"""Of an operator that fits: mm, and radii."""
 
 
 _TEXT = re.compile(r"\s*(\w+)\s+0\s*(?:-|to)\s*(\S+)\s*mm\s*(?:,\s*(\d+)\s+radii\s*)?")
@@ -90,13 +91,10 @@ class Observation:
             return
         if len(self.radii):
             raise SolveError(f"observation: a {self.form} has a window and no radii; write form='rings' for these")
-        if not _lies_within(self.window, 1e-3, 1e4):
-            raise SolveError(f"observation: window is {self.window!r}; allowed is a length of 0.001 to 10000 mm")
         points = DEFAULT_RADII[self.form] if self.points is None else self.points
-        if not _lies_within(points, _FEWEST, _MOST) or points != int(points):
-            raise SolveError(f"observation: points is {points!r}; allowed are whole numbers, {_FEWEST} to {_MOST}")
-        object.__setattr__(self, "window", float(self.window))
-        object.__setattr__(self, "points", int(points))
+        set_fields(self, points=points)
+        check_fields(self, ALLOWED, "observation: ", SolveError)
+        set_fields(self, window=float(self.window), points=int(points))
 
     def _check_rings(self) -> None:
         if self.window != DEFAULT_WINDOW or self.points is not None:
@@ -219,10 +217,6 @@ def _length_text(length: float) -> str:
     return repr(length).removesuffix(".0")
 
 
-def _lies_within(value: object, least: float, most: float) -> bool:
-    return isinstance(value, Real) and least <= float(value) <= most
-
-
 def _frames(profiles: ArrayLike, sampling: ProfileSampling) -> Floats:
     frames = np.asarray(profiles, dtype=float)
     nodes = sampling.nodes.values.shape[1]
@@ -275,8 +269,8 @@ def _disc(operator: Observation) -> tuple[Floats, Floats, Floats, Floats]:
 
 def checked_ring_radii(radii: Sequence[Any]) -> tuple[float, ...]:
     """Radii of rings, mm; SolveError unless there are one to eight, not negative and increasing."""
-    numbers = all(isinstance(r, Real) and 0.0 <= float(r) <= 1e4 for r in radii)
-    if not (numbers and 1 <= len(radii) <= MOST_RINGS and all(a < b for a, b in pairwise(radii))):
+    in_range = all(r in numbers(0.0, 1e4) for r in radii)
+    if not (in_range and 1 <= len(radii) <= MOST_RINGS and all(a < b for a, b in pairwise(radii))):
         raise SolveError(
             f"observation: rings have the radii {tuple(radii)}; allowed are one to {MOST_RINGS} increasing radii in "
             "mm, as in radii=(0, 2, 4)"

@@ -20,6 +20,7 @@ from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import GeometryDerivative, Mesh
 from creepkit.hookspecs import hookimpl
+from creepkit.limits import Limits, numbers
 from creepkit.records import (
     Dimension,
     History,
@@ -82,8 +83,8 @@ class Bulge(FiniteElementSpecimen):
     optional_outputs: ClassVar[tuple[Output, ...]] = (*OBSERVED, *RING_OUTPUTS)
     """Those that a test has whose operator says so."""
 
-    ranges: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
-        {**FiniteElementSpecimen.ranges, "refinement": REFINEMENT_RANGE, "deflection_limit": (1e-3, 1e3)}
+    ranges: ClassVar[Mapping[str, Limits]] = MappingProxyType(
+        {**FiniteElementSpecimen.ranges, "refinement": REFINEMENT_RANGE, "deflection_limit": numbers(1e-3, 1e3)}
     )
     loads: ClassVar[tuple[Load, ...]] = (Load("pressure", "pressure", "gas pressure", ramp=5.0),)
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
@@ -177,8 +178,9 @@ class Bulge(FiniteElementSpecimen):
     def dimensions(self) -> tuple[Dimension, ...]:  # type: ignore[override]
         """The lengths of the dimple, unless its mesh is from elsewhere, and the window within which it is observed."""
         names = DimpleGeometry.lengths if self.mesh is None else ()
-        lengths = (Dimension(n, getattr(self.geometry, n), LENGTH_RANGE, **_LENGTHS.get(n, {})) for n in names)
-        return (*lengths, Dimension("window", self.observation.window, LENGTH_RANGE, of_piece=False))
+        bounds = (LENGTH_RANGE.low, LENGTH_RANGE.high)
+        lengths = (Dimension(n, getattr(self.geometry, n), bounds, **_LENGTHS.get(n, {})) for n in names)
+        return (*lengths, Dimension("window", self.observation.window, bounds, of_piece=False))
 
     def outputs_of_test(self, history: History) -> tuple[Output, ...]:
         """What the operator of a history observes, or that of the specimen where it names none.

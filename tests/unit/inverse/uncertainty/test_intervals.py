@@ -11,7 +11,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 import creepkit as ck
-from creepkit.errors import FitError
+from creepkit.errors import ArgumentError, FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.correlation import correlation, undetermined
@@ -55,7 +55,7 @@ def test_conditioned_coordinates_are_not(fit):
     found = correlation(fit, "conditioned")
     assert found.names == ("ln rate", "n")
     assert abs(found.matrix[0, 1]) < 1e-3
-    with pytest.raises(FitError, match="allowed are 'author' and 'conditioned'"):
+    with pytest.raises(ArgumentError, match="allowed is 'author' or 'conditioned'"):
         correlation(fit, "raw")
 
 

@@ -7,7 +7,7 @@ import pytest
 from sympy import log
 
 import creepkit as ck
-from creepkit.errors import HistoryError, LawError, SolveError
+from creepkit.errors import ArgumentError, HistoryError, LawError, SolveError
 from creepkit.language import stress, time
 from creepkit.language.elastic import STATE_MODULUS
 from creepkit.readers.history_csv import write_history
@@ -143,8 +143,11 @@ MISTAKES = [
      "law 'norton' needs a value for n; give all of them, such as {'n': 1.5}, in a command --set n=1.5"),
     (LawError, {"values": {"A": -1.0, "n": 3.0}},
      "law 'norton', parameter 'A': -1 is negative; it must be positive"),
-    (LawError, {"values": {"A": 5e-13, "n": np.nan}}, "law 'norton', parameter 'n': nan is not a finite number"),
-    (SolveError, {"loading": 8.0}, "loading is 8.0; write constant_stress(50) or PressureJump(P1=8, P2=10, Tj=14400)"),
+    (ArgumentError, {"values": {"A": 5e-13, "n": np.nan}},
+     "values['n'] of simulate() is nan; allowed is a finite number"),
+    (ArgumentError, {"loading": 8.0},
+     "loading of simulate() is 8.0; allowed is a loading such as constant_stress(50) or PressureJump(P1=8, P2=10, "
+     "Tj=14400)"),
 ]  # fmt: skip
 
 
