@@ -47,7 +47,6 @@ BENCHMARKS = {
         30, (("--cases", "40000"),), short=("--cases", "1000", "--laws", "10", "--seed", "7", "--jobs", "2")
     ),
     "rendered_speckle": Benchmark(1, needs="pyvale 2026.10, here or in the Python of the option --python"),
-    "user_costs": Benchmark(2, needs=DATA),
     "studies": Benchmark(4, needs=DATA),
     "kernel_speed": Benchmark(1, needs="numba, for the hand-written code beside ours"),
     "dimple_accuracy": Benchmark(
@@ -68,8 +67,8 @@ BENCHMARKS = {
     "plate_of_alloys": Benchmark(8),
     "inconel_event": Benchmark(15, needs=DATA),
     "inconel_temperature": Benchmark(4, needs=DATA),
-    "measured_creep": Benchmark(90, needs=DATA),
-    "whole_life": Benchmark(60, needs=DATA),
+    "measured_creep": Benchmark(4, needs=DATA),
+    "whole_life": Benchmark(4, needs=DATA),
     "rupture_methods": Benchmark(3, needs=DATA),
     "rupture_strength_coverage": Benchmark(5, (("--sets", "40"),)),
     "forecast_coverage": Benchmark(50),

@@ -25,7 +25,6 @@ from bulge_cases import DRAWN_LAWS, TIMES, TRUE, Case, PublishedCase, dimple_ref
 from measured import Page, arguments, progress
 from public_calls import predict
 
-from creepkit import kernels
 from creepkit.arrays import Floats
 from creepkit.records import PressureJump, Status
 
@@ -176,7 +175,7 @@ def new_rows(count: int, seed: int, cache: Path | None, tolerance: float) -> lis
 
 
 def new_tables(page: Page, rows: list[Row]) -> None:
-    """Errors of the new cases, as a whole and by groups, the worst ones, and their speed."""
+    """Errors of the new cases, as a whole and by groups, and their speed."""
     page.heading(f"{len(rows)} new cases")
     page.table("output", *_SUMMARY_HEADS)
     for k, name in enumerate(("apex", "D_amp", "S_d", "S_p")):
@@ -184,11 +183,6 @@ def new_tables(page: Page, rows: list[Row]) -> None:
     page.table("apex, by group", *_SUMMARY_HEADS)
     for name, belongs in GROUPS.items():
         _summary(page, name, np.array([row.errors[0] for row in rows if belongs(row)]))
-    page.table("the ten worst", "error of the apex, %", "apex at 12 h, mm", "effective n", "values")
-    for row in sorted(rows, key=lambda row: -row.errors[0])[:10]:
-        values = ", ".join(f"{name} {value:.3g}" for name, value in row.case.values.items())
-        exponent = f"{effective_exponent(row.case):.1f}"
-        page.row(row.case.name, f"{row.errors[0]:.3f}", f"{row.apex:.3f}", exponent, values)
     seconds = np.array([row.seconds for row in rows])
     page.paragraph(
         f"CPU time of a simulation: mean {1e3 * seconds.mean():.1f} ms, median {1e3 * np.median(seconds):.1f} ms; "
@@ -213,22 +207,8 @@ def _summary(page: Page, name: str, group_errors: Floats) -> None:
         page.row(name, group_errors.size, *(f"{x:.3f}" for x in numbers), *(f"{x:.1f}" for x in shares))
 
 
-def effective_exponent(case: Case) -> float:
-    """d ln rate / d ln stress at the stress that stands for the larger pressure, strain 0.01 and 1e4 s: effective n."""
-    stress = case.specimen.reference_stress(case.history(TIMES))[-1] * np.array([0.99, 1.01])
-    rate = kernels.lower(case.model, "numpy").log_rate(case.values, stress=stress, strain=0.01, time=1e4)
-    return float(np.diff(rate)[0] / np.diff(np.log(stress))[0])
-
-
 GROUPS: dict[str, Callable[[Row], bool]] = {
-    **{law: partial(lambda row, law: row.case.law == law, law=law) for law in DRAWN_LAWS},
-    "effective n below 4": lambda row: effective_exponent(row.case) < 4,
-    "effective n 4 to 6.5": lambda row: 4 <= effective_exponent(row.case) < 6.5,
-    "effective n above 6.5": lambda row: effective_exponent(row.case) >= 6.5,
-    "strain hardening, m below -0.5": lambda row: row.case.law == "strain-hardening" and row.case.values["m"] < -0.5,
-    "apex at 12 h below 0.3 mm": lambda row: row.apex < 0.3,
-    "apex at 12 h 0.3 to 1 mm": lambda row: 0.3 <= row.apex < 1,
-    "apex at 12 h above 1 mm": lambda row: row.apex >= 1,
+    **{law: partial(lambda row, law: row.case.law == law, law=law) for law in DRAWN_LAWS}
 }
 
 

@@ -24,7 +24,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from helpers.correlated_noise import LAW, VALUES, least_squares, measured
 from helpers.two_outputs_predictor import TwoOutputs
 
-SETTINGS = IdentificationSettings(starts=1, sobol_points=8, frames=60, nuisances=(), weights="likelihood")
+SETTINGS = IdentificationSettings(
+    starts=1, sobol_points=8, frames=60, nuisances=(), weights="likelihood", usual_errors="none"
+)
 CORRELATIONS = (0.9, 0.0, -0.9)
 
 

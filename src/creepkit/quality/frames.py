@@ -119,7 +119,10 @@ def scatter_about_line(t: Floats, y: Floats) -> float:
 
 
 def extrapolate(t: Floats, y: Floats, time: float) -> tuple[float, float]:
-    """A line through frames, at a later time, and the standard deviation of y less it over that of y."""
+    """A line through frames, at a later time, and the standard deviation of y less it over that of y.
+
+    t, y : (frames,) s, and the output's unit.
+    """
     mean_time, time_variation = t.mean(), float(((t - t.mean()) ** 2).sum())
     slope = float(((t - mean_time) * (y - y.mean())).sum()) / time_variation
     return float(y.mean()) + slope * (time - mean_time), float(

@@ -149,16 +149,19 @@ def _assumed_duration(fit: Identification) -> list[str]:
 
 
 def _left_out(fit: Identification) -> list[str]:
-    """Between which the stress exponent lies where one test is left out; none of fewer tests than four."""
+    """Between which the stress exponent lies where one test is left out, of a law that is not rejected; and which test
+    is farthest from the others; none of fewer tests than four.
+    """
     if not fit.left_out:
         return []
     low, high = min(fit.left_out, key=lambda one: one.exponent), max(fit.left_out, key=lambda one: one.exponent)
     far = max(fit.left_out, key=lambda one: abs(one.log_factor) / one.sd)
     factor = math.exp(far.log_factor)
+    span = f"{low.exponent:.3g} (without '{low.test}') to {high.exponent:.3g} (without '{high.test}')"
     return [
-        f"leaving one test out: stress exponent {low.exponent:.3g} (without '{low.test}') to {high.exponent:.3g} "
-        f"(without '{high.test}'); farthest from the others: '{far.test}', {factor:.3g} times their rate "
-        f"[{factor * math.exp(-1.96 * far.sd):.3g}, {factor * math.exp(1.96 * far.sd):.3g}]"
+        *([] if rejected(fit) else [f"leaving one test out: stress exponent {span}"]),
+        f"farthest from the others: '{far.test}', {factor:.3g} times their rate "
+        f"[{factor * math.exp(-1.96 * far.sd):.3g}, {factor * math.exp(1.96 * far.sd):.3g}]",
     ]
 
 
