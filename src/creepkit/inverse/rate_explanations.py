@@ -60,7 +60,7 @@ OUTLYING_CHANCE = 0.05
 
 
 HELD = 1e10
-"""Times the precision of its prior, that of a value at its bound: it does not move with an explanation."""
+"""Times the precision of its prior, that of a value at its bound, which does not move with the others."""
 
 
 STEP = 0.01
@@ -83,10 +83,10 @@ class RateExplanations:
     """The search for explanations of a problem at its optimum x (unknowns,), where it is made linear."""
 
     def __init__(self, problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise: NoiseModel) -> None:
-        self.problem, self.x = problem, x
+        self.problem, self.x, self.free = problem, x, linear.free[: problem.parameter_count]
         alike = replace(linear, residuals=linear.residuals.with_test_weights(np.ones(len(problem.histories))))
-        alike = replace(alike, precision=np.where(linear.free, linear.precision, HELD * linear.precision))
-        self.scatter = replace(rate_scatter(problem, alike, noise), members={})
+        held = replace(alike, precision=np.where(linear.free, linear.precision, HELD * linear.precision))
+        self.scatter, self.held = (replace(rate_scatter(problem, one, noise), members={}) for one in (alike, held))
         self.stresses, self.temperatures = problem.conditions
         log_stress, activation = np.log(self.stresses), -1.0 / (GAS_CONSTANT * self.temperatures)  # -, mol/J
         self.log_stress, self.activation = log_stress - log_stress.mean(), activation - activation.mean()
@@ -160,12 +160,18 @@ class RateExplanations:
 
         Beside the one test whose rate is its own that makes it likeliest, if any: either may hide the other.
         """
-        count, column = len(self.problem.histories), self.log_stress
-        further = [self._evidence([column, self._only(k)], [EXPONENT_CHANGE, FACTOR_SD]) for k in range(count)]
-        tried = [(0.0, self._evidence([column], [EXPONENT_CHANGE])), *((float(np.log(count)), one) for one in further)]
+        column, ones, choice = (
+            self.log_stress[:, None],
+            np.eye(len(self.log_stress))[..., None],
+            np.log(self.log_stress.size),
+        )
+        alone = max(self.held.evidence(one, np.array([FACTOR_SD])).log for one in ones) - choice
+        without = max(self.held.evidence(column[:, :0], np.zeros(0)).log, alone)
+        sizes = np.array([EXPONENT_CHANGE, FACTOR_SD])
+        tried = [(0.0, self.held.evidence(column, sizes[:1]))]
+        tried += [(choice, self.held.evidence(np.concatenate([column, one], axis=1), sizes)) for one in ones]
         choice, evidence = max(tried, key=lambda one: one[1].log - one[0])
-        without = max(self._as_it_is, max(one.log for one in self._alone) - float(np.log(count)))
-        return evidence, evidence.log - choice - without
+        return evidence, float(evidence.log - choice - without)
 
     def _of_curves(self) -> Iterable[Explanation]:
         """The stress exponent of the rates of tests is another one than the shape of curves gives the law.
@@ -174,10 +180,19 @@ class RateExplanations:
         under a constant load. By a right law both are one exponent, and two estimates of it agree.
         """
         (evidence, odds), stress = self._by_rates, self.problem.coordinates.reference.stress
+        if self._slope[~self.free].any():  # a bound holds the exponent, and not the shape of curves
+            return
         change, sd = float(evidence.mean[0]), float(evidence.sd[0])
         if abs(change) > SMALLEST_CHANGE["stress exponent"]:
-            own = float(local_exponent(self.problem.coordinates, stress)(self._moved(evidence)))
-            yield Explanation("stress exponent", (), change, sd, odds, (own, own + change), (stress, stress))
+            exponent, u = local_exponent(self.problem.coordinates, stress), self.x[: self.problem.parameter_count]
+            ends = float(exponent(u)), float(exponent(self._moved(evidence))) + change
+            yield Explanation("stress exponent", (), change, sd, odds, ends, (stress, stress))
+
+    @cached_property
+    def _slope(self) -> Floats:
+        """(parameters,) derivatives of the law's exponent to its coordinates."""
+        u, coordinates = self.x[: self.problem.parameter_count], self.problem.coordinates
+        return gradient(local_exponent(coordinates, coordinates.reference.stress), u, np.ones(u.size))
 
     @property
     def second_moment(self) -> Floats:
@@ -189,8 +204,7 @@ class RateExplanations:
         u, width = self.x[: self.problem.parameter_count], self.problem.bounds.width[: self.problem.parameter_count]
         if not any(e.is_of_curves for e in self.found):
             return np.zeros((u.size, u.size))
-        exponent = local_exponent(self.problem.coordinates, self.problem.coordinates.reference.stress)
-        evidence, slope = self._by_rates[0], gradient(exponent, u, np.ones(u.size)) * width
+        evidence, slope = self._by_rates[0], self._slope * width
         shift = self._moved(evidence) - u + float(evidence.mean[0]) * width * slope / float(slope @ slope)
         return np.asarray(np.outer(shift, shift))
 
