@@ -300,9 +300,8 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
             return "compare it with other laws that suit the tests (creepkit init)"
         return "use it within the range of the tests alone; try further laws for more"
     undecided = ranking is not None and len(ranking.laws) > 1 and not ranking.decisive
-    if undecided or weak:
-        what = "tells the laws apart" if undecided else "determines more"
-        return f"make a test that {what} (creepkit design says which)"
+    if wanted := "tells the laws apart" if undecided else weak and "determines more":
+        return f"make a test that {wanted} (creepkit design says which)"
     return "forecast (creepkit predict), or export the law to your code (creepkit export)"
 
 
