@@ -50,7 +50,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29_900
+TESTS = 30_000
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
