@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from creepkit.exporters.documents import expression_mathml, law_equations
 from creepkit.inverse.adequacy import UNDETECTED_SCATTER
+from creepkit.inverse.history_checks import LENGTHS_BY_DEFAULT
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.inverse.perturbation import beyond_intervals, combined_change_text
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
@@ -192,7 +193,8 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
     """What to mind, the most serious first, a sentence each without a full stop."""
     others = [one.fit for one in ranking.laws if one.fit is not fit] if ranking is not None else []
     choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
-    of_law = [*_of_tests(fit), *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
+    tests = [*(one for one in fit.notes if one.startswith(LENGTHS_BY_DEFAULT)), *_of_tests(fit)]
+    of_law = [*tests, *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
     return list(dict.fromkeys([*of_law, *_held(others), *_data(quality)]))
 
 
