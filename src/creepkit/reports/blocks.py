@@ -130,6 +130,7 @@ class Answer:
     """
 
     kind: ClassVar[str] = "answer"
+    units: ClassVar[str] = "stress in MPa, time in s, strain as a fraction"
     headline: str
     law: Cell
     equations: Sequence[Rich]
@@ -265,6 +266,7 @@ def _lines(block: Block) -> list[str]:
 def _answer_lines(answer: Answer) -> list[str]:
     """MOST_LINES lines, none longer than WIDTH; cautions and figures without room among them stand in the details."""
     pieces = [f"{name} = {value} [{', '.join(ends)}] {unit}".strip() for name, value, ends, unit in answer.values]
+    pieces.append(f"({answer.units})")
     lines = wrap(answer.headline, WIDTH)
     for text in (*answer.remarks, *map(str, answer.equations), "   ".join(p.replace(" ", "\u00a0") for p in pieces)):
         lines += _indented(text)
