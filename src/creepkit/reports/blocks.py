@@ -13,11 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from textwrap import wrap
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from markupsafe import Markup
 
-from creepkit.arrays import Floats
+if TYPE_CHECKING:
+    from creepkit.arrays import Floats
 
 LONGEST_TEXT = 4000
 """Characters of a cell or paragraph; an error message may hold a name of any length."""
