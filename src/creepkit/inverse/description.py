@@ -63,9 +63,9 @@ class Description:
             ("creep rates", self.rates),
             *((_plural(name), value) for name, value in self.outputs.items() if is_logarithmic(name)),
         ]
-        texts = [f"{name} to {spread_text(value)}" for name, value in logarithmic if np.isfinite(value)]
+        texts = [f"{name} within {spread_text(value)}" for name, value in logarithmic if np.isfinite(value)]
         texts += [
-            f"{_plural(name)} to {100 * value:.2g} %"
+            f"{_plural(name)} within {100 * value:.2g} %"
             for name, value in self.outputs.items()
             if np.isfinite(value) and not is_logarithmic(name)
         ]

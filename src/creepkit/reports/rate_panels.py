@@ -258,11 +258,11 @@ def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
 
 
 def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
-    """Rates in %/h with 95 % intervals at the median stress of all; fits : (material, best law), in the order drawn."""
-    stress = float(np.median([fit.reference.stress for _, fit in fits]))
+    """Rates in %/h, 95 % intervals, at the median stress and strain of all; fits : (material, best law), in order."""
+    stress, strain = (float(v) for v in np.median([(f.reference.stress, f.reference.strain) for _, f in fits], axis=0))
     laws = list(dict.fromkeys(fit.law.name for _, fit in fits))
     colours = dict(zip(laws, distinct_colours(len(laws)), strict=True))
-    rates = np.array([[float(v) for v in fit.rate(stress, warn=False)] for _, fit in fits])
+    rates = np.array([[float(v) for v in fit.rate(stress, strain=strain, warn=False)] for _, fit in fits])
     rates = PERCENT_PER_HOUR * rates
     centre = rates[:, 0][np.isfinite(rates[:, 0]) & (rates[:, 0] > 0)]
     named: set[str] = set()
@@ -283,5 +283,5 @@ def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
         span(axes, "x", centre, bounds, logarithmic=True, most=8)
     axes.set_yticks(range(len(fits)), [shortened(name, 24) for name, _ in fits], fontsize=7 if len(fits) > 20 else 8)
     axes.set_ylim(len(fits) - 0.5, -0.5)
-    axes.set(xlabel=f"creep rate at {stress:.3g} MPa, %/h")
+    axes.set(xlabel=f"creep rate at {stress:.3g} MPa and {100 * strain:.2g} % strain, %/h")
     place_legend_right(axes, "law; open:\ncontradicted\nby its tests")
