@@ -9,7 +9,7 @@ that were followed to rupture do: their readings outweigh their end.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -53,23 +53,27 @@ LEAST_INCREASE = 1e-6
 
 @lru_cache(maxsize=256)
 def has_tertiary_creep(law: CreepLaw) -> bool:
-    """Whether the rate of some term can rise along a test at constant stress, by strain, time or internal variables.
+    """Whether the rate of some term can rise along a test at constant stress, by strain, time or internal variables."""
+    return any(
+        _is_somewhere(rise, law)
+        for term in law.terms.values()
+        for rise in (strain * term.diff(strain) / term, time * term.diff(time) / term, *_by_states(term, law))
+    )
 
-    It is differentiated at points within the bounds of the parameters.
-    """
-    symbols = [*law.params, *law.states, *POINT_VARIABLES]
-    points = _sampled_points(law)
-    for term in law.terms.values():
-        rises = [strain * term.diff(strain) / term, time * term.diff(time) / term]
-        rises += [term.diff(z) * state.rate / term for z, state in law.states.items()]
-        for rise in rises:
-            if rise == 0:
-                continue
-            with np.errstate(all="ignore"):
-                values = np.asarray(sympy.lambdify(symbols, rise, "numpy")(*points), float)
-            if (np.isfinite(values) & (values > LEAST_INCREASE)).any():
-                return True
-    return False
+
+def _by_states(term: sympy.Expr, law: CreepLaw) -> Iterator[sympy.Expr]:
+    """Relative rises of a term by each internal variable."""
+    return (term.diff(z) * state.rate / term for z, state in law.states.items())
+
+
+def _is_somewhere(rise: sympy.Expr, law: CreepLaw) -> bool:
+    """Whether a relative rise is above rounding at some of the points within the bounds of the parameters."""
+    if rise == 0:
+        return False
+    with np.errstate(all="ignore"):
+        symbols = [*law.params, *law.states, *POINT_VARIABLES]
+        values = np.asarray(sympy.lambdify(symbols, rise, "numpy")(*_sampled_points(law)), float)
+    return bool((np.isfinite(values) & (values > LEAST_INCREASE)).any())
 
 
 def _sampled_points(law: CreepLaw) -> Floats:
@@ -106,12 +110,16 @@ def duration_known(history: History) -> bool:
     return float(history.times[-1]) > UNKNOWN_DURATION
 
 
+@lru_cache(maxsize=256)
 def needs_durations(law: CreepLaw) -> bool:
     """Whether the minimum rate of a law depends on how long the test lasted: it has a rate of strain or time.
 
-    Over a duration that is assumed from the measured rate such a law would predict that rate from itself.
+    Or it falls with internal variables, as by transients that fade. Over a duration that is assumed from the measured
+    rate such a law would predict that rate from itself.
     """
-    return law.uses(strain) or law.uses(time)
+    if law.uses(strain) or law.uses(time):
+        return True
+    return any(_is_somewhere(-rise, law) for term in law.terms.values() for rise in _by_states(term, law))
 
 
 def rests_on_durations(law: CreepLaw, histories: Sequence[History]) -> bool:

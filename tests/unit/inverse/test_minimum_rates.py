@@ -206,7 +206,8 @@ def test_rates_of_unknown_duration_do_not_judge_hardening():
     """Planted n = 5, Q = 400 kJ/mol. Over a duration set from the rate itself, time hardening predicts all."""
     tests = rate_table(np.random.default_rng(3))
     factor = ck.arrhenius(T_ref=1100.0)
-    laws = [ck.law(name).times(factor) for name in ("norton", "strain-hardening", "time-hardening")]
+    names = ("norton", "strain-hardening", "time-hardening", "blackburn", "norton*primary", "theta-projection")
+    laws = [ck.law(name).times(factor) for name in names]
     ranking = ck.select(laws, tests, starts=1)
     assert [ranked.fit.law.name for ranked in ranking.laws] == ["norton*arrhenius"]
     values = {e.name: e for e in ranking.best.estimates}
@@ -216,6 +217,7 @@ def test_rates_of_unknown_duration_do_not_judge_hardening():
     assert values["Q"].value == pytest.approx(4e5, rel=0.05)
     assert "depends on time, and minimum creep rates of tests of unknown" in ranking.failed["time-hardening*arrhenius"]
     assert "depends on strain, and minimum" in ranking.failed["strain-hardening*arrhenius"]
+    assert "depends on internal variables, with which its rate falls" in ranking.failed["blackburn*arrhenius"]
     without = laws[2].fix(m=0.0)
     assert ck.identify(without, tests, starts=1).values["n"] == pytest.approx(values["n"].value, rel=1e-3)
     lasted = [h.replace(times=np.array([1e7]), unruptured=True) for h in tests]

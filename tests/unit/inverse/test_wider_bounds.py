@@ -5,9 +5,12 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
+from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identify import identify, refit
+from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import constant_stress
+from creepkit.registry import default_registry, kinds
 from helpers.planted_bars import BAR, bars
 
 NORTON, QUICK = ck.law("norton"), IdentificationSettings(starts=2, sobol_points=16)
@@ -27,6 +30,43 @@ def test_a_search_goes_on_beyond_bounds_that_nobody_stated(truth, stresses):
             identify(stated, tests, BAR, settings=QUICK)
     else:
         assert identify(stated, tests, BAR, settings=QUICK).values["n"] < 8.0 + 1e-6
+
+
+def isothermal_rates(rate_at, stresses, scatter=0.08):
+    """Minimum rates at 900 K by a formula, with scatter between tests."""
+    factors = np.exp(scatter * np.random.default_rng(4).standard_normal(len(stresses)))
+    return [
+        ck.History(f"m{s:g}", np.array([1.0]), {}, constant_stress(s), 900.0, minimum_rate=float(rate_at(s) * factor))
+        for s, factor in zip(stresses, factors, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "truth", "rate_at"),
+    [
+        ("hyperbolic-sine", {"A": 6e-4, "n": 4.0, "B": 15.0}, lambda s: 6e-4 * np.sinh(s / 15.0) ** 4),
+        ("threshold-stress", {"A": 2e-6, "n": 3.0, "s_0": 2.5}, lambda s: 2e-6 * (s - 2.5) ** 3),
+    ],
+)
+def test_a_law_is_not_excluded_by_its_own_bounds(name, truth, rate_at):
+    """Of a soft metal: a coefficient beyond the usual ones, and a threshold at 1/200 of the range of thresholds."""
+    tests = isothermal_rates(rate_at, np.geomspace(4.0, 60.0, 14))
+    ranking = ck.select(["norton", name], tests, starts=4)
+    assert not ranking.failed
+    assert ranking.best.law.name == name
+    estimates = {e.name: e for e in ranking.best.estimates}
+    assert all(estimates[key].low < value < estimates[key].high for key, value in truth.items()), estimates
+
+
+def test_rate_coefficients_of_every_law_are_sought_beyond_their_bounds():
+    laws = default_registry().values(kinds.LAWS)
+    kept = {
+        (law.name, law.names[k])
+        for law in laws
+        for k in Coordinates(law, ReferencePoint(100.0, 0.01, 1e6, 900.0)).coefficients
+        if not law.table[law.names[k]].widens
+    }
+    assert not kept
 
 
 def minimum_rates(n, highest, seed):
