@@ -287,8 +287,9 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked
         strain = best.central.of("strain", history.times)[0]
         point["strain"] = np.array([np.nanmax(strain, initial=0.0)])
     parts = [extrapolation_text(fit.ranges, point, NEARBY).removeprefix("extrapolated: ")]
-    if "stress" not in extrapolated_names(parts[0]) and point["stress"].size == stresses[stresses > 0].size:
-        grid = [(float(s), float(T)) for s in point["stress"] for T in np.unique(np.round(temperatures, 1))]
+    if "stress" not in extrapolated_names(parts[0]):
+        held = stresses[stresses > 0]  # as those of the tests, before strain or relaxation changes them
+        grid = [(float(s), float(T)) for s in held for T in np.unique(np.round(temperatures, 1))]
         conditions = np.array(grid, float).reshape(-1, 2)
         parts.append(outside_combinations(fit, conditions[:, 0], conditions[:, 1]))
     parts = [part for part in (*parts, *_extrapolated_times(fit, asked)) if part]

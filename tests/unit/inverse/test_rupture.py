@@ -25,6 +25,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, constant_strain, constant_stress
+from creepkit.reports.answer import key_figures
 from creepkit.specimens.relaxation import Relaxation
 from helpers.literature_laws import EQUATIONS
 from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, whole_life_table
@@ -391,6 +392,25 @@ def test_time_hardening_has_n_over_one_plus_m_at_constant_strain() -> None:
     assert state.time[0] == pytest.approx(reached, rel=1e-4)
     assert state.rate[0] == pytest.approx((1 + m) * r.strain / reached, rel=1e-4)
     assert "at constant time the law's formula has the stress exponent" in fit.details()
+
+
+@pytest.mark.parametrize("name", ["time-hardening", "strain-hardening"])
+def test_exponent_and_energy_are_those_of_bars_at_one_strain(name: str) -> None:
+    """Both laws make the curves A exp(-Q/R (1/T - 1/1000)) s^n t^(1 + m) / (1 + m): at a strain Q is Q / (1 + m)."""
+    energy, curved = 2e5, []
+    for T in (970.0, 1000.0, 1030.0):
+        factor = np.exp(-energy / GAS_CONSTANT * (1 / T - 1 / 1000.0))
+        curved += [
+            h.replace(name=f"{h.name}, {T:g} K", temperature=T, outputs={"strain": factor * h.outputs["strain"]})
+            for h in curves()
+        ]
+    fit = ck.identify(ck.law(name).times(ck.arrhenius(T_ref=1000.0)), curved, starts=1, usual_errors="none")
+    exponent, activation, _ = key_figures(fit)
+    assert exponent.where == activation.where
+    assert exponent.where.endswith("% strain")
+    assert exponent.value == pytest.approx(N / (1 + M), rel=0.01)
+    assert activation.value == pytest.approx(energy / (1 + M) / 1e3, rel=0.01)
+    assert activation.low < energy / (1 + M) / 1e3 < activation.high
 
 
 # ---- rates and durations ---------------------------------------------------------------------------------------------
