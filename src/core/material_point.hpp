@@ -38,14 +38,17 @@ struct PointLaw {
 // directions : (3, count) w/e. deviator : (6, count) derivatives of the stress components y that are conjugate to w,
 //     from the last tangent: 11, 22, 33, 12, 13, 23. trials : (count,) trial stress at which D was found last, MPa
 //     (negative: none in this stage). by_trial : (count,) dD/d(trial stress) of the last tangent.
+// shifted : whether D follows more than the trial stress: internal variables, largest principal or mean stress.
 struct PointStates {
     int64_t count, states, values;
+    bool shifted;
     double *value, *base, *increments, *state, *slopes, *mises, *directions, *deviator, *trials, *by_trial;
 
     template <class Memory>
     void take(Memory& memory, int64_t points, int64_t state_count) {
         count = points;
         states = state_count;
+        shifted = states > 0;
         values = EQUIVALENT_STRAIN + 1 + state_count;
         value = memory.doubles(values * count);
         base = memory.doubles(values * count);
@@ -69,6 +72,11 @@ struct ElasticPredictor {
 // Derivatives of D to the trial stress, and to shifts of the largest principal and of the mean stress.
 struct CreepDerivatives {
     Vector by_trial, by_principal, by_mean;
+
+    CREEPKIT_INLINE bool shifted() const {
+        const Vector zero{};
+        return any((by_principal < zero) | (by_principal > zero) | (by_mean < zero) | (by_mean > zero));
+    }
 };
 
 // base : (3, stride) creep components of these points.
@@ -109,8 +117,8 @@ CREEPKIT_INLINE void strain_derivatives(const StageConditions& stage, const Elas
     follow[1] = along * p.difference * (1.0 / 3.0);
     follow[2] = along * p.shear * (1.0 / 3.0);
     follow[3] = -(by.by_trial * stress);
+    if (!by.shifted()) return;
     const Vector zero{};
-    if (!any((by.by_principal < zero) | (by.by_principal > zero) | (by.by_mean < zero) | (by.by_mean > zero))) return;
     const Vector radius = square_root(p.difference * p.difference + p.shear * p.shear);
     const Vector turned = by.by_principal * stress * p.inverse * (1.0 / 3.0);
     const Vector shrink = by.by_principal * stress * p.top * p.inverse * p.inverse;
@@ -344,6 +352,25 @@ inline PointFlag creep_increments_with_states(const PointLaw& law, const StageCo
     return POINTS_SOLVED;
 }
 
+// Keep what has become of the points of a vector by their increments.
+CREEPKIT_INLINE void keep_points(PointStates& points, int64_t k, const ElasticPredictor& p, Vector trial,
+                                 Vector increment) {
+    store(points.trials + k, trial);
+    store(points.mises + k, trial - p.stiffness * increment);
+    store(points.directions + k, p.hoop * p.inverse);
+    store(points.directions + points.count + k, p.difference * p.inverse);
+    store(points.directions + 2 * points.count + k, p.shear * p.inverse);
+}
+
+// Move the points of a vector to another predictor, their increments with the trial stress along the last tangent.
+CREEPKIT_INLINE void move_points(PointStates& points, int64_t k, const ElasticPredictor& p) {
+    const Vector trial = p.stiffness * p.equivalent, last = load(points.increments + k);
+    const Vector moved = last + load(points.by_trial + k) * (trial - load(points.trials + k));
+    const Vector increment = select(moved > Vector{}, moved, last);
+    store(points.increments + k, increment);
+    keep_points(points, k, p, trial, increment);
+}
+
 // Stress P of the points of a vector and, if STIFF, A = dP/dF (symmetric), both times `weight`, into eights of numbers;
 // keeps what the states of the points become, whose increments are known.
 template <bool STIFF>
@@ -351,17 +378,13 @@ CREEPKIT_INLINE void finish_points(const StageConditions& stage, PointStates& po
                                    const ElasticPredictor& p, const CreepDerivatives& by, Vector weight, double* P,
                                    double* A) {
     const Vector increment = load(points.increments + k);
-    const Vector trial = p.stiffness * p.equivalent;
-    store(points.trials + k, trial);
-    store(points.mises + k, trial - p.stiffness * increment);
-    store(points.directions + k, p.hoop * p.inverse);
-    store(points.directions + points.count + k, p.difference * p.inverse);
-    store(points.directions + 2 * points.count + k, p.shear * p.inverse);
+    keep_points(points, k, p, p.stiffness * p.equivalent, increment);
     Vector stress[4], piola[5];
     log_stress(stage, p, increment, stress);
     piola_stress(at, stress, piola);
     CREEPKIT_UNROLL for (int i = 0; i < 5; ++i) store(P + EIGHT * i, piola[i] * weight);
     if (!STIFF) return;
+    points.shifted = points.shifted || by.shifted();
     store(points.by_trial + k, by.by_trial);
     Vector follow[4], moduli[4][4], by_w[3][3];
     strain_derivatives(stage, p, increment, by, follow);

@@ -117,14 +117,16 @@ private:
         ended = {row + 1, REACHED_END, time};
     }
 
-    // Bring `displacement` to equilibrium; corrections below `tolerance`, mm, end the search.
+    // Bring `displacement` to equilibrium, and the points to those displacements.
     //
-    // tight : tolerance of the points' own equations once near.
+    // tolerance : mm, of what a correction leaves, which is what the next one would be if corrections went on to fall as
+    // the last two did. tight : tolerance of the points' own equations once near.
     EquilibriumFlag solve_equilibrium(const StageConditions& stage, double tolerance, double tight) {
         const int passes = system.touches() ? 40 : 16, patience = system.touches() ? 20 : 6;
         constexpr double LOOSE = 0.03;   // tolerance of the points' equations in the first pass
         constexpr double KEEP = 0.3;     // the tangent is kept while a correction is at most this share of the last
-        double last = 0.0, size = 0.0, factor = 1.0;
+        constexpr double MOST = 3.0;     // times the tolerance, the last correction at most
+        double last = INFINITY, size = INFINITY, factor = 1.0;
         for (int pass = 0; pass < passes; ++pass) {
             const bool stiff = pass == 0 || factor < 1.0 || (pass > 1 && size > KEEP * last);
             const double local = pass == 0 ? fmax(tight, LOOSE) : tight;
@@ -140,9 +142,28 @@ private:
             if (!isfinite(size) || (pass > patience && size > last)) return TOO_FAR;
             factor = system.correction_share(stage, displacement, size);
             system.correct(displacement, factor);
-            if (size <= tolerance && system.contact_settled()) return CONVERGED;
+            const double ratio = size / last, left = ratio < KEEP ? size * ratio / (1.0 - ratio) : size;
+            if ((size <= tolerance || (size <= MOST * tolerance && left <= tolerance)) && system.contact_settled())
+                return settle_points(stage, tight);
         }
         return TOO_MANY_PASSES;
+    }
+
+    // Take the points to the displacements as they were corrected last: along the tangent, unless more than the trial stress
+    // moves them or a force is asked for. Derivatives follow from what a point does at its strain, and err as values do.
+    EquilibriumFlag settle_points(const StageConditions& stage, double tight) {
+        if (points.shifted || system.reaction() != 0.0) {
+            record.counts[3] += 1;
+            return system.template assemble<false>(law, stage, displacement, points, tight) == POINTS_SOLVED ? CONVERGED
+                                                                                                             : NO_STRESS;
+        }
+        for (int64_t k = 0; k < points.count; k += LANES) {
+            Kinematics at;
+            system.deform(k, displacement, at);
+            if (!set_strains(at)) return NO_STRESS;
+            move_points(points, k, elastic_predictor(stage, at, points.base + k, points.count));
+        }
+        return CONVERGED;
     }
 
     // The elastic change at a sudden change of load, in as many parts as it needs; recorded at the segment's start.

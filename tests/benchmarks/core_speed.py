@@ -24,7 +24,7 @@ from creepkit import kernels
 from creepkit.fem.simulation import simulate
 from creepkit.records import History, PressureJump
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.finite_element_tests import FiniteElementTest, solver_settings
+from creepkit.specimens.finite_element_tests import EQUILIBRIUM_SHARE, FiniteElementTest, solver_settings
 
 TIMES = np.maximum(np.arange(289) * 150.0, 1.0)
 CASES = {
@@ -60,7 +60,7 @@ class Case:
         """What a fit asks for."""
         nuisances = NUISANCES if jacobian else {}
         test = FiniteElementTest.of(self.specimen, self.history, nuisances, jacobian)
-        return test.response(test.simulate(self.law, self.theta, solver_settings(self.specimen, exact=jacobian)))
+        return test.response(test.simulate(self.law, self.theta, solver_settings(self.specimen)))
 
 
 def least(call, repeats: int) -> float:
@@ -103,7 +103,7 @@ def tolerances(page: Page, repeats: int) -> None:
         errors, costs = [], []
         for name in CASES:
             case = Case(name)
-            settings = dict(tolerance=tolerance, newton=1e-2 * tolerance, growth=growth_)
+            settings = dict(tolerance=tolerance, newton=EQUILIBRIUM_SHARE * tolerance, growth=growth_)
             made = case.simulate(**settings)
             apex = made.at(made.displacements[:, case.setup.model.top[0], 1], TIMES)
             errors.append(100 * np.nanmax(np.abs(apex - exact[name])) / np.nanmax(exact[name]))
@@ -120,7 +120,7 @@ def answer_rounds() -> None:
         predictor = case.specimen.reduced_order_model()
         reduced = predictor.reduced_model_of(case.setup.piece)
         simulation = partial(
-            simulate, case.law, case.theta, reduced, case.setup.load_history, settings=predictor.settings(False)
+            simulate, case.law, case.theta, reduced, case.setup.load_history, settings=predictor.settings
         )
         calls.append((case.simulate, case.predict, partial(case.predict, True), simulation))
     for _ in sys.stdin:

@@ -86,7 +86,7 @@ def timed(function, repeats: int = 3):
 def errors_of(reference: Reference, basis: ReducedBasis) -> tuple[float, float, float]:
     """Error in %, difference of the end in %, and CPU time in s."""
     model = ReducedOrderModel(reference.setup.model, basis)
-    history, settings = reference.setup.load_history, BulgeReducedOrderModel(reference.setup.piece).settings(False)
+    history, settings = reference.setup.load_history, BulgeReducedOrderModel(reference.setup.piece).settings
     cpu, run = timed(lambda: simulate(reference.kernel, reference.theta, model, history, settings=settings))
     top = reference.setup.model.top
     exact, found = (each.at(each.displacements[:, top, 1], TIMES) for each in (reference.run, run))
@@ -160,7 +160,7 @@ def costs_table(page: Page) -> None:
             ("reduced", reduced),
             ("in searches", reduced.for_search()),
         ):
-            settings = solver_settings(each.specimen) if predictor is None else predictor.settings(False)
+            settings = solver_settings(each.specimen) if predictor is None else predictor.settings
             model = each.setup.model if predictor is None else predictor.reduced_model_of(each.setup.piece)
 
             def run(each=each, settings=settings, model=model):

@@ -134,7 +134,7 @@ def test_derivatives_are_those_of_differences_in_the_same_steps() -> None:
     )  # fmt: skip
     nuisances = {"modulus": 0.02, "temperature": 3.0, "load step@50000": 0.01}
     nuisances |= {each.name: 1.01 * each.default for each in disc.dimensions}
-    settings = solver_settings(disc, exact=True)._replace(newton=1e-8)
+    settings = solver_settings(disc)._replace(newton=1e-8)
     test = FiniteElementTest.of(disc, plan, nuisances, True)
     simulation = test.simulate(kernel, theta, settings)
     assert simulation.sensitivities is not None

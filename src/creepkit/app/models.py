@@ -87,7 +87,7 @@ def rom_data(predictor: BulgeReducedOrderModel, lengths: Mapping[str, float] | N
         "limited": compiled.structure.limited,
         "window": piece.observation.window,
         "grid": [fit.grid.log_radius.size, fit.grid.angular.size],
-        "settings": predictor.settings(False)._asdict(),
+        "settings": predictor.settings._asdict(),
         "lengths": {name: float(getattr(piece.geometry, name)) for name in piece.geometry.lengths},
         "arrays": {
             "modes": packed(basis.modes, "float32"),  # to draw the body by

@@ -18,6 +18,7 @@ from creepkit.integration.core_structures import IntegrationSettings, SettingsSt
 from creepkit.integration.time_discretisation import SDIRK4, SMALLEST_EXPONENT
 from creepkit.records import Status
 from creepkit.specimens.bulge.reduced_order_model import SEARCH_GROWTH, SEARCH_MODES, SEARCH_TOLERANCE
+from creepkit.specimens.finite_element_tests import EQUILIBRIUM_SHARE
 
 RUNTIME_FILES = ("core.js", "programs.js", "bars.js", "dimple.js")
 """Each needs those before it."""
@@ -55,7 +56,7 @@ def core_code() -> bytes:
 def _constants() -> dict[str, Any]:
     """Numbers and words that the core's callers bring along: the method of integration, settings, endings."""
     settings = IntegrationSettings()
-    tolerance = {"tolerance": SEARCH_TOLERANCE, "newton": 1e-3 * SEARCH_TOLERANCE, "growth": SEARCH_GROWTH}
+    tolerance = {"tolerance": SEARCH_TOLERANCE, "newton": EQUILIBRIUM_SHARE * SEARCH_TOLERANCE, "growth": SEARCH_GROWTH}
     numbers = np.concatenate([SDIRK4.a, SDIRK4.c, SDIRK4.error, SDIRK4.dense], axis=None).tolist()
     return {
         "bar": {

@@ -40,7 +40,7 @@ class SolverSettings(NamedTuple):
     """How accurately, and how far, to simulate.
 
     tolerance : estimated error of a step's displacements over (0.01 mm + the largest of those that are observed).
-    newton : last correction of equilibrium over the same.
+    newton : what the last correction of equilibrium leaves, over the same.
     first : s, the first step after a change of load. growth : by which the time since then may grow in a step.
     deflection_limit : mm, observed displacement at which the body has burst.
     strain_limit : creep strain at which a point has burst. max_steps : cap on steps, accepted and rejected.
@@ -48,7 +48,7 @@ class SolverSettings(NamedTuple):
     """
 
     tolerance: float = 1e-2
-    newton: float = 1e-4
+    newton: float = 7e-5
     first: float = 10.0
     growth: float = 2.0
     deflection_limit: float = 3.0

@@ -49,7 +49,8 @@ class Explanation:
         changes by over the tests, and its standard deviation. odds : ln of the odds against the law as it is; 0 of a
         test that stands out and is no explanation.
     ends : the exponent at the lowest and the highest stress, or the energy in J/mol at the lowest and the highest
-        temperature; at : these stresses, MPa, or temperatures, K.
+        temperature; at : these stresses, MPa, or temperatures, K. Where both are one, ends are the exponent by the
+        shape of curves and by the rates of tests.
     errors : of one test, errors of what is stated of it, any one of which would make it: {"load", "strain", "time":
         true value over that stated, "temperature": true less stated, K}.
     factors : on the rates of the single tests. near : others that explain nearly as much as the last of them.
@@ -80,6 +81,11 @@ class Explanation:
         return self.kind in ("stress exponent", "activation energy")
 
     @property
+    def is_of_curves(self) -> bool:
+        """Whether it is what the shape of curves and the rates of tests say apart of the exponent at one stress."""
+        return self.at[0] == self.at[1] > 0.0
+
+    @property
     def headline(self) -> str:
         """In a few words."""
         if self.kind == "one test":
@@ -93,7 +99,7 @@ class Explanation:
     def sentence(self) -> str:
         """What it is, for people, without a full stop."""
         if self.is_of_law:
-            return f"{self.headline}, more than this law lets it"
+            return self.headline + ", more than this law lets it" * (not self.is_of_curves)
         speed = f"{np.exp(self.size):.3g} times as fast"
         if self.kind == "two groups":
             named = ", ".join(self.tests[:MOST_NAMED])
@@ -156,6 +162,8 @@ class Explanation:
     @property
     def _change(self) -> str:
         low, high = self.ends
+        if self.is_of_curves:
+            return f"is {low:.2g} by the shape of the curves and {high:.2g} by the rates of the tests"
         verb = "rises" if high > low else "falls"
         if self.kind == "stress exponent":
             return f"{verb} from {low:.2g} at {self.at[0]:.4g} MPa to {high:.2g} at {self.at[1]:.4g} MPa"

@@ -406,7 +406,7 @@ def _reported(
     prediction = with_correction_at_frames(problem, histories, prediction)
     error_covariance = of_errors[:count, :count]
     by_tests_alone = positive_semidefinite(covariance[:count, :count])
-    law_covariance = by_tests_alone + error_covariance
+    law_covariance = by_tests_alone + error_covariance + rates.second_moment
     estimated = covariance_of_values(linear, noise_model, working_noise)[:count, :count]
     values_of_tests = LawAtTests(coordinates, u, scatter, noise_model, problem.predictor)
     used = compares_rupture_times(law, problem.settings)

@@ -33,7 +33,7 @@ from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per_kelvin
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import USUAL_ERRORS
-from creepkit.inverse.uncertainty.quantities import local_exponent, log_rate
+from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.uncertainty.rate_scatter import SMALLEST_FACTOR, Evidence, rate_scatter, redundant_rates
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import temperature
@@ -59,6 +59,10 @@ OUTLYING_CHANCE = 0.05
 """That of any of the tests standing out so far by scatter (Bonferroni), below which one is a caution."""
 
 
+HELD = 1e10
+"""Times the precision of its prior, that of a value at its bound, which does not move with the others."""
+
+
 STEP = 0.01
 """Of ln of strain and time, for derivatives of the rate."""
 
@@ -79,9 +83,10 @@ class RateExplanations:
     """The search for explanations of a problem at its optimum x (unknowns,), where it is made linear."""
 
     def __init__(self, problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise: NoiseModel) -> None:
-        self.problem, self.x = problem, x
+        self.problem, self.x, self.free = problem, x, linear.free[: problem.parameter_count]
         alike = replace(linear, residuals=linear.residuals.with_test_weights(np.ones(len(problem.histories))))
-        self.scatter = replace(rate_scatter(problem, alike, noise), members={})
+        held = replace(alike, precision=np.where(linear.free, linear.precision, HELD * linear.precision))
+        self.scatter, self.held = (replace(rate_scatter(problem, one, noise), members={}) for one in (alike, held))
         self.stresses, self.temperatures = problem.conditions
         log_stress, activation = np.log(self.stresses), -1.0 / (GAS_CONSTANT * self.temperatures)  # -, mol/J
         self.log_stress, self.activation = log_stress - log_stress.mean(), activation - activation.mean()
@@ -145,8 +150,63 @@ class RateExplanations:
         s, z = self.log_stress, self.activation
         if np.unique(s.round(2)).size >= 3:
             yield from self._change("stress exponent", s, EXPONENT_CHANGE)
+            yield from self._of_curves()
         if self.problem.law.uses(temperature) and np.unique((z / max(np.ptp(z), 1e-300)).round(2)).size >= 3:
             yield from self._change("activation energy", z, ENERGY_CHANGE)
+
+    @cached_property
+    def _by_rates(self) -> tuple[Evidence, float]:
+        """Of a stress exponent of the rates of tests that is not the law's, and the odds of it.
+
+        Beside the one test whose rate is its own that makes it likeliest, if any: either may hide the other.
+        """
+        column, ones, choice = (
+            self.log_stress[:, None],
+            np.eye(len(self.log_stress))[..., None],
+            np.log(self.log_stress.size),
+        )
+        alone = max(self.held.evidence(one, np.array([FACTOR_SD])).log for one in ones) - choice
+        without = max(self.held.evidence(column[:, :0], np.zeros(0)).log, alone)
+        sizes = np.array([EXPONENT_CHANGE, FACTOR_SD])
+        tried = [(0.0, self.held.evidence(column, sizes[:1]))]
+        tried += [(choice, self.held.evidence(np.concatenate([column, one], axis=1), sizes)) for one in ones]
+        choice, evidence = max(tried, key=lambda one: one[1].log - one[0])
+        return evidence, float(evidence.log - choice - without)
+
+    def _of_curves(self) -> Iterable[Explanation]:
+        """The stress exponent of the rates of tests is another one than the shape of curves gives the law.
+
+        A law that is not that of the curves bends its exponent to them, as where the stress of a bar rises with strain
+        under a constant load. By a right law both are one exponent, and two estimates of it agree.
+        """
+        (evidence, odds), stress = self._by_rates, self.problem.coordinates.reference.stress
+        if self._slope[~self.free].any():  # a bound holds the exponent, and not the shape of curves
+            return
+        change, sd = float(evidence.mean[0]), float(evidence.sd[0])
+        if abs(change) > SMALLEST_CHANGE["stress exponent"]:
+            exponent, u = local_exponent(self.problem.coordinates, stress), self.x[: self.problem.parameter_count]
+            ends = float(exponent(u)), float(exponent(self._moved(evidence))) + change
+            yield Explanation("stress exponent", (), change, sd, odds, ends, (stress, stress))
+
+    @cached_property
+    def _slope(self) -> Floats:
+        """(parameters,) derivatives of the law's exponent to its coordinates."""
+        u, coordinates = self.x[: self.problem.parameter_count], self.problem.coordinates
+        return gradient(local_exponent(coordinates, coordinates.reference.stress), u, np.ones(u.size))
+
+    @property
+    def second_moment(self) -> Floats:
+        """(parameters, parameters) of coordinates, by what rates of tests and shapes of curves say apart; or zeros.
+
+        The coordinates move with the rates of tests, and beside that as changes the law's exponent by as much and is
+        likeliest by the bounds alone.
+        """
+        u, width = self.x[: self.problem.parameter_count], self.problem.bounds.width[: self.problem.parameter_count]
+        if not any(e.is_of_curves for e in self.found):
+            return np.zeros((u.size, u.size))
+        evidence, slope = self._by_rates[0], self._slope * width
+        shift = self._moved(evidence) - u + float(evidence.mean[0]) * width * slope / float(slope @ slope)
+        return np.asarray(np.outer(shift, shift))
 
     def _change(self, kind: Kind, over: Floats, prior_sd: float) -> Iterable[Explanation]:
         """The slope of ln rate over ln stress, or over -1/(R T), changes in proportion to it or to its exponential.

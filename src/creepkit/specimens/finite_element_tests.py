@@ -207,7 +207,7 @@ def predict_tests(
     that is simulated in the place of the finite elements.
     """
     kernel = kernels.lower(law, "compiled")
-    settings = solver_settings(specimen, exact=sensitivities) if reduction is None else reduction.settings
+    settings = solver_settings(specimen) if reduction is None else reduction.settings
 
     def prepared(k: int, of_test: Mapping[str, float]) -> tuple[FiniteElementTest, SolvableModel]:
         test = FiniteElementTest.of(specimen, histories[k], of_test, sensitivities)
@@ -224,11 +224,15 @@ def predict_tests(
     return predict_separately(respond, theta, histories, nuisances, outputs, specimen.threads)
 
 
-def solver_settings(specimen: Any, *, exact: bool = False) -> SolverSettings:
-    """The solver's settings; exact : equilibrium so tight that derivatives err by 1e-5 to 1e-3 of their largest."""
+EQUILIBRIUM_SHARE = 7e-3
+"""Of the tolerance of steps, that of equilibrium: values and derivatives then err by some 1e-4 of their largest."""
+
+
+def solver_settings(specimen: Any) -> SolverSettings:
+    """The solver's settings, the same with derivatives as without: a test has one prediction."""
     return SolverSettings(
         tolerance=specimen.tolerance,
-        newton=1e-6 if exact else 1e-2 * specimen.tolerance,
+        newton=EQUILIBRIUM_SHARE * specimen.tolerance,
         first=specimen.first_step,
         deflection_limit=specimen.deflection_limit,
         strain_limit=specimen.strain_limit,

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 
 OUTPUTS = (
-    Output("strain", "strain", "equivalent creep strain", logarithmic=True, visible=2e-4),
+    Output("strain", "strain", "equivalent creep strain", visible=2e-4),
     *(Output(f"strain_{c}", "strain", f"strain {c}", grows=False) for c in TENSOR_COMPONENTS),
     *(Output(f"stress_{c}", "signed stress", f"stress {c}", grows=False) for c in TENSOR_COMPONENTS),
 )

@@ -45,7 +45,7 @@ class Uniaxial(Bar):
 
     name: ClassVar[str] = "uniaxial"
     title: ClassVar[str] = "Uniaxial tension under steps of stress or load"
-    outputs: ClassVar[tuple[Output, ...]] = (Output("strain", "strain", logarithmic=True, visible=2e-4),)
+    outputs: ClassVar[tuple[Output, ...]] = (Output("strain", "strain", visible=2e-4),)
     loads: ClassVar[tuple[Load, ...]] = (Load("stress", "stress"),)
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({"stress": (40.0, 300.0)})
     """Stresses, MPa, of the paper's dimple of 0.5 mm under its pressures, about 12.5 times them."""

@@ -23,7 +23,13 @@ from creepkit.records import History, NuisanceValues, Output, Prediction, Predic
 from creepkit.specimens.bulge.geometry import DimpleGeometry, model_of_geometry
 from creepkit.specimens.bulge.observation import DEFAULT_WINDOW, Observation
 from creepkit.specimens.bulge.outputs import OBSERVED, RING_OUTPUTS
-from creepkit.specimens.finite_element_tests import FiniteElementTest, Reduction, predict_tests, solver_settings
+from creepkit.specimens.finite_element_tests import (
+    EQUILIBRIUM_SHARE,
+    FiniteElementTest,
+    Reduction,
+    predict_tests,
+    solver_settings,
+)
 from creepkit.specimens.reduced_order_training import MODES, RAMP, power_law_runs, trained_basis
 
 if TYPE_CHECKING:
@@ -35,9 +41,8 @@ THICKNESS_RANGE = 1.25
 """Largest over smallest apex thickness of one basis."""
 
 
-STEP_SHARE, EQUILIBRIUM_SHARE, STEP_GROWTH = 1.5, 3.0, 3.0
-"""Tolerances of steps and of equilibrium over those of the specimen, and the growth of steps: they err by half as much
-as the modes."""
+STEP_SHARE, STEP_GROWTH = 1.5, 3.0
+"""Tolerance of steps over that of the specimen, and their growth: they err by half as much as the modes."""
 
 
 SEARCH_TOLERANCE, SEARCH_GROWTH = 4e-2, 4.0
@@ -105,7 +110,7 @@ class BulgeReducedOrderModel(Predictor):
 
         theta : (candidates, parameters) internal values.
         """
-        reduction = Reduction(self.reduced_model_of, self.settings(sensitivities))
+        reduction = Reduction(self.reduced_model_of, self.settings)
         return predict_tests(self.specimen, law, theta, histories, nuisances, sensitivities, reduction)
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
@@ -115,7 +120,7 @@ class BulgeReducedOrderModel(Predictor):
         """
         from creepkit.specimens.finite_element_run import run_test
 
-        reduction = Reduction(self.reduced_model_of, self.settings(False))
+        reduction = Reduction(self.reduced_model_of, self.settings)
         return run_test(FiniteElementTest.of(self.specimen, plan, {}), law, values, reduction)  # type: ignore[no-any-return]
 
     def single_threaded(self) -> BulgeReducedOrderModel:
@@ -126,14 +131,13 @@ class BulgeReducedOrderModel(Predictor):
         """The same model in longer steps."""
         return replace(self, searching=True)
 
-    def settings(self, sensitivities: bool) -> SolverSettings:
-        """The solver's settings, of which a search is to see differences of the law alone."""
-        settings, own = solver_settings(self.specimen, exact=sensitivities), self.specimen.tolerance
-        if self.searching:
-            tolerance = max(SEARCH_TOLERANCE, own)  # and one newton, so that values are the same with derivatives
-            return settings._replace(tolerance=tolerance, newton=1e-3 * tolerance, growth=SEARCH_GROWTH)
-        newton = settings.newton if sensitivities else EQUILIBRIUM_SHARE * settings.newton
-        return settings._replace(tolerance=STEP_SHARE * own, newton=newton, growth=STEP_GROWTH)
+    @property
+    def settings(self) -> SolverSettings:
+        """The solver's settings."""
+        own, growth = self.specimen.tolerance, SEARCH_GROWTH if self.searching else STEP_GROWTH
+        tolerance = max(SEARCH_TOLERANCE, own) if self.searching else STEP_SHARE * own
+        newton = EQUILIBRIUM_SHARE * tolerance
+        return solver_settings(self.specimen)._replace(tolerance=tolerance, newton=newton, growth=growth)
 
     def reduced_model_of(self, piece: Any) -> ReducedOrderModel:
         """The reduced-order model of a test piece."""
@@ -177,7 +181,7 @@ def _output_errors(predictor: BulgeReducedOrderModel) -> tuple[float, ...]:
     if fit.form == "rings":
         fit = Observation(window=min(DEFAULT_WINDOW, float(radii[-1])))
     runs = power_law_runs([model], TESTED_RUNS, seed=1)
-    simulated, errors = ((model, solver_settings(specimen)), (reduced, predictor.settings(False))), []
+    simulated, errors = ((model, solver_settings(specimen)), (reduced, predictor.settings)), []
     for run in runs:
         made = [simulate(run.law, run.theta, each, run.load_history, settings=own) for each, own in simulated]
         end = TESTED_SHARE * min(each.end_time for each in made)
