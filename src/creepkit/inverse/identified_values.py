@@ -83,19 +83,18 @@ def state_at_strain(fit: Identification) -> StateAtStrain | None:
     r, predictor = fit.reference, fit.predictor
     if predictor is None:
         return None
-    halves, inverse = np.array([0.5, 1.0]), [TEMPERATURE_RATIO**k / r.temperature for k in (1, -1)]
-    colder, hotter = ((r.stress, 1.0 / one) for one in inverse)
-    stresses = [(r.stress * STRESS_RATIO**k, r.temperature) for k in (-1, 0, 1)]
+    halves, stresses = np.array([0.5, 1.0]), r.stress * STRESS_RATIO ** np.array([-1.0, 0.0, 1.0, 0.0, 0.0])
+    temperatures = r.temperature * TEMPERATURE_RATIO ** np.array([0.0, 0.0, 0.0, -1.0, 1.0])
     bars = [
         History(
             f"bar {k}",
             r.time * halves,
             {"strain": r.strain * halves},
-            constant_stress(stress, "stress"),
-            temperature,
+            constant_stress(float(stress), "stress"),
+            float(temperature),
             strain_measure="logarithmic",
         )
-        for k, (stress, temperature) in enumerate((*stresses, colder, hotter))
+        for k, (stress, temperature) in enumerate(zip(stresses, temperatures, strict=True))
     ]
 
     def function(u: Floats) -> Floats:
@@ -107,7 +106,7 @@ def state_at_strain(fit: Identification) -> StateAtStrain | None:
             log_time = np.log(reached.times[..., 1])
             log_rate = np.log(reached.log_time_derivatives[..., 1]) - log_time
         exponent = (log_rate[:, 2] - log_rate[:, 0]) / (2 * np.log(STRESS_RATIO))
-        energy = GAS_CONSTANT * (log_rate[:, 4] - log_rate[:, 3]) / (inverse[0] - inverse[1])
+        energy = GAS_CONSTANT * (log_rate[:, 4] - log_rate[:, 3]) / -np.diff(1.0 / temperatures[3:])
         return np.stack([log_time[:, 1], log_rate[:, 1], exponent, energy], axis=-1).reshape(*theta.shape[:-1], 4)
 
     try:

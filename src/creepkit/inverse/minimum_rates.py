@@ -56,8 +56,7 @@ def check_minimum_rates(law: CreepLaw, histories: Sequence[History], predictor: 
     """
     unknown = [h.name for h in histories if not duration_known(h)]
     if unknown and needs_durations(law):
-        used = [symbol.name for symbol in (strain, time) if law.uses(symbol)]
-        variables = " and ".join(used) or "internal variables, with which its rate falls"
+        variables = " and ".join(one.name for one in (strain, time) if law.uses(one)) or "internal variables"
         more = f" and {len(unknown) - 1} more" if len(unknown) > 1 else ""
         raise FitError(
             f"law '{law.name}' depends on {variables}, and minimum creep rates of tests of unknown duration cannot "

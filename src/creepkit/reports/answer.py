@@ -115,38 +115,27 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
     by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
-    figures = [replace(_with_interval("stress exponent", at, exponent), remark=by_tests)]
+    figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     low, high = fit.ranges["temperature"]
     if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol"))
-    rate_figure = _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h")
-    included = any(one.included for one in fit.unmodelled)
-    return [*figures, replace(rate_figure, remark="with usual errors") if included else rate_figure]
+    included = "with usual errors" if any(one.included for one in fit.unmodelled) else ""
+    return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)]
 
 
-def _with_interval(name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "") -> KeyFigure:
+def _with_interval(
+    name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "", remark: str = ""
+) -> KeyFigure:
     """Of (value, low, high), each times a factor."""
     value, low, high = (factor * float(v) for v in values)
-    return KeyFigure(name, where, value, low, high, unit)
+    return KeyFigure(name, where, value, low, high, unit, remark)
 
 
 def asked_figures(forecast: Forecast) -> list[KeyFigure]:
     """What a forecast says of each test: its life, or what it shows at the end, with the interval of a single test."""
     level = "" if forecast.level == 0.95 else f"{100 * forecast.level:g} % interval"
-    shown = (_shown(test) for test in forecast.tests)
-    return [replace(one, remark=", ".join(filter(None, (level, one.remark)))) for one in shown if one is not None]
-
-
-def _extrapolated(test: TestForecast, one: TimeForecast | None = None) -> str:
-    """Of which quantities what is shown lies beyond the tests: a time by its own condition and length, or the end."""
-    from creepkit.forecasts.forecast_of_test import extrapolated_names
-
-    names = extrapolated_names(test.extrapolation)
-    if one is not None:  # how long the test goes on, and the strain it ends at, are not of this time
-        own = "time" if f"{one.event} after" in test.extrapolation else "strain" if one.output else "rupture"
-        names = [name for name in names if name in ("stress", "temperature")]
-        names += [own] if f"{one.event} " in test.extrapolation else []
-    return f"extrapolated beyond the tests in {listed(names)}" if names else ""
+    shown = filter(None, map(_shown, forecast.tests))
+    return [replace(one, remark=", ".join(filter(None, (level, one.remark)))) for one in shown]
 
 
 def event_text(one: TimeForecast) -> str:
@@ -162,8 +151,8 @@ def _shown(test: TestForecast) -> KeyFigure | None:
     for one in test.times:
         if math.isfinite(one.median):
             times = (one.median, one.low, one.high)
-            found = _with_interval(f"time to {event_text(one)}", where, times, 1 / SECONDS_PER_HOUR, "h")
-            return replace(found, remark=_extrapolated(test, one))
+            label = f"time to {event_text(one)}"
+            return _with_interval(label, where, times, 1 / SECONDS_PER_HOUR, "h", test.extrapolated(one))
     for name, output in test.outputs.items():
         alive = np.flatnonzero(np.isfinite(output.value))
         if alive.size:
@@ -171,7 +160,7 @@ def _shown(test: TestForecast) -> KeyFigure | None:
             unit, factor = ("%", 100.0) if is_logarithmic(name) else (output_unit(name), 1.0)
             values = (output.value[k], output.band.low[k], output.band.high[k])
             label = f"{name.replace('_', ' ')} at {time_text(float(output.times[k]))}"
-            return replace(_with_interval(label, where, values, factor, unit), remark=_extrapolated(test))
+            return _with_interval(label, where, values, factor, unit, test.extrapolated())
     return None
 
 
@@ -425,7 +414,7 @@ def held_quantities(fit: Identification) -> str:
 
 def reference_sentences(fit: Identification) -> list[str]:
     """Where the rate amid the tests is taken, and the exponent of the law's formula where that is another."""
-    law, r, state, held = fit.law, fit.reference, _state(fit), held_quantities(fit)
+    r, state, held = fit.reference, _state(fit), held_quantities(fit)
     lines = []
     if state is not None:
         hours = interval_text(tuple(v / SECONDS_PER_HOUR for v in state.time))
@@ -433,9 +422,7 @@ def reference_sentences(fit: Identification) -> list[str]:
         lines.append(f"a bar under a true stress of {at} reaches {100 * r.strain:.2g} % strain after {hours} h")
     if held and (held != "strain" or state is None):
         formula = interval_text(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
-        energy = interval_text(tuple(v / 1e3 for v in fit.activation_energy())) if law.uses(temperature) else ""
-        beside = f" and the activation energy {energy} kJ/mol" if energy else ""
-        lines.append(f"at constant {held} the law's formula has the stress exponent {formula}{beside}")
+        lines.append(f"at constant {held} the law's formula has the stress exponent {formula}")
         lines += [] if held == "strain" else ["tests compared at one strain show another exponent"]
     return lines
 

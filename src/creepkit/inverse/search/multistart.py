@@ -89,8 +89,7 @@ def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) ->
     """
     observations, bounds, seed = problem.observations, problem.bounds, problem.settings.seed
     sobol = qmc.Sobol(bounds.lower.size, seed=seed).random(draws)
-    vanishing = [k for k, one in enumerate(problem.law.params.values()) if one.off == one.bounds[0] == 0.0]
-    sobol[:, vanishing] **= VANISHING_POWER
+    sobol[:, [one.off == one.bounds[0] == 0.0 for one in problem.law.params.values()]] **= VANISHING_POWER
     points = np.concatenate([bounds.centre[None], bounds.lower + sobol * bounds.width])
     points = _with_sampled_exponents(problem, points, np.concatenate([np.full((1, bounds.lower.size), 0.5), sobol]))
     rates, internal_rates = list(problem.coordinates.term_rates), list(problem.coordinates.state_rates)
