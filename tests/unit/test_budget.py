@@ -14,43 +14,43 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 300,
+    "api": 260,
     "app": 600,
     "cameras": 835,
     "cli": 2200,
-    "core": 100,
+    "core": 70,
     "dataset": 750,
     "discovery": 1400,
     "experiments": 1350,
-    "exporters": 2700,
+    "exporters": 2680,
     "extraction": 1300,
     "fem": 1450,
     "files": 1350,
     "forecasts": 1350,
     "instruments": 1225,
     "integration": 800,
-    "inverse": 10500,
+    "inverse": 10560,
     "jobs": 250,
-    "kernels": 1750,
+    "kernels": 1710,
     "language": 1500,
     "laws": 150,
     "modules": 750,
-    "quality": 1340,
-    "readers": 5850,
+    "quality": 1370,
+    "readers": 5900,
     "records": 2250,
     "registry": 650,
-    "reports": 5450,
+    "reports": 5500,
     "rupture_assessment": 1800,
     "sampling": 1000,
     "screening": 600,
     "specimens": 3200,
     "studies": 3050,
-    "surrogates": 1400,
-    "testing": 1850,
+    "surrogates": 1370,
+    "testing": 1820,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 29_900
+TESTS = 30_000
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 from creepkit.checked_arguments import checked
 from creepkit.inverse.composite_predictor import through_for_law
-from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
+from creepkit.inverse.history_checks import length_notes, loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify as identify_law
 from creepkit.inverse.identify import sampled_where_needed
@@ -71,7 +71,8 @@ def identify(
     else:
         fit = identify_sparse(law, histories, predictor, penalty=penalty, **how)
     fit = sampled_where_needed(fit, surrogate)
-    return replace(fit, notes=(*fit.notes, *left_out, *loading_notes(histories), *rig_notes(histories, settings)))
+    notes = (*left_out, *length_notes(histories, predictor), *loading_notes(histories))
+    return replace(fit, notes=(*fit.notes, *notes, *rig_notes(histories, settings)))
 
 
 @takes_options(IdentificationSettings)
@@ -112,7 +113,7 @@ def select(
         criterion=criterion,
         progress=progress,
     )
-    notes = (*left_out, *loading_notes(histories), *rig_notes(histories, settings))
+    notes = (*left_out, *length_notes(histories, predictor), *loading_notes(histories), *rig_notes(histories, settings))
     noted = (replace(one, fit=replace(one.fit, notes=(*one.fit.notes, *notes))) for one in ranking.laws)
     return replace(ranking, laws=tuple(noted))
 

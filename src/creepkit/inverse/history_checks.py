@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.quality import check_loading_strain, check_rig, exclude_suspect_frames, repeated_row_notes, without_copies
-from creepkit.records import History, Predictor, is_logarithmic, output_named
+from creepkit.records import History, Predictor, dimension_named, is_logarithmic, output_named
+from creepkit.records.specimen_lookup import lengths_by_default
 
 SUSPECT_LABEL = "suspect"
 """Label of a history that says which of its frames were left out, and why."""
@@ -84,6 +85,22 @@ def loading_notes(histories: Sequence[History]) -> tuple[str, ...]:
         return ()
     others = f" (also: {', '.join(flag.history for flag in flags[1:])})" if len(flags) > 1 else ""
     return (f"{flags[0]}{others}",)
+
+
+LENGTHS_BY_DEFAULT = "stresses rest on lengths by default"
+"""How the note on lengths of test pieces begins that no file states."""
+
+
+def length_notes(histories: Sequence[History], using: Predictor | Mapping[str, Predictor]) -> tuple[str, ...]:
+    """The lengths of test pieces that neither the files of the tests nor what predicts them state, in one sentence."""
+    found = list[str]()
+    for history in (one for one in histories if one.source):
+        predictor = using if isinstance(using, Predictor) else using[history.specimen]
+        for name, length in lengths_by_default(history.specimen, history.geometry).items():
+            own = dimension_named(predictor.for_history(history), name)
+            found += [name.replace("_", " ")] if own is None or own.default == length else []
+    named = ", ".join(dict.fromkeys(found))
+    return (f"{LENGTHS_BY_DEFAULT}, for no file states them: {named}; write them into the files",) if found else ()
 
 
 def check_creep(observations: ObservationVector, histories: Sequence[History]) -> None:

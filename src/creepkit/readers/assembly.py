@@ -49,7 +49,8 @@ from creepkit.readers.standard_names import in_standard_keys, in_standard_names,
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, words_of
-from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, dimensions_of, known_specimens, specimen_of
+from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, known_specimens, specimen_of
+from creepkit.records.specimen_lookup import lengths_by_default
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -308,12 +309,6 @@ def _elastic_of(modulus: float) -> Elastic:
     return Elastic(modulus)
 
 
-def _lengths_by_default(specimen: str, geometry: Mapping[str, float]) -> dict[str, float]:
-    """{length of a test piece that is not stated: mm}."""
-    pieces = [one for one in dimensions_of(known_specimens().get(specimen)) if one.of_piece]
-    return {one.name: one.default for one in pieces if not {*one.names, one.name} & geometry.keys()}
-
-
 _BY_ITS_COLUMNS = "specimen {} by its columns with lengths by default: "
 
 
@@ -323,7 +318,7 @@ def _record_unstated(conditions: StatedConditions, specimen: str, is_named: bool
     Of a specimen that is named these count where no more lengths are by default than are stated. A length that a label
     may state is asked for.
     """
-    lengths = _lengths_by_default(specimen, conditions.geometry)
+    lengths = lengths_by_default(specimen, conditions.geometry)
     for name in lengths:
         words = {*name.split("_")}
         said = {key: _LENGTH.fullmatch(text) for key, text in conditions.labels.items()}
@@ -343,9 +338,9 @@ _PLACES = {"middle": re.compile(r"mid|cent(?:re|er|ral)|mitte|mitten"), "load po
 def _record_place(conditions: StatedConditions, table: CellTable, specimen: str) -> None:
     """Say where an output was read, if another specimen of the kind has it of another place; HistoryError for that."""
     own, known = known_specimens().get(specimen), known_specimens()
-    for name, other in known.items() if own is not None else ():
+    for name, other in known.items():
         is_kin = own is not other and (isinstance(other, type(own)) or isinstance(own, type(other)))
-        for one, two in zip(own.outputs, other.outputs, strict=False) if is_kin else ():
+        for one, two in zip(own.outputs, other.outputs, strict=False) if own and is_kin else ():
             if one != two or one.long_name == two.long_name:
                 continue
             written = next((table.as_written(k) for k, c in enumerate(table.columns) if c.startswith(one)), "")
@@ -361,12 +356,11 @@ _LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?mm")
 
 
 def questions_of_assumed(history: History) -> list[Question]:
-    """What may be asked of a test whose specimen and lengths nobody stated; what is assumed is the likely answer."""
-    if not history.labels.get("assumed", "").startswith(_BY_ITS_COLUMNS.format(history.specimen)):
-        return []
-    path, lengths = Path(history.source.partition(" (")[0]), _lengths_by_default(history.specimen, history.geometry)
+    """What may be asked of a test whose specimen or lengths nobody stated; what is assumed is the likely answer."""
+    is_named = not history.labels.get("assumed", "").startswith(_BY_ITS_COLUMNS.format(history.specimen))
+    path, lengths = Path(history.source.partition(" (")[0]), lengths_by_default(history.specimen, history.geometry)
     what = f"no specimen is stated, and the columns are those of {history.specimen}; which is it?"
-    asked: list[tuple[str, str, str | float]] = [(what, "specimen", history.specimen)]
+    asked: list[tuple[str, str, str | float]] = [] if is_named else [(what, "specimen", history.specimen)]
     asked += [(f"{one} is not stated; how many mm is it?", f"{one}_mm", mm) for one, mm in lengths.items()]
     return [Question(path, str(path), what, key, (likely,), is_free=True) for what, key, likely in asked]
 

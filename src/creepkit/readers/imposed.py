@@ -344,24 +344,26 @@ def _recorded(
     levels = [float(np.median(column[first:last])) for first, last in pairwise(bounds)]
     times = [0.0, *(float(frames.times[frame]) for frame in starts[1:])]
     for k, (before, frame, after) in enumerate(zip(bounds, bounds[1:-1], bounds[2:], strict=False), 1):
+        if int(frames.lines[frame]) in frames.marked:
+            continue
         shorter = min(frames.times[frame - 1] - frames.times[before], frames.times[after - 1] - frames.times[frame])
-        gap = frames.times[frame] - frames.times[frame - 1]
-        if gap > LARGEST_GAP * shorter and int(frames.lines[frame]) not in frames.marked:
-            unit = "K" if is_temperature else next(iter(conditions.terms.load_kinds[quantity].units))
-            early = float(frames.times[frame - 1])
-            steps = [[*times[:k], time, *times[k + 1 :]] for time in (early, times[k])]
+        early, late = float(frames.times[frame - 1]), times[k]
+        is_early = _steps_early(frames, quantity, (before, frame, after), levels[k] - levels[k - 1])
+        unit = "K" if is_temperature else next(iter(conditions.terms.load_kinds[quantity].units))
+        if late - early > LARGEST_GAP * shorter and is_early is None:
+            steps = [[*times[:k], time, *times[k + 1 :]] for time in (early, late)]
             texts = ["; ".join(f"{t:g} s {v:g} {unit}" for t, v in zip(one, levels, strict=True)) for one in steps]
-            is_early = _steps_early(frames, quantity, (before, frame, after), levels[k] - levels[k - 1])
-            if is_early is None:
-                raise conditions.question(
-                    f"the {quantity} changes from {levels[k - 1]:g} to {levels[k]:g} {unit} between {early:g} s and "
-                    f"{times[k]:g} s; state when",
-                    f"{quantity}_steps",
-                    *texts,
-                    location=frames.location(frame),
-                )
-            times[k] = early if is_early else times[k]
-            which = f"the {'earlier' if is_early else 'later'} of two frames as what was measured shows"
+            raise conditions.question(
+                f"the {quantity} changes from {levels[k - 1]:g} to {levels[k]:g} {unit} between {early:g} s and "
+                f"{late:g} s; state when",
+                f"{quantity}_steps",
+                *texts,
+                location=frames.location(frame),
+            )
+        is_extra = late - early < 0.5 * float(np.median(np.diff(frames.times[before:after])))
+        times[k] = late if is_extra or is_early is False else early if is_early else 0.5 * (early + late)
+        if times[k] != late or late - early > LARGEST_GAP * shorter:
+            which = "as what was measured shows" if is_early is not None else "between the readings before and after it"
             conditions.record_assumption(f"{quantity} {levels[k]:g} {unit} from {time_text(times[k])} on ({which})")
     if times[1:] == [float(frames.times[frame]) for frame in starts[1:]]:
         conditions.record_assumption(f"steps of {quantity} from the first frame of each level on")
@@ -376,7 +378,7 @@ def _steps_early(frames: TableFrames, quantity: str, bounds: tuple[int, int, int
     """Whether a load was changed at the earlier of two frames, as what is observed grows between them.
 
     bounds : first frames of two levels, and the end. None where neither the rate before nor that behind, each perhaps
-    with the elastic strain of the step, is clearly nearer to that between them.
+    with the elastic strain of the step, is clearly nearer to that between them, or noise is as large.
     """
     before, frame, after = bounds
     names = [n for n in frames.values if n not in ("time", "used", "temperature", quantity) and n[-3:] != "_sd"]
@@ -388,7 +390,7 @@ def _steps_early(frames: TableFrames, quantity: str, bounds: tuple[int, int, int
     slow = gap * (y[frame - 1] - y[first]) / (times[frame - 1] - times[first])
     fast = gap * (y[last] - y[frame]) / (times[last] - times[frame])
     elastic = step / TYPICAL_MODULUS if quantity == "stress" and "strain" in names else 0.0
-    if (fast - slow) * step <= 0.0:
+    if (fast - slow) * np.sign(step) <= 4.0 * noise_of_readings(y, order=3):
         return None
     late, early = (min(abs(growth - rate - extra) for extra in (0.0, elastic)) for rate in (slow, fast))
     return None if min(late, early) > NEAR * max(late, early) else bool(early < late)

@@ -62,6 +62,12 @@ def dimensions_of(predictor: Registered | None) -> tuple[Dimension, ...]:
     return () if predictor is None else tuple(predictor.specimen.dimensions)
 
 
+def lengths_by_default(specimen: str, geometry: Mapping[str, float]) -> dict[str, float]:
+    """{length of a test piece that is not stated, which stresses rest on all the same: mm}."""
+    pieces = [one for one in dimensions_of(known_specimens().get(specimen)) if one.of_piece]
+    return {one.name: one.default for one in pieces if not {*one.names, one.name} & geometry.keys()}
+
+
 def dimension_named(predictor: Registered, name: str) -> Dimension | None:
     """The length of a specimen's test piece of this name or alias; None where it has none."""
     return next((d for d in dimensions_of(predictor) if name in d.names), None)

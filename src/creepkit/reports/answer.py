@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from creepkit.exporters.documents import expression_mathml, law_equations
 from creepkit.inverse.adequacy import UNDETECTED_SCATTER
+from creepkit.inverse.history_checks import LENGTHS_BY_DEFAULT
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.inverse.perturbation import beyond_intervals, combined_change_text
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
@@ -194,7 +195,8 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
     """What to mind, the most serious first, a sentence each without a full stop."""
     others = [one.fit for one in ranking.laws if one.fit is not fit] if ranking is not None else []
     choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
-    of_law = [*_of_tests(fit), *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
+    tests = [*(one for one in fit.notes if one.startswith(LENGTHS_BY_DEFAULT)), *_of_tests(fit)]
+    of_law = [*tests, *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
     return list(dict.fromkeys([*of_law, *_held(others), *_data(quality)]))
 
 
@@ -219,7 +221,7 @@ def _contradictions(fit: Identification) -> Iterator[str]:
     """What keeps the law from describing the tests."""
     adequacy = fit.adequacy
     if not fit.converged:
-        yield "the search did not converge: repeat it with more starts"
+        yield "the search did not converge: these values may not be its best"
     if adequacy is None:
         yield "whether the tests contradict the law is not known"
         return
@@ -291,17 +293,19 @@ def _named(names: Sequence[str], noun: str, *, quoted: bool = True) -> str:
 
 def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
     """What to do now, in one sentence without a full stop."""
-    adequacy = fit.adequacy
+    adequacy, weak = fit.adequacy, [e.name for e in fit.estimates if e.verdict in (NOT_DETERMINED, POORLY_DETERMINED)]
+    if not fit.converged:
+        held = f" and bounds for {_named(weak, 'parameter', quoted=False)}" if weak else ""
+        return f"repeat the search with more starts (--starts {2 * fit.settings.starts}, or starts in a study){held}"
     if adequacy is not None and adequacy.in_tests is not None:
         return adequacy.in_tests.next_step
     if adequacy is not None and (adequacy.rejects or adequacy.verdict == "cannot be judged"):
         if ranking is None or len(ranking.laws) < 2:
             return "compare it with other laws that suit the tests (creepkit init)"
         return "use it within the range of the tests alone; try further laws for more"
-    if ranking is not None and len(ranking.laws) > 1 and not ranking.decisive:
-        return "make a test that tells the laws apart (creepkit design says which)"
-    if any(e.verdict in (NOT_DETERMINED, POORLY_DETERMINED) for e in fit.estimates):
-        return "make a test that determines more (creepkit design says which)"
+    undecided = ranking is not None and len(ranking.laws) > 1 and not ranking.decisive
+    if wanted := "tells the laws apart" if undecided else weak and "determines more":
+        return f"make a test that {wanted} (creepkit design says which)"
     return "forecast (creepkit predict), or export the law to your code (creepkit export)"
 
 

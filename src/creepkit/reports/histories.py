@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.records import SECONDS_PER_HOUR, History, is_logarithmic, load_unit, output_named, output_unit
+from creepkit.records.specimen_lookup import lengths_by_default
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, aligned, as_text, plural
 from creepkit.reports.figures import Course, Panels, draw_over_time, over_time
 from creepkit.reports.json_values import fields_to_json
@@ -99,7 +100,10 @@ def assumptions_text(histories: Sequence[History]) -> str:
     """One line for each thing that was assumed of tests, with the number of tests; numbers may differ among them."""
     groups: dict[str, list[str]] = {}
     for history in histories:
-        for text in filter(None, history.labels.get("assumed", "").split(", ")):
+        assumed, lengths = history.labels.get("assumed", ""), lengths_by_default(history.specimen, history.geometry)
+        listed = "; ".join(f"{name.replace('_', ' ')} {length:g}" for name, length in lengths.items())
+        unsaid = [f"lengths by default: {listed} mm"] if lengths and "lengths by default" not in assumed else []
+        for text in filter(None, [*assumed.split(", "), *unsaid]):
             groups.setdefault(re.sub(r"\d[\w.:+-]*", "0", text), []).append(text)
     return "\n".join(
         f"assumed: {texts[0]}{' or the like' * (len(set(texts)) > 1)}{_count_text(len(texts), len(histories))}"
@@ -143,12 +147,8 @@ def histories_to_json(histories: Sequence[History]) -> dict[str, Any]:
                 "used_frames": int(np.asarray(history.used).sum()),
                 "times": [float(history.times[0]), float(history.times[-1])],
                 "outputs": {
-                    name: {
-                        "unit": output_unit(name, history.specimen),
-                        "first": float(values[0]),
-                        "last": float(values[-1]),
-                    }
-                    for name, values in history.outputs.items()
+                    name: {"unit": output_unit(name, history.specimen), "first": float(y[0]), "last": float(y[-1])}
+                    for name, y in history.outputs.items()
                 },
             }
             for history in histories

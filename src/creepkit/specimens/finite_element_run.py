@@ -128,7 +128,7 @@ def run_test(
     if reduction is None:
         simulation = test.simulate(kernel, theta, solver_settings(piece), keep_points=True)
     else:
-        simulation = test.simulate(kernel, theta, reduction.settings, reduction.model_of(piece))
+        simulation = test.simulate(kernel, theta, reduction.settings, reduction.model_of(piece, piece))
     status, end_time, reason = simulation.status, simulation.end_time, simulation.reason
     failure = None if reduction else last_finite_rate(kernel, theta, simulation, test.load_history.temperature)
     if failure is not None:

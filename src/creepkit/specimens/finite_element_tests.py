@@ -186,9 +186,12 @@ def _load_history_of(
 
 
 class Reduction(NamedTuple):
-    """How a reduced-order model simulates: the model of a test piece, and the settings of the solver."""
+    """How a reduced-order model simulates: the model of a test piece, and the settings of the solver.
 
-    model_of: Callable[[Any], SolvableModel]
+    model_of : of a test piece, and of that which its history states, to which the one is near.
+    """
+
+    model_of: Callable[[Any, Any], SolvableModel]
     settings: SolverSettings
 
 
@@ -211,7 +214,9 @@ def predict_tests(
 
     def prepared(k: int, of_test: Mapping[str, float]) -> tuple[FiniteElementTest, SolvableModel]:
         test = FiniteElementTest.of(specimen, histories[k], of_test, sensitivities)
-        return test, test.model if reduction is None else reduction.model_of(test.piece)
+        if reduction is None:
+            return test, test.model
+        return test, reduction.model_of(test.piece, FiniteElementTest.of(specimen, histories[k], {}).piece)
 
     for k in range(len(histories)) if len(theta) else ():  # before threads begin: a model may have to be trained
         prepared(k, {key: float(values[0, k]) for key, values in nuisances.items()})

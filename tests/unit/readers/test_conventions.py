@@ -103,6 +103,19 @@ def test_the_strain_tells_when_a_load_was_raised_between_distant_frames(read):
             assert program.times[np.argmax(program.values > 120.0)] == pytest.approx(3600.0 * expected)
 
 
+def test_a_step_between_readings_of_a_schedule_is_amid_them_unless_the_strain_tells_where(read):
+    """Norton, read every 2 h from 1 h on: a temperature raised at 60.1, 59.1, 60.9 h; with a noise that hides it, 60 h.
+
+    The first reading at the new level would be off by up to 2 h, by which the rate is off beyond noise.
+    """
+    times = np.arange(1.0, 121.0, 2.0)
+    for raised, noise, expected in ((60.1, 0.0, 60.0), (59.1, 0.0, 59.0), (60.9, 0.0, 61.0), (60.9, 4e-4, 60.0)):
+        strain = 1e-4 * (np.minimum(times, raised) + 3.0 * np.maximum(times - raised, 0.0))
+        strain = strain + noise * np.random.default_rng(0).standard_normal(times.size)
+        text = "# stress_MPa: 60\ntime_h,temperature_C,strain_1\n" + rows(times, np.where(times < 60, 700, 720), strain)
+        assert read(text).temperature.times[1] == pytest.approx(3600.0 * expected)
+
+
 def test_a_step_between_distant_frames_may_be_stated(read):
     kept = STEP_TIMES != 50.5 * 3600
     body = "time_s,strain_pct,stress_MPa\n" + rows(STEP_TIMES[kept], STRAIN[kept], LEVELS[kept])
@@ -135,7 +148,7 @@ def test_the_measure_of_the_stress_says_what_is_held(read):
     assert engineering.loading.control == "load"
     assert "control load, for the stress is the engineering one" in assumed(engineering)
     steps = HOT + "# stress_steps: 0 s 60 MPa; 5 s 70 MPa\n# control: load\n# stress_measure: true\n"
-    with pytest.raises(HistoryError, match="x.csv:4: stress_measure is true and control is load, but steps and rec"):
+    with pytest.raises(HistoryError, match="x.csv:4: stress_measure is true and control is load, but an engine"):
         read(steps + body)
 
 

@@ -139,13 +139,18 @@ class BulgeReducedOrderModel(Predictor):
         newton = EQUILIBRIUM_SHARE * tolerance
         return solver_settings(self.specimen)._replace(tolerance=tolerance, newton=newton, growth=growth)
 
-    def reduced_model_of(self, piece: Any) -> ReducedOrderModel:
-        """The reduced-order model of a test piece."""
+    def reduced_model_of(self, piece: Any, stated: Any = None) -> ReducedOrderModel:
+        """The reduced-order model of a test piece.
+
+        stated : that of the history, by default `piece`. Its basis serves all lengths that a fit tries: another one
+        differs by micrometres, a step in the middle of a fit.
+        """
         if piece.mesh is not None:
             model = piece.finite_elements()
             basis = trained_basis((model,), solver_settings(self.specimen), modes=self.modes, points=self.points)
             return ReducedOrderModel(model, basis)
-        reduced = _model_of_geometry(self.specimen, piece.geometry, self.modes, self.points)
+        about = (stated or piece).geometry
+        reduced = _model_of_geometry(self.specimen, piece.geometry, about, self.modes, self.points)
         return _with_leading_modes(reduced, SEARCH_MODES) if self.searching else reduced
 
     def train(self) -> str:
@@ -202,11 +207,13 @@ def _with_leading_modes(model: ReducedOrderModel, count: int) -> ReducedOrderMod
 
 
 @lru_cache(maxsize=256)
-def _model_of_geometry(specimen: Any, geometry: DimpleGeometry, modes: int, points: int | None) -> ReducedOrderModel:
-    """The reduced-order model of a dimple; kept, for a fit needs it a thousand times."""
+def _model_of_geometry(
+    specimen: Any, geometry: DimpleGeometry, about: DimpleGeometry, modes: int, points: int | None
+) -> ReducedOrderModel:
+    """The reduced-order model of a dimple, by the basis for the one `about`; kept, a fit needs it a thousand times."""
     refinement = specimen.refinement
     model = model_of_geometry(geometry, refinement)
-    candidates = _thicknesses(nominal_geometry(specimen.geometry, geometry), refinement)
+    candidates = _thicknesses(nominal_geometry(specimen.geometry, about), refinement)
     alike = [each for each in candidates if _same_numbering(model, each)] or [model]
     places = np.linspace(0, len(alike) - 1, min(len(alike), TRAINED_THICKNESSES)).round().astype(int)
     family = tuple(alike[k] for k in places)

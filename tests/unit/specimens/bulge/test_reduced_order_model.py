@@ -168,3 +168,17 @@ def test_test_pieces_share_a_basis() -> None:
     assert thick.apex_thickness == pytest.approx(0.625)
     tall = own.replace(roof_axial=3.45)
     assert nominal_geometry(own, tall).roof_axial == pytest.approx(3.45, rel=0.025)
+
+
+def test_a_fitted_thickness_moves_no_step() -> None:
+    """Where a history of that thickness, 0.559 mm, begins to have another basis, the one that is stated stays."""
+    creep, values = CASES["combined"]
+    amplitudes = np.array(
+        [
+            REDUCED.predict(
+                creep, creep.to_internal(values), [history()], nuisances={"thickness": np.array([[h]])}
+            ).values[0, 0, -1, 0]
+            for h in (0.558, 0.559, 0.56)
+        ]
+    )
+    assert abs(np.diff(amplitudes, 2)[0]) < 0.01 * abs(amplitudes[2] - amplitudes[0])
