@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 from scipy.stats import norm, t
 
 import creepkit as ck
@@ -130,14 +131,23 @@ def test_curves_that_run_away_need_no_rupture_line():
 
 def test_an_exponent_bent_to_the_shape_of_curves_is_contradicted_by_the_rates_of_tests():
     """Rates (1 + 30 e) s^n under constant load, by quadrature: a damage law follows them with n 3.9 in place of 6."""
-    slowness = np.exp(-6 * STRAINS) / (1 + 30 * STRAINS)
-    passed = np.concatenate([[0.0], np.cumsum(np.diff(STRAINS) * (slowness[1:] + slowness[:-1]) / 2)])
+    passed = cumulative_trapezoid(np.exp(-6 * STRAINS) / (1 + 30 * STRAINS), STRAINS, initial=0.0)
     tests = runaway_tests((passed, STRAINS), 0.05, 0.0, 5)
     fit = ck.identify(ck.law("kachanov-rabotnov").times(ck.arrhenius(T_ref=1123.15)), tests, using=BAR)
     assert fit.adequacy.explanations[0].ends == pytest.approx((fit.values["n"], 6.0), abs=0.4)
     assert "is 3.9 by the shape of the curves and 6" in fit.headline
     found = {e.name: e for e in fit.estimates}
     assert all(found[name].low < truth < found[name].high for name, truth in (("n", 6.0), ("Q", 480e3)))
+
+
+def test_heats_do_not_hide_that_time_hardening_bends_its_exponent_to_curves_of_strain_hardening():
+    """Rates s^6 e^-0.55 under constant load, which by time are of n = 6 / 1.55; heats differ by factors of two."""
+    strains, heats = STRAINS / 2, [0, 1, 2, 1, 2, 0, 2, 0, 1]
+    passed = cumulative_trapezoid(strains**0.55 * np.exp(-6 * strains), strains, initial=0.0)
+    bars = zip(runaway_tests((passed, strains), 0.05, 0.0, 5), heats, strict=True)
+    tests = [h.replace(times=h.times / 2.0**heat, labels={"heat": f"{heat}"}) for h, heat in bars]
+    fit = ck.identify(ck.law("time-hardening").times(ck.arrhenius(T_ref=1123.15)), tests, using=BAR)
+    assert fit.adequacy.mentioned.ends[1] == pytest.approx(6.0 / 1.55, abs=0.2)
 
 
 def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
@@ -411,15 +421,12 @@ def test_of_bars_at_one_strain_exponent_and_energy_are_over_one_plus_m(name: str
     law = ck.law(name).times(ck.arrhenius(T_ref=1000.0))
     fit = ck.identify(law, [*curves(970.0), *curves(1030.0)], starts=1, usual_errors="none")
     (exponent, energy, _), state, r = key_figures(fit), state_at_strain(fit), fit.reference
-    assert exponent.where == energy.where
-    assert exponent.where.endswith("% strain")
+    assert exponent.where == energy.where == f"{r.stress:.4g} MPa, 727 °C, {100 * r.strain:.2g} % strain"
     assert [exponent.value, energy.value] == pytest.approx([N / (1 + M), 200.0 / (1 + M)], rel=0.01)
-    assert state is not None
     assert state.exponent[1] < N / (1 + M) < state.exponent[2]
     reached = (r.strain * (1 + M) / (A * r.stress**N * boltzmann(r.temperature))) ** (1 / (1 + M))
     assert [state.time[0], state.rate[0]] == pytest.approx([reached, (1 + M) * r.strain / reached], rel=0.02)
-    said = "at constant time the law's formula has the stress exponent" in fit.details()
-    assert said == (name == "time-hardening")
+    assert ("at constant time the law's formula has the stress" in fit.details()) == (name == "time-hardening")
 
 
 # ---- rates and durations ---------------------------------------------------------------------------------------------
@@ -430,8 +437,7 @@ def test_of_bars_at_one_strain_exponent_and_energy_are_over_one_plus_m(name: str
 def _table() -> list[ck.History]:
     """Rates of Norton's law with n = 4.6 and lives of Monkman and Grant, as a table states them."""
     stated = [h for h in rate_table(np.random.default_rng(4), 0.05, 4.6) if h.temperature == 1100.0]
-    lives = [0.06 / h.minimum_rate for h in stated]
-    return [h.replace(times=np.array([t]), rupture_time=t) for h, t in zip(stated, lives, strict=True)]
+    return [h.replace(times=np.array([t]), rupture_time=t) for h in stated for t in [0.06 / h.minimum_rate]]
 
 
 def test_only_laws_of_hardening_rest_on_durations():

@@ -52,7 +52,6 @@ def test_a_law_is_not_excluded_by_its_own_bounds(name):
     """Of a soft metal: a coefficient beyond the usual ones, and a threshold at 1/200 of the range of thresholds."""
     (truth, rate), stresses = SOFT[name], np.geomspace(4.0, 60.0, 14)
     ranking = ck.select(["norton", name], stated_tests(stresses, rate(stresses), 0.08, 4, 1.0), starts=4)
-    assert not ranking.failed
     assert ranking.best.law.name == name
     assert all(e.low < truth[e.name] < e.high for e in ranking.best.estimates), ranking.best.estimates
 
