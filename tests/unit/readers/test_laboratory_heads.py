@@ -503,3 +503,34 @@ def test_a_specimen_that_is_stated_stands_beside_the_mark_of_a_piece_and_a_modul
     assert [flag.kind for flag in ck.check_data_quality([test])] == ["modulus"]
     tube = test.replace(geometry={"outer_diameter": 9.5}, outputs={"diameter_growth": test.times / 3.6e5 + 9.51})
     assert [flag.kind for flag in ck.check_data_quality([tube])] == ["unit", "modulus"]
+
+
+BOLT = (
+    "Bolt no.;{}\nMaterial;21CrMoV5-7\nDiameter (mm);10\nTemperature (°C);500\nStrain (%);0,15\nE-modulus (GPa);170\n\n"
+)
+
+
+def test_bolts_under_a_held_strain_with_their_load_are_relaxation_by_their_cross_section(tmp_path):
+    """20 kN on a bolt of 10 mm are 254.65 MPa; a column in kN is no stress, whatever an answer says."""
+    for number in (1, 2):
+        text = f"{BOLT.format(number)}Time (h);Load (kN)\n0;20,0\n10;12,5\n100;8,0\n"
+        (tmp_path / f"bolt{number}.csv").write_text(text, encoding="utf-8")
+    for one in ck.read_histories(tmp_path):
+        assert (one.specimen, one.elastic.E, one.loading.program().values[-1]) == ("relaxation", 170e3, 0.0015)
+        np.testing.assert_allclose(one.outputs["stress"], np.array([20e3, 12.5e3, 8e3]) / (25.0 * np.pi))
+    (tmp_path / "tests.toml").write_text('["*.csv"]\ncolumns = {"Load (kN)" = "stress_MPa"}\n', encoding="utf-8")
+    with pytest.raises(HistoryError, match=r"bolt1.csv:8 \(and 1 more\): 'Load \(kN\)' is in kN and cannot be the str"):
+        ck.read_histories(tmp_path)
+
+
+def test_a_dimple_is_read_by_the_symbols_of_its_pressures_and_the_plain_name_of_its_thickness(tmp_path):
+    head = "Thickness (mm);0,48\nP1 (MPa);8\nP2 (MPa);10\nTj (h);4\nTemperature (°C);800\n\n"
+    (tmp_path / "d.csv").write_text(f"{head}time (h);amplitude (mm)\n1;0,05\n3;0,08\n5;0,12\n", encoding="utf-8")
+    (one,) = ck.read_histories(tmp_path / "d.csv")
+    assert (one.specimen, one.geometry, one.loading.P1, one.loading.P2) == (
+        "bulge",
+        {"apex_thickness": 0.48},
+        8.0,
+        10.0,
+    )
+    assert one.loading.Tj == pytest.approx(4 * 3600.0)
