@@ -35,7 +35,7 @@ TIME_TO_STRAIN = "time_to_strain"
 
 
 QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
-    "stress": (STRESS, (*NAMES_OF["stress"], "stress", "sigma", "σ", "contrainte appliquée", "contrainte nominale")),
+    "stress": (STRESS, (*NAMES_OF["stress"], "stress", "sigma", "σ", "σ0", "σo")),
     "temperature": (TEMPERATURE, (*NAMES_OF["temperature"], "temperature", "t", "temp d essai")),
     "minimum_rate": (RATE, ("minimum rate", "minimum creep rate", "mcr", "minimale kriechrate")),
     "minimum_rate_sd": (RATE, ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd")),

@@ -158,13 +158,10 @@ def _with_strain(conditions: StatedConditions, frames: TableFrames, values: dict
     if "strain" in values:
         return ["the extension beside the strain not used"]
     if length is None:
-        raise conditions.question(
-            "an extension is a strain by its gauge length, which is not stated; write gauge_length_mm (or 'specimen: "
-            "notched-bar' with its lengths)",
-            "gauge_length_mm",
-            *_lengths_in(conditions.labels),
-            location=frames.table.location(frames.table.columns_line),
-        )
+        what = "an extension is a strain by its gauge length, which is not stated; write gauge_length_mm (or 'specimen:"
+        place, choices = frames.table.location(frames.table.columns_line), _lengths_in(conditions.labels)
+        what = f"{what} notched-bar' with its lengths)"
+        raise conditions.question(what, "gauge_length_mm", *choices, location=place)
     values["strain"] = elongation / length
     return [f"strain = extension / gauge length {length:g} mm"]
 
@@ -194,12 +191,9 @@ def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict
         return ["the load beside the stress not used"]
     if area is None:
         where = stated.location if stated is not None else frames.table.location(frames.table.columns_line)
-        raise conditions.question(
-            "a load is a stress by the cross-section, which is not stated; write diameter_mm, or width_mm and "
-            "thickness_mm, or area_mm2, or the stress itself",
-            "diameter_mm",
-            location=where,
-        )
+        what = "a load is a stress by the cross-section, which is not stated; write diameter_mm, or width_mm and"
+        what = f"{what} thickness_mm, or area_mm2, or the stress itself"
+        raise conditions.question(what, "diameter_mm", location=where)
     if column is not None:
         values["stress"] = np.where((column < 0.0) & (column >= -0.01 * column.max()), 0.0, column) / area
     elif stated is not None:

@@ -139,15 +139,14 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
     location, written = table.location(table.columns_line), table.as_written(k)
     result = split_unit(name, kinds)
     if result is None:
-        unit = split_written_name(written)[1]
+        unit = split_written_name(written)[1].strip("()[]")
         sensor, names = _sensor(written, kinds), table.written or table.columns
         others = [other for other in names if other != written and sensor and _sensor(other, kinds) == sensor]
         measured = f"{sensor} ({unit})" if unit else sensor
         if others:
-            counts = [
-                {one: measured, **{o: UNUSED for o in (written, *others) if o != one}} for one in (written, *others)
-            ]
-            what = f"'{written}' and '{others[0]}' seem to be several sensors of the {sensor}; which counts?"
+            same = [name for name in names if name == written or name in others]
+            counts = [{one: measured, **{o: UNUSED for o in same if o != one}} for one in same]
+            what = f"'{same[0]}' and '{same[1]}' seem to be several sensors of the {sensor}; which counts?"
             raise column_question(table, what, *counts[:3])
         present = {(split_unit(other, kinds) or ("",))[0] for other in table.columns}
         is_known = sensor in ("temperature", "diameter") and unit_suffix(unit) in kinds[sensor].units
@@ -177,10 +176,15 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
     return result
 
 
+_PLACE_OF_SENSOR = re.compile(
+    r"(?<=[^\d\s_])[\s_.-]*\d+$|[\s_]+(?:[A-Z]|(?i:top|mid\w*|bot\w*|oben|mitte|unten|haut|bas|milieu))$"
+)
+
+
 def _sensor(name: str, kinds: Mapping[str, QuantityKind]) -> str:
     """The quantity that one sensor of several measures, `T1_C` or `Temperature top (C)`; "" where it is none."""
     words = split_written_name(name)[0]
-    stem = re.split(r"(?<=[^\d\s_])[\s_.-]*\d+$|[\s_]+(?:top|mid|middle|bot|bottom|[A-Z])$", words)[0]
+    stem = _PLACE_OF_SENSOR.split(words)[0]
     return NameTable(kinds).meaning(stem) or ("temperature" if stem.casefold() in ("tc", "thermocouple") else "")
 
 

@@ -165,7 +165,8 @@ def readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
     if path.is_file() or any(accepts_path(reader, path) for reader in readers):
         return [path]
     if not path.is_dir():
-        raise HistoryError(f"{path}: is no regular file but a device, a pipe or the like; name a file or a folder")
+        what = "is no regular file but a device, a pipe or the like" if path.exists() else "no such file or folder"
+        raise HistoryError(f"{path}: {what}; name a file or a folder")
     try:
         entries = sorted(path.iterdir())
     except OSError as error:

@@ -337,7 +337,7 @@ def _add_row(
     is_only: bool,
 ) -> None:
     """Add what a row of a key and values, of pairs of key and value, or of names says of one test."""
-    first, known, dialect = min(filled), result.known, result.table.dialect
+    first, known, dialect, place = min(filled), result.known, result.table.dialect, result.table.location(row.line)
     others = [k for k in filled if k != first]
     values = [filled[k] for k in range(columns[0], columns[-1] + 1) if k in filled]
     if len(values) > 1 and known.is_condition(values[0].rstrip(": ")):
@@ -347,19 +347,18 @@ def _add_row(
         k = others[0] if one_for_all else _covering(others, columns)
         if k is not None:
             result.put(key, filled[k], row)
+            result.sources += conditions_in_text(filled[k], place, known) if known.condition(key) == "name" else []
             if one_for_all:
                 result.assumptions.append(f"{key} in line {row.line} holds for all tests")
             elif k < columns[0]:
                 result.assumptions.append(f"{key} in line {row.line} holds from '{quoted(filled[k], 20)}' on")
     elif values and is_number(values[0], dialect):
-        raise HistoryError(
-            f"{result.table.location(row.line)}: '{quoted(values[0])}' stands above the names of the columns, and "
-            f"'{quoted(filled[first])}' is no condition that is known; write one such as 'Stress (MPa)' before it"
-        )
+        what = f"'{quoted(values[0])}' stands above the names of the columns, and '{quoted(filled[first])}' is no known"
+        raise HistoryError(f"{place}: {what} condition; write one such as 'Stress (MPa)' before it")
     elif values:
         is_label = first in key_columns and len(set(filled.values())) < len(filled)
         result.put(f"label {filled[first].rstrip(': ')}" if is_label else "name", values[0], row)
-        result.sources += conditions_in_text(values[0], result.table.location(row.line), known)
+        result.sources += conditions_in_text(values[0], place, known)
 
 
 # ---- conditions in titles and names ----------------------------------------------------------------------------------

@@ -63,24 +63,26 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("elapsed time", "time elapsed", "test time", "creep time", "time under load", "zeit", "prüfzeit", "laufzeit"),
         *("belastungszeit", "beanspruchungsdauer", "versuchszeit", "temps", "durée", "temps écoulé", "x_value"),
-        *("timestamp", "time stamp", "datetime", "date time", "date/time", "time of day", "uhrzeit"),
+        *("timestamp", "time stamp", "datetime", "date time", "date/time", "time of day", "uhrzeit", "時間"),
     ),
     "temperature": (
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
         *("probentemperatur", "ofen", "ofentemperatur", "température", "température d'essai", "four", "temp ctrl"),
+        *("試験温度", "温度"),
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
         *("remaining stress", "residual stress", "relaxed stress", "restspannung", "spannung", "prüfspannung"),
-        *("nennspannung", "anfangsspannung", "contrainte", "contrainte initiale"),
+        *("nennspannung", "anfangsspannung", "contrainte", "contrainte initiale", "contrainte appliquée", "応力"),
+        *("contrainte nominale", "tensile stress", "axial stress"),
     ),
     "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
     "strain": (
         *("creep", "total creep", "total creep strain", "creep strain", "total strain", "engineering strain"),
-        *("true strain", "logarithmic strain", "dehnung"),
+        *("true strain", "logarithmic strain", "dehnung", "axial strain", "tensile strain", "クリープひずみ"),
         *("kriechdehnung", "gesamtdehnung", "zeitdehnung", "plastische dehnung", "bleibende dehnung", "déformation"),
-        *("déformation de fluage", "allongement relatif", "deformation relative"),
+        *("déformation de fluage", "allongement relatif", "deformation relative", "tensile strain extensometer"),
     ),
     "diametral_strain": (
         *("diametrical strain", "diameter strain", "hoop strain", "circumferential strain", "umfangsdehnung"),
@@ -144,7 +146,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("querschnitt", "querschnittsfläche", "anfangsquerschnitt", "section", "section initiale"),
     ),
     "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung"),
-    "name": ("test name", "test id", "test"),
+    "name": ("test name", "test id", "test", "試験片番号"),
 }
 """{quantity or text key: its names in small letters}."""
 

@@ -132,7 +132,7 @@ NUMBER = QuantityKind("number", _NO_UNIT)
 
 
 STRESS = QuantityKind(
-    "stress", conversions("MPa", "kPa", "GPa", "Pa", "bar", "ksi", "psi", "kgf/mm2"), low=0.0, high=1e5
+    "stress", conversions("MPa", "kPa", "GPa", "Pa", "bar", "ksi", "psi", "kgf/mm2", "tsi"), low=0.0, high=1e5
 )
 
 

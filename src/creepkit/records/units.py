@@ -77,13 +77,15 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
             "stress", 9.80665, "kgf/mm²", "kgf/mm^2", "kp/mm2", "kp/mm²", "kp/mm^2", "kg/mm2", "kg/mm²", "kg/mm^2"
         ),
         "ksi": _unit("stress", 1e3 * PSI),
+        "tsi": _unit("stress", 2240.0 * PSI, "tonf/in2", "ton/in2", "tons/in2", "tons/sq in"),
         "Msi": _unit("stress", 1e6 * PSI),
         "K": _unit("temperature", 1.0, "kelvin", "degk"),
         "C": _unit(
-            *("temperature", 1.0, "°c", "ºc", "℃", "degc", "deg c", "deg. c", "celsius", "oc"), offset=ZERO_CELSIUS
+            *("temperature", 1.0, "°c", "ºc", "℃", "degc", "deg c", "deg_c", "deg. c", "celsius", "oc"),
+            offset=ZERO_CELSIUS,
         ),
         "F": _unit(
-            *("temperature", 1.0 / 1.8, "°f", "ºf", "℉", "degf", "deg f", "deg. f", "fahrenheit", "of"),
+            *("temperature", 1.0 / 1.8, "°f", "ºf", "℉", "degf", "deg f", "deg_f", "deg. f", "fahrenheit", "of"),
             offset=ZERO_CELSIUS - 32.0 / 1.8,
         ),
         "1": _unit("strain", 1.0, "-", "mm/mm", "m/m", "in/in", "in./in.", "fraction"),

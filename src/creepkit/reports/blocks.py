@@ -13,11 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from textwrap import wrap
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from markupsafe import Markup
 
-from creepkit.arrays import Floats
+if TYPE_CHECKING:
+    from creepkit.arrays import Floats
 
 LONGEST_TEXT = 4000
 """Characters of a cell or paragraph; an error message may hold a name of any length."""
@@ -130,6 +131,7 @@ class Answer:
     """
 
     kind: ClassVar[str] = "answer"
+    units: ClassVar[str] = "stress in MPa, time in s, strain as a fraction"
     headline: str
     law: Cell
     equations: Sequence[Rich]
@@ -265,6 +267,7 @@ def _lines(block: Block) -> list[str]:
 def _answer_lines(answer: Answer) -> list[str]:
     """MOST_LINES lines, none longer than WIDTH; cautions and figures without room among them stand in the details."""
     pieces = [f"{name} = {value} [{', '.join(ends)}] {unit}".strip() for name, value, ends, unit in answer.values]
+    pieces.append(f"({answer.units})")
     lines = wrap(answer.headline, WIDTH)
     for text in (*answer.remarks, *map(str, answer.equations), "   ".join(p.replace(" ", "\u00a0") for p in pieces)):
         lines += _indented(text)

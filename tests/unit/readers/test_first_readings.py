@@ -5,6 +5,8 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import HistoryError
+from creepkit.readers.questions import SeveralErrors
+from helpers.command_line import creepkit
 
 SHEET = "Éprouvette;Température (°C);Contrainte (MPa);Déformation (%);Temps (h);Observations\n"
 LOGARITHMS = "Specimen,T (C),stress (MPa),log10(t_r/h),lg(minimum rate) (1/h)\nA1,600,200,2.5,-4\nA2,600,160,3,-5\n"
@@ -180,3 +182,44 @@ def test_thermal_expansion_at_steps_of_temperature(read, tmp_path):
     (tmp_path / "tests.toml").write_text('["a.csv"]\nthermal_expansion = "14 K"\n')
     with pytest.raises(HistoryError, match="is '14 K'; write it per kelvin, such as 14e-6 1/K"):
         ck.read_histories(tmp_path / "a.csv")
+
+
+TABLES = {
+    "Instron": (
+        "Test temperature,1200,(F)\nTime,Extension,Tensile strain (Extensometer),Tensile stress\n(s),(mm),(%),(MPa)\n"
+        "0,0,0,690\n60,0.1,0.4,690\n3600,0.2,0.5,690\n",
+        "649 °C, 690 MPa",
+    ),
+    "thesis": (
+        "sample,,A3 (750C 200MPa),,B1 (750C 250MPa)\n,t [h],ε [%],t [h],ε [%]\n,0,0,0,0\n,1,0.05,1,0.11\n",
+        "750 °C, 200 MPa",
+    ),
+    "Japan": (
+        "試験片番号,N-12\n試験温度(℃),650\n応力(MPa),120\n時間(h),クリープひずみ(%)\n0,0\n9,0.1\n",
+        "650 °C, 120 MPa",
+    ),
+    "Denison": ("Temp (C),565\nStress,12 tsi\nHours,Strain %\n0,0\n9,0.1\n", "565 °C, 185.331 MPa"),
+}
+"""{laboratory: a file as it writes them, and the conditions of its first test}."""
+
+
+@pytest.mark.parametrize(("text", "condition"), TABLES.values(), ids=TABLES)
+def test_tables_of_further_laboratories(read, text, condition):
+    assert read(text)[0].condition == condition
+
+
+def test_three_thermocouples_are_one_question(read):
+    names = ('"Temperatur oben (°C)"', '"Temperatur Mitte (°C)"', '"Temperatur unten (°C)"')
+    head = f'"Prüfspannung";"120";"MPa"\n"Zeit (h)";"Dehnung (%)";{";".join(names)}\n'
+    with pytest.raises(
+        HistoryError, match="csv:2: 'Temperatur oben .* and 'Temperatur Mitte .* several sensors"
+    ) as said:
+        read(head + "0,0;0,0;600,1;600,2;599,8\n1,0;0,1;600,1;600,1;599,9\n")
+    assert not isinstance(said.value, SeveralErrors)
+
+
+def test_what_is_not_there_and_what_is_no_record_are_told(tmp_path):
+    """A strain beside times of a clock is a test, and no record of an instrument whose columns nobody asks about."""
+    assert "no such file or folder" in creepkit("read", tmp_path / "no.csv").output
+    (tmp_path / "d.csv").write_text("Date,Time,Hours,Strain % x 10^-3\n12/01/1998,09:30,0,0\n13/01/1998,09:30,24,64\n")
+    assert creepkit("read", tmp_path / "d.csv").exit_code == 1

@@ -24,7 +24,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.records import Histories
-from creepkit.reports.answer import cautions, interval_digits, key_figures
+from creepkit.reports.answer import cautions, interval_digits, key_figures, next_step
 from creepkit.reports.blocks import number, typeset
 from creepkit.reports.compared_values import judged_readings
 from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
@@ -294,6 +294,8 @@ def test_a_law_that_the_search_holds_says_so_first() -> None:
     found = identify(wide, tests, Steady(), settings=SETTINGS)
     assert found.values["n"] == pytest.approx(9.5, rel=0.02)
     assert not any("held" in one for one in cautions(found))
+    lost = replace(found, converged=False)
+    assert next_step(lost).startswith("repeat the search with more starts (--starts 4, or starts in a study)")
 
 
 # ---- what separates two laws ----------------------------------------------------------------------------------------

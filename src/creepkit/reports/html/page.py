@@ -12,12 +12,13 @@ from markupsafe import Markup
 
 from creepkit.discovery.temperature_law import TemperatureLaw
 from creepkit.inverse.perturbation import combined_change_text
+from creepkit.inverse.uncertainty.correlation import LOOSE
 from creepkit.reports.answer import (
     KeyFigure,
     answer,
     asked_figures,
     interval_text,
-    rate_and_exponent,
+    rate_exponent_and_energy,
     tests_text,
     titled_law,
 )
@@ -249,8 +250,8 @@ def _sections_of(
 ) -> Iterator[PageSection]:
     """What was found of one material behind its answer; most : tests that are drawn, drawn : whether its ranking is."""
     fit, ranking = found.fit, found.ranking
-    determined = sum(e.verdict == "determined" for e in fit.estimates)
-    said = f"{determined} of {plural(len(fit.estimates), 'value')} determined by these tests"
+    loose = sum(e.verdict in LOOSE for e in fit.estimates)
+    said = f"{loose or 'none'} of {plural(len(fit.estimates), 'value')} hardly determined by these tests"
     if isinstance(found.result, AlloyResult):
         values = [*value_blocks(fit, found.result.verdict, found.result.equivalents), Items(found.result.notes)]
     elif ranking is None:
@@ -276,7 +277,7 @@ def _table_of_groups(found: Sequence[ReportGroup]) -> Table:
     rows = []
     for one in found:
         fit = one.fit
-        rate, exponent = map(interval_text, rate_and_exponent(fit))
+        rate, exponent, _ = map(interval_text, rate_exponent_and_energy(fit))
         properties = (rate, combined_change_text(fit.unmodelled) or "–", exponent)
         rows.append(
             (
