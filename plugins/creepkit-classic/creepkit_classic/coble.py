@@ -26,6 +26,7 @@ COBLE = CreepLaw(
             bounds=(1e-12, 1e-1),
             scale="log",
             off=0.0,
+            widens=True,
         ),
         Q: Param("activation energy of boundary diffusion", unit="J/mol", bounds=(2e4, 9e5)),
         Omega: Param("atomic volume", unit="mm^3", bounds=(5e-21, 1e-19), scale="log"),

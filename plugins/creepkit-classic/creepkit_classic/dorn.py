@@ -23,7 +23,7 @@ DORN = CreepLaw(
     title="Dorn's law: power-law creep scaled with diffusivity and shear modulus",
     terms={"climb and glide": A * diffusivity * modulus * b / (BOLTZMANN * temperature) * (stress / modulus) ** n},
     params={
-        A: Param("Dorn's constant", unit="1", bounds=(1e-5, 1e20), scale="log", off=0.0),
+        A: Param("Dorn's constant", unit="1", bounds=(1e-5, 1e20), scale="log", off=0.0, widens=True),
         n: Param("stress exponent", bounds=(1, 12), widens=True),
         D_0: Param("frequency factor of lattice diffusion", unit="mm^2/s", bounds=(1e-3, 1e6), scale="log"),
         Q: Param("activation energy of lattice diffusion", unit="J/mol", bounds=(2e4, 9e5)),

@@ -11,7 +11,7 @@ from creepkit.language import GAS_CONSTANT, CreepLaw, Param, hookimpl, parameter
 
 A_1, n_1, Q_1, A_2, n_2, Q_2 = parameters("A_1 n_1 Q_1 A_2 n_2 Q_2")
 
-RATE = Param("rate coefficient", unit="1/s", bounds=(1e-80, 1e40), scale="log", off=0.0)
+RATE = Param("rate coefficient", unit="1/s", bounds=(1e-80, 1e40), scale="log", off=0.0, widens=True)
 ENERGY = Param("activation energy", unit="J/mol", bounds=(1e4, 9e5), off=0.0)
 
 DOUBLE_POWER = CreepLaw(

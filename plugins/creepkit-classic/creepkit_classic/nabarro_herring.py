@@ -20,7 +20,14 @@ NABARRO_HERRING = CreepLaw(
     title="Nabarro-Herring creep by diffusion through the lattice",
     terms={"lattice diffusion": 14 * diffusivity * Omega * stress / (BOLTZMANN * temperature * d**2)},
     params={
-        D_0: Param("frequency factor of lattice diffusion", unit="mm^2/s", bounds=(1e-3, 1e6), scale="log", off=0.0),
+        D_0: Param(
+            "frequency factor of lattice diffusion",
+            unit="mm^2/s",
+            bounds=(1e-3, 1e6),
+            scale="log",
+            off=0.0,
+            widens=True,
+        ),
         Q: Param("activation energy of lattice diffusion", unit="J/mol", bounds=(2e4, 9e5)),
         Omega: Param("atomic volume", unit="mm^3", bounds=(5e-21, 1e-19), scale="log"),
         d: Param("grain diameter", unit="mm", bounds=(1e-5, 10.0), scale="log"),

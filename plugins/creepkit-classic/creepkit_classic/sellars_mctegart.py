@@ -16,7 +16,7 @@ SELLARS_MCTEGART = CreepLaw(
     title="Sellars-McTegart: hyperbolic sine with an activation energy",
     terms={"hyperbolic sine": A * sympy.sinh(alpha * stress) ** n * sympy.exp(-Q / (GAS_CONSTANT * temperature))},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-20, 1e60), scale="log", off=0.0),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-20, 1e60), scale="log", off=0.0, widens=True),
         alpha: Param("inverse breakdown stress", unit="1/MPa", bounds=(1e-4, 0.5), scale="log"),
         n: Param("exponent of sinh", bounds=(1, 12)),
         Q: Param("activation energy", unit="J/mol", bounds=(1e4, 9e5)),

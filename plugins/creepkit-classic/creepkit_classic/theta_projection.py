@@ -25,9 +25,13 @@ THETA_PROJECTION = CreepLaw(
     terms={"primary": hardening, "tertiary": weakening},
     params={
         theta[0]: Param("primary strain at zero stress", unit="1", bounds=(1e-10, 1.0), scale="log"),
-        theta[1]: Param("rate constant of primary creep", unit="1/s", bounds=(1e-15, 1.0), scale="log", off=0.0),
+        theta[1]: Param(
+            "rate constant of primary creep", unit="1/s", bounds=(1e-15, 1.0), scale="log", off=0.0, widens=True
+        ),
         theta[2]: Param("scale of tertiary strain at zero stress", unit="1", bounds=(1e-10, 1.0), scale="log"),
-        theta[3]: Param("rate constant of tertiary creep", unit="1/s", bounds=(1e-15, 1.0), scale="log", off=0.0),
+        theta[3]: Param(
+            "rate constant of tertiary creep", unit="1/s", bounds=(1e-15, 1.0), scale="log", off=0.0, widens=True
+        ),
         **{k: Param(f"slope of ln theta_{i} with stress", unit="1/MPa", bounds=(0, 0.1)) for i, k in enumerate(c, 1)},
     },
     states={p: State(0.0, hardening, "strain of primary creep"), q: State(0.0, weakening, "strain of tertiary creep")},

@@ -36,7 +36,7 @@ KACHANOV_RABOTNOV = CreepLaw(
     params={
         A: Param("rate coefficient", unit="1/s", bounds=(1e-60, 1e-5), scale="log", off=0.0, widens=True),
         n: Param("stress exponent", bounds=(1, 20), widens=True),
-        B: Param("damage rate coefficient", unit="1/s", bounds=(1e-60, 1e-3), scale="log", off=0.0),
+        B: Param("damage rate coefficient", unit="1/s", bounds=(1e-60, 1e-3), scale="log", off=0.0, widens=True),
         chi: Param("stress exponent of damage", bounds=(1, 20)),
         phi: Param("exponent of damage", bounds=(0, 30)),
         alpha: Param("share of the largest principal stress in the rupture stress", bounds=(0, 1), off=0.0),

@@ -34,10 +34,10 @@ SINH_DAMAGE = CreepLaw(
     title="Sinh creep damage of Stewart",
     terms={"damaged creep": A * sympy.sinh(stress / s_s) * sympy.exp(lambda_ * w ** sympy.Rational(3, 2))},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-3), scale="log", off=0.0),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-3), scale="log", off=0.0, widens=True),
         s_s: Param("breakdown stress of creep", unit="MPa", bounds=(3.0, 1e3), scale="log"),
         lambda_: Param("ln of the final over the minimum rate", bounds=(0, 15)),
-        M: Param("damage rate coefficient", unit="1/s", bounds=(1e-40, 1e-2), scale="log", off=0.0),
+        M: Param("damage rate coefficient", unit="1/s", bounds=(1e-40, 1e-2), scale="log", off=0.0, widens=True),
         s_t: Param("breakdown stress of damage", unit="MPa", bounds=(30.0, 1e3), scale="log"),
         chi: Param("exponent of sinh in damage", bounds=(1, 8)),
         phi: Param("exponential growth of damage", bounds=(0.5, 20)),

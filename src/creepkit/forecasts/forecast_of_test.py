@@ -91,6 +91,15 @@ class TestForecast:
         """Name of the test."""
         return self.history.name
 
+    def extrapolated(self, time: TimeForecast | None = None) -> str:
+        """In which quantities a time, or by default the end of the test, is extrapolated; "" if in none."""
+        names = extrapolated_names(self.extrapolation)
+        if time is not None:  # how long the test goes on, and the strain that it ends at, are not of this time
+            own = "time" if f"{time.event} after" in self.extrapolation else "strain" if time.output else "rupture"
+            names = [name for name in names if name in ("stress", "temperature")]
+            names += [own] if f"{time.event} " in self.extrapolation else []
+        return f"extrapolated beyond the tests in {' and '.join(names)}" if names else ""
+
 
 def forecast_test(
     laws: Sequence[tuple[LawDraws, float]],
@@ -287,8 +296,9 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked
         strain = best.central.of("strain", history.times)[0]
         point["strain"] = np.array([np.nanmax(strain, initial=0.0)])
     parts = [extrapolation_text(fit.ranges, point, NEARBY).removeprefix("extrapolated: ")]
-    if "stress" not in extrapolated_names(parts[0]) and point["stress"].size == stresses[stresses > 0].size:
-        grid = [(float(s), float(T)) for s in point["stress"] for T in np.unique(np.round(temperatures, 1))]
+    if "stress" not in extrapolated_names(parts[0]):
+        held = stresses[stresses > 0]  # as those of the tests, before strain or relaxation changes them
+        grid = [(float(s), float(T)) for s in held for T in np.unique(np.round(temperatures, 1))]
         conditions = np.array(grid, float).reshape(-1, 2)
         parts.append(outside_combinations(fit, conditions[:, 0], conditions[:, 1]))
     parts = [part for part in (*parts, *_extrapolated_times(fit, asked)) if part]

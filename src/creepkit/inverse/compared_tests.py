@@ -9,7 +9,7 @@ that were followed to rupture do: their readings outweigh their end.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -53,35 +53,34 @@ LEAST_INCREASE = 1e-6
 
 @lru_cache(maxsize=256)
 def has_tertiary_creep(law: CreepLaw) -> bool:
-    """Whether the rate of some term can rise along a test at constant stress, by strain, time or internal variables.
+    """Whether the rate of some term can rise along a test at constant stress, by strain, time or internal variables."""
+    return any(_is_somewhere(rise, law) for rise in _rises(law, strain, time))
 
-    It is differentiated at points within the bounds of the parameters.
-    """
-    symbols = [*law.params, *law.states, *POINT_VARIABLES]
-    points = _sampled_points(law)
+
+def _rises(law: CreepLaw, *variables: sympy.Symbol) -> Iterator[sympy.Expr]:
+    """Relative rises of the terms by internal variables, and by ln of variables."""
     for term in law.terms.values():
-        rises = [strain * term.diff(strain) / term, time * term.diff(time) / term]
-        rises += [term.diff(z) * state.rate / term for z, state in law.states.items()]
-        for rise in rises:
-            if rise == 0:
-                continue
-            with np.errstate(all="ignore"):
-                values = np.asarray(sympy.lambdify(symbols, rise, "numpy")(*points), float)
-            if (np.isfinite(values) & (values > LEAST_INCREASE)).any():
-                return True
-    return False
+        yield from (x * term.diff(x) / term for x in variables)
+        yield from (term.diff(z) * state.rate / term for z, state in law.states.items())
+
+
+def _is_somewhere(rise: sympy.Expr, law: CreepLaw) -> bool:
+    """Whether a relative rise is above rounding at some of the points within the bounds of the parameters."""
+    with np.errstate(all="ignore"):
+        symbols = [*law.params, *law.states, *POINT_VARIABLES]
+        values = np.asarray(sympy.lambdify(symbols, rise, "numpy")(*_sampled_points(law)), float)
+    return bool((np.isfinite(values) & (values > LEAST_INCREASE)).any())
 
 
 def _sampled_points(law: CreepLaw) -> Floats:
     """(symbols, samples) of parameters in their bounds, internal variables up to their limits, and states of a test."""
     ranges = [param.bounds for param in law.table.values()]
-    logarithmic = [param.scale == "log" for param in law.table.values()]
     for state in law.states.values():
         growth = 1.0 if state.limit is None else state.limit - state.initial
         ranges.append((state.initial + 0.01 * growth, state.initial + 0.9 * growth))
-        logarithmic.append(False)
     ranges += [POINT_RANGES.get(symbol.name, (10.0, 500.0)) for symbol in POINT_VARIABLES]
-    logs = np.array([*logarithmic, *(True for _ in POINT_VARIABLES)])
+    scales = (param.scale == "log" for param in law.table.values())
+    logs = np.array([*scales, *(False for _ in law.states), *(True for _ in POINT_VARIABLES)])
     low, high = (np.where(logs, np.log(np.where(logs, end, 1.0)), end) for end in np.array(ranges).T)
     values = low + qmc.Sobol(len(ranges), seed=0).random(SAMPLES) * (high - low)
     return np.asarray(np.where(logs, np.exp(np.where(logs, values, 0.0)), values).T)
@@ -106,12 +105,14 @@ def duration_known(history: History) -> bool:
     return float(history.times[-1]) > UNKNOWN_DURATION
 
 
+@lru_cache(maxsize=256)
 def needs_durations(law: CreepLaw) -> bool:
     """Whether the minimum rate of a law depends on how long the test lasted: it has a rate of strain or time.
 
-    Over a duration that is assumed from the measured rate such a law would predict that rate from itself.
+    Or it falls with internal variables, as by transients that fade. Over a duration that is assumed from the measured
+    rate such a law would predict that rate from itself.
     """
-    return law.uses(strain) or law.uses(time)
+    return law.uses(strain) or law.uses(time) or any(_is_somewhere(-rise, law) for rise in _rises(law))
 
 
 def rests_on_durations(law: CreepLaw, histories: Sequence[History]) -> bool:
@@ -120,9 +121,8 @@ def rests_on_durations(law: CreepLaw, histories: Sequence[History]) -> bool:
     Its rate falls with strain or time and has neither a minimum nor a steady state, so that its value at the end of
     each test, a time that damage decides, is compared with the rate.
     """
-    compared = [history for history in histories if history.outputs or compares_minimum_rate(history)]
-    curves = any(history.outputs for history in compared)
-    return bool(compared) and not curves and needs_durations(law) and not has_tertiary_creep(law)
+    rates_alone = any(map(compares_minimum_rate, histories)) and not any(h.outputs for h in histories)
+    return rates_alone and needs_durations(law) and not has_tertiary_creep(law)
 
 
 def testable_laws(laws: Sequence[CreepLaw], histories: Sequence[History]) -> list[CreepLaw]:

@@ -14,10 +14,11 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.minimum_rates import measured_minimum_rate
 from creepkit.inverse.single_values import SingleValue
 from creepkit.language import CreepLaw, strain, time
+from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import History, constant_stress
 
-STRESS_RATIO = 1.05
-"""Ratio of the stresses between which the exponent of bars is taken, to each side."""
+STRESS_RATIO, TEMPERATURE_RATIO = 1.05, 1.005
+"""Ratios of stresses and of temperatures between which exponent and energy of bars are taken, to each side."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,13 +57,14 @@ def minimum_rates_of(fit: Identification) -> list[MinimumRate]:
 class StateAtStrain:
     """The state of a bar under constant true stress, at the reference stress and temperature, at the reference strain.
 
-    time : s, rate : 1/s, and exponent : d ln rate / d ln stress of bars at that strain, each with its 95 % interval,
-    (value, low, high).
+    time : s, rate : 1/s, exponent : d ln rate / d ln stress and energy : -R d ln rate / d(1/T), J/mol, of bars at that
+    strain, each with its 95 % interval, (value, low, high).
     """
 
     time: tuple[float, float, float]
     rate: tuple[float, float, float]
     exponent: tuple[float, float, float]
+    energy: tuple[float, float, float]
 
 
 def depends_on_history(law: CreepLaw) -> bool:
@@ -73,25 +75,26 @@ def depends_on_history(law: CreepLaw) -> bool:
 def state_at_strain(fit: Identification) -> StateAtStrain | None:
     """At the reference point; None where the law never gets to that strain, or no predictor follows bars to it.
 
-    A derivative of the law's formula to stress holds time, strain and internal variables. Bars under different stresses
-    reach one strain at different times, so that the exponent which measured rates show is another one: with time
-    hardening, rate = A s^n t^m, the strain A s^n t^(1 + m) / (1 + m) is reached after a time ~ s^(-n / (1 + m)), at a
-    rate ~ s^(n / (1 + m)).
+    A derivative of the law's formula holds time, strain and internal variables. Bars under different stresses reach one
+    strain at different times, so that the exponent which measured rates show is another one: with time hardening,
+    rate = A s^n t^m, the strain A s^n t^(1 + m) / (1 + m) is reached after a time ~ s^(-n / (1 + m)), at a rate
+    ~ s^(n / (1 + m)); and where A has an activation energy Q, that of the rate is Q / (1 + m).
     """
     r, predictor = fit.reference, fit.predictor
     if predictor is None:
         return None
-    halves = np.array([0.5, 1.0])
+    halves, stresses = np.array([0.5, 1.0]), r.stress * STRESS_RATIO ** np.array([-1.0, 0.0, 1.0, 0.0, 0.0])
+    temperatures = r.temperature * TEMPERATURE_RATIO ** np.array([0.0, 0.0, 0.0, -1.0, 1.0])
     bars = [
         History(
             f"bar {k}",
             r.time * halves,
             {"strain": r.strain * halves},
-            constant_stress(r.stress * STRESS_RATIO**k, "stress"),
-            r.temperature,
+            constant_stress(float(stress), "stress"),
+            float(temperature),
             strain_measure="logarithmic",
         )
-        for k in (-1, 0, 1)
+        for k, (stress, temperature) in enumerate(zip(stresses, temperatures, strict=True))
     ]
 
     def function(u: Floats) -> Floats:
@@ -103,7 +106,8 @@ def state_at_strain(fit: Identification) -> StateAtStrain | None:
             log_time = np.log(reached.times[..., 1])
             log_rate = np.log(reached.log_time_derivatives[..., 1]) - log_time
         exponent = (log_rate[:, 2] - log_rate[:, 0]) / (2 * np.log(STRESS_RATIO))
-        return np.stack([log_time[:, 1], log_rate[:, 1], exponent], axis=-1).reshape(*theta.shape[:-1], 3)
+        energy = GAS_CONSTANT * (log_rate[:, 4] - log_rate[:, 3]) / -np.diff(1.0 / temperatures[3:])
+        return np.stack([log_time[:, 1], log_rate[:, 1], exponent, energy], axis=-1).reshape(*theta.shape[:-1], 4)
 
     try:
         if not all(predictor.for_history(bar).follows_to_rupture for bar in bars):
@@ -114,4 +118,4 @@ def state_at_strain(fit: Identification) -> StateAtStrain | None:
     if not np.isfinite(ends).all():
         return None
     time_, rate = ([math.exp(min(v, 700.0)) for v in column] for column in ends.T[:2])
-    return StateAtStrain(*map(tuple, (time_, rate, ends[:, 2].tolist())))
+    return StateAtStrain(*map(tuple, (time_, rate, *ends.T[2:].tolist())))

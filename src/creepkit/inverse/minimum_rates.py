@@ -52,17 +52,17 @@ CONSTANT_LOAD = 1e-6
 def check_minimum_rates(law: CreepLaw, histories: Sequence[History], predictor: Predictor) -> None:
     """FitError for a stated rate that cannot be predicted.
 
-    No strain leads, the load is not constant, or the law depends on strain or time and the duration is not known.
+    No strain leads, the load is not constant, or the rate changes with the duration of tests, which is not known.
     """
     unknown = [h.name for h in histories if not duration_known(h)]
     if unknown and needs_durations(law):
-        variables = " and ".join(symbol.name for symbol in (strain, time) if law.uses(symbol))
+        variables = " and ".join(one.name for one in (strain, time) if law.uses(one)) or "internal variables"
         more = f" and {len(unknown) - 1} more" if len(unknown) > 1 else ""
         raise FitError(
             f"law '{law.name}' depends on {variables}, and minimum creep rates of tests of unknown duration cannot "
             f"judge it (history '{unknown[0]}'{more}): state how long these tests lasted, as rupture_h or as "
-            "end_time_h with 'ended: stopped', leave them out, or take a law that depends on neither strain nor time, "
-            "such as norton"
+            "end_time_h with 'ended: stopped', leave them out, or take a law that depends on stress and temperature "
+            "alone, such as norton"
         )
     for history in (h for h in histories if compares_minimum_rate(h)):
         own = predictor.for_history(history)

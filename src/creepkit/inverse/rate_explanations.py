@@ -55,8 +55,9 @@ LARGEST_CHANCE = 0.003
 """That scatter and usual errors of temperature make a change of the activation energy that is stated."""
 
 
-OUTLYING_CHANCE = 0.05
-"""That of any of the tests standing out so far by scatter (Bonferroni), below which one is a caution."""
+OUTLYING_CHANCE, BENT_CHANCE = 0.05, 0.01
+"""That of any of the tests standing out so far by scatter (Bonferroni), below which one is a caution; and that of rates
+and curves saying exponents so far apart."""
 
 
 HELD = 1e10
@@ -86,7 +87,8 @@ class RateExplanations:
         self.problem, self.x, self.free = problem, x, linear.free[: problem.parameter_count]
         alike = replace(linear, residuals=linear.residuals.with_test_weights(np.ones(len(problem.histories))))
         held = replace(alike, precision=np.where(linear.free, linear.precision, HELD * linear.precision))
-        self.scatter, self.held = (replace(rate_scatter(problem, one, noise), members={}) for one in (alike, held))
+        self.scatter = replace(rate_scatter(problem, alike, noise), members={})
+        self.held = rate_scatter(problem, held, noise)  # beside heats, whose rates would hide what stresses say
         self.stresses, self.temperatures = problem.conditions
         log_stress, activation = np.log(self.stresses), -1.0 / (GAS_CONSTANT * self.temperatures)  # -, mol/J
         self.log_stress, self.activation = log_stress - log_stress.mean(), activation - activation.mean()
@@ -103,9 +105,11 @@ class RateExplanations:
 
     @cached_property
     def outlying(self) -> Explanation | None:
-        """The one test alone that the others do not lead to expect, where nothing explains the rates."""
+        """What rates do not lead to expect where nothing explains them: the exponent of curves, or one test alone."""
         if self.redundant < FEWEST_CONTRASTS or self.found:
             return None
+        if np.unique(self.log_stress.round(2)).size >= 3 and self._by_rates[0].p_value[0] < BENT_CHANCE:
+            return next(iter(self._of_curves()), None)
         chance = len(self._alone) * np.array([one.p_value[0] for one in self._alone])
         far = np.flatnonzero(chance < OUTLYING_CHANCE)
         if far.size != 1 or abs(self._alone[far[0]].mean[0]) < SMALLEST_FACTOR:

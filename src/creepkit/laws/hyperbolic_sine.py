@@ -12,7 +12,7 @@ HYPERBOLIC_SINE = CreepLaw(
     title="Hyperbolic-sine law (HS)",
     terms={"hyperbolic sine": A * sympy.sinh(stress / B) ** n},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0, widens=True),
         n: Param("exponent of sinh", bounds=(1, 8), off=0.0),
         B: Param("breakdown stress", unit="MPa", bounds=(1.0, 1e3), scale="log"),
     },

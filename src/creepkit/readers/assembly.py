@@ -49,7 +49,7 @@ from creepkit.readers.standard_names import in_standard_keys, in_standard_names,
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, words_of
-from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, known_specimens, specimen_of
+from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, dimensions_of, known_specimens, specimen_of
 from creepkit.records.specimen_lookup import lengths_by_default
 
 if TYPE_CHECKING:
@@ -318,6 +318,8 @@ def _record_unstated(conditions: StatedConditions, specimen: str, is_named: bool
     Of a specimen that is named these count where no more lengths are by default than are stated. A length that a label
     may state is asked for.
     """
+    names = {alias: one.name for one in dimensions_of(known_specimens().get(specimen)) for alias in one.names}
+    conditions.geometry = {names.get(name, name): length for name, length in conditions.geometry.items()}
     lengths = lengths_by_default(specimen, conditions.geometry)
     for name in lengths:
         words = {*name.split("_")}

@@ -140,7 +140,8 @@ def as_plain_bar(conditions: StatedConditions, frames: TableFrames) -> TableFram
     has_load = "force" in values or conditions.states("force")
     if conditions.text_of("specimen") not in PLAIN or notch or foreign & values.keys():
         return frames
-    if "elongation" not in values and not (has_load and "strain" in values):
+    is_held = conditions.states_load("strain") or conditions.text_of("specimen") == "relaxation"
+    if "elongation" not in values and not (has_load and "strain" in values) and not ("force" in values and is_held):
         return frames
     what = list[str]()
     if "elongation" in values:

@@ -169,6 +169,10 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
         )
     quantity, suffix = result
     kinds[quantity].unit(suffix, location, written)
+    in_unit = unit_suffix(split_written_name(written)[1])
+    if name != table.columns[k] and suffix and in_unit and in_unit not in kinds[quantity].units:
+        what = f"'{written}' is in {in_unit} and cannot be the {quantity} in {suffix} that it is said to be"
+        raise HistoryError(f"{location}: {what}; correct the name or the answer")
     return result
 
 

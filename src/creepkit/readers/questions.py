@@ -73,7 +73,7 @@ class Question(HistoryError):
 
 
 def merged(errors: Iterable[Exception]) -> list[Exception]:
-    """Errors by themselves, each once; questions that say the same of files of a folder as one."""
+    """Errors by themselves; those that say the same of several places, and questions of files of a folder, as one."""
     found, questions = list[Exception](), dict[tuple[object, ...], Question]()
     for one in (one for error in errors for one in single_errors(error)):
         if isinstance(one, Question):
@@ -84,7 +84,16 @@ def merged(errors: Iterable[Exception]) -> list[Exception]:
             found.append(question)
         else:
             found.append(one)
-    return list({str(one): one for one in found}.values())
+    alike = dict[str, list[Exception]]()
+    for one in {str(one): one for one in found}.values():
+        is_plain = isinstance(one, HistoryError) and not isinstance(one, Question)
+        alike.setdefault(str(one).partition(": ")[2] if is_plain else str(one), []).append(one)
+    return [one[0] if len(one) == 1 else _at_places(sentence, one) for sentence, one in alike.items()]
+
+
+def _at_places(sentence: str, errors: Sequence[Exception]) -> HistoryError:
+    """Errors of one sentence as one, with the first of their places and how many more there are."""
+    return HistoryError(f"{str(errors[0]).partition(': ')[0]} (and {len(errors) - 1} more): {sentence}")
 
 
 def toml_value(value: object) -> str:

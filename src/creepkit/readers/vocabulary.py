@@ -100,7 +100,8 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("längenänderung", "verlängerung", "allongement"),
     ),
     "modulus": (
-        *("young's modulus", "youngs modulus", "elastic modulus", "e modul", "elastizitätsmodul", "module d'young"),
+        *("young's modulus", "youngs modulus", "elastic modulus", "modulus of elasticity", "e modulus", "e modul"),
+        *("elastizitätsmodul", "module d'young", "module d'élasticité"),
     ),
     "thermal_expansion": ("coefficient of thermal expansion", "cte", "wärmeausdehnungskoeffizient"),
     "poisson": ("poisson's ratio", "poissons ratio", "poisson ratio"),
@@ -156,6 +157,7 @@ NAME_SYNONYMS: Mapping[str, str] = {name: meaning for meaning, names in NAMES_OF
 
 SYMBOLS: Mapping[str, str] = {
     **{"t": "time", "T": "temperature", "σ": "stress", "sigma": "stress", "ε": "strain", "epsilon": "strain"},
+    **{"P1": "pressure_1", "P2": "pressure_2", "Tj": "jump_time"},
     **{"p": "pressure", "P": "pressure", "E": "modulus", "ν": "poisson", "nu": "poisson"},
     **{"F": "force", "ΔL": "elongation", "Δl": "elongation", "ΔL0": "elongation", "dL": "elongation"},
     **dict.fromkeys(("σ0", "σo", "σ₀", "R0", "Ro", "sig"), "stress"),

@@ -112,30 +112,31 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         interval = (measured, measured - half, measured + half)
         return [KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law)]
     r = fit.reference
-    at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}"
-    rate, exponent = rate_and_exponent(fit)
+    of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
+    at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}"
+    rate, exponent, energy = rate_exponent_and_energy(fit)
     by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
-    figures = [replace(_with_interval("stress exponent", at, exponent), remark=by_tests)]
+    figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     low, high = fit.ranges["temperature"]
     if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
-        figures.append(_with_interval("activation energy", at, fit.activation_energy(), 1e-3, "kJ/mol"))
-    of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
-    rate_figure = _with_interval("creep rate", f"{at}{of_state}", rate, PERCENT_PER_HOUR, "%/h")
-    included = any(one.included for one in fit.unmodelled)
-    return [*figures, replace(rate_figure, remark="with usual errors") if included else rate_figure]
+        figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol"))
+    included = "with usual errors" if any(one.included for one in fit.unmodelled) else ""
+    return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)]
 
 
-def _with_interval(name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "") -> KeyFigure:
+def _with_interval(
+    name: str, where: str, values: Sequence[float], factor: float = 1.0, unit: str = "", remark: str = ""
+) -> KeyFigure:
     """Of (value, low, high), each times a factor."""
     value, low, high = (factor * float(v) for v in values)
-    return KeyFigure(name, where, value, low, high, unit)
+    return KeyFigure(name, where, value, low, high, unit, remark)
 
 
 def asked_figures(forecast: Forecast) -> list[KeyFigure]:
     """What a forecast says of each test: its life, or what it shows at the end, with the interval of a single test."""
     level = "" if forecast.level == 0.95 else f"{100 * forecast.level:g} % interval"
-    shown = ((_shown(test), "extrapolated beyond the tests" if test.extrapolation else "") for test in forecast.tests)
-    return [replace(one, remark=", ".join(filter(None, (level, far)))) for one, far in shown if one is not None]
+    shown = filter(None, map(_shown, forecast.tests))
+    return [replace(one, remark=", ".join(filter(None, (level, one.remark)))) for one in shown]
 
 
 def event_text(one: TimeForecast) -> str:
@@ -151,7 +152,8 @@ def _shown(test: TestForecast) -> KeyFigure | None:
     for one in test.times:
         if math.isfinite(one.median):
             times = (one.median, one.low, one.high)
-            return _with_interval(f"time to {event_text(one)}", where, times, 1 / SECONDS_PER_HOUR, "h")
+            label = f"time to {event_text(one)}"
+            return _with_interval(label, where, times, 1 / SECONDS_PER_HOUR, "h", test.extrapolated(one))
     for name, output in test.outputs.items():
         alive = np.flatnonzero(np.isfinite(output.value))
         if alive.size:
@@ -159,7 +161,7 @@ def _shown(test: TestForecast) -> KeyFigure | None:
             unit, factor = ("%", 100.0) if is_logarithmic(name) else (output_unit(name), 1.0)
             values = (output.value[k], output.band.low[k], output.band.high[k])
             label = f"{name.replace('_', ' ')} at {time_text(float(output.times[k]))}"
-            return _with_interval(label, where, values, factor, unit)
+            return _with_interval(label, where, values, factor, unit, test.extrapolated())
     return None
 
 
@@ -388,16 +390,18 @@ def unit_text(unit: str) -> str:
 # ---- rate and stress exponent amid the tests -------------------------------------------------------------------------
 
 
-def rate_and_exponent(fit: Identification) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Creep rate, 1/s, and stress exponent amid the tests, (value, low, high) each: of bars at the reference strain.
+def rate_exponent_and_energy(fit: Identification) -> tuple[tuple[float, ...], ...]:
+    """Creep rate, 1/s, stress exponent and activation energy, J/mol, amid the tests: of bars at the reference strain.
 
-    Where the law's rate depends on stress and temperature alone, or no bar can be followed, those of the formula.
+    (value, low, high) each. Where the law has no more than stress and temperature, or no bar can be followed, those of
+    the formula.
     """
     state = _state(fit)
     if state is not None:
-        return state.rate, state.exponent
+        return state.rate, state.exponent, state.energy
     stress = fit.reference.stress
-    return tuple(map(float, fit.rate(stress, warn=False))), tuple(map(float, fit.local_exponent(stress, warn=False)))
+    rate, exponent = fit.rate(stress, warn=False), fit.local_exponent(stress, warn=False)
+    return tuple(map(float, rate)), tuple(map(float, exponent)), fit.activation_energy()
 
 
 def _state(fit: Identification) -> StateAtStrain | None:

@@ -265,9 +265,11 @@ class DataSummary:
 
     @property
     def law_at_each(self) -> int:
-        """How many temperatures have tests of which a law may be identified: a curve, or enough minimum rates."""
+        """How many temperatures have tests, held there, of which a law may be identified: a curve, or enough rates."""
+        from creepkit.discovery.discover import isothermal_tests
+
         levels = list[tuple[float, int]]()
-        for test in sorted(self.framed, key=lambda one: one.mean_temperature):
+        for test in sorted(isothermal_tests(self.framed)[0], key=lambda one: one.mean_temperature):
             count = FEWEST_RATES if test.outputs else 1
             if levels and test.mean_temperature <= levels[-1][0] + ISOTHERMAL_RANGE:
                 levels[-1] = levels[-1][0], levels[-1][1] + count

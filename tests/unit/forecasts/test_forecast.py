@@ -16,6 +16,7 @@ from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.selection.ranking import ranking_from_scores
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.records import Status
+from creepkit.reports.answer import asked_figures
 from creepkit.reports.forecast import forecast_to_json
 from helpers.rupture_tests import BAR
 
@@ -300,6 +301,18 @@ def test_a_saved_identification_forecasts_the_same(fit, tmp_path):
 def test_extrapolation_is_said_by_how_much(fit):
     one = fit.forecast(bar("plan", 60.0, noise=0.0)).tests[0]
     assert "stress 60 MPa (the tests cover 80 to 120 MPa; 1.33 times beyond)" in one.extrapolation
+
+
+def test_what_is_shown_is_extrapolated_in_its_own_condition_alone():
+    """Tests of 150 to 230 MPa at 800 K, and 70 to 110 MPa at 900 K: 90 MPa is below those at 800 K."""
+    stated = ((150.0, 800.0, 0.1), (230.0, 800.0, 0.11), (70.0, 900.0, 1.6), (110.0, 900.0, 1.7))
+    tests = [bar(f"{s:g}", s, factor).replace(temperature=T) for s, T, factor in stated]
+    fit = ck.identify(ck.law("norton").times(ck.arrhenius(T_ref=850.0)), tests, using=BAR, starts=1)
+    for T, said in ((900.0, ""), (800.0, "extrapolated beyond the tests in stress and time")):
+        plan = bar("plan", 90.0, noise=0.0).replace(times=np.array([1e5, 1e8]), temperature=T)
+        found = fit.forecast(plan, targets={"strain": 0.002})
+        assert "time 2.778e+04 h" in found.tests[0].extrapolation  # of its end, 2.8e4 h
+        assert asked_figures(found)[0].remark == said
 
 
 def test_celsius_is_refused_and_may_be_insisted_on(fit):

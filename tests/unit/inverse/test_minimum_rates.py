@@ -206,7 +206,7 @@ def test_rates_of_unknown_duration_do_not_judge_hardening():
     """Planted n = 5, Q = 400 kJ/mol. Over a duration set from the rate itself, time hardening predicts all."""
     tests = rate_table(np.random.default_rng(3))
     factor = ck.arrhenius(T_ref=1100.0)
-    laws = [ck.law(name).times(factor) for name in ("norton", "strain-hardening", "time-hardening")]
+    laws = [ck.law(name).times(factor) for name in ("norton", "strain-hardening", "time-hardening", "blackburn")]
     ranking = ck.select(laws, tests, starts=1)
     assert [ranked.fit.law.name for ranked in ranking.laws] == ["norton*arrhenius"]
     values = {e.name: e for e in ranking.best.estimates}
@@ -216,6 +216,7 @@ def test_rates_of_unknown_duration_do_not_judge_hardening():
     assert values["Q"].value == pytest.approx(4e5, rel=0.05)
     assert "depends on time, and minimum creep rates of tests of unknown" in ranking.failed["time-hardening*arrhenius"]
     assert "depends on strain, and minimum" in ranking.failed["strain-hardening*arrhenius"]
+    assert "depends on internal variables, and minimum" in ranking.failed["blackburn*arrhenius"]
     without = laws[2].fix(m=0.0)
     assert ck.identify(without, tests, starts=1).values["n"] == pytest.approx(values["n"].value, rel=1e-3)
     lasted = [h.replace(times=np.array([1e7]), unruptured=True) for h in tests]
@@ -238,27 +239,27 @@ def measured_curve(t: np.ndarray) -> np.ndarray:
     return 4e-3 * (t / END) ** (1 / 3) + 5e-3 * (t / END) + 1e-2 * (t / END) ** 4
 
 
+FINE = np.linspace(0.0, END, 100_001)[1:]
+EXACT = np.min(np.diff(measured_curve(FINE)) / np.diff(FINE))
+
+
 def test_the_least_slope_is_that_of_the_curve_at_its_inflection() -> None:
     times = np.linspace(0.0, END, 400)[1:]
-    fine = np.linspace(0.0, END, 100_001)[1:]
-    exact = np.min(np.diff(measured_curve(fine)) / np.diff(fine))
     found = least_slope(times, measured_curve(times), np.zeros(times.size))
-    assert found == pytest.approx(exact, rel=0.03)
-    assert found >= exact * (1 - 1e-6)  # a chord of a curve is never below its least slope
+    assert found == pytest.approx(EXACT, rel=0.03)
+    assert found >= EXACT * (1 - 1e-6)  # a chord of a curve is never below its least slope
 
 
 def test_noise_does_not_lower_it_by_more_than_it_is_allowed_to() -> None:
     times = np.linspace(0.0, END, 120)[1:]
     noise = 1e-4
-    fine = np.linspace(0.0, END, 100_001)[1:]
-    exact = np.min(np.diff(measured_curve(fine)) / np.diff(fine))
     rng = np.random.default_rng(0)
     found = [
         least_slope(times, measured_curve(times) + noise * rng.normal(size=times.size), np.full(times.size, noise))
         for _ in range(20)
     ]
-    assert np.median(found) == pytest.approx(exact, rel=0.1)
-    assert np.abs(np.log(found) - np.log(exact)).max() < 0.25
+    assert np.median(found) == pytest.approx(EXACT, rel=0.1)
+    assert np.abs(np.log(found) - np.log(EXACT)).max() < 0.25
 
 
 def test_a_slope_that_noise_hides_is_not_known() -> None:

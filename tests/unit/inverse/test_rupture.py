@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 from scipy.stats import norm, t
 
 import creepkit as ck
@@ -25,9 +26,10 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, constant_strain, constant_stress
+from creepkit.reports.answer import key_figures
 from creepkit.specimens.relaxation import Relaxation
 from helpers.literature_laws import EQUATIONS
-from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, whole_life_table
+from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, rate_table, whole_life_table
 from helpers.rupture_tests import BAR, campaign
 
 KACHANOV, LIU = (EQUATIONS[name] for name in ("Kachanov-Rabotnov", "Liu-Murakami"))
@@ -129,14 +131,23 @@ def test_curves_that_run_away_need_no_rupture_line():
 
 def test_an_exponent_bent_to_the_shape_of_curves_is_contradicted_by_the_rates_of_tests():
     """Rates (1 + 30 e) s^n under constant load, by quadrature: a damage law follows them with n 3.9 in place of 6."""
-    slowness = np.exp(-6 * STRAINS) / (1 + 30 * STRAINS)
-    passed = np.concatenate([[0.0], np.cumsum(np.diff(STRAINS) * (slowness[1:] + slowness[:-1]) / 2)])
+    passed = cumulative_trapezoid(np.exp(-6 * STRAINS) / (1 + 30 * STRAINS), STRAINS, initial=0.0)
     tests = runaway_tests((passed, STRAINS), 0.05, 0.0, 5)
     fit = ck.identify(ck.law("kachanov-rabotnov").times(ck.arrhenius(T_ref=1123.15)), tests, using=BAR)
     assert fit.adequacy.explanations[0].ends == pytest.approx((fit.values["n"], 6.0), abs=0.4)
     assert "is 3.9 by the shape of the curves and 6" in fit.headline
     found = {e.name: e for e in fit.estimates}
     assert all(found[name].low < truth < found[name].high for name, truth in (("n", 6.0), ("Q", 480e3)))
+
+
+def test_heats_do_not_hide_that_time_hardening_bends_its_exponent_to_curves_of_strain_hardening():
+    """Rates s^6 e^-0.55 under constant load, which by time are of n = 6 / 1.55; heats differ by factors of two."""
+    strains, heats = STRAINS / 2, [0, 1, 2, 1, 2, 0, 2, 0, 1]
+    passed = cumulative_trapezoid(strains**0.55 * np.exp(-6 * strains), strains, initial=0.0)
+    bars = zip(runaway_tests((passed, strains), 0.05, 0.0, 5), heats, strict=True)
+    tests = [h.replace(times=h.times / 2.0**heat, labels={"heat": f"{heat}"}) for h, heat in bars]
+    fit = ck.identify(ck.law("time-hardening").times(ck.arrhenius(T_ref=1123.15)), tests, using=BAR)
+    assert fit.adequacy.mentioned.ends[1] == pytest.approx(6.0 / 1.55, abs=0.2)
 
 
 def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
@@ -385,35 +396,37 @@ A, N, M = 1e-13, 4.0, -0.4
 TIMES = np.geomspace(360.0, 3.6e5, 30)
 
 
-def curves() -> list[ck.History]:
-    """Strain A s^n t^(1 + m) / (1 + m) under constant true stress, with 0.5 % of noise."""
-    rng = np.random.default_rng(3)
+def boltzmann(T: float) -> float:
+    return float(np.exp(-2e5 / GAS_CONSTANT * (1 / T - 1 / 1000.0)))
+
+
+def curves(T: float) -> list[ck.History]:
+    """Strain A s^n t^(1 + m) / (1 + m) under constant true stress, with 0.5 % of noise; Q is 200 kJ/mol."""
+    rng, strain = np.random.default_rng(3), boltzmann(T) * A * TIMES ** (1 + M) / (1 + M)
     return [
         ck.History(
-            f"{stress:g} MPa",
+            f"{stress:g} MPa, {T:g} K",
             TIMES,
-            {"strain": A * stress**N * TIMES ** (1 + M) / (1 + M) * (1 + 0.005 * rng.standard_normal(TIMES.size))},
+            {"strain": strain * stress**N * (1 + 0.005 * rng.standard_normal(TIMES.size))},
             ck.constant_stress(stress, "stress"),
-            1000.0,
+            T,
             strain_measure="logarithmic",
         )
         for stress in (40.0, 60.0, 90.0)
     ]
 
 
-def test_time_hardening_has_n_over_one_plus_m_at_constant_strain() -> None:
-    fit = ck.identify("time-hardening", curves(), starts=1)
-    state = state_at_strain(fit)
-    assert state is not None
-    n, m = fit.values["n"], fit.values["m"]
-    assert state.exponent[0] == pytest.approx(n / (1 + m), rel=1e-4)
+@pytest.mark.parametrize("name", ["time-hardening", "strain-hardening"])
+def test_of_bars_at_one_strain_exponent_and_energy_are_over_one_plus_m(name: str) -> None:
+    law = ck.law(name).times(ck.arrhenius(T_ref=1000.0))
+    fit = ck.identify(law, [*curves(970.0), *curves(1030.0)], starts=1, usual_errors="none")
+    (exponent, energy, _), state, r = key_figures(fit), state_at_strain(fit), fit.reference
+    assert exponent.where == energy.where == f"{r.stress:.4g} MPa, 727 °C, {100 * r.strain:.2g} % strain"
+    assert [exponent.value, energy.value] == pytest.approx([N / (1 + M), 200.0 / (1 + M)], rel=0.01)
     assert state.exponent[1] < N / (1 + M) < state.exponent[2]
-    assert float(fit.local_exponent(60.0)[0]) == pytest.approx(n, rel=1e-6)
-    r = fit.reference
-    reached = (r.strain * (1 + m) / (fit.values["A"] * r.stress**n)) ** (1 / (1 + m))
-    assert state.time[0] == pytest.approx(reached, rel=1e-4)
-    assert state.rate[0] == pytest.approx((1 + m) * r.strain / reached, rel=1e-4)
-    assert "at constant time the law's formula has the stress exponent" in fit.details()
+    reached = (r.strain * (1 + M) / (A * r.stress**N * boltzmann(r.temperature))) ** (1 / (1 + M))
+    assert [state.time[0], state.rate[0]] == pytest.approx([reached, (1 + M) * r.strain / reached], rel=0.02)
+    assert ("at constant time the law's formula has the stress" in fit.details()) == (name == "time-hardening")
 
 
 # ---- rates and durations ---------------------------------------------------------------------------------------------
@@ -421,30 +434,16 @@ def test_time_hardening_has_n_over_one_plus_m_at_constant_strain() -> None:
 # Laws of hardening and minimum rates without curves: their shape rests on the stated durations alone.
 
 
-def _table(rate_scatter: float = 0.05) -> list[ck.History]:
+def _table() -> list[ck.History]:
     """Rates of Norton's law with n = 4.6 and lives of Monkman and Grant, as a table states them."""
-    rng = np.random.default_rng(4)
-    tests = []
-    for s in (60.0, 80.0, 100.0, 130.0, 160.0, 200.0):
-        rate = 1e-8 * (s / 100) ** 4.6 * np.exp(rate_scatter * rng.standard_normal())
-        tests.append(
-            ck.History(
-                f"{s:g} MPa", np.array([0.06 / rate]), {}, ck.constant_stress(s, "stress"), 1173.15,
-                minimum_rate=rate, rupture_time=0.06 / rate,
-            )
-        )  # fmt: skip
-    return tests
+    stated = [h for h in rate_table(np.random.default_rng(4), 0.05, 4.6) if h.temperature == 1100.0]
+    return [h.replace(times=np.array([t]), rupture_time=t) for h in stated for t in [0.06 / h.minimum_rate]]
 
 
-@pytest.mark.parametrize(
-    ("name", "untestable"), [("norton", False), ("strain-hardening", True), ("time-hardening", True)]
-)
-def test_only_laws_of_hardening_rest_on_durations(name, untestable):
-    assert rests_on_durations(ck.law(name), _table()) is untestable
-    curve = ck.simulate(
-        "norton", "uniaxial", {"A": 1e-18, "n": 5.0}, times=[0.0, 1e4], loading=ck.constant_stress(80.0)
-    )
-    assert not rests_on_durations(ck.law(name), [*_table(), curve])
+def test_only_laws_of_hardening_rest_on_durations():
+    for name in ("norton", "strain-hardening", "time-hardening", "blackburn"):
+        assert rests_on_durations(ck.law(name), _table()) is (name != "norton")
+        assert not rests_on_durations(ck.law(name), [*_table(), curves(1000.0)[0]])
 
 
 def test_an_interval_that_excludes_the_planted_exponent_is_said_not_to_be_testable():

@@ -7,6 +7,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
+from creepkit.inverse.history_checks import length_notes
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
@@ -14,16 +15,7 @@ from creepkit.inverse.settings import USUAL_ERRORS, IdentificationSettings
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
-from creepkit.records import (
-    History,
-    Nuisance,
-    PressureJump,
-    Program,
-    RecordedLoading,
-    constant_load,
-    constant_stress,
-    known_specimens,
-)
+from creepkit.records import History, Nuisance, PressureJump, Program, RecordedLoading, constant_stress, known_specimens
 from creepkit.reports.answer import cautions
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.uniaxial import Uniaxial
@@ -215,21 +207,12 @@ def test_a_dimple_is_sampled_with_the_errors_that_its_values_were_found_with():
         assert low < truth < high
 
 
-def test_lengths_that_no_file_states_are_the_first_caution(tmp_path):
-    """Beams of 4 x 3 mm: with their lengths the planted exponent and no caution, without them a caution on top."""
-    beam, times = known_specimens()["four-point-bend"], np.linspace(1e4, 2e5, 12)
-    own, elastic = replace(beam, width=4.0, height=3.0), Elastic(3e5)
-    for name, load in (("a", 40.0), ("b", 70.0), ("c", 110.0)):
-        held = {"loading": constant_load("force", load), "times": times, "temperature": 1273.0, "elastic": elastic}
-        deflections = ck.simulate(NORTON, own, {"A": 1e-12, "n": 2.5}, **held).outputs["deflection"]
-        noisy = deflections * (1.0 + 1e-4 * (-1.0) ** np.arange(times.size))
-        rows = "".join(f"{t:.6g},{y:.7g}\n" for t, y in zip(times, noisy, strict=True))
-        head = f"specimen,four-point-bend\nLoad,{load:g},N\nT (K),1273\nmodulus_GPa,300\n"
-        (tmp_path / f"{name}.csv").write_text(f"{head}\ntime (s),deflection (mm)\n{rows}", encoding="utf-8")
-    default, by_own = (ck.identify("norton", ck.read_histories(tmp_path), using, starts=1) for using in (beam, own))
-    assert cautions(default)[0].endswith("states them: width, height, span, inner span; write them into the files")
-    assert cautions(by_own)[:1] == [one for one in by_own.notes if "no file states them: span, inner span;" in one]
-    assert by_own.values["n"] == pytest.approx(2.5, rel=0.01)
-    rates = [fit.values["A"] * 40.0 ** fit.values["n"] for fit in (by_own, default)]
-    assert rates[0] == pytest.approx(1e-12 * 40.0**2.5, rel=0.03)
-    assert rates[1] > 10.0 * rates[0]
+def test_lengths_that_no_file_states_are_noted_and_are_the_first_caution(tmp_path):
+    head = "specimen,four-point-bend\nWidth,4,mm\nLoad,72,N\nT (C),1300"
+    (tmp_path / "b.csv").write_text(f"{head}\n\nTime (h),deflection (mm)\n0,0\n1,0.001\n")
+    tests, beam = ck.read_histories(tmp_path), known_specimens()["four-point-bend"]
+    note = length_notes(tests, beam)[0]
+    assert "no file states them: height, span, inner span;" in note
+    assert not length_notes(tests, replace(beam, height=3.0, span=60.0, inner_span=30.0))
+    fit = identify(AT_TEMPERATURES, campaign_of_six(), Steady(), settings=SETTINGS)
+    assert cautions(replace(fit, notes=(note,)))[0] == note

@@ -5,9 +5,12 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError
+from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identify import identify, refit
+from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import constant_stress
+from creepkit.registry import default_registry, kinds
 from helpers.planted_bars import BAR, bars
 
 NORTON, QUICK = ck.law("norton"), IdentificationSettings(starts=2, sobol_points=16)
@@ -29,15 +32,41 @@ def test_a_search_goes_on_beyond_bounds_that_nobody_stated(truth, stresses):
         assert identify(stated, tests, BAR, settings=QUICK).values["n"] < 8.0 + 1e-6
 
 
+def stated_tests(stresses, rates, scatter, seed, duration):
+    """Tests at 900 K by their minimum rates, with scatter between them."""
+    rates = rates * np.exp(scatter * np.random.default_rng(seed).standard_normal(len(stresses)))
+    return [
+        ck.History(f"m{s:g}", np.array([duration]), {}, constant_stress(float(s)), 900.0, minimum_rate=float(rate))
+        for s, rate in zip(stresses, rates, strict=True)
+    ]
+
+
+SOFT = {
+    "hyperbolic-sine": ({"A": 6e-4, "n": 4.0, "B": 15.0}, lambda s: 6e-4 * np.sinh(s / 15.0) ** 4),
+    "threshold-stress": ({"A": 2e-6, "n": 3.0, "s_0": 2.5}, lambda s: 2e-6 * (s - 2.5) ** 3),
+}
+
+
+@pytest.mark.parametrize("name", SOFT)
+def test_a_law_is_not_excluded_by_its_own_bounds(name):
+    """Of a soft metal: a coefficient beyond the usual ones, and a threshold at 1/200 of the range of thresholds."""
+    (truth, rate), stresses = SOFT[name], np.geomspace(4.0, 60.0, 14)
+    ranking = ck.select(["norton", name], stated_tests(stresses, rate(stresses), 0.08, 4, 1.0), starts=4)
+    assert ranking.best.law.name == name
+    assert all(e.low < truth[e.name] < e.high for e in ranking.best.estimates), ranking.best.estimates
+
+
+def test_rate_coefficients_of_every_law_are_sought_beyond_their_bounds():
+    for law in default_registry().values(kinds.LAWS):
+        coordinates = Coordinates(law, ReferencePoint(100.0, 0.01, 1e6, 900.0))
+        assert all(law.table[law.names[k]].widens for k in coordinates.coefficients), law.name
+
+
 def minimum_rates(n, highest, seed):
     """Six minimum rates between 100 MPa and `highest` by a stress exponent n, with 15 % of scatter; their slope."""
     stresses = np.geomspace(100.0, highest, 6)
-    rates = 1e-9 * (stresses / 100.0) ** n * np.exp(0.15 * np.random.default_rng(seed).standard_normal(6))
-    tests = [
-        ck.History(f"t{k}", np.array([1e6]), {}, constant_stress(stress), 900.0, minimum_rate=rate)
-        for k, (stress, rate) in enumerate(zip(stresses, rates, strict=True))
-    ]
-    return tests, np.polyfit(np.log(stresses), np.log(rates), 1)[0]
+    tests = stated_tests(stresses, 1e-9 * (stresses / 100.0) ** n, 0.15, seed, 1e6)
+    return tests, np.polyfit(np.log(stresses), np.log([test.minimum_rate for test in tests]), 1)[0]
 
 
 @pytest.mark.parametrize("seed", [2, 5])
@@ -68,13 +97,9 @@ def test_values_at_a_bound_and_rates_are_of_one_point(tmp_path):
     """Rates over a threshold stress, and of an exponential law, hold the exponent of a sine at either of its bounds."""
     stresses = np.geomspace(50.0, 130.0, 9)
     shapes = {"above a threshold": 1e-15 * (stresses - 44.0) ** 4.0, "exponential": 1e-12 * np.exp(stresses / 9.0)}
-    scatter = np.exp(0.08 * np.random.default_rng(3).standard_normal(9))
     wrong = {}
     for shape, rates in shapes.items():
-        tests = [
-            ck.History(f"m{s:.0f}", np.array([1e6]), {}, ck.constant_stress(s), 900.0, minimum_rate=rate)
-            for s, rate in zip(stresses, rates * scatter, strict=True)
-        ]
+        tests = stated_tests(stresses, rates, 0.08, 3, 1e6)
         fit = ck.identify("hyperbolic-sine", tests, weights="likelihood")
         formula = fit.values["A"] * np.sinh(stresses / fit.values["B"]) ** fit.values["n"]
         loaded = ck.load(fit.save(tmp_path / "fit.json"))

@@ -487,19 +487,36 @@ def test_where_the_deflection_of_a_beam_was_read_is_heard_or_said(tmp_path, name
     (plain,) = ck.read_histories(tmp_path / "b.csv")
     assert "deflection of the load points (four-point-bend-midspan has the" in plain.labels["assumed"]
     (tmp_path / "b.csv").write_text(text.replace("deflection (mm)", name))
-    with pytest.raises(
-        HistoryError, match=r"is the deflection of the middle, and four-.*specimen: four-point-bend-mid"
-    ):
+    with pytest.raises(HistoryError, match=r"is the deflection of the middle, and .*specimen: four-point-bend-midspan"):
         ck.read_histories(tmp_path / "b.csv")
 
 
 def test_a_specimen_that_is_stated_stands_beside_the_mark_of_a_piece_and_a_modulus_is_asked_for(tmp_path):
-    (tmp_path / "beam.csv").write_text(
-        BEAM.format("Outer span,60,mm\nInner span,25,mm").replace("four-point-bend", "B1") + "0,0\n1,0.001\n2,0.002\n"
-    )
+    text = BEAM.format("Outer span,60,mm\nInner span,25,mm").replace("four-point-bend", "B1")
+    (tmp_path / "beam.csv").write_text(text + "0,0\n1,0.001\n2,0.002\n")
     (tmp_path / "tests.toml").write_text('["*.csv"]\nspecimen = "four-point-bend-midspan"\n')
     (test,) = ck.read_histories(tmp_path / "beam.csv")
     assert (test.specimen, test.labels["specimen"]) == ("four-point-bend-midspan", "B1")
     assert [flag.kind for flag in ck.check_data_quality([test])] == ["modulus"]
     tube = test.replace(geometry={"outer_diameter": 9.5}, outputs={"diameter_growth": test.times / 3.6e5 + 9.51})
     assert [flag.kind for flag in ck.check_data_quality([tube])] == ["unit", "modulus"]
+
+
+BOLT = "Diameter (mm);10\nT (°C);500\nStrain (%);0,15\nE-modulus (GPa);170\n\nTime (h);Load (kN)\n0;20,0\n10;12,5\n"
+
+
+def test_bolts_under_a_held_strain_with_their_load_are_relaxation_by_their_cross_section(tmp_path):
+    """20 kN on a bolt of 10 mm are 254.65 MPa; a column in kN is no stress, whatever an answer says."""
+    _, one = (*read(tmp_path, BOLT, name="a.csv"), *read(tmp_path, BOLT, name="b.csv"))
+    assert (one.specimen, one.elastic.E, one.loading.program().values[-1]) == ("relaxation", 170e3, 0.0015)
+    np.testing.assert_allclose(one.outputs["stress"], np.array([20e3, 12.5e3]) / (25.0 * np.pi))
+    (tmp_path / "tests.toml").write_text('["*.csv"]\ncolumns = {"Load (kN)" = "stress_MPa"}\n', encoding="utf-8")
+    with pytest.raises(HistoryError, match=r"a.csv:6 \(and 1 more\): 'Load \(kN\)' is in kN and cannot be the stress"):
+        ck.read_histories(tmp_path)
+
+
+def test_a_dimple_is_read_by_the_symbols_of_its_pressures_and_the_plain_name_of_its_thickness(tmp_path):
+    head = "Thickness (mm);0,48\nP1 (MPa);8\nP2 (MPa);10\nTj (h);4\nTemperature (°C);800\n\n"
+    (one,) = read(tmp_path, f"{head}time (h);amplitude (mm)\n1;0,05\n3;0,08\n5;0,12\n")
+    assert (one.specimen, one.geometry) == ("bulge", {"apex_thickness": 0.48})
+    assert (one.loading.P1, one.loading.P2, one.loading.Tj) == pytest.approx((8.0, 10.0, 4 * 3600.0))

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import creepkit as ck
 from creepkit.errors import StudyError
+from creepkit.studies.proposal import propose_study
 from creepkit.studies.stages import export_name
 from creepkit.studies.study_file import key_lines, known_keys, parse_study
 from helpers.paths import ROOT
@@ -317,3 +318,12 @@ def test_the_lines_are_those_of_all_keys_that_tomllib_reads(parts):
         shown = text.splitlines()[line - 1]
         if isinstance(path[-1], str):
             assert name in shown or name.replace('"', '\\"') in shown
+
+
+def test_a_proposed_study_asks_for_forms_of_temperature_only_of_tests_at_three_held_temperatures(tmp_path):
+    """Two tests are held, at 700 and 740 C; one goes through three levels, or is held at 720 C."""
+    for third, expected in (([700] * 20 + [720] * 20 + [740] * 20, False), ([720] * 60, True)):
+        for name, celsius in (("a", [700] * 60), ("b", [740] * 60), ("c", third)):
+            rows = "".join(f"{k},{one},{0.01 * (k + k**0.5):.4f}\n" for k, one in enumerate(celsius))
+            (tmp_path / f"{name}.csv").write_text(f"# stress_MPa: 60\ntime_h,temperature_C,strain_pct\n{rows}")
+        assert ("\n[temperature]\n" in propose_study(tmp_path, tmp_path / "study.toml").text) == expected

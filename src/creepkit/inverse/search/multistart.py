@@ -27,6 +27,11 @@ INTERNAL_RATE_RANGE = (-4.0, 0.0)
 """Range of draws for an internal variable: ln of its rate times the duration of a test."""
 
 
+VANISHING_POWER = 3
+"""Of the uniform draws of a parameter that is off at its lower bound, zero, such as a threshold stress: its scale is
+that of the tests, which may be a hundredth of its bounds, and above all tests it leaves nothing to compare."""
+
+
 @checked
 @dataclass(frozen=True)
 class MultiStart(Options, title="multi-start"):
@@ -84,6 +89,7 @@ def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) ->
     """
     observations, bounds, seed = problem.observations, problem.bounds, problem.settings.seed
     sobol = qmc.Sobol(bounds.lower.size, seed=seed).random(draws)
+    sobol[:, [one.off == one.bounds[0] == 0.0 for one in problem.law.params.values()]] **= VANISHING_POWER
     points = np.concatenate([bounds.centre[None], bounds.lower + sobol * bounds.width])
     points = _with_sampled_exponents(problem, points, np.concatenate([np.full((1, bounds.lower.size), 0.5), sobol]))
     rates, internal_rates = list(problem.coordinates.term_rates), list(problem.coordinates.state_rates)

@@ -18,7 +18,7 @@ from creepkit.reports.answer import (
     answer,
     asked_figures,
     interval_text,
-    rate_and_exponent,
+    rate_exponent_and_energy,
     tests_text,
     titled_law,
 )
@@ -277,7 +277,7 @@ def _table_of_groups(found: Sequence[ReportGroup]) -> Table:
     rows = []
     for one in found:
         fit = one.fit
-        rate, exponent = map(interval_text, rate_and_exponent(fit))
+        rate, exponent, _ = map(interval_text, rate_exponent_and_energy(fit))
         properties = (rate, combined_change_text(fit.unmodelled) or "–", exponent)
         rows.append(
             (
