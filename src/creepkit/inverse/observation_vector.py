@@ -27,7 +27,7 @@ from creepkit.inverse.output_transforms import (
     OutputTransform,
     RateTransform,
 )
-from creepkit.quality.curve_shapes import shows_tertiary_creep
+from creepkit.quality.curve_shapes import runs_away
 from creepkit.records import History, Prediction, Predictor, is_logarithmic
 from creepkit.records.history import correlation_matrix
 
@@ -208,15 +208,14 @@ class ObservationVector:
     ) -> ObservationVector:
         """The observations of histories; noise is estimated from `full`, the same before frames were left out.
 
-        rupture_times : whether ends of tests without frames are among them. accelerating : whether curves that show
-        tertiary creep are followed to their end where nobody states it.
+        rupture_times : whether ends of tests without frames are among them. accelerating : whether curves that run
+        away are followed to their end where nobody states it.
         """
         full = histories if full is None else full
         follows = np.array([predictor.for_history(h).follows_to_rupture for h in histories])
         ends = follows & [h.end_known and (rupture_times or bool(h.outputs)) for h in histories]
         followed = ends | [
-            bool(accelerating and one and h.outputs and shows_tertiary_creep(h))
-            for one, h in zip(follows, full, strict=True)
+            bool(accelerating and one and h.outputs and runs_away(h)) for one, h in zip(follows, full, strict=True)
         ]
         rows = [
             {

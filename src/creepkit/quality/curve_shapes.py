@@ -34,6 +34,10 @@ PARTS_OF_STRAIN = ((0.0, 1.0), (0.0, 0.5), (0.0, 0.3))
 """Parts in which a rate may fall, over the growth of the output: primary creep comes first, and is short in time."""
 
 
+STEEP, LAST_FRAMES = 2.0, 5
+"""Slope of ln output over ln time from which on a curve runs away, and the frames at its end that tell."""
+
+
 FEWEST_FRAMES = 12
 """Of a part that is judged."""
 
@@ -49,6 +53,18 @@ def shows_tertiary_creep(history: History) -> bool:
         return False
     times, values = _curve(history, segments[-1].frames)
     return bool(np.ptp(times) > 0 and values[-1] >= values[0] and _rises_in_a_part(times, values, PARTS))
+
+
+def runs_away(history: History) -> bool:
+    """Whether tertiary creep ends so steeply that a few per cent of rate are twice as many of the output.
+
+    There ln output over ln time has a slope above STEEP in the last frames.
+    """
+    if not shows_tertiary_creep(history):
+        return False
+    times, values = _curve(history, load_segments(history)[-1].frames[-LAST_FRAMES:])
+    positive = (times > 0) & (values > 0)
+    return bool(positive.sum() > 2 and np.polyfit(np.log(times[positive]), np.log(values[positive]), 1)[0] > STEEP)
 
 
 def shows_primary_creep(history: History) -> bool:
