@@ -24,7 +24,14 @@ from creepkit.rupture_assessment.assessment import (
     check_conditions,
     interpolated,
 )
-from creepkit.rupture_assessment.checks import AssessmentCheck, effectiveness, physical_realism, repeatability, turning
+from creepkit.rupture_assessment.checks import (
+    AssessmentCheck,
+    effectiveness,
+    physical_realism,
+    populations,
+    repeatability,
+    turning,
+)
 from creepkit.rupture_assessment.fitting import (
     LEAST_CURVATURE,
     MinimumRateRelation,
@@ -115,7 +122,8 @@ def rupture(
             one for name in by_name for t in wanted for one in assessment.strengths_at(t, hours=hours, method=name)
         ]
         lives = tuple(assessment.life(stress, t) for t in wanted for stress in stresses)
-        checks = _checks(assessment, tensile, max(hours), wanted)
+        labels, at = [one.labels for one in tests if one.end_known], conditions_of(observed, tensile)
+        checks = _checks(assessment, tensile, max(hours), wanted) + populations(assessment.best, observed, at, labels)
     return replace(assessment, strengths=tuple(stated), checks=tuple(checks), lives=lives)
 
 

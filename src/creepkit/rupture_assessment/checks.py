@@ -22,18 +22,23 @@ group 2, since their rupture times are not known.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.stats import chi2, norm
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.methods import METHODS, Conditions
-from creepkit.rupture_assessment.observed_tests import RuptureTests, TensileStrength
+from creepkit.rupture_assessment.observed_tests import GROUP_LABELS, RuptureTests, TensileStrength
 from creepkit.rupture_assessment.rupture_fit import RuptureFit, power_of_ten
+
+MOST_KINDS, FEWEST_OF_KIND, LEAST_P_OF_KINDS = 5, 4, 0.01
+"""Values of a label that tell populations of tests apart, tests that broke of each, and by how rare a chance."""
 
 LEAST_SLOPE = 1.5
 """-d log t / d log s."""
@@ -141,6 +146,45 @@ def effectiveness(fit: RuptureFit, tests: RuptureTests, at: Conditions) -> list[
         chosen = near & broken
         if len(tests.isotherms) > 1 and chosen.sum() >= LEAST_ISOTHERM and np.ptp(tests.log_time[chosen]) > 0.3:
             checks.append(_predicted_against_measured(celsius_text(T), predicted[chosen], tests.log_time[chosen]))
+    return checks
+
+
+def populations(
+    fit: RuptureFit, tests: RuptureTests, at: Conditions, labels: Sequence[Mapping[str, str]]
+) -> list[AssessmentCheck]:
+    """Whether tests of each value of a label, such as a product form, last as long as the others.
+
+    By the ratio of likelihoods of a factor on the times of each value, run-outs as such; heats and laboratories are
+    effects of the fit. labels : of each test.
+    """
+    residuals = tests.log_time - fit.location(at)
+    scale = float(np.sqrt(fit.scale**2 + sum(s**2 for s in fit.scatter.values())))
+
+    def best(those: Bools) -> tuple[float, float]:
+        """log10 of the most likely factor on the times of some tests, and ln of its likelihood."""
+        broken, running = residuals[those & ~tests.censored], residuals[those & tests.censored]
+
+        def cost(shift: float) -> float:
+            return -float(norm.logpdf((broken - shift) / scale).sum() + norm.logsf((running - shift) / scale).sum())
+
+        return (found := minimize_scalar(cost, bounds=(-3.0, 3.0), method="bounded")).x, -found.fun
+
+    checks = []
+    for name in sorted(set.intersection(*map(set, labels)) - {"assumed", *GROUP_LABELS}):
+        values = np.array([one[name] for one in labels])
+        masks = {str(kind): values == kind for kind in np.unique(values)}
+        if (
+            not 1 < len(masks) <= MOST_KINDS
+            or min((m & ~tests.censored).sum() for m in masks.values()) < FEWEST_OF_KIND
+        ):
+            continue
+        apart = {kind: best(mask) for kind, mask in masks.items()}
+        gain = sum(likelihood for _, likelihood in apart.values()) - best(np.ones(len(tests), bool))[1]
+        p_value, kind = float(chi2.sf(2.0 * gain, len(masks) - 1)), min(apart, key=lambda one: apart[one][0])
+        factor = power_of_ten(apart[kind][0] - best(~masks[kind])[0])
+        found = f"p = {p_value:.2g} (allowed: from {LEAST_P_OF_KINDS})"
+        fault = f"tests of {name} '{kind}' last {factor:.2g} times as long as others (assess --only {name}={kind})"
+        checks.append(AssessmentCheck(f"{name} makes no difference", p_value >= LEAST_P_OF_KINDS, found, fault))
     return checks
 
 

@@ -23,11 +23,6 @@ def not_loaded_yet():
     core.library.cache_clear()
 
 
-def test_the_library_beside_the_sources_has_their_interface(monkeypatch, not_loaded_yet):
-    monkeypatch.delenv("CREEPKIT_CORE", raising=False)
-    assert core.library().creepkit_core_version() == core.INTERFACE_VERSION
-
-
 def test_a_library_of_other_sources_is_refused(monkeypatch, not_loaded_yet):
     monkeypatch.setattr(core, "INTERFACE_VERSION", 0)
     with pytest.raises(CreepkitError, match=r"has interface \d+, but this Python code needs 0 .*; run 'make core'"):

@@ -19,7 +19,6 @@ from creepkit.language import (
     time,
     wachtman,
 )
-from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 
 A, n, B = parameters("A n B")
@@ -171,15 +170,6 @@ def test_a_parameter_may_be_called_as_a_function_is():
 
 
 # ---- print ---------------------------------------------------------------------------------------------------------
-
-
-def test_a_law_prints_its_terms_and_table():
-    text = str(COMBINED)
-    assert "A_1*sinh(stress/B)**n_1    [hyperbolic sine]" in text
-    assert "+ A_3*stress**n_3*time**m_2    [time hardening]" in text
-    assert "m_2      time exponent: -0.95 to 0" in text
-    assert "A_1      rate coefficient: 1e-40 to 1e-05 or 0 1/s, log scale" in text
-    assert repr(NORTON) == "<CreepLaw norton: 1 term(s), parameters A, n>"
 
 
 def test_latex_shows_arrhenius_as_people_write_it():

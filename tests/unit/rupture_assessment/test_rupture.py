@@ -176,6 +176,18 @@ def _shortened(test):
     return HOUR * (hours if hours < 300 else 300 * (hours / 300) ** 0.2)
 
 
+@pytest.mark.parametrize(("less", "named"), [(0.7, 6), (1.0, 0)])
+def test_a_product_form_that_lasts_less_long_is_named(less, named):
+    sets = (
+        planted(larson_miller, count=40, heats=2, effects=[0, np.log10(less)], end=4000.0, seed=k) for k in range(6)
+    )
+    verdicts = [
+        ck.rupture([t.replace(labels={"form": t.labels["heat"]}) for t in tests], "larson-miller").verdict
+        for tests in sets
+    ]
+    assert sum("tests of form 'H1' last 0." in one for one in verdicts) == named
+
+
 def test_isotherms_that_turn_back_within_the_tests_are_not_ranked():
     x = np.linspace(1.7, 2.3, 12)
     rising = 3.0 - 20.0 * (x - 1.9) ** 2 + 0.03 * np.cos(40.0 * x)
