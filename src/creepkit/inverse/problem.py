@@ -60,6 +60,10 @@ FAILED_COST = 1e12
 """Cost of a candidate that cannot be predicted at all."""
 
 
+ROUNDING = 1e-12
+"""Least eigenvalue of a correlation, of a combination of unknowns that the tests do not tell."""
+
+
 HARD_BOUNDS = 100.0
 """By what penalties of bounds weigh more where no prediction is needed, and steps may be short."""
 
@@ -425,7 +429,10 @@ class LeastSquaresProblem:
         start, target : (unknowns,) from within, and what distances are taken from. free : (unknowns,) what may move;
         covariance : (free, free) of its estimate, by which distances are measured. It costs no prediction.
         """
-        whitening = np.linalg.inv(np.linalg.cholesky(covariance))
+        sd = np.sqrt(np.diag(covariance))
+        # by rounding no covariance where the tests do not tell a combination of unknowns
+        variances, axes = np.linalg.eigh(covariance / np.outer(sd, sd))
+        whitening = (axes / np.sqrt(np.maximum(variances, ROUNDING))).T / sd
         rows = np.zeros((len(whitening), target.size))
         rows[:, free] = whitening
         count = target.size - self.parameter_count  # of the priors of nuisance parameters, which the target knows
@@ -446,7 +453,7 @@ class LeastSquaresProblem:
         start = np.clip(start, self.bounds.lower + margin, self.bounds.upper - margin)
         start[list(held)] = list(held.values())
         scale = np.where(free, 1.0, self.bounds.width)
-        scale[free] = np.sqrt(np.diag(covariance))
+        scale[free] = sd
         minimum = bounded_least_squares(
             system, start, self.bounds, scale, Tolerances(100, 1e-10), fixed=held, robust=False
         )

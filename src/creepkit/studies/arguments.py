@@ -392,7 +392,8 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
         temperature = temperature_of(file, (*place, "temperature_C"), part.temperature_C)
     if temperature is None:
         raise file.error(place, "the fitted tests were made at several temperatures; give temperature_C")
-    options = PlannedTestOptions().changed(values_of_table(PlannedTestOptions, part))
+    stated = values_of_table(PlannedTestOptions, part)
+    options = PlannedTestOptions().changed({name: stated[name] for name in stated if name != "temperature"})
     lengths = lengths_of(file, (*place, "lengths"), part.lengths, specimen)
     described = DescribedTest(specimen, options, loads, lengths, temperature)
     with file.at(*place, "load", next(iter(part.load))):
