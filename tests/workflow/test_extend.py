@@ -132,7 +132,8 @@ def test_three_specimens_are_identified_together() -> None:
     fits, truth = space["fits"], space["TRUTH"]
     for fit in fits.values():
         for estimate in fit.estimates:
-            assert estimate.low < truth[estimate.name] < estimate.high
+            low, high = (estimate.value * (end / estimate.value) ** 1.32 for end in (estimate.low, estimate.high))
+            assert low < truth[estimate.name] < high  # at 99 %: of eight at 95 % one lies outside in a third of draws
     width = {g: {e.name: np.log(e.high / e.low) for e in fit.estimates} for g, fit in fits.items()}
     for name in ("A", "n"):
         assert width["all"][name] < 1.1 * min(width[group][name] for group in ("bar", "dimple", "beams"))
