@@ -40,7 +40,7 @@ class SmallPunch(ck.Axisymmetric):
     contact_stiffness: float = field(default=4e6, kw_only=True)
     contact_smoothing: float = field(default=1e-4, kw_only=True)
     strain_limit: float = field(default=1.5, kw_only=True)
-    tolerance: float = field(default=1e-3, kw_only=True)
+    tolerance: float = field(default=5e-4, kw_only=True)  # node after node comes into contact
 
     name, title = "small-punch", "Disc under a ball at constant force"
     outputs = (ck.Output("deflection", "length", "deflection of the lower face", noise=2e-3),)
