@@ -14,6 +14,7 @@ from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.quality import check_loading_strain, check_rig, exclude_suspect_frames, repeated_row_notes, without_copies
+from creepkit.quality.curve_shapes import CUT_LABEL
 from creepkit.records import History, Predictor, dimension_named, is_logarithmic, output_named
 from creepkit.records.specimen_lookup import lengths_by_default
 
@@ -53,7 +54,11 @@ def truncated_at_strain(histories: Sequence[History], limit: float) -> list[Hist
     One without any frames stays.
     """
     truncated = [
-        h.up_to("strain", limit).replace(rupture_time=None, unruptured=False) if "strain" in h.outputs else h
+        h.up_to("strain", limit).replace(
+            rupture_time=None, unruptured=False, labels={**h.labels, CUT_LABEL: f"{limit:g}"}
+        )
+        if "strain" in h.outputs
+        else h
         for h in histories
     ]
     return [h for h in truncated if not h.outputs or int((h.used & (h.times > 0)).sum()) >= 2]

@@ -38,6 +38,10 @@ STEEP, LAST_FRAMES = 2.0, 5
 """Slope of ln output over ln time from which on a curve runs away, and the frames at its end that tell."""
 
 
+CUT_LABEL = "cut at strain"
+"""Label of a history whose later frames were left out."""
+
+
 FEWEST_FRAMES = 12
 """Of a part that is judged."""
 
@@ -58,9 +62,9 @@ def shows_tertiary_creep(history: History) -> bool:
 def runs_away(history: History) -> bool:
     """Whether tertiary creep ends so steeply that a few per cent of rate are twice as many of the output.
 
-    There ln output over ln time has a slope above STEEP in the last frames.
+    There ln output over ln time has a slope above STEEP in the last frames. A curve that was cut at a strain does not.
     """
-    if not shows_tertiary_creep(history):
+    if CUT_LABEL in history.labels or not shows_tertiary_creep(history):
         return False
     times, values = _curve(history, load_segments(history)[-1].frames[-LAST_FRAMES:])
     positive = (times > 0) & (values > 0)
