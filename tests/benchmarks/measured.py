@@ -1,7 +1,7 @@
 """Pages of measured figures: a benchmark program prints its tables through a Page, and may write them to docs/measured.
 
 What stands in the terminal and what stands in the page are the same lines. A page has the title and the description of
-the program (its docstring), the tables, and a last line with date, machine and the command that repeats them.
+the program (its docstring), the tables, and a last line with date, commit, machine and the command that repeats them.
 """
 
 from __future__ import annotations

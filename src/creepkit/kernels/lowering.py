@@ -40,8 +40,6 @@ def lower(law: CreepLaw, target: KernelTarget = "numpy") -> ArrayKernel | Compil
         from creepkit.kernels.compilation import compile_law
 
         return compile_law(law)
-    if target not in ("numpy", "torch"):
-        raise LawError(f"no kernel target '{target}': {nearest(str(target), ('numpy', 'torch', 'compiled'))}")
     return _array_kernel(law, target)
 
 

@@ -18,6 +18,8 @@ longest time is that asked for (ECCC: 300,000 h), the stresses of group 1 start 
 strength at the longest time, whichever is lower, and the main temperatures have a tenth of the tests each, or
 are the lowest and the highest. Of few tests one may always lie beyond 2.5 standard deviations. Run-outs are left out of
 group 2, since their rupture times are not known.
+
+Beside these groups it is asked whether tests of one product form, or of another label, last as long as the others.
 """
 
 from __future__ import annotations
