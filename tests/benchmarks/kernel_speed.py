@@ -122,7 +122,7 @@ def array_runs(
     theta = [module.log(v) if p.scale == "log" else v for v, p in zip(given, law.params.values(), strict=True)]
     arguments = [*point, 1.0, point[0], point[0] / 3, *theta]
     return [
-        (lambda: rate(*point, *given), lambda: kernel.internal_rate(*arguments)),
+        (lambda: rate(*point, *given), lambda: kernel.internal_rates(*arguments)),
         (lambda: derivatives(*point, *given), lambda: kernel.internal_derivatives(*arguments)),
     ]
 
