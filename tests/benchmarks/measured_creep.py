@@ -5,8 +5,9 @@
 
 Columns: rms of ln(predicted/measured strain), each test's own loading strain subtracted; Z = 10^(2.5 s), s the standard
 deviation of log10(measured/predicted time to 1 % creep strain), of the fit and, where tests times parameters are up to
-100, with each condition left out; standard deviation of the creep rate between tests; BIC above the best. No law can do
-better than tests repeated at one condition agree with each other: their own Z stands above each table.
+100, with each condition left out; standard deviation of the creep rate between tests. No law can do better than tests
+repeated at one condition agree with each other: their own Z stands above each table. Weights are the default ones: by
+likelihood every test has a rate of its own, and a law whose curves have the wrong shape bends them by its exponent.
 """
 
 import time
@@ -20,7 +21,6 @@ from time_comparison import loading_strains, measured_time_to_strain, times_to_s
 
 import creepkit as ck
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures
-from creepkit.inverse.selection import rank
 from creepkit.quality.repeats import duplicate_tests
 
 STRAIN_LIMIT = 0.05
@@ -43,10 +43,8 @@ HEADS = (
     "Z fitted",
     "Z cross-validated",
     "rate between tests, %",
-    "BIC above the best",
     "not determined, or at a bound",
 )
-BIC_COLUMN = HEADS.index("BIC above the best")
 
 
 def catalogue(histories):
@@ -102,7 +100,7 @@ def spread_of_repeats(histories):
 
 
 def cells(name, fit, histories, max_work):
-    """One row of the table, without BIC."""
+    """One row of the table."""
     fitted = times_to_strain(fit.law, fit.values, histories, fit.predictor, STRAIN, loading_strains(histories))
     validated = "-"
     if len(histories) * len(fit.law.params) <= max_work:
@@ -115,13 +113,12 @@ def cells(name, fit, histories, max_work):
         f"{fitted.z_factor:.2f}",
         validated,
         f"{100 * fit.noise_model.rate:.0f}",
-        "",
         ", ".join(undetermined) or "none",
     ]
 
 
 def table_of(page, title, histories, options):
-    """Identify all laws from one set of tests, and their table by BIC."""
+    """Identify all laws from one set of tests, and their table in the order of their misfit."""
     page.heading(title)
     tests = usable(page, histories)
     z, repeats = spread_of_repeats(tests)
@@ -131,7 +128,7 @@ def table_of(page, title, histories, options):
             continue
         start = time.process_time()
         try:
-            fit = ck.identify(law, tests, weights="likelihood")  # BIC compares likelihoods
+            fit = ck.identify(law, tests)
         except ck.errors.FitError as error:
             page.paragraph(f"{name}: no identification: {error}.")
             continue
@@ -145,9 +142,7 @@ def table_of(page, title, histories, options):
     frames = sum(m.frames for m in fits[0].tests)
     page.paragraph(f"{len(tests)} tests, {frames} frames; Z = {z:.2f} between repeats of one condition ({repeats}).")
     page.table(*HEADS)
-    for ranked in rank(fits).laws:
-        row = rows[fits.index(ranked.fit)]
-        row[BIC_COLUMN] = f"{ranked.excess:.0f}"
+    for _, row in sorted(zip((fit.rms for fit in fits), rows, strict=True)):
         page.row(*row)
 
 
