@@ -223,14 +223,21 @@ def ranked(tests):
     )
 
 
-@pytest.mark.parametrize(("stated", "where"), [((0.5,), ""), ((0.44, 0.58), " in each of the 2 tests")])
-def test_a_thickness_that_is_stated_too_large_is_named_with_its_size(stated, where):
+def test_a_law_that_a_usual_error_of_the_thickness_explains_is_not_ruled_out():
+    """One thickness, stated 5 % too large: time hardening fits better, but 2 % is usual and integrated out."""
+    found = ranked(dimples((0.5,), 0.05))
+    assert {one.fit.law.name for one in found.credible} == {"norton", "time-hardening"}
+
+
+def test_a_thickness_that_is_stated_too_large_in_all_tests_is_named_with_its_size():
     """Stated 5 % too large they are 4.8 % smaller: a law that hardens fits better as they are stated."""
-    found = ranked(dimples(stated, 0.05))
+    found = ranked(dimples((0.44, 0.58), 0.05))
     assert found.best.law.name == "time-hardening"
     assert not found.decisive
     named = next(c for c in found.challenges if c.subject == "thickness")
-    said = re.match(rf"with a thickness ([\d.]+) % smaller{where} (or .*)?norton .*would explain them", named.sentence)
+    said = re.match(
+        r"with a thickness ([\d.]+) % smaller in each of the 2 tests (or .*)?norton .*would", named.sentence
+    )
     assert float(said[1]) == pytest.approx(100 * (1 - 1 / 1.05), abs=0.8)
     assert named.sentence in found.verdict
     assert len(named.sentence.split()) < 40
