@@ -16,7 +16,6 @@ from creepkit.inverse.selection.challenges import (
     FittedLaw,
     ShareResidual,
     _chi_square,
-    _comparison_text,
     _least_excess,
     altered_laws,
     challenges_of,
@@ -175,15 +174,6 @@ def test_the_planted_example_is_decisive():
     assert found.best.law.name == "strain-hardening*arrhenius"
     assert found.challenges == ()
     assert challenges_of([r.fit for r in found.laws]) == ()
-
-
-def test_what_fits_better_is_said_to_fit_better():
-    """3.84 is 95 % of chi-square with one degree of freedom: beyond it, two laws do not explain tests equally well."""
-    assert _comparison_text(-48.6) == "fits better (its chi-square is 48.6 lower)"
-    assert _comparison_text(-8.6, 5) == "explains them as well (its chi-square is 8.6 lower)"
-    assert _comparison_text(-1.2) == "explains them as well (its chi-square is 1.2 lower)"
-    assert _comparison_text(2.0) == "explains them as well (its chi-square is 2.0 higher)"
-    assert _comparison_text(-0.01) == "explains them as well (its chi-square is the same)"
 
 
 # ---- perturbation trials ---------------------------------------------------------------------------------------------
