@@ -7,7 +7,7 @@ selection.challenges).
 
 Laws are compared under a common covariance (see selection.discrimination), where each fits best under it whatever
 weights its values were found with: chi-square + K ln n (BIC), or + 2K + 2K(K+1)/(n-K-1) (AICc), with n the independent
-frames and nuisance parameters integrated out. Weights are exp(-excess / 2) over their sum.
+frames and nuisance parameters and usual errors of tests integrated out. Weights are exp(-excess / 2) over their sum.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from creepkit.inverse.information_criteria import (
     criterion_weights,
     determined_parameters,
 )
-from creepkit.inverse.selection.discrimination import under_common_covariance
+from creepkit.inverse.selection.discrimination import under_common_covariance, usual_errors
 from creepkit.records.presentable import Plotted, Presentable, Tabulated
 
 if TYPE_CHECKING:
@@ -244,7 +244,7 @@ def rank(
             "the identifications were made from different histories, frames, nuisances or rupture times and "
             "cannot be ranked; make them alike (rupture_times='use' or 'ignore' for all laws)"
         )
-    common = under_common_covariance(fits)
+    common = under_common_covariance(fits, [usual_errors(fit) for fit in fits])
     independent_frames, chi_square = common.independent_frames, common.chi_square
     penalty = bic_penalty if criterion == "bic" else aicc_penalty
     counts = [determined_parameters(fit.linear_problem.residuals, fit.u.size) for fit in fits]
