@@ -102,26 +102,20 @@ def threshold_laws(tests: Sequence[History]) -> list[str]:
     stress, temperature, rate = points[np.isfinite(points).all(axis=1)].T
     if stress.size == 0:
         return []
-    rise = temperature - temperature.min()
-    several = float(np.ptp(temperature)) > ISOTHERMAL_RANGE
-    least, coldest, hottest = (
-        THRESHOLDS * stress[at].min()
-        for at in (rise >= 0, rise < ISOTHERMAL_RANGE, rise > np.ptp(rise) - ISOTHERMAL_RANGE)
-    )
-    falling = [
-        first + (second - first) * rise / np.ptp(rise)
-        for first in coldest
-        for second in hottest
-        if several and second < first
-    ]
-    T_ref, names = f"{reference_temperature(tests):g}", list[str]()
+    rise, T_ref, names = temperature - temperature.min(), f"{reference_temperature(tests):g}", list[str]()
+    several, share = rise.max() > ISOTHERMAL_RANGE, rise / max(rise.max(), 1.0)
+    levels = (share >= 0.0, rise < ISOTHERMAL_RANGE, rise > rise.max() - ISOTHERMAL_RANGE)
+    all_least, coldest, hottest = (THRESHOLDS * stress[level].min() for level in levels)
     squares = _least_squares(stress, temperature, rate, [0.0 * stress])
-    for thresholds, further, name in (
-        ([one + 0.0 * stress for one in least], 1, "threshold-stress"),
-        (falling, 2, f"threshold-stress[s_0:linear({T_ref})]*arrhenius({T_ref})"),
-    ):
-        found, more = _least_squares(stress, temperature, rate, thresholds), further - len(names)
-        freedom = stress.size - 2 - several - further
+    for ends, further, name in (
+        ([(s_0, s_0) for s_0 in all_least], 1, "threshold-stress"),
+        (
+            [(first, last) for first in coldest for last in hottest if several and last < first], 2,
+            f"threshold-stress[s_0:linear({T_ref})]*arrhenius({T_ref})",
+        ),
+    ):  # fmt: skip
+        found = _least_squares(stress, temperature, rate, [first + (last - first) * share for first, last in ends])
+        more, freedom = further - len(names), stress.size - 2 - several - further
         if freedom > 1 and stats.f.sf((squares - found) / more / (found / freedom), more, freedom) < CHANCE:
             names, squares = [*names, name], found
     return names

@@ -196,7 +196,8 @@ class Ranking(Presentable, Plotted, Tabulated):
 def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
     """Why a ranking of several laws is not decisive."""
     names, best, count = [r.fit.law.name for r in ranking.credible], ranking.best.law.name, len(ranking.laws)
-    adequacy, weight = ranking.adequacy, f"weight {ranking.laws[0].weight:.2f} of the laws tried"
+    lost = f"; {unmet['convergence']}" if "convergence" in unmet else ""
+    adequacy, weight = ranking.adequacy, f"weight {ranking.laws[0].weight:.2f} of the laws tried{lost}"
     named = unmet["challenges"] if ranking.challenges else ""
     if adequacy is not None and adequacy.rejects:
         if adequacy.lies_in_tests:
@@ -215,12 +216,12 @@ def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
         none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
         return f"{none} the tests; {found}: plan tests that can refute it"
     if len(names) > 1:
-        found = f"{f'{named}; ' if named else ''}the best is {best}: {ranking.adequacy_text}"
+        found = f"{f'{named}; ' if named else ''}the best is {best}: {ranking.adequacy_text}{lost}"
         return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; {found}"
     if named and ranking.singled_out and adequacy is not None:
         explains = f"is not contradicted by the tests{adequacy.qualification}"
         return f"of {count} laws tried {best} has nearly all the weight ({weight}) and {explains}; but {named}"
-    reasons = dict.fromkeys([ranking.adequacy_text, *unmet.values()])
+    reasons = dict.fromkeys([ranking.adequacy_text, *(why for name, why in unmet.items() if name != "convergence")])
     return f"of {count} laws tried {best} is best ({weight}); {'; '.join(reasons)}"
 
 
