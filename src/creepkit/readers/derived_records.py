@@ -66,6 +66,10 @@ RAMP_RANGE, CREEP_RANGE = (0.05, 1.02), 0.6
 """Of the stress at the end of a ramp: between them the ramp is elastic; below CREEP_RANGE alone where creep shows."""
 
 
+STRAIGHT = 0.8
+"""Slope of the second half of a straight ramp over that of the first, from which on it is one."""
+
+
 CREEP_SHOWS = 0.01
 """Fraction of the stress that is lost within one frame of the ramp after its end, above which it bends the ramp."""
 
@@ -242,17 +246,24 @@ def modulus_of_ramp(strain: Floats, stress: Floats) -> tuple[float, str] | None:
     """Young's modulus, MPa, of the frames of a loading ramp, and what is said of it; None where too few show it.
 
     strain, stress : (frames,) of the program that was imposed, without the noise of its record, and MPa. The line is
-    fitted by least squares; its 95 % interval is that of Student's t.
+    fitted by least squares; its 95 % interval is that of Student's t. Where a ramp bends, as in a tension test that is
+    pulled on, its beginning counts as far as it is straight.
     """
     end = int(np.argmax(strain >= strain.max())) + 1
     low, high = (part * float(stress[end - 1]) for part in RAMP_RANGE)
     if stress.size > end and stress[end] < (1.0 - CREEP_SHOWS) * stress[end - 1]:
         high = CREEP_RANGE * float(stress[end - 1])
     kept = np.flatnonzero((stress[:end] >= low) & (stress[:end] <= high) & (np.diff(strain[:end], prepend=-1.0) > 0.0))
-    if kept.size < FEWEST_RAMP_FRAMES:
-        return None
     from scipy.stats import linregress, t
 
+    while kept.size >= FEWEST_RAMP_FRAMES:
+        halves = kept[: (kept.size + 1) // 2], kept[kept.size // 2 :]
+        first, second = (linregress(strain[half], stress[half]) for half in halves)
+        if second.slope >= STRAIGHT * first.slope:
+            break
+        kept = kept[: kept.size // 2]
+    if kept.size < FEWEST_RAMP_FRAMES:
+        return None
     line = linregress(strain[kept], stress[kept])
     modulus, half = float(line.slope), float(t.ppf(0.975, kept.size - 2) * line.stderr)
     if not modulus > 0.0 or half > 0.25 * modulus:

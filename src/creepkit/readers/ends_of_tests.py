@@ -13,6 +13,7 @@ import unicodedata
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Literal
 
 from creepkit.files.delimited_text import is_missing
 from creepkit.readers.vocabulary import unit_suffix
@@ -129,6 +130,20 @@ def end_said_by(text: str) -> str:
     if STOPPED in said:
         said.discard(INTERRUPTED)
     return said.pop() if len(said) == 1 else UNCLEAR if said or _ENDED.search(plain) else ""
+
+
+_INVALID = _words(r"invalid\w*|void|not valid|disregard|ungultig\w*|nicht gultig|verworfen|non valides?|invalides?|nul")
+_ELSEWHERE = re.compile(
+    r"outside(?: of)?(?: the)? ga[u]?ge|out of ga[u]?ge|ausserhalb (?:der )?mess|hors (?:de )?(?:la )?(?:longueur|zone)"
+    r"|(?:at|in|near) (?:the )?(?:grips?|shoulders?|fillets?|threads?)|grip failure"
+    r"|im (?:gewinde|kopf)|in der einspannung"
+)
+
+
+def invalidity_said_by(text: str) -> Literal["invalid", "elsewhere", ""]:
+    """Whether a text says that a test is invalid, or that it broke elsewhere than in its gauge length."""
+    plain = plain_words(text)
+    return "invalid" if _INVALID.search(plain) else "elsewhere" if _ELSEWHERE.search(plain) else ""
 
 
 YES = frozenset(

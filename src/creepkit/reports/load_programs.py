@@ -16,6 +16,10 @@ MOST_HOLDS = 3
 """Holds that are written one by one; of more, the first, the last and their number."""
 
 
+EVEN, EVEN_POINTS = 0.02, 41
+"""Of the final strain: how far a strain that rises evenly departs from a line; and at how many times that is asked."""
+
+
 SHORT_RAMP = 0.025
 """Of the time at its end: a longer ramp has both its ends written, such as a step that lies between two readings."""
 
@@ -39,7 +43,10 @@ def load_text(history: History) -> str:
 
 
 def kind_of_test(history: History) -> str:
-    """What is prescribed in a test: "creep under constant load", "constant strain, at which the stress relaxes"."""
+    """What is prescribed in a test: "creep under constant load", "constant strain, at which the stress relaxes".
+
+    A strain that rises evenly is "tension at a constant strain rate".
+    """
     loading = history.loading
     if isinstance(loading, PointLoading):
         prescribed = [name for name, one in (("stress", loading.stress), ("strain", loading.strain)) if one]
@@ -47,12 +54,26 @@ def kind_of_test(history: History) -> str:
     program, last = loading.program(), last_data_time(history)
     pieces = holds(program, last, HELD_LOAD * float(np.abs(program.values).max()))
     levels = "constant" if len(pieces) == 1 else "stepwise" if pieces else "changing"
+    if strain_rate(history) is not None:
+        return "tension at a constant strain rate"
     if loading.quantity == "strain":
         return f"{levels} strain{', at which the stress relaxes' if pieces else ''}"
     if loading.quantity == "stress":
         held = "true stress" if getattr(loading, "control", "load") == "stress" else "load"
         return f"creep under {levels} {held}"
     return f"creep under {levels} {loading.quantity}"
+
+
+def strain_rate(history: History) -> float | None:
+    """1/s, of a strain that is prescribed and rises evenly over the frames; None of other tests."""
+    if isinstance(history.loading, PointLoading) or history.loading.quantity != "strain":
+        return None
+    program, last = history.loading.program(), last_data_time(history)
+    times = np.linspace(0.0, last, EVEN_POINTS)
+    values = np.interp(times, program.times, program.values)
+    rate = float(values[-1] - values[0]) / last if last > 0 else 0.0
+    even = np.abs(values - values[0] - rate * times).max() <= EVEN * abs(values[-1] - values[0])
+    return rate if rate > 0 and even else None
 
 
 def _level_text(program: Program, last: float, unit: str) -> str:

@@ -185,7 +185,7 @@ def populations(
         p_value, kind = float(chi2.sf(2.0 * gain, len(masks) - 1)), min(apart, key=lambda one: apart[one][0])
         factor = power_of_ten(apart[kind][0] - best(~masks[kind])[0])
         found = f"p = {p_value:.2g} (allowed: from {LEAST_P_OF_KINDS})"
-        fault = f"tests of {name} '{kind}' last {factor:.2g} times as long as others (assess --only {name}={kind})"
+        fault = f"tests of {name} '{kind}' last {factor:.2g} times as long as others (add --only '{name}={kind}')"
         checks.append(AssessmentCheck(f"{name} makes no difference", p_value >= LEAST_P_OF_KINDS, found, fault))
     return checks
 

@@ -13,6 +13,7 @@ from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError, quoted
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.quality import repeated_row_notes
+from creepkit.readers.ends_of_tests import invalidity_said_by
 from creepkit.records import SECONDS_PER_HOUR, History
 
 TensileStrength = Callable[[Floats], Floats]
@@ -100,6 +101,7 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
 
     HistoryError for a test without one constant stress and temperature, or when there is none to assess.
     """
+    histories, notes = _valid(histories)
     known = [h for h in histories if h.end_known]
     with_rate = [h for h in histories if h.minimum_rate is not None]
     if not any(h.rupture_time is not None for h in histories):
@@ -113,7 +115,6 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
             f"the tests are of {len(alloys)} alloys ({', '.join(alloys[:4])}); assess one, by "
             f"--only alloy={alloys[0]} or select_tests(tests, alloy='{alloys[0]}')"
         )
-    notes = []
     silent = sum(not h.end_known and h.minimum_rate is None for h in histories)
     if silent:
         notes.append(f"{silent} tests say neither when they broke nor that they were stopped before; they are left out")
@@ -121,7 +122,7 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
     repeated = []
     for h in known:
         numbers = (h.rupture_time or float(h.times[-1]), h.unruptured, _constant_stress(h), _constant_temperature(h))
-        key = (*numbers, h.labels.get("heat", ""))
+        key = (*numbers, *(h.labels.items() if h.unruptured else [h.labels.get("heat", "")]))
         if key in seen:
             repeated.append(h.name)
         seen.add(key)
@@ -132,6 +133,24 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
         )
     notes += repeated_row_notes([h for h in with_rate if not h.end_known])
     return _as_arrays(known), _as_arrays(with_rate), tuple(notes)
+
+
+def _valid(histories: Sequence[History]) -> tuple[list[History], list[str]]:
+    """The tests that no label says to be invalid, and notes on those and on what broke outside its gauge length."""
+    said: dict[str, list[tuple[History, str]]] = {"invalid": [], "elsewhere": []}
+    for h in histories:
+        for name, text in h.labels.items():
+            if isinstance(text, str) and (kind := invalidity_said_by(text)):
+                said[kind].append((h, f"{name} says '{text}'"))
+                break
+    words = {"invalid": "left out as invalid", "elsewhere": "broken elsewhere than in the gauge length, and counted"}
+    notes = [
+        f"tests {words[kind]}: {len(found)}, such as '{found[0][0].name}', of which {found[0][1]}"
+        for kind, found in said.items()
+        if found
+    ]
+    left_out = {id(h) for h, _ in said["invalid"]}
+    return [h for h in histories if id(h) not in left_out], notes
 
 
 def _as_arrays(histories: Sequence[History]) -> RuptureTests:

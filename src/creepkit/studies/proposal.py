@@ -25,6 +25,7 @@ from creepkit.readers.questions import ANSWERS_FILE, Question, single_errors
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
 from creepkit.records.units import celsius_text
 from creepkit.registry.reading import read_those_that_can_be
+from creepkit.reports.load_programs import kind_of_test, strain_rate
 from creepkit.studies.camera_proposal import found_cameras
 from creepkit.studies.study_file import parse_study
 
@@ -304,7 +305,10 @@ class DataSummary:
         if len(units) == 1:
             loads += f", {self.loads[0]:g}"
             loads += f" to {self.loads[-1]:g} {units.pop() or self.tests[0].loading.quantity}" if several else ""
-        kinds = ", ".join(dict.fromkeys(history.specimen for history in self.tests))
+        rates = [rate for history in self.tests if (rate := strain_rate(history)) is not None]
+        if len(rates) == len(self.tests):
+            loads = f"strain rates of {min(rates):.2g} to {max(rates):.2g} 1/s"
+        kinds = ", ".join(dict.fromkeys(h.specimen if strain_rate(h) is None else kind_of_test(h) for h in self.tests))
         stopped = sum(history.unruptured for history in self.tests)
         count = f"{len(self.tests)} test{'s' if len(self.tests) > 1 else ''} ({kinds})"
         return [

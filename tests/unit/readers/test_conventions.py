@@ -9,6 +9,7 @@ import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import HISTORY_CSV, write_history
 from creepkit.records import History, RecordedLoading, StrainSteps, StressSteps
+from creepkit.reports.load_programs import kind_of_test
 
 HOT = "# temperature_C: 850\n"
 SAID = "# control: load\n# strain_measure: engineering\n"
@@ -334,6 +335,14 @@ def test_a_ramp_that_is_read_after_its_start_begins_unloaded(tmp_path: Path) -> 
     rows = [(t, min(t / 120, 1.0) * 1.5e-3, min(t / 120, 1.0) * 240 * (max(t, 120) / 120) ** -0.05) for t in times]
     test = read_bar(tmp_path, creep("time_s,strain_1,stress_MPa", rows, "# modulus_GPa: 160\n"))
     np.testing.assert_allclose(test.loading.program().at(np.array([0.0, 10, 60, 3e4])), [0, 1.25e-4, 7.5e-4, 1.5e-3])
+
+
+def test_a_tension_test_that_bends_shows_its_modulus_at_its_beginning(tmp_path: Path) -> None:
+    """100 GPa where it begins; pulled on at 1e-5 1/s to 40 times the strain at which it has bent away."""
+    rows = [(e / 1e-5, e, 120.0 * np.tanh(1e5 * e / 120.0)) for e in np.geomspace(1e-5, 0.05, 80)]
+    test = read_bar(tmp_path, creep("time_s,strain_1,stress_MPa", rows))
+    assert float(test.elastic.E) == pytest.approx(1e5, rel=0.06)
+    assert kind_of_test(test) == "tension at a constant strain rate"
 
 
 def creep(names: str, rows: list[tuple[float, ...]], head: str = "") -> str:

@@ -303,7 +303,17 @@ TESTS = planted(larson_miller, count=18)
 
 def test_tests_that_stand_twice_are_told() -> None:
     assert any("18 tests have the stress" in note for note in ck.rupture([*TESTS, *TESTS], "larson-miller").notes)
-    assert not any("have the stress" in note for note in ck.rupture(TESTS, "larson-miller").notes)
+    run_outs = [rupture_test(k, 80.0, 873.15, 2e4, end=1e4, labels={"type": k}) for k in "wb"]
+    assert not any("have the stress" in note for note in rupture_tests([*TESTS, *run_outs])[2])
+
+
+@pytest.mark.parametrize("remark", ["failed outside gauge length - invalid", "Bruch außerhalb der Messlänge, ungültig"])
+def test_what_a_laboratory_calls_invalid_is_left_out_and_said(remark):
+    remarks = [remark, "broke near the shoulder", *16 * [""]]
+    tests = [test.replace(labels={"remark": text}) for test, text in zip(TESTS, remarks, strict=True)]
+    known, _, notes = rupture_tests(tests)
+    assert known.names == tuple(t.name for t in TESTS[1:])
+    assert [note.split()[1] for note in notes[:2]] == ["left", "broken"]
 
 
 def test_times_beyond_a_double_are_infinite() -> None:
