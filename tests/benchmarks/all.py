@@ -62,7 +62,9 @@ BENCHMARKS = {
     "clock_alignment": Benchmark(15, (("--tests", "39"),), DATA),
     "surrogate_accuracy": Benchmark(10, (("--samples", "150"),)),
     "specimen_recovery": Benchmark(25),
-    "design_of_experiments": Benchmark(90),
+    "design_of_experiments": Benchmark(
+        30, (("--bars", "40", "--dimples", "16", "--law-bars", "40", "--laws", "40", "--shares", "half"),)
+    ),
     "law_recovery": Benchmark(45, (("--specimens", "24", "--others", "10"),)),
     "plate_of_alloys": Benchmark(8),
     "inconel_event": Benchmark(15, needs=DATA),
@@ -71,7 +73,7 @@ BENCHMARKS = {
     "whole_life": Benchmark(4, needs=DATA),
     "rupture_methods": Benchmark(3, needs=DATA),
     "rupture_strength_coverage": Benchmark(5, (("--sets", "40"),)),
-    "forecast_coverage": Benchmark(50),
+    "forecast_coverage": Benchmark(30, (("--campaigns", "50", "--dimples", "20"),)),
     "forecast_measured": Benchmark(12, needs=DATA),
     "causes": Benchmark(5, (("--campaigns", "20"),)),
     "forecast_beyond": Benchmark(4, (("--campaigns", "20"),), short=("--campaigns", "1", "--truths", "sinh")),

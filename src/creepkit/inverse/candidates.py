@@ -11,11 +11,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy import stats
 
+from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, LawError
 from creepkit.inverse.compared_tests import testable_laws
 from creepkit.inverse.minimum_rates import measured_minimum_rate
-from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_condition, reference_stresses
+from creepkit.inverse.reference_conditions import (
+    ISOTHERMAL_RANGE,
+    reference_condition,
+    reference_stresses,
+    reference_temperature,
+)
 from creepkit.language import CreepLaw
 from creepkit.quality.curve_shapes import shows_primary_creep, shows_tertiary_creep
 from creepkit.records import History, growing_output, is_logarithmic
@@ -29,6 +35,11 @@ FEWEST_STRESSES, STRESS_RATIO = 3, 1.5
 """Levels of stress, and the largest over the smallest, from which on an exponent that changes can be told."""
 
 
+THRESHOLDS, CHANCE = np.linspace(0.0, 0.96, 25), 0.05
+"""Threshold stresses that are tried, of the least stress; how probable by chance a better fit may be: a law too many
+costs a fit, one too few the answer."""
+
+
 FEWEST_RUPTURES = 4
 """Of tests without curves, from which damage can be identified beside minimum rates."""
 
@@ -38,18 +49,23 @@ def candidates(histories: Sequence[History]) -> list[CreepLaw]:
     """Laws that suit tests, the simplest first; those of plugins that are not installed are left out.
 
     Laws of steady creep are Norton's and, where three stresses or more differ by half, Garofalo's sine, or a threshold
-    stress where the exponent falls as the stress rises; with primary creep where a third of the curves show it, with
-    and without where a third relax, else beside hardening by strain and by time. Where a third of the curves show
-    tertiary creep, or where a table states rupture times, laws with damage are added.
+    stress, constant or linear in temperature, where minimum rates prefer it; with primary creep where a third of the
+    curves show it, with and without where a third relax, else beside hardening by strain and by time. Where a third of
+    the curves show tertiary creep, or where a table states rupture times, laws with damage are added.
     """
+    return list(named_candidates(histories).values())
+
+
+def named_candidates(histories: Sequence[History]) -> dict[str, CreepLaw]:
+    """{name by which ck.law() makes it: law} of the candidates; temperatures in it refer to the middle of the tests."""
     tests = [h for h in histories if h.outputs or h.minimum_rate is not None]
     if not tests:
         raise FitError("none of the tests has a curve or a minimum creep rate, from which a law could be identified")
     curves = [h for h in tests if h.outputs]
     several = _several_stresses(tests)
     steady = ["norton", *(["hyperbolic-sine"] if several else [])]
-    if several and exponent_falls(tests):
-        steady.append("threshold-stress")
+    if several:
+        steady += threshold_laws(tests)
     if 2 * len(curves) < len(tests):
         ruptures = sum(h.rupture_time is not None for h in tests if not h.outputs) >= FEWEST_RUPTURES
         names = [*steady, *(["kachanov-rabotnov", *(["sinh-damage"] if several else [])] if ruptures else [])]
@@ -61,8 +77,10 @@ def candidates(histories: Sequence[History]) -> list[CreepLaw]:
         names = [*(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening"]
     else:
         names = ["norton", "strain-hardening", "time-hardening", *steady[1:]]
-    laws = [law for name in names if (law := _law(name)) is not None]
-    return testable_laws(laws, tests) or laws[:1]
+    named = {name: law for name in names if (law := _law(name)) is not None}
+    laws = list(named.values())
+    kept = [law.fingerprint for law in testable_laws(laws, tests) or laws[:1]]
+    return {name: law for name, law in named.items() if law.fingerprint in kept}
 
 
 def _several_stresses(tests: Sequence[History]) -> bool:
@@ -71,27 +89,46 @@ def _several_stresses(tests: Sequence[History]) -> bool:
     return len(distinct) >= FEWEST_STRESSES and distinct[-1] >= STRESS_RATIO * distinct[0]
 
 
-def exponent_falls(tests: Sequence[History]) -> bool:
-    """Whether ln rate over ln stress bends down as the stress rises, more than its scatter explains (1 %, one side).
+def threshold_laws(tests: Sequence[History]) -> list[str]:
+    """Names of the laws above a threshold stress that minimum rates prefer to Norton's by an F test.
 
-    A line with a quadratic term is fitted to minimum rates, with a level of each temperature; a threshold stress below
-    the tests makes such a bend, an exponential dependence on stress the opposite one.
+    ln rate = a + n ln(s - s_0) - Q/(R T) is fitted to them with s_0 of a grid, constant or falling as the temperature
+    rises. One that follows the stresses down bends ln rate over ln stress at each temperature alone, and shows as an
+    activation energy that depends on stress.
     """
     points = np.array(
         [(*reference_condition(h), measured_minimum_rate(h)) for h in tests if h.loading.quantity == "stress"]
-    )
-    stress, temperature, rate = points.reshape(-1, 3)[np.isfinite(points.reshape(-1, 3)).all(axis=1)].T
-    x, levels = (
-        np.log(stress / np.median(stress)) if stress.size else stress,
-        np.unique(np.round(temperature / ISOTHERMAL_RANGE)),
-    )
-    columns = np.column_stack([*(np.round(temperature / ISOTHERMAL_RANGE) == level for level in levels), x, x**2])
-    freedom = len(x) - columns.shape[1]
-    if freedom < 2 or np.linalg.matrix_rank(columns) < columns.shape[1]:
-        return False
-    values, squares, *_ = np.linalg.lstsq(columns, np.log(rate), rcond=None)
-    variance = float(squares[0]) / freedom * np.linalg.inv(columns.T @ columns)[-1, -1]
-    return bool(values[-1] < -stats.t.ppf(0.99, freedom) * np.sqrt(variance))
+    ).reshape(-1, 3)
+    stress, temperature, rate = points[np.isfinite(points).all(axis=1)].T
+    if stress.size == 0:
+        return []
+    rise, T_ref, names = temperature - temperature.min(), f"{reference_temperature(tests):g}", list[str]()
+    several, share = rise.max() > ISOTHERMAL_RANGE, rise / max(rise.max(), 1.0)
+    levels = (share >= 0.0, rise < ISOTHERMAL_RANGE, rise > rise.max() - ISOTHERMAL_RANGE)
+    all_least, coldest, hottest = (THRESHOLDS * stress[level].min() for level in levels)
+    squares = _least_squares(stress, temperature, rate, [0.0 * stress])
+    for ends, further, name in (
+        ([(s_0, s_0) for s_0 in all_least], 1, "threshold-stress"),
+        (
+            [(first, last) for first in coldest for last in hottest if several and last < first], 2,
+            f"threshold-stress[s_0:linear({T_ref})]*arrhenius({T_ref})",
+        ),
+    ):  # fmt: skip
+        found = _least_squares(stress, temperature, rate, [first + (last - first) * share for first, last in ends])
+        more, freedom = further - len(names), stress.size - 2 - several - further
+        if freedom > 1 and stats.f.sf((squares - found) / more / (found / freedom), more, freedom) < CHANCE:
+            names, squares = [*names, name], found
+    return names
+
+
+def _least_squares(stress: Floats, temperature: Floats, rate: Floats, thresholds: Sequence[Floats]) -> float:
+    """The least sum of squares of ln rate (tests,) with n and Q free, over thresholds (tests,) below the stresses."""
+    sums = [np.inf]
+    for above in (stress - threshold for threshold in thresholds):
+        if np.all(above > 0):
+            columns = np.column_stack([np.ones_like(stress), np.log(above), temperature.mean() / temperature])
+            sums.append(float(((columns @ np.linalg.lstsq(columns, np.log(rate))[0] - np.log(rate)) ** 2).sum()))
+    return min(sums)
 
 
 def _stresses(history: History) -> list[float]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from math import erf
 from typing import Literal
 
 import numpy as np
@@ -348,9 +349,10 @@ def _recorded(
             continue
         shorter = min(frames.times[frame - 1] - frames.times[before], frames.times[after - 1] - frames.times[frame])
         early, late = float(frames.times[frame - 1]), times[k]
-        is_early = _steps_early(frames, quantity, (before, frame, after), levels[k] - levels[k - 1])
+        step = levels[k] - levels[k - 1]
+        share = (_share_behind_kink if is_temperature else _steps_early)(frames, quantity, (before, frame, after), step)
         unit = "K" if is_temperature else next(iter(conditions.terms.load_kinds[quantity].units))
-        if late - early > LARGEST_GAP * shorter and is_early is None:
+        if late - early > LARGEST_GAP * shorter and share is None:
             steps = [[*times[:k], time, *times[k + 1 :]] for time in (early, late)]
             texts = ["; ".join(f"{t:g} s {v:g} {unit}" for t, v in zip(one, levels, strict=True)) for one in steps]
             raise conditions.question(
@@ -361,9 +363,9 @@ def _recorded(
                 location=frames.location(frame),
             )
         is_extra = late - early < 0.5 * float(np.median(np.diff(frames.times[before:after])))
-        times[k] = late if is_extra or is_early is False else early if is_early else 0.5 * (early + late)
+        times[k] = late if is_extra else late - (0.5 if share is None else share) * (late - early)
         if times[k] != late or late - early > LARGEST_GAP * shorter:
-            which = "as what was measured shows" if is_early is not None else "between the readings before and after it"
+            which = "as what was measured shows" if share is not None else "between the readings before and after it"
             conditions.record_assumption(f"{quantity} {levels[k]:g} {unit} from {time_text(times[k])} on ({which})")
     if times[1:] == [float(frames.times[frame]) for frame in starts[1:]]:
         conditions.record_assumption(f"steps of {quantity} from the first frame of each level on")
@@ -372,6 +374,39 @@ def _recorded(
 
 TYPICAL_MODULUS, NEAR = 150e3, 0.5
 """MPa; ratio of two distances above which none is the nearer one."""
+
+
+NEAREST_READINGS, OFF = 5, 3.0
+"""On either side of a step, whose lines meet at it; standard deviations of where they meet, beyond which out of the gap
+thermal expansion has moved the second one."""
+
+
+def _share_behind_kink(frames: TableFrames, quantity: str, bounds: tuple[int, int, int], step: float) -> float | None:
+    """The share of the time between two frames that is behind a step of temperature, as what creeps shows.
+
+    Lines through the readings before and after it meet at the step: the mean of where within their noise they may meet
+    in the gap. None where the second is not the steeper one of a rise, or they meet outside; bounds : first frames of
+    two levels, and the end.
+    """
+    before, frame, after = bounds
+    names = [n for n in frames.values if n not in ("time", "used", quantity) and n[-3:] != "_sd"]
+    sides = slice(max(before, frame - NEAREST_READINGS), frame), slice(frame, min(after, frame + NEAREST_READINGS))
+    if not names or min(side.stop - side.start for side in sides) < 3:
+        return None
+    y, times = frames.values["strain" if "strain" in names else names[0]], frames.times - frames.times[frame]
+    gap = -float(times[frame - 1])
+    fits = [np.polyfit(times[side], y[side], 1, cov="unscaled") for side in sides]
+    (first, level), (second, other) = (line for line, _ in fits)
+    if (second - first) * np.sign(step) <= 0.0:
+        return None
+    met = (level - other) / (second - first)
+    spread = sum(covariance[1, 1] + 2.0 * met * covariance[0, 1] + met**2 * covariance[0, 0] for _, covariance in fits)
+    sd = max(noise_of_readings(y, order=3) * float(np.sqrt(spread)) / abs(second - first), 1e-3 * gap)
+    ends = np.array([-gap - met, -met]) / sd
+    if ends[0] > OFF or ends[1] < -OFF:
+        return None
+    density, below = np.exp(-0.5 * ends**2) * np.sqrt(2.0 / np.pi), [erf(end) for end in ends / np.sqrt(2.0)]
+    return float(-(met - sd * (density[1] - density[0]) / (below[1] - below[0])) / gap)
 
 
 def _steps_early(frames: TableFrames, quantity: str, bounds: tuple[int, int, int], step: float) -> bool | None:

@@ -240,8 +240,10 @@ class HeadOfTest:
         place, cells, known = self.table.location(row.line), [cell for cell in row.cells if cell], self.known
         if self.table.dialect.delimiter == " ":
             cells = [" ".join(cells)]
-        if len(cells) == 1 and known.is_condition(cells[0].partition(":")[0].strip()) and ":" in cells[0]:
-            cells = [part.strip() for part in cells[0].split(":", 1)]
+        key, colon, value = (part.strip() for part in "".join(cells[:1]).partition(":"))
+        is_program = known.condition(key).endswith(("_steps", "_program"))  # whose pairs a delimiter may have parted
+        if colon and known.is_condition(key) and (len(cells) == 1 or is_program):
+            cells = [key, "; ".join([value, *cells[1:]])]
         while cells:
             key, *cells = cells
             plain = key.rstrip(": ")

@@ -146,12 +146,20 @@ class Registry:
             self._given[predictor.specimen.name] = predictor.specimen
 
     def law(self, name: str) -> CreepLaw:
-        """The law of a name, a sum as "norton+strain-hardening", or "hyperbolic-sine*primary"; LawError without one."""
+        """The law of a name, a sum as "norton+strain-hardening", or "hyperbolic-sine*primary"; LawError without one.
+
+        With forms of temperature about a reference in K: "threshold-stress[s_0:linear(840)]*arrhenius(840)".
+        """
         if "+" in name and name not in self.laws():
             first, *others = (self.law(part.strip()) for part in name.split("+"))
             return sum(others, start=first)
         if name.endswith("*primary"):
             return self.law(name.removesuffix("*primary")).with_primary()
+        if factor := re.fullmatch(r"(.+)\*arrhenius\(([\d.]+)\)", name):
+            return self.law(factor[1]).times(self.one(kinds.TEMPERATURE_FORMS, "arrhenius")(T_ref=float(factor[2])))
+        if form := re.fullmatch(r"(.+)\[(\w+):([\w-]+)\(([\d.]+)\)\]", name):
+            made = self.one(kinds.TEMPERATURE_FORMS, form[3])(T_ref=float(form[4]))
+            return self.law(form[1]).with_temperature(**{form[2]: made})
         return self.one(kinds.LAWS, name)
 
     def specimen(self, name: str) -> Specimen:

@@ -14,7 +14,7 @@ from textwrap import wrap
 from typing import Any
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.inverse.candidates import candidates
+from creepkit.inverse.candidates import named_candidates
 from creepkit.inverse.compared_tests import duration_known, followed_duration
 from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
@@ -137,7 +137,7 @@ def _identification(summary: DataSummary) -> dict[str, Any]:
     import creepkit as ck
     from creepkit.surrogates.surrogate import reduced_order_models
 
-    laws, one = [law.name for law in candidates(summary.framed)], summary.framed[0]
+    laws, one = list(named_candidates(summary.framed)), summary.framed[0]
     damage = {name for name in laws if "alpha" in ck.law(name).names}
     specimens = {history.specimen for history in summary.tests}
     lengths = dimensions_of(ck.available("specimens").get(summary.tests[0].specimen))

@@ -1,7 +1,6 @@
 """What a page gets to show: laws of every kind of source, specimens by their records, tests with noise and offsets."""
 
 import json
-from dataclasses import replace
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
@@ -16,7 +15,6 @@ from creepkit.app.runtime_files import runtime_script
 from creepkit.cli.report import fitted_laws
 from creepkit.errors import CreepkitError, ExportError, FitError
 from creepkit.exporters.javascript import script_safe_json
-from creepkit.inverse.defect_correction import NumericalError
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.laws.norton import NORTON
 from creepkit.records import is_logarithmic
@@ -148,13 +146,6 @@ def test_it_is_said_why_a_test_has_no_misfit_and_which_the_law_does_not_know(fit
         "the law was identified without this test",
         "",
     ]
-
-
-def test_it_is_said_where_the_identification_was_corrected_and_the_curves_are_not(fit):
-    assert "numerical error" not in document(fit)["laws"][0]["judged"]
-    error = NumericalError("coarse", "fine", {"strain": 4e-5}, noises=2.0, shift=0.3)
-    (law,) = document(replace(fit, numerical_error=error))["laws"]
-    assert "up to 2 times the noise; the curves and misfits here are not" in law["judged"]
 
 
 # ---- model data ------------------------------------------------------------------------------------------------------

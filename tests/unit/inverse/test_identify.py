@@ -7,7 +7,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import FitError, FitWarning
-from creepkit.inverse.candidates import candidates
+from creepkit.inverse.candidates import candidates, named_candidates
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.extrapolation import extrapolation_text
 from creepkit.inverse.frame_noise import frame_noise
@@ -287,19 +287,23 @@ def test_tables_of_rates_and_lives():
     assert names(rows) == ["norton", "hyperbolic-sine", "kachanov-rabotnov", "sinh-damage"]
 
 
-def test_rates_over_a_threshold_stress_bend_down_and_those_of_a_power_law_do_not():
-    def rates(below, n):
-        factors = 1e-15 * np.exp(0.1 * np.random.default_rng(3).standard_normal(9))
-        rows = zip(np.geomspace(50.0, 130.0, 9), factors, strict=True)
-        return [
-            ck.History(
-                f"m{s:.0f}", np.array([1e6]), {}, ck.constant_stress(s), 900.0, minimum_rate=f * (s - below) ** n
-            )
-            for s, f in rows
-        ]
+def test_rates_over_a_threshold_stress_bend_down_at_each_temperature_and_those_of_a_power_law_do_not():
+    stress = np.array([150.0, 185.0, 225.0, 105.0, 140.0, 180.0, 70.0, 95.0, 140.0])
+    kelvin, scatter = np.repeat([813.15, 843.15, 873.15], 3), np.random.default_rng(3).standard_normal(9)
+    factors = 1e-15 * np.exp(0.05 * scatter - 3e5 / 8.314 * (1 / kelvin - 1 / 843.15))
 
-    assert names(rates(40.0, 4.0)) == ["norton", "hyperbolic-sine", "threshold-stress"]
-    assert names(rates(0.0, 4.0)) == ["norton", "hyperbolic-sine"]
+    def named(s_0):
+        rows = zip(stress, kelvin, factors * (stress - s_0) ** 4.0, strict=True)
+        end = np.array([1e6])
+        tests = [ck.History("m", end, {}, ck.constant_stress(s), T, minimum_rate=rate) for s, T, rate in rows]
+        return list(named_candidates(tests))
+
+    falling = "threshold-stress[s_0:linear(843.15)]*arrhenius(843.15)"
+    assert named(40.0) == ["norton", "hyperbolic-sine", "threshold-stress"]
+    assert named(65.0 - 0.7 * (kelvin - 843.15)) == ["norton", "hyperbolic-sine", falling]
+    assert named(0.0) == ["norton", "hyperbolic-sine"]
+    forms = ck.law("threshold-stress").with_temperature(s_0=ck.linear(T_ref=843.15))
+    assert ck.law(falling).fingerprint == forms.times(ck.arrhenius(T_ref=843.15)).fingerprint
 
 
 def test_a_name_with_primary_creep_is_the_law_itself_with_the_factor():

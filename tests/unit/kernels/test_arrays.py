@@ -269,16 +269,6 @@ def test_an_exponent_that_varies_with_temperature_is_taken_at_the_point() -> Non
 # Printed kernels read well, whatever the author's names are.
 
 
-def test_a_kernel_is_printed_in_the_words_of_its_author() -> None:
-    source = lower(COMBINED, "numpy").source
-
-    assert "# strain hardening: A_2*strain**m_1*stress**n_2" in source
-    assert "    ln_stress = log_floor(stress, 1e-30)" in source
-    assert "    B = exp(ln_B)" in source
-    assert "    strain_hardening = exp(ln_A_2 + ln_strain*m_1 + ln_stress*n_2)" in source
-    assert "        hyperbolic_sine + strain_hardening + time_hardening," in source
-
-
 def test_what_needs_no_point_is_done_once_for_all_eight() -> None:
     """Functions of parameters alone, such as exp(-r) of Liu-Murakami, are called for one number, not for a vector."""
     for law_ in (COMBINED, EQUATIONS["Liu-Murakami"]):

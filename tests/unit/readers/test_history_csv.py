@@ -100,6 +100,10 @@ def test_temperature_steps_and_programs(read):
     body = "# stress_MPa: 50\ntime_s,strain_1\n0,0\n10,1e-3\n"
     stepped = read("# temperature_steps: 0 s 900 K; 5 s 910 K\n" + body).temperature_program()
     np.testing.assert_allclose(stepped.at([0, 4.9, 5, 9]), [900, 900, 910, 910])
+    parted = read(
+        "Stress: 50 MPa\nTemperature steps: 0 s 900 K; 5 s 910 K\n\nTime (s);Strain (%)\n0;0.0\n5;0.05\n10;0.1\n"
+    )
+    assert parted.temperature_program() == stepped
     ramped = read("# temperature_program: 0 s 900 K; 10 s 910 K\n" + body).temperature_program()
     np.testing.assert_allclose(ramped.at([0, 5, 20]), [900, 905, 910])
 

@@ -9,7 +9,7 @@ are therefore asked before an answer is called decisive:
    parameters give by chance, it fits better. Both
    are the least under the covariance of the best law's identification.
 2. May there be a threshold? The stress s in the terms of the best law is replaced by s - s_0, with s_0 THRESHOLD of
-   the reference stress, and judged likewise.
+   the reference stress, and judged likewise. One that has a threshold is not asked for another.
 3. Does the answer rest on something nobody measured? The laws are ranked again with each unmodelled effect (see
    selection.perturbation_trials).
 """
@@ -105,7 +105,8 @@ def _alterations(fits: Sequence[Identification]) -> Iterator[tuple[Kind, str, Ca
                 f"a sum with {fit.law.name}",
                 partial(sum_with_share, best, FittedLaw(fit.least_squares_problem, fit.x)),
             )
-    yield "threshold", f"{best.law.name} above a threshold", partial(above_threshold, best)
+    if not any(cut.has(stress) for term in best.law.terms.values() for cut in term.atoms(sympy.Max)):
+        yield "threshold", f"{best.law.name} above a threshold", partial(above_threshold, best)
 
 
 def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -> Challenge | None:

@@ -21,17 +21,11 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, bic_penalty, criterion_weights
-from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
-from creepkit.inverse.selection.discrimination import (
-    DISTINGUISHABLE_CHI_SQUARE,
-    under_common_covariance,
-    with_covariance_of,
-)
-from creepkit.inverse.variance_components import LinearisedProblem
+from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, under_common_covariance, usual_errors
 from creepkit.records import Nuisance, is_length_nuisance
 
 MOST_NAMED = 2
@@ -75,11 +69,7 @@ class Trial:
     @classmethod
     def of(cls, fits: Sequence[Identification], effects: tuple[Perturbation, ...], scope: Scope) -> Trial:
         """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
-        perturbed = [
-            p.with_effects([replace(e, common=scope == "all")])
-            for p, e in zip([fit.linear_problem for fit in fits], effects, strict=True)
-        ]
-        scores, noise_model = _scores(fits, perturbed)
+        scores, noise_model = _scores(fits, [replace(effect, common=scope == "all") for effect in effects])
         return cls(scope, effects, scores, criterion_weights(scores)[1], noise_model)
 
     @property
@@ -98,20 +88,17 @@ class Trial:
         return _description(self, fits[law], law, self.sizes(fits, law))
 
 
-def _scores(fits: Sequence[Identification], problems: Sequence[LinearisedProblem]) -> tuple[Floats, NoiseModel]:
-    """(laws,) -2 ln of the evidence by BIC of these linear problems of the laws, and the noise model it is under."""
-    common = under_common_covariance([replace(f, linearised=p) for f, p in zip(fits, problems, strict=True)])
-    noise_model, unperturbed = fits[common.reference_law].noise_model, [fit.linear_problem for fit in fits]
-    reference = unperturbed[common.reference_law].residuals
+def _scores(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) -> tuple[Floats, NoiseModel]:
+    """(laws,) -2 ln of the evidence by BIC of identifications, and the noise model it is under.
 
-    def log_determinant(linear: LinearisedProblem) -> float:
-        residuals = with_covariance_of(reference, linear.residuals)
-        return CovarianceFactor.of_residuals(residuals, noise_model).log_determinant
-
-    scores = log_determinant(unperturbed[common.reference_law]) + common.chi_square + common.log_determinant
-    scores += [log_determinant(new) - log_determinant(old) for new, old in zip(problems, unperturbed, strict=True)]
-    frames = effective_sample_size(reference, noise_model)
-    return scores + [bic_penalty(len(fit.u), frames) for fit in fits], noise_model
+    tried : a perturbation by each law, beside the usual errors of tests, and in the place of one of its kind.
+    """
+    errors = [usual_errors(fit) for fit in fits]
+    if tried:
+        errors = [[*(e for e in own if e.kind != new.kind), new] for own, new in zip(errors, tried, strict=True)]
+    common = under_common_covariance(fits, errors)
+    penalties = [bic_penalty(len(fit.u), common.independent_frames) for fit in fits]
+    return common.chi_square + common.log_determinant + penalties, fits[common.reference_law].noise_model
 
 
 def _description(trial: Trial, fit: Identification, law: int, sizes: Floats) -> str:
@@ -135,12 +122,16 @@ def _description(trial: Trial, fit: Identification, law: int, sizes: Floats) -> 
 
 
 def _trials(fits: Sequence[Identification]) -> Iterator[Trial]:
-    """Those of all perturbations that every law has, of which the first states its size."""
+    """Those of all perturbations that every law has, of which the first states its size.
+
+    What intervals include of each test by itself is in the evidence already, and tried as one error of all.
+    """
     by_kind = [{e.kind: e for e in fit.unmodelled if not e.common and e.residual_change.size} for fit in fits]
     for kind in by_kind[0]:
         effects = tuple(one[kind] for one in by_kind if kind in one)
         if len(effects) == len(fits):
-            yield Trial.of(fits, effects, "test")
+            if not effects[0].included:
+                yield Trial.of(fits, effects, "test")
             if len(fits[0].tests) > 1:
                 yield Trial.of(fits, effects, "all")
 
@@ -176,7 +167,7 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
     if not trials:
         return ()
     rejected = fits[0].adequacy is not None and fits[0].adequacy.rejects
-    as_stated, _ = _scores(fits, [fit.linear_problem for fit in fits])
+    as_stated, _ = _scores(fits)
     raised = [
         (float(trial.scores[law]), law, trial)
         for trial in trials

@@ -7,7 +7,7 @@ selection.challenges).
 
 Laws are compared under a common covariance (see selection.discrimination), where each fits best under it whatever
 weights its values were found with: chi-square + K ln n (BIC), or + 2K + 2K(K+1)/(n-K-1) (AICc), with n the independent
-frames and nuisance parameters integrated out. Weights are exp(-excess / 2) over their sum.
+frames and nuisance parameters and usual errors of tests integrated out. Weights are exp(-excess / 2) over their sum.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from creepkit.inverse.information_criteria import (
     criterion_weights,
     determined_parameters,
 )
-from creepkit.inverse.selection.discrimination import under_common_covariance
+from creepkit.inverse.selection.discrimination import under_common_covariance, usual_errors
 from creepkit.records.presentable import Plotted, Presentable, Tabulated
 
 if TYPE_CHECKING:
@@ -196,7 +196,8 @@ class Ranking(Presentable, Plotted, Tabulated):
 def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
     """Why a ranking of several laws is not decisive."""
     names, best, count = [r.fit.law.name for r in ranking.credible], ranking.best.law.name, len(ranking.laws)
-    adequacy, weight = ranking.adequacy, f"weight {ranking.laws[0].weight:.2f} of the laws tried"
+    lost = f"; {unmet['convergence']}" if "convergence" in unmet else ""
+    adequacy, weight = ranking.adequacy, f"weight {ranking.laws[0].weight:.2f} of the laws tried{lost}"
     named = unmet["challenges"] if ranking.challenges else ""
     if adequacy is not None and adequacy.rejects:
         if adequacy.lies_in_tests:
@@ -215,12 +216,12 @@ def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
         none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
         return f"{none} the tests; {found}: plan tests that can refute it"
     if len(names) > 1:
-        found = f"{f'{named}; ' if named else ''}the best is {best}: {ranking.adequacy_text}"
+        found = f"{f'{named}; ' if named else ''}the best is {best}: {ranking.adequacy_text}{lost}"
         return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; {found}"
     if named and ranking.singled_out and adequacy is not None:
         explains = f"is not contradicted by the tests{adequacy.qualification}"
         return f"of {count} laws tried {best} has nearly all the weight ({weight}) and {explains}; but {named}"
-    reasons = dict.fromkeys([ranking.adequacy_text, *unmet.values()])
+    reasons = dict.fromkeys([ranking.adequacy_text, *(why for name, why in unmet.items() if name != "convergence")])
     return f"of {count} laws tried {best} is best ({weight}); {'; '.join(reasons)}"
 
 
@@ -244,7 +245,7 @@ def rank(
             "the identifications were made from different histories, frames, nuisances or rupture times and "
             "cannot be ranked; make them alike (rupture_times='use' or 'ignore' for all laws)"
         )
-    common = under_common_covariance(fits)
+    common = under_common_covariance(fits, [usual_errors(fit) for fit in fits])
     independent_frames, chi_square = common.independent_frames, common.chi_square
     penalty = bic_penalty if criterion == "bic" else aicc_penalty
     counts = [determined_parameters(fit.linear_problem.residuals, fit.u.size) for fit in fits]

@@ -6,8 +6,10 @@ Candidates are laws and sums of two of them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.candidates import candidates
@@ -15,6 +17,7 @@ from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import describing, identify, sampled_where_needed
+from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.ranking import Criterion, Ranking, rank
@@ -22,6 +25,9 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Predictor
 from creepkit.registry import default_registry, kinds
+
+ALIKE = 2.0
+"""Of the log-likelihood, by which a search that converged may end below another."""
 
 
 def sums_of_two(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
@@ -52,7 +58,8 @@ def select(
     sums : also sums of two candidates: True, False, or None for sums of the best law where it does not explain the
         tests to their noise, and then richer registered laws, at most settings.further_laws of both together.
     criterion : "bic" or "aicc".
-    A law that cannot be identified is named in `failed`; FitError if none can.
+    A law that cannot be identified is named in `failed`; FitError if none can. The search of a best law that did not
+    converge is repeated.
     """
     asked = settings or IdentificationSettings()
     settings = replace(asked, weights="likelihood")
@@ -73,9 +80,27 @@ def select(
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
     ranking = rank(fits, criterion, failed)
+    if not ranking.best.converged:
+        best = _repeated(ranking.best, using, settings, through)
+        ranking = rank([best if fit is ranking.best else fit for fit in fits], criterion, failed)
     shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
     laws = [replace(one, fit=_as_shown(one.fit, asked, through)) if id(one) in shown else one for one in ranking.laws]
     return replace(ranking, laws=tuple(laws), further=tried_further)
+
+
+def _repeated(fit: Identification, using: Any, settings: IdentificationSettings, through: Any) -> Identification:
+    """An identification that did not converge, from its end and then by twice the starts, until the likeliest does."""
+    best, through = fit, through_for_law(through, fit.law)
+    for start, starts in ((StartingEstimate.from_identification(fit), settings.starts), (None, 2 * settings.starts)):
+        more = {"settings": replace(settings, starts=starts), "start": start, "through": through}
+        with suppress(CreepkitError):
+            best = max(
+                (best, identify(fit.law, fit.histories, using, **more)),
+                key=lambda one: one.log_likelihood + ALIKE * one.converged,
+            )
+        if best.converged:
+            break
+    return best
 
 
 def _as_shown(fit: Identification, asked: IdentificationSettings, through: Predictor | None) -> Identification:
