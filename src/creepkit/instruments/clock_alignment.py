@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from creepkit.arrays import ArrayLike, Floats, Ints
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.instruments.response_likelihood import (
+    TRIED,
     DrivingRecord,
     Response,
     ResponseModel,
@@ -63,17 +65,17 @@ SPIKE = 8.0
 """Standard deviations by which a single frame that falls back at once is off."""
 
 
-COARSE_LAGS, FINE_LAGS, CANDIDATES, MOST_FRAMES = 2000, 500, 3, 500
+COARSE_LAGS, FINE_LAGS, CANDIDATES, MOST_FRAMES = 2000, 300, 3, 500
 """Lags of the first search and of the second, candidates kept between them, and frames that are used at most."""
 
 
 LOOSER = 3.0
-"""Factor of the walks of models that are averaged with the most likely ones, which tend to know too much."""
+"""Factor of the walk of the rate of models that are averaged with the most likely one, which tends to know too much."""
 
 
-MODEL_LAGS, MOST_MODELS, MODEL_ITERATIONS, ITERATIONS = 3, 2, 2, 7
-"""Lags at which the scales of the model are estimated, how many of these models are averaged, in how many of the
-iterations that close in on the posterior they are estimated, and iterations at most."""
+MODEL_LAGS, MODEL_ITERATIONS, ITERATIONS, SHARE_ITERATIONS = 3, 2, 7, 4
+"""Lags at which the scales of the model are estimated, in how many of the iterations that close in on the posterior
+they are, iterations at most, and those that find the share of several test pieces that counts."""
 
 
 RESOLVED, NEGLIGIBLE = 30, 12.0
@@ -107,14 +109,11 @@ class _Task:
         return best_model(self.driving.response(self.times, np.array([lag])), self.displacements, self.noise)
 
     def models(self, lags: Floats) -> list[ResponseModel]:
-        """The most likely models at several lags, each once, but for those that are nowhere as likely as others."""
+        """The most likely model of several lags, with each of the walks that it may have."""
         found = list(dict.fromkeys(self.best_model(float(lag)) for lag in lags))
-        totals = np.array([self.terms(lags, model).sum(axis=0) for model in found])
-        good = totals.max(axis=1) > totals.max() - NEGLIGIBLE
-        chosen = [found[k] for k in np.argsort(-totals.max(axis=1)) if good[k]][:MOST_MODELS]
-        first = chosen[0]
-        looser = replace(first, compliance_walk=LOOSER * first.compliance_walk, rate_walk=LOOSER * first.rate_walk)
-        return [*chosen, looser]
+        best = max(found, key=lambda model: float(self.terms(lags, model).sum(axis=0).max()))
+        size, walks = float(np.ptp(self.displacements)), product(TRIED[0], (1.0, LOOSER))
+        return [replace(best, compliance_walk=k * size, rate_walk=c * best.rate_walk) for k, c in walks]
 
     def log_at_rest(self, lags: Floats) -> Floats:
         """(lags,) logarithm of how likely it is that frames that seem to be without load are under what they are."""
@@ -329,7 +328,7 @@ def _checked_best(
 def _responds(task: _Task, model: ResponseModel, peak: float) -> bool:
     """Whether the displacement follows the load at the best lag better than one without a load would be."""
     nothing = np.zeros((task.times.size, 1))
-    silent = Response(nothing, nothing, np.diff(task.times) / np.ptp(task.times))
+    silent = Response(nothing, nothing, np.diff(task.times) / np.ptp(task.times), nothing[None, 1:])
     alone = log_likelihoods(silent, task.displacements, best_model(silent, task.displacements, task.noise)).sum()
     return bool(peak - alone > LEAST_GAIN)
 
@@ -342,11 +341,8 @@ def _posterior(tasks: Sequence[_Task], lag: float, search: tuple[float, float]) 
             models = [task.models(lag + half * np.linspace(-0.9, 0.9, MODEL_LAGS)) for task in tasks]
         lags = lag + np.linspace(-half, half, FINE_LAGS)
         step = float(lags[1] - lags[0])
-        each = [
-            np.logaddexp.reduce([task.terms(lags, model, step).sum(axis=0) for model in own])
-            for task, own in zip(tasks, models, strict=True)
-        ]
-        logs = _together(np.array(each), lags)
+        grids = [[task.terms(lags, m, step).sum(axis=0) for m in own] for task, own in zip(tasks, models, strict=True)]
+        logs = _together(np.array([np.logaddexp.reduce(grid) for grid in grids]), lags)
         logs[(lags < search[0]) | (lags > search[1])] = -np.inf
         relevant = np.flatnonzero(logs > logs.max() - NEGLIGIBLE)
         cut_off = relevant[0] == 0 or relevant[-1] == lags.size - 1
@@ -374,13 +370,19 @@ def _together(each: Floats, lags: Floats) -> Floats:
     """(lags,) logarithm of the likelihood of test pieces (pieces, lags), as sure as the surest of them.
 
     What no model of the response follows is the same in all, whose errors therefore are no independent ones: the sum of
-    the logarithms counts as if the information in it were that of the piece that has most.
+    the logarithms counts by the share that has the variance of the piece that has least.
     """
-    by_lag = np.exp(each - each.max(axis=1, keepdims=True))
-    by_lag /= by_lag.sum(axis=1, keepdims=True)
-    means = by_lag @ lags
-    information = 1.0 / np.maximum((by_lag * (lags - means[:, None]) ** 2).sum(axis=1), 1e-300)
-    return np.asarray(each.sum(axis=0) * information.max() / information.sum())
+    total, share, least = each.sum(axis=0), 1.0, min(_variance(logs, lags) for logs in each)
+    for _ in range(SHARE_ITERATIONS):  # one would do for normal ones
+        share = min(1.0, share * _variance(share * total, lags) / least)
+    return np.asarray(share * total)
+
+
+def _variance(logs: Floats, lags: Floats) -> float:
+    """s^2, of lags (points,) s by logarithms of their probabilities, that of a cell of the grid at least."""
+    weights = np.exp(logs - logs.max())
+    mean, spread = np.average(lags, weights=weights), (lags[1] - lags[0]) ** 2 / 12.0
+    return float(np.average((lags - mean) ** 2, weights=weights) + spread)
 
 
 def _interval(values: Floats, weights: Floats) -> tuple[float, float]:

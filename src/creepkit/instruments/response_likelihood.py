@@ -1,11 +1,12 @@
 """How likely displacements are at every lag between two clocks: a Kalman filter, run at many lags at once.
 
-Between two frames the displacement grows by k dp + q dm + (c + b p^4) dt + transients: k is the compliance, q that of
-first loading (m is the largest load so far; plastic flow), c and b p^4 are creep rates. All walk at random, k and q
-with the load that has changed, c with that and with time, b with time; each change of load starts transients of primary
-creep of random size that fade within one and within six intervals. So stiffening, plastic flow and creep of any law are
+Between two frames the displacement grows by k dp + q dm + integral of (c + a p^3 + b p^6) dt + transients: k is the
+compliance, q that of first loading (m is the largest load so far; plastic flow), c, a p^3 and b p^6 are creep rates.
+All walk at random, k and q with the load that has changed, c with the creep rate that has changed and with time, a and
+b with time; each change of load starts transients of primary creep of random size, in proportion to the change of the
+creep rate, that fade within one and within six intervals. So stiffening, plastic flow and creep of any law are
 followed; what cannot be followed is a jump of the displacement in another interval between frames than that of the
-load.
+load. Primary creep that were as large after a step at low load as after one at high load would pass for a lag.
 """
 
 from __future__ import annotations
@@ -16,17 +17,21 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Floats, Ints
 from creepkit.records import InstrumentRecord, Program
 from creepkit.records.recorded_programs import recorded_program
 
-STATES = 7
-"""Displacement, compliance, that of first loading, creep rate, what is left of two transients, creep rate at the whole
-range of the load that falls with LOAD_EXPONENT."""
+STATES = 8
+"""Displacement, compliance, that of first loading, creep rate, what is left of two transients, creep rates at the whole
+range of the load that fall with its EXPONENTS."""
+
+
+EXPONENTS = (3, 6)
+"""Of the creep rate on the load, about which those of alloys lie; the rest is left to the random walks."""
 
 
 LOAD_EXPONENT = 4
-"""Of the creep rate on the load, as alloys have about; the rest is left to the random walks."""
+"""Of the changes of the creep rate that start transients."""
 
 
 TRANSIENTS = (1.0, 6.0)
@@ -42,12 +47,14 @@ class Response:
     """What drives a displacement, at several lags.
 
     loads, maxima : (frames, lags) load, and the largest so far, as fractions of the range of the load.
-    intervals : (frames - 1,) between frames, as fractions of the whole time.
+    intervals : (frames - 1,) between frames, as fractions of the whole time. powers : (EXPONENTS, frames - 1, lags)
+    means of the powers of the load between frames.
     """
 
     loads: Floats
     maxima: Floats
     intervals: Floats
+    powers: Floats
 
 
 @dataclass(frozen=True)
@@ -69,11 +76,13 @@ class DrivingRecord:
         than lags lie apart would be missed.
         """
         wanted = frame_times[:, None] + lags
-        span = float(np.ptp(frame_times))
+        between, loads = np.diff(frame_times), np.maximum(self.loads, 0.0)
+        powers = [np.diff(_integral(self.times, loads, power, wanted), axis=0) for power in EXPONENTS]
         return Response(
             _averaged(self.times, self.loads, width, wanted),
             _averaged(self.times, self.maxima, width, wanted),
-            np.diff(frame_times) / span,
+            between / np.ptp(frame_times),
+            np.array(powers) / between[:, None],
         )
 
 
@@ -105,20 +114,26 @@ def _with_crossings(program: Program) -> tuple[Floats, Floats]:
 
 def _averaged(times: Floats, values: Floats, width: float, wanted: Floats) -> Floats:
     """(...,) mean of a polygon over `width` s about times (...,) s; its first and last values hold outside."""
-    if width <= 0.0 or times.size < 2:
+    if width <= 0.0:
         return np.asarray(np.interp(wanted, times, values))
-    distances = np.diff(times)
-    integral = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * distances)])
-    slopes = np.diff(values) / np.maximum(distances, 1e-300)
+    before, after = _integral(times, values, 1, np.array([wanted - 0.5 * width, wanted + 0.5 * width]))
+    return np.asarray((after - before) / width)
 
-    def up_to(t: Floats) -> Floats:
-        inside = np.clip(t, times[0], times[-1])
-        row = np.clip(np.searchsorted(times, inside, side="right") - 1, 0, times.size - 2)
-        part = inside - times[row]
-        outside = values[0] * np.minimum(t - times[0], 0.0) + values[-1] * np.maximum(t - times[-1], 0.0)
-        return np.asarray(integral[row] + part * (values[row] + 0.5 * slopes[row] * part) + outside)
 
-    return np.asarray((up_to(wanted + 0.5 * width) - up_to(wanted - 0.5 * width)) / width)
+def _integral(times: Floats, values: Floats, power: int, wanted: Floats) -> Floats:
+    """(...,) integral of a power of a polygon up to times (...,) s; its first and last values hold outside."""
+    times = np.array([min(times[0], wanted.min()) - 1.0, *times, max(times[-1], wanted.max()) + 1.0])
+    values = np.array([values[0], *values, values[-1]])
+
+    def from_corner(row: Ints, until: Floats) -> Floats:
+        share = (until - times[row]) / (times[row + 1] - times[row])
+        first, last = values[row], values[row] + share * (values[row + 1] - values[row])
+        mean = sum(first**k * last ** (power - k) for k in range(power + 1)) / (power + 1)
+        return np.asarray((until - times[row]) * mean)
+
+    up_to = np.append(0.0, np.cumsum(from_corner(np.arange(times.size - 1), times[1:])))
+    row = np.clip(np.searchsorted(times, wanted, side="right") - 1, 0, times.size - 2)
+    return np.asarray(up_to[row] + from_corner(row, wanted))
 
 
 @dataclass(frozen=True)
@@ -128,8 +143,8 @@ class ResponseModel:
     noise : number or (lags,) mm. compliance : mm over the range of the load, rate : mm over the whole time, prior
     standard deviations. compliance_walk : number or (lags,) mm over the range of the load, by which the compliance
     walks over that range. rate_walk : number or (lags,) mm over the whole time, by which the creep rate walks over the
-    whole time, and over the range of the load. transient : number or (lags,) mm, standard deviation of each transient
-    after a change of the load by its whole range.
+    whole time, and over its range. transient : number or (lags,) mm, standard deviation of each transient after a
+    change of the load by its whole range.
     """
 
     noise: Floats | float
@@ -165,11 +180,8 @@ def best_model(response: Response, displacements: Floats, noise: float) -> Respo
     grid = np.array(list(product(*TRIED)))
     for step in (10.0**0.5, 10.0**0.25):
         values = np.maximum(grid * scales, 1e-12)
-        repeated = replace(
-            response,
-            loads=np.repeat(response.loads, len(grid), axis=1),
-            maxima=np.repeat(response.maxima, len(grid), axis=1),
-        )
+        columns = ("loads", "maxima", "powers")
+        repeated = replace(response, **{c: np.repeat(getattr(response, c), len(grid), axis=-1) for c in columns})
         tried = ResponseModel(values[:, 3], size, 10 * size, values[:, 0], values[:, 1], values[:, 2])
         best = grid[int(np.argmax(log_likelihoods(repeated, displacements, tried).sum(axis=0)))]
         factors = (1 / step, 1.0, step)
@@ -195,8 +207,8 @@ def _innovations(response: Response, displacements: Floats, model: ResponseModel
     spread = np.zeros((STATES, STATES, lags))
     for state, sd in enumerate((model.noise, model.compliance, model.compliance, model.rate)):
         spread[state, state] = np.square(sd)
-    spread[6, 6] = np.square(model.rate)
-    powers = np.maximum(0.5 * (response.loads[1:] + response.loads[:-1]), 0.0) ** LOAD_EXPONENT
+    spread[6, 6] = spread[7, 7] = np.square(model.rate)
+    steps = np.abs(np.diff(np.maximum(response.loads, 0.0) ** LOAD_EXPONENT, axis=0))
     changes, first_loading = np.diff(response.loads, axis=0), np.diff(response.maxima, axis=0)
     noise, compliance_walk, rate_walk, transient = (
         np.square(x) for x in (model.noise, model.compliance_walk, model.rate_walk, model.transient)
@@ -207,12 +219,12 @@ def _innovations(response: Response, displacements: Floats, model: ResponseModel
         change = np.abs(changes[k])
         spread[1, 1] += compliance_walk * change
         spread[2, 2] += compliance_walk * first_loading[k]
-        spread[3, 3] += rate_walk * (dt + change)
-        spread[6, 6] += rate_walk * dt
+        spread[3, 3] += rate_walk * (dt + steps[k])
+        spread[(6, 7), (6, 7)] += rate_walk * dt
         left = np.exp(-dt / constants)
-        gain[1], gain[2], gain[3], gain[6] = changes[k], first_loading[k], dt, dt * powers[k]
+        gain[1], gain[2], gain[3], gain[6:] = changes[k], first_loading[k], dt, dt * response.powers[:, k]
         for state, fraction in zip((4, 5), left, strict=True):
-            spread[state, state] += transient * change
+            spread[state, state] += transient * steps[k]
             gain[state] = 1.0 - fraction
         mean[0] = (gain * mean).sum(axis=0)
         row = (gain[:, None] * spread).sum(axis=0)
