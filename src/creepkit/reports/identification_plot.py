@@ -44,6 +44,10 @@ DOTS_ABOVE_LINES = 100
 """Up to so many frames lie above the identified curve; more would hide it."""
 
 
+BAND_OPACITY = 0.2
+"""Of the bands of one condition."""
+
+
 SUMMARY_WIDTH, CURVES_HEIGHT, PANELS_HEIGHT = 8.6, 3.6, 2.9
 """Inches of the figure of an answer and of its rows."""
 
@@ -129,7 +133,9 @@ def _label_stresses(
             )
 
 
-def draw_curve(axes: Axes, curve: TestCurve, colour: Any, style: str = "-", dots: Any = None) -> None:
+def draw_curve(
+    axes: Axes, curve: TestCurve, colour: Any, style: str = "-", dots: Any = None, opacity: float = BAND_OPACITY
+) -> None:
     """One output of one test: measured (in the colour of `dots`, if given), identified, and the 95 % band."""
     if dots is not None:
         plotted = curve.measured > 0 if curve.logarithmic else np.isfinite(curve.measured)
@@ -146,7 +152,7 @@ def draw_curve(axes: Axes, curve: TestCurve, colour: Any, style: str = "-", dots
         end = _drawn_end(curve)
         low, high = np.minimum(low, end), np.minimum(high, end)
         identified = np.where(identified <= end, identified, np.nan)
-    axes.fill_between(curve.hours, low, high, color=colour, alpha=0.2, lw=0)
+    axes.fill_between(curve.hours, low, high, color=colour, alpha=opacity, lw=0)
     axes.plot(curve.hours, identified, style, lw=1.2, color=colour)
 
 
@@ -162,7 +168,9 @@ def _draw_curves(
     """An output of tests in one panel."""
     drawn = [curve_of_test(fit, curves, k, output) for k in tests]
     for k, curve in zip(tests, drawn, strict=True):
-        draw_curve(axes, curve, colours[k], line_style(fit.tests[k].weight), dots=colours[k])
+        alike = sum(fit.tests[other].condition == fit.tests[k].condition for other in tests)
+        opacity = 1.0 - (1.0 - BAND_OPACITY) ** (1.0 / alike)  # bands of one condition lie upon each other
+        draw_curve(axes, curve, colours[k], line_style(fit.tests[k].weight), colours[k], opacity)
     set_curve_ranges(axes, drawn, output)
     axes.set(xlabel="time, h", ylabel=axis_label(output))
 
