@@ -13,7 +13,7 @@ LOGARITHMIC = CreepLaw(
     params={
         A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0, widens=True),
         n: Param("stress exponent", bounds=(1, 8), widens=True),
-        e_0: Param("strain that divides the rate by e", unit="1", bounds=(1e-3, 1.0), scale="log"),
+        e_0: Param("strain that divides the rate by e", unit="1", bounds=(1e-5, 1.0), scale="log"),
     },
     references=("Wyatt (1953), Proc. Phys. Soc. B 66, 459",),
 )

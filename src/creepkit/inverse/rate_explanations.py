@@ -21,6 +21,7 @@ One test alone that the others do not lead to expect, by Student's t, is a cauti
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -78,6 +79,17 @@ FEWEST_TESTS, FEWEST_CONTRASTS = 4, 2
 
 MOST_TESTS = 3
 """That may be named one after the other."""
+
+
+NAMES = re.compile("alloy|heat|lab|rig|machine|furnace|batch|charge|lot|schmelze|ofen|maschine|coulee|coulée", re.I)
+"""Labels whose numbers are names."""
+
+
+def are_numbers(label: str, entries: Iterable[str]) -> bool:
+    """Whether all entries of a label are numbers, and no names such as those of heats and machines."""
+    texts = [entry.strip() for entry in entries if entry.strip()]
+    numbers = [re.fullmatch(r"[-+]?\d*[.,]?\d+(?:[eE][-+]?\d+)?", text) for text in texts]
+    return bool(texts) and all(numbers) and not NAMES.search(label)
 
 
 class RateExplanations:
@@ -347,11 +359,13 @@ class RateExplanations:
     def _stated_groups(self) -> dict[tuple[str, str], Bools]:
         """{(what they are, what the others are): which tests}, of groups that the tests state: alloy, heat, rig.
 
-        The others are "" where they are of several or not all of them state it.
+        The others are "" where they are of several or not all of them state it. A label of numbers is a quantity.
         """
         histories, groups = self.problem.histories, dict[tuple[str, str], Bools]()
         for key in dict.fromkeys(["alloy", *(key for h in histories for key in h.labels)]):
             entries = [h.alloy if key == "alloy" else h.labels.get(key, "") for h in histories]
+            if are_numbers(key, entries):
+                continue
             for entry in dict.fromkeys(entries):
                 group = np.array([one == entry for one in entries])
                 known = any((group == other).all() or (group != other).all() for other in groups.values())

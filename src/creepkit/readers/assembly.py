@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import partial
@@ -49,7 +49,16 @@ from creepkit.readers.standard_names import in_standard_keys, in_standard_names,
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, words_of
-from creepkit.records import UNKNOWN_DURATION, History, Loading, Program, dimensions_of, known_specimens, specimen_of
+from creepkit.records import (
+    SECONDS_PER_HOUR,
+    UNKNOWN_DURATION,
+    History,
+    Loading,
+    Program,
+    dimensions_of,
+    known_specimens,
+    specimen_of,
+)
 from creepkit.records.specimen_lookup import lengths_by_default
 
 if TYPE_CHECKING:
@@ -280,7 +289,31 @@ def _time_and_end(
     if said == {STOPPED}:
         conditions.record_assumption(f"stopped before rupture by its label '{quoted(label)}'")
         return time, STOPPED, True
+    if not said and time is None and frames is not None:
+        time = _time_in_remark(conditions, [label for label, end in remarks.items() if end == RUPTURED], frames)
+        said = {RUPTURED} if time is not None else said
     return time, "".join(said), False
+
+
+_HOURS = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:h|hrs?|hours?|std|stunden|heures?)(?!\w)", re.IGNORECASE)
+"""A time in a remark such as `ruptured after 453.1 h, A = 22 %`."""
+
+
+AT_LAST_FRAME = 0.01
+"""Of the time of the last frame, by which a rounded time of rupture may lie before it."""
+
+
+def _time_in_remark(conditions: StatedConditions, labels: Sequence[str], frames: TableFrames) -> StatedNumber | None:
+    """The one time in hours that remarks on the rupture of a test name, if it is not before its last frame."""
+    texts = {label: conditions.labels[label] for label in labels}
+    found = {float(h.replace(",", ".")): label for label, text in texts.items() for h in _HOURS.findall(text)}
+    if len(found) != 1:
+        return None
+    ((hours, label),) = found.items()
+    if hours * SECONDS_PER_HOUR < (1.0 - AT_LAST_FRAME) * frames.times[-1]:
+        return None
+    conditions.record_assumption(f"ruptured at {hours:g} h by its label '{quoted(label)}'")
+    return StatedNumber(hours * SECONDS_PER_HOUR, label, conditions.location)
 
 
 def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | None]:

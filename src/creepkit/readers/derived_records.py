@@ -100,6 +100,9 @@ def with_changes_of_lengths(conditions: StatedConditions, frames: TableFrames) -
         column, length = values.pop(name), output.change_of.lstrip("-") if output else "diameter"
         stated, first = conditions.geometry.get(length), float(column[0])
         if is_relative and not output:
+            if any(map(_HOOP.search, frames.table.written or frames.table.columns)):
+                what = "a hoop strain is that of a tube under internal pressure, not of a bar; which specimen is it?"
+                raise conditions.question(what, "specimen", "tube", "open-tube")
             column = -abs(column)
         elif stated is None and (is_relative or frames.times[0] > 0.0):
             what = f"the {name} counts from the {length} before the test, which is not stated; how many mm is it?"
@@ -119,10 +122,14 @@ def with_changes_of_lengths(conditions: StatedConditions, frames: TableFrames) -
             strain *= np.sign(strain[np.argmax(abs(strain))])
             is_true = conditions.text_of("strain_measure") == "logarithmic"
             values["strain"] = np.log1p(strain) if is_true else strain
-        conditions.geometry.setdefault(length, initial)
+        if output or not is_relative:
+            conditions.geometry.setdefault(length, initial)
         what = name if is_relative else f"{name} from {initial:g} mm on"
         conditions.record_assumption(f"{output or 'strain at constant volume'} by the {what}")
     return replace(frames, values=values)
+
+
+_HOOP = re.compile("hoop|circumferential|umfang|tangential|circonférentielle", re.IGNORECASE)
 
 
 def _change_of(conditions: StatedConditions, frames: TableFrames, name: str) -> Output | None:

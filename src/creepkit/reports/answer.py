@@ -85,7 +85,7 @@ class KeyFigure:
         """Value, interval and unit."""
         unit = f" {self.unit}" if self.unit else ""
         if math.isnan(self.low + self.high):
-            return f"{self.value:#.2g}".rstrip(".") + unit
+            return f"{_written_out(self.value, 2)}{unit}"
         digits = interval_digits(self.value, self.low, self.high)
         value, low, high = (_written_out(v, digits) for v in (self.value, self.low, self.high))
         return f"{value}{unit} [{low}, {high}]"

@@ -33,6 +33,7 @@ from scipy.stats import chi2, norm
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
+from creepkit.inverse.rate_explanations import are_numbers
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.methods import METHODS, Conditions
@@ -174,6 +175,8 @@ def populations(
     checks = []
     for name in sorted(set.intersection(*map(set, labels)) - {"assumed", *GROUP_LABELS}):
         values = np.array([one[name] for one in labels])
+        if are_numbers(name, map(str, values)):
+            continue
         masks = {str(kind): values == kind for kind in np.unique(values)}
         if (
             not 1 < len(masks) <= MOST_KINDS

@@ -137,17 +137,6 @@ def test_a_test_without_stated_minimum_rate_shows_that_of_its_readings():
     ]
 
 
-def test_it_is_said_why_a_test_has_no_misfit_and_which_the_law_does_not_know(fit, histories):
-    unused = histories[0].replace(used=np.zeros(histories[0].times.size, bool))
-    other = histories[1].replace(name="another")
-    shown = document(fit, [unused, other, histories[2]])["tests"]
-    assert [test["note"] for test in shown] == [
-        "no misfit: all of its frames are excluded",
-        "the law was identified without this test",
-        "",
-    ]
-
-
 # ---- model data ------------------------------------------------------------------------------------------------------
 
 # What a page knows of a law: plain JSON with names, bounds, equations and code, that ends no script element.

@@ -113,7 +113,7 @@ SENTENCES = {
         *("failed in grips", "rupture expected in May", "ruptured?"),
     ),
     "ruptured": ("ruptured without necking", "Bruch ohne Einschnürung", "uncensored", "gerissen", "premature failure"),
-    "": ("necking", "heat X7", "thermocouple replaced", "Probe hält noch", "still holding"),
+    "": ("necking", "heat X7", "thermocouple replaced", "Probe hält noch", "creep of a disc 8 mm dia"),
 }
 
 
@@ -147,6 +147,16 @@ def test_what_is_not_understood_is_asked_for(tmp_path, column, text):
 def test_what_sentences_say():
     found = {text: end_said_by(text) for texts in SENTENCES.values() for text in texts}
     assert found == {text: end for end, texts in SENTENCES.items() for text in texts}
+
+
+@pytest.mark.parametrize(
+    ("remark", "hours"), [("ruptured after 453.1 h, A = 22 %", 453.1), ("gebrochen bei 20 h", None)]
+)
+def test_a_remark_above_a_curve_says_when_it_ruptured(tmp_path, remark, hours):
+    head = f"# stress_MPa: 120\n# temperature_C: 600\n# Remark: {remark}\n"
+    (tmp_path / "a.csv").write_text(f"{head}Time (h);Strain (%)\n0;0\n452;5\n")
+    (test,) = ck.read_histories(tmp_path)
+    assert test.rupture_time == (hours and pytest.approx(3600.0 * hours))
 
 
 LAST_REMARKS = {

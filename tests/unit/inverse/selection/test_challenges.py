@@ -157,7 +157,6 @@ def test_what_rests_on_a_furnace_that_nobody_watched_is_not_decisive():
     size = r"with independent drifts of the temperature of up to ([\d.]+) K over each of the 3 tests"
     said = re.fullmatch(rf"{size} time-hardening would explain them \(weight 0\.\d\d\)", drift.sentence)
     assert 0.0 < float(said[1]) < 5.0
-    assert str(drift) == drift.sentence
     assert drift.sentence in found.verdict
 
 
@@ -230,7 +229,6 @@ def test_a_thickness_that_is_stated_too_large_in_all_tests_is_named_with_its_siz
     )
     assert float(said[1]) == pytest.approx(100 * (1 - 1 / 1.05), abs=0.8)
     assert named.sentence in found.verdict
-    assert len(named.sentence.split()) < 40
 
 
 def test_where_thicknesses_are_as_stated_none_is_named():
