@@ -45,7 +45,8 @@ _GOES_ON = (
     rf"run ?outs?|(?:failure|rupture|fracture) free|{_CENSORED}|unbroken|unfailed"
     r"|unruptured|unfractured|discontinu\w+|surviv\w*|survecu\w*|running"
     r"|on ?going|in progress|(?:in|on|under) test|test continu\w*|(?:durch)?lauf(?:er|end\w*|t(?: noch| weiter)?)"
-    r"|un(?:ge|zer)broch\w*|disc(?= ?(?:\||$))|bruchfrei\w*|bruchlos\w*|uberleb\w*|im versuch|en cours|en essai|essai continu\w*"
+    r"|un(?:ge|zer)broch\w*|disc(?= ?(?:\||$))|bruchfrei\w*|bruchlos\w*|uberleb\w*|im versuch|en cours"
+    r"|en essai|essai continu\w*"
 )
 _INTERRUPTED = (
     r"broken off|interr|aktiv\w*|intactes?|stopp?(?:ed|s)?|halted|aborted|interrupt\w*"
