@@ -59,7 +59,7 @@ BENCHMARKS = {
     "verify_export": Benchmark(20, needs="gcc, gfortran, make, the network for CalculiX's source; CalculiX is built"),
     "neml2_model": Benchmark(1, needs="NEML2 3.1, see the program"),
     "javascript_runtime": Benchmark(5, needs="node"),
-    "clock_alignment": Benchmark(15, (("--tests", "39"),), DATA),
+    "clock_alignment": Benchmark(15, (("--tests", "20"),), DATA),
     "surrogate_accuracy": Benchmark(10, (("--samples", "150"),)),
     "specimen_recovery": Benchmark(25),
     "design_of_experiments": Benchmark(
