@@ -116,7 +116,9 @@ def threshold_laws(tests: Sequence[History]) -> list[str]:
     ):  # fmt: skip
         found = _least_squares(stress, temperature, rate, [first + (last - first) * share for first, last in ends])
         more, freedom = further - len(names), stress.size - 2 - several - further
-        if freedom > 1 and stats.f.sf((squares - found) / more / (found / freedom), more, freedom) < CHANCE:
+        if freedom < 2 or not 0.0 < found < squares:
+            continue
+        if stats.f.sf((squares - found) / more / (found / freedom), more, freedom) < CHANCE:
             names, squares = [*names, name], found
     return names
 

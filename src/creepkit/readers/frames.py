@@ -164,6 +164,13 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
         )
         likely = [name for name, one in OF_UNIT.items() if unit_suffix(unit) in one.units and name not in near]
         likely = [] if unit_suffix(unit) in (None, "") else [name for name in likely if name not in present]
+        if _SHEAR.search(written):
+            meant = (
+                f"'{written}' is of shear: a law's stress is sqrt(3) times a shear stress, its strain a shear strain "
+            )
+            meant, near, likely = f"{meant}over sqrt(3); add them as columns such as stress_MPa and strain_pct", [], []
+        elif _OF_TUBES.search(written):
+            near, likely = (["pressure"] if "pressure" in kinds and "hoop" not in written.casefold() else []), []
         raise column_question(
             table, meant, *({written: f"{one} ({unit})"} for one in (*near, *likely)), {written: UNUSED}
         )
@@ -174,6 +181,11 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
         what = f"'{written}' is in {in_unit} and cannot be the {quantity} in {suffix} that it is said to be"
         raise HistoryError(f"{location}: {what}; correct the name or the answer")
     return result
+
+
+_SHEAR = re.compile(r"shear|schub|scher|cisaillement|glissement", re.IGNORECASE)
+_OF_TUBES = re.compile(r"pressure|druck(?!fest)|pression|hoop", re.IGNORECASE)
+"""Names of columns that are no stress and no strain of a bar, though they have the unit of one."""
 
 
 _PLACE_OF_SENSOR = re.compile(

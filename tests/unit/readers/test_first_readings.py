@@ -150,6 +150,8 @@ def test_relative_growths_and_diameters_of_bars(read):
     assert tube.outputs["diameter_growth"][-1] == pytest.approx(0.019)
     with pytest.raises(HistoryError, match="of a tube under internal pressure, not of a bar; which specimen"):
         read("# stress_MPa: 60\n# temperature_C: 400\nTime (h),Hoop strain (%)\n0,0\n100,0.2\n")
+    with pytest.raises(HistoryError, match="is of shear.*Internal pressure .* = .pressure"):
+        read("# temperature_C: 400\nTime (h),Shear strain (-),Internal pressure (MPa)\n0,0,12\n100,0.2,12\n")
     bar = "# stress_MPa: 60\n# temperature_C: 700\n# specimen: uniaxial\n# diameter_mm: 10\nTime (h),Diameter (mm)\n"
     (test,) = read(bar + "0,10.01\n9,9.91\n")
     assert test.outputs["strain"][-1] == pytest.approx((10.01 / 9.91) ** 2 - 1.0)
