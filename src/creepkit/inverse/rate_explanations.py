@@ -81,7 +81,11 @@ MOST_TESTS = 3
 """That may be named one after the other."""
 
 
-NAMES = re.compile("alloy|heat|lab|rig|machine|furnace|batch|charge|lot|schmelze|ofen|maschine|coulee|coulée", re.I)
+NAMES = re.compile(
+    r"(?<![a-z])(?:alloy|heat|lab\w*|rig|machine|furnace|batch|charge|lot|schmelze|ofen|maschine|coul[eé]e)"
+    r"(?:s|n)?(?:[ _-]*(?:no|nr|number|nummer|id|code)\b.*|\W*)$",
+    re.IGNORECASE,
+)
 """Labels whose numbers are names."""
 
 

@@ -155,9 +155,9 @@ class Registry:
             return sum(others, start=first)
         if name.endswith("*primary"):
             return self.law(name.removesuffix("*primary")).with_primary()
-        if factor := re.fullmatch(r"(.+)\*arrhenius\(([\d.]+)\)", name):
+        if factor := re.fullmatch(r"(.+)\*arrhenius\((\d+\.?\d*)\)", name):
             return self.law(factor[1]).times(self.one(kinds.TEMPERATURE_FORMS, "arrhenius")(T_ref=float(factor[2])))
-        if form := re.fullmatch(r"(.+)\[(\w+):([\w-]+)\(([\d.]+)\)\]", name):
+        if form := re.fullmatch(r"(.+)\[(\w+):([\w-]+)\((\d+\.?\d*)\)\]", name):
             made = self.one(kinds.TEMPERATURE_FORMS, form[3])(T_ref=float(form[4]))
             return self.law(form[1]).with_temperature(**{form[2]: made})
         return self.one(kinds.LAWS, name)
