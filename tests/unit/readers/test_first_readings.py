@@ -118,6 +118,20 @@ def test_tubes_of_several_diameters(read):
         read(TUBES.replace("# specimen: tube\n", ""))
 
 
+@pytest.mark.parametrize(("column", "first"), [("Tube", "T"), ("Joint", "J-"), ("Probe Nr.", ""), ("Bar", "B")])
+def test_names_of_tests_whatever_they_are_called(read, tmp_path, column, first):
+    """Their cells change where time falls; in the order of time, and in rows of tests, an answer or the words tell."""
+    rows = [f"{first}{k};600;{100 + 10 * k};{t};{k * t / 1e3}\n" for k in (1, 2) for t in (0, 10, 100)]
+    head, names = f"{column};T (C);Stress (MPa);Time (h);Strain (%)\n", [f"{first}1", f"{first}2"]
+    assert [one.name for one in read(head + "".join(rows))] == names
+    if first:
+        assert [
+            one.name for one in read(head.split("Time")[0] + f"Rupture (h)\n{rows[1][:-6]}\n{rows[5][:-5]}\n")
+        ] == names
+    (tmp_path / "tests.toml").write_text(f'["*.csv"]\ncolumns = {{"{column}" = "test"}}\n')
+    assert [one.name for one in read(head + "".join(sorted(rows, key=lambda row: float(row.split(";")[3]))))] == names
+
+
 def test_points_of_a_plot(tmp_path):
     """Sets side by side, in the order of the clicks, the first left of the axis."""
     text = "650C 100MPa,,650C 120MPa,\nX,Y,X,Y\n-0.5,0,-0.5,0\n60,0.4,90,0.9\n30,0.2,40,0.5\n"
