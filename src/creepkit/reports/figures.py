@@ -278,6 +278,27 @@ def place_legend_right(axes: Axes, title: str | None = None, size: float = 8.0) 
         axes.legend(fontsize=size, title=title, title_fontsize=size, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
+BELOW_LABELS = 34
+"""Points below a panel where the labels of its axis end."""
+
+
+def place_legend_below(axes: Axes, title: str | None = None, size: float = 8.0) -> None:
+    """The legend of a narrow panel below its labels, as wide as that."""
+    from matplotlib.transforms import ScaledTranslation
+
+    labels = axes.get_legend_handles_labels()[1]
+    if labels:
+        characters = max(map(len, labels)) + 6
+        columns = max(1, min(len(labels), LEGEND_WIDTH // characters))
+        moved = axes.transAxes + ScaledTranslation(0.0, -BELOW_LABELS / 72.0, axes.figure.dpi_scale_trans)
+        place: Any = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": moved}
+        axes.legend(fontsize=size, title=title, title_fontsize=size, ncols=columns, frameon=False, **place)
+
+
+LEGEND_WIDTH = 56
+"""Characters of a line of such a legend."""
+
+
 def wrapped(text: str, figure_width: float, size: float = 10.0) -> str:
     """Lines of a text that fit a width in inches at a font size in points."""
     characters = max(30, int(figure_width * 72.0 / (0.55 * size)))
