@@ -132,7 +132,7 @@ def _draw_leading(
     if scale.label != by_stress.label and len(tests) <= MOST_LABELLED:
         _label_stresses(axes, fit, by_stress.values, tests, scale.colours)
     if bar and np.ptp(scale.values) > 0:
-        scale.add_bar(axes.figure, [axes])
+        scale.add_bar(axes)
 
 
 def _label_stresses(

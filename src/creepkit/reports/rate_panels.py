@@ -16,7 +16,7 @@ from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_st
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
-from creepkit.reports.figures import draw_parity, panels_of, place_legend_below, place_legend_right, shortened, span
+from creepkit.reports.figures import draw_parity, panels_of, place_legend, shortened, span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -165,7 +165,7 @@ def _draw(
     ends = ends[(ends > centre.min() / DRAWN_FACTOR) & (ends < centre.max() * DRAWN_FACTOR)]
     span(axes, "x", *(one.stress for one in drawn), logarithmic=True, margin=1.07)
     span(axes, "y", centre, ends, logarithmic=True, margin=1.25, most=8)
-    place_legend_below(axes, legend)
+    place_legend(axes, legend, below=True)
 
 
 def _drawn_temperatures(tested: Sequence[float]) -> list[float]:
@@ -198,7 +198,7 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
     if any(r.censored for r, _ in ruptures):
         axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped: broke later, if at all")
     axes.set(xlabel="measured time to rupture, h", ylabel="predicted time to rupture, h")
-    place_legend_below(axes)
+    place_legend(axes, below=True)
     axes.set_title("bars: 95 % of a single test, if the law is right", fontsize=9)
 
 
@@ -290,4 +290,4 @@ def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
     axes.set_yticks(range(len(fits)), [shortened(name, 24) for name, _ in fits], fontsize=7 if len(fits) > 20 else 8)
     axes.set_ylim(len(fits) - 0.5, -0.5)
     axes.set(xlabel=f"creep rate at {stress:.3g} MPa and {100 * strain:.2g} % strain, %/h")
-    place_legend_right(axes, "law; open:\ncontradicted\nby its tests")
+    place_legend(axes, "law; open:\ncontradicted\nby its tests")

@@ -26,7 +26,7 @@ from creepkit.reports.svg import PageFigures
 from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 STYLE = (
-    ".creepkit .seen .scroll{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,18rem),1fr));gap:0 1rem}"
+    ".creepkit .seen .scroll{display:grid;grid-template-columns:repeat(auto-fit,minmax(18rem,1fr));gap:0 1rem}"
     ".creepkit .formula math{width:fit-content;margin:0}"
     ".creepkit .lead{font-weight:600}.creepkit dd{margin:0 0 .4rem;font-weight:600}.creepkit figure{margin:.5rem 0}"
     ".creepkit dl span{display:block;font-weight:400;opacity:.7}.creepkit .drawing svg{width:100%;height:auto}"
