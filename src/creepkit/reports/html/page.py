@@ -53,7 +53,7 @@ from creepkit.reports.identification import (
     value_blocks,
     worst_tests,
 )
-from creepkit.reports.identification_plot import summary_figure
+from creepkit.reports.identification_plot import summary_figures
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.law_names import LawNames
 from creepkit.reports.ranking import equivalents_among_remaining, explanation, ranking_blocks
@@ -203,7 +203,7 @@ def group_answer(found: ReportGroup, figures: PageFigures, *, asked: Sequence[Ke
         rupture = ", and times to rupture, predicted over measured" if rupture_rows(fit) else ""
         title = f"The law over the tests{found.of}"
         description = f"Curves of {plural(len(fit.tests), 'test')} over time, creep rate over stress{rupture}."
-        picture = figures.picture(lambda: summary_figure(fit), title, description, f"{title}: {tests_text(fit)}.")
+        picture = figures.picture(lambda: summary_figures(fit), title, description, f"{title}: {tests_text(fit)}.")
     return answer(fit, found.ranking, asked=asked, picture=picture, **page)
 
 
