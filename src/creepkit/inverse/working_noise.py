@@ -201,8 +201,12 @@ class WorkingNoiseEstimator:
         }
 
     def _initial_components(self, noise_model: NoiseModel, *, drift: bool, discrepancy: bool) -> NoiseModel:
-        """Where an estimate begins: with the noise that was measured, and the autocorrelated parts asked for."""
-        observations = self.observations
+        """Where an estimate begins: with the noise that was measured, and the autocorrelated parts asked for.
+
+        No component begins smaller than in a first estimate: the likelihood hardly depends on one that has vanished, as
+        far from the optimum, and it would never come back.
+        """
+        observations, likely = self.observations, self._likely_start(len(self.observations.values))
         for name, noise, stated, scale in zip(
             observations.outputs, observations.noise, observations.stated, observations.transforms, strict=True
         ):
@@ -211,12 +215,13 @@ class WorkingNoiseEstimator:
             noise_model = noise_model.with_output(
                 name,
                 noise=initial_noise,
+                offset=max(noise_model[name].offset, likely[name].offset),
                 drift=initial_drift,
                 correlation_length=INITIAL_DRIFT_LENGTH,
                 stated=initial_noise if stated else 0.0,
             )
-        size = max(noise_model.discrepancy, INITIAL_DISCREPANCY) if discrepancy else 0.0
-        return replace(noise_model, discrepancy=size, discrepancy_length=1.0)
+        size, rate = max(noise_model.discrepancy, INITIAL_DISCREPANCY), max(noise_model.rate, likely.rate)
+        return replace(noise_model, rate=rate, discrepancy=size if discrepancy else 0.0, discrepancy_length=1.0)
 
     def _in_ratio_of_weights(self, noise_model: NoiseModel, scale: float) -> NoiseModel:
         """Misfits in the ratio that the weights ask for, without noise of their own."""

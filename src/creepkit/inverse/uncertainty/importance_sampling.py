@@ -198,9 +198,11 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
     count = max(LEAST_POINTS, 2 * terms // (1 + centre.size))
     drawn = _drawn(centre, shape, seed, MOST_DRAWS)
     judged, known = drawn[posterior.inside(drawn)][:count], list[tuple[Floats, ...]]()
+    samples: Floats = judged
+    density: Callable[[Floats], Floats] = posterior
     if len(judged) < count:
         return None
-    for k, points in enumerate((*JUDGED_POINTS, 0)):
+    for k, points in enumerate(JUDGED_POINTS):
         residuals, rate_effect, jacobian = posterior.residuals_and_jacobian(judged)
         exact = posterior.log_density(residuals, rate_effect)
         if k and float(np.std(exact - density(judged))) < LARGEST_ERROR:
@@ -213,10 +215,10 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
         weights = np.exp(0.5 * np.maximum(log_density - log_density.max(), LEAST_LOG_WEIGHT))
         surface = QuadraticResiduals.fitted(u, residuals, weights, centre, shape, jacobian)
         density = _corrected(replace(posterior, quadratic=surface, errors=0.0), u, log_density, weights)
-        samples = posterior_samples(density, centre, shape, seed + k, least=2.0 * SAMPLES)
-        if samples is None:
+        found = posterior_samples(density, centre, shape, seed + k, least=2.0 * SAMPLES)
+        if found is None:
             return None
-        judged = samples[:: len(samples) // points][:points] if points else samples
+        samples, judged = found, found[:: len(found) // points][:points]
     further, further_effect = posterior.residuals(judged)
     errors = posterior.log_density(further, further_effect) - density(judged)
     return _resampled(judged, errors, LEAST_EFFECTIVE_SIZE, SAMPLES)
@@ -246,9 +248,9 @@ LEAST_POINTS = 10
 """Simulated points, with derivatives, that quadratic residuals are fitted to at least."""
 
 
-JUDGED_POINTS = (10, 16)
-"""Draws at which each of the fits of quadratic residuals is judged, and which improve the next. All draws of the last
-are weighted by what predictions say."""
+JUDGED_POINTS = (10, 16, 400)
+"""Draws at which each of the fits of quadratic residuals is judged, and which improve the next; the last are weighted
+by what predictions say."""
 
 
 LEAST_LOG_WEIGHT = -20.0
