@@ -107,7 +107,8 @@ def estimate_iteratively(
     robust, by_likelihood = estimator.settings.test_loss == "student", estimator.by_likelihood
     residuals, best, is_near = problem.residuals(x), None, noise is not None
     noise = noise or estimator.starting_noise(len(problem.histories))
-    tolerances = Tolerances(limits.steps, max(limits.tolerance, LIKELIHOOD_TOLERANCE * by_likelihood))
+    gain = LIKELIHOOD_TOLERANCE * by_likelihood
+    tolerances = Tolerances(limits.steps, max(limits.tolerance, gain), gain)
     for round_index in range(limits.rounds):
         previous_weights = residuals.test_weights
         if robust:

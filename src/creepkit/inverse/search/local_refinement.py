@@ -38,7 +38,7 @@ class Minimum:
     """The end of a search.
 
     x : (unknowns,) where it ended; cost : half the sum of squares there; converged : whether it met its tolerance;
-    evaluations : how many points it evaluated. promised : cost that a further step of Gauss and Newton promises.
+    evaluations : how many points it evaluated.
     whitened_residuals : (data,) -, whitened residuals of the data there, where they were kept.
     """
 
@@ -46,7 +46,6 @@ class Minimum:
     cost: float
     converged: bool
     evaluations: int
-    promised: float = np.inf
     whitened_residuals: Floats | None = field(default=None, repr=False)
 
 
@@ -55,12 +54,12 @@ class Tolerances:
     """When a local refinement ends.
 
     After so many steps, at this relative change of the cost, or where a step of Gauss and Newton promises less than the
-    relative gain, which is judged before the step is simulated; None for the same.
+    relative gain, which is judged before the step is simulated.
     """
 
     max_steps: int = 30
     tolerance: float = 1e-5
-    gain: float | None = None
+    gain: float = 0.0
 
 
 class _PromisesNothing(Exception):
@@ -85,7 +84,7 @@ def bounded_least_squares(
     """
     free = np.setdiff1d(np.arange(start.size), list(fixed))
     lower, upper, cache = bounds.lower[free], bounds.upper[free], dict[bytes, tuple[Minimum, Floats]]()
-    least, count = tolerances.tolerance if tolerances.gain is None else tolerances.gain, itertools.count(1)
+    count = itertools.count(1)
 
     def evaluate(free_values: Floats) -> tuple[Minimum, Floats]:
         """The point as an end, and the derivatives there."""
@@ -98,7 +97,8 @@ def bounded_least_squares(
             weights = 1.0 / np.sqrt(1.0 + values**2) if robust else np.ones_like(values)
             cost = 0.5 * float((robust_loss(values**2) if robust else values**2).sum())
             gain = _promised_gain(values, jacobian[:, free], weights, lower - free_values, upper - free_values)
-            cache[key] = Minimum(x, cost, gain <= least * cost, next(count), cost - gain, values), jacobian[:, free]
+            ends = gain <= tolerances.gain * cost
+            cache[key] = Minimum(x, cost, ends, next(count), values), jacobian[:, free]
         return cache[key]
 
     def jacobian(free_values: Floats) -> Floats:
