@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
@@ -49,21 +49,30 @@ class PageFigures:
         self.count, self.prefix = 0, prefix
 
     def picture(
-        self, draw: Callable[[], Figure], title: str, description: str, caption: str, *, shows_values: bool = False
+        self,
+        draw: Callable[[], Figure | Mapping[str, Figure]],
+        title: str,
+        description: str,
+        caption: str,
+        *,
+        shows_values: bool = False,
     ) -> Picture | Paragraph:
         """What `draw` draws with its alternative text (title and description) and a caption, which gets its number.
 
-        Its own heading is left out: the page says the same above it. A figure that cannot be drawn is a paragraph that
-        says why.
+        It draws one figure, or panels as {what it shows: figure}. Their own headings are left out: the page says the
+        same above them. A figure that cannot be drawn is a paragraph that says why.
         """
         try:
-            figure = draw()
+            drawn = draw()
         except CreepkitError as error:
             return Paragraph(f"{title}: no figure, for {error}", "note")
         self.count += 1
-        figure.suptitle("")
-        svg = svg_text(figure, f"{self.prefix}{self.count}", title, description)
-        return Picture(Markup(svg), f"Figure {self.count}. {caption}", shows_values)
+        panels, svgs = drawn if isinstance(drawn, Mapping) else {"": drawn}, []
+        for k, (name, figure) in enumerate(panels.items()):
+            figure.suptitle("")
+            identifier = f"{self.prefix}{self.count}{chr(ord('a') + k) if name else ''}"
+            svgs.append(svg_text(figure, identifier, f"{title}: {name}" if name else title, description))
+        return Picture(Markup("".join(svgs)), f"Figure {self.count}. {caption}", shows_values)
 
 
 def svg_text(figure: Figure, identifier: str, title: str, description: str) -> str:
