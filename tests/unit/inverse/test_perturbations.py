@@ -103,7 +103,7 @@ def test_independent_drifts_move_the_rate_by_no_more_than_their_own_mean(law, no
 
 
 def test_a_drift_of_one_test_alone_is_no_cause_and_one_of_several_is_given_in_rate():
-    """Rates that drift by 10, -8 and 6 % over three tests at one temperature: kelvins are those of an assumed energy."""
+    """Rates that drift by 10, -8 and 6 % over tests at one temperature: kelvins are those of an assumed energy."""
     tests = bars(NORTON_AT, [constant_stress(s, "stress") for s in (70.0, 90.0, 110.0)])
     ahead = [1 + 0.5 * drift * TIMES / END for drift in (0.1, -0.08, 0.06)]
     drifted = [one.replace(outputs={"strain": one.outputs["strain"] * a}) for one, a in zip(tests, ahead, strict=True)]
