@@ -175,10 +175,8 @@ def test_relative_growths_and_diameters_of_bars(read):
     assert test.outputs["strain"][-1] == pytest.approx((10.01 / 9.91) ** 2 - 1.0)
     tubes = "OD (mm),9.5,9.5\nWall (mm),1,1\nTemp (C),400,400\nPressure (MPa),12,{}\nTime (h),D1 (mm),D2 (mm)\n"
     tubes = TUBE.splitlines()[-1] + "\n" + tubes + "0,9.5,9.5\n9,9.52,9.51\n"
-    assert [f"{one.condition}: {one.outputs['diameter_growth'][-1]:.3g}" for one in read(tubes.format(10))] == [
-        "400 °C, 12 MPa: 0.02",
-        "400 °C, 10 MPa: 0.01",
-    ]
+    said = [f"{one.condition}: {one.outputs['diameter_growth'][-1]:.3g}" for one in read(tubes.format(10))]
+    assert said == ["400 °C, 12 MPa: 0.02", "400 °C, 10 MPa: 0.01"]
     with pytest.raises(HistoryError, match="no conditions above each, may be tests or sensors of one"):
         read(tubes.format(12))
 
