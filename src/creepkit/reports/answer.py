@@ -104,24 +104,32 @@ def _written_out(value: float, digits: int) -> str:
 def key_figures(fit: Identification) -> list[KeyFigure]:
     """Stress exponent, activation energy and creep rate at the tests; of a rejected law what was measured."""
     rates = compared_minimum_rates(fit)
-    measured, half, predicted = exponents(rates) if rates else (math.nan, math.nan, math.nan)
+    (measured, half, predicted), of_rates = (
+        (exponents(rates, energy=one) if rates else _NONE) for one in (False, True)
+    )
+    heat, low, high = (1e-3 * (of_rates[0] + sign * of_rates[1]) for sign in (0, -1, 1))  # kJ/mol
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
-        if not math.isfinite(measured):
-            return []
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
         interval = (measured, measured - half, measured + half)
-        return [KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law)]
+        found = [
+            KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law),
+            KeyFigure("measured activation energy", _range(fit), heat, low, high, "kJ/mol"),
+        ]
+        return [one for one in found if math.isfinite(one.value)]
     r = fit.reference
     of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
     by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
-    low, high = fit.ranges["temperature"]
-    if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
-        figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol"))
+    if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
+        by_tests = f"{KeyFigure('', '', heat, low, high).text} by measured minimum rates" if math.isfinite(heat) else ""
+        figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with usual errors" if any(one.included for one in fit.unmodelled) else ""
     return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)]
+
+
+_NONE = (math.nan, math.nan, math.nan)
 
 
 def _with_interval(
