@@ -200,8 +200,8 @@ class RateExplanations:
         under a constant load. By a right law both are one exponent, and two estimates of it agree.
         """
         (evidence, odds), stress = self._by_rates, self.problem.coordinates.reference.stress
-        if self._slope[~self.free].any():  # a bound holds the exponent, and not the shape of curves
-            return
+        if self._slope[~self.free].any() or not any(history.outputs for history in self.problem.histories):
+            return  # a bound holds the exponent, or there are no curves: their shape does not
         change, sd = float(evidence.mean[0]), float(evidence.sd[0])
         if abs(change) > SMALLEST_CHANGE["stress exponent"]:
             exponent, u = local_exponent(self.problem.coordinates, stress), self.x[: self.problem.parameter_count]

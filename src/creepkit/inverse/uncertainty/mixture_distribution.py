@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import ndtr, ndtri, stdtr, stdtrit
 
 from creepkit.arrays import Floats
 
@@ -34,12 +34,14 @@ class MixtureDistribution:
 
     def cumulative(self, x: Floats) -> Floats:
         """(...,) the probability of less than x (...,)."""
-        probabilities = student.cdf((x - self.location) / self.scale, self._freedom)
+        standardised = (x - self.location) / self.scale
+        probabilities = ndtr(standardised) if self._is_normal else stdtr(self._freedom, standardised)
         return np.asarray(np.einsum("p,p...->...", self.weight, probabilities), float)
 
     def quantile(self, probability: float) -> Floats:
         """(...,) by halving, between the lowest and the highest quantile of the parts."""
-        quantiles = self.location + self.scale * student.ppf(probability, self._freedom)
+        standard = ndtri(probability) if self._is_normal else stdtrit(self._freedom, probability)
+        quantiles = self.location + self.scale * standard
         lower, upper = quantiles.min(axis=0), quantiles.max(axis=0)
         for _ in range(BISECTIONS):
             midpoint = 0.5 * (lower + upper)
@@ -51,6 +53,11 @@ class MixtureDistribution:
         """Median and 95 % interval, (...,) each."""
         median, low, high = (self.quantile(p) for p in INTERVAL_PROBABILITIES)
         return median, low, high
+
+    @property
+    def _is_normal(self) -> bool:
+        """Whether every part is normal, whose distribution is computed twenty times faster than Student's."""
+        return bool((self.degrees_of_freedom >= NORMAL_FREEDOM).all())
 
     @property
     def _freedom(self) -> Floats:
