@@ -275,24 +275,21 @@ def apparent_energy(stresses: Floats, rates: Floats, temperatures: Floats) -> tu
 
     As apparent_exponent; NaN where the temperatures do not differ, or not apart from the stresses.
     """
-    per_energy = -1.0 / (GAS_CONSTANT * temperatures)
-    least = (ISOTHERMAL_RANGE * per_energy / temperatures) ** 2
-    beside = np.column_stack([np.ones(stresses.size), np.log(stresses)])
-    return _slope(per_energy, beside, rates, float(np.max(least, initial=0.0)))
+    per_energy, beside = -1.0 / (GAS_CONSTANT * temperatures), np.column_stack([np.ones(rates.size), np.log(stresses)])
+    return _slope(per_energy, beside, rates, (ISOTHERMAL_RANGE * per_energy / temperatures) ** 2)
 
 
-def _slope(x: Floats, beside: Floats, rates: Floats, least: float) -> tuple[float, float]:
+def _slope(x: Floats, beside: Floats, rates: Floats, least: Floats | float) -> tuple[float, float]:
     """Slope of ln rate over x (tests,) beside other columns (tests, columns), and half of its 95 % interval.
 
     NaN of rates that are not known, and of x that differs by less than `least` in mean square.
     """
     known = np.isfinite(rates) & (rates > 0)
-    if not known.any():
-        return float("nan"), float("nan")
-    beside = beside[known]
-    x, y = (v - beside @ np.linalg.lstsq(beside, v, rcond=None)[0] for v in (x[known], np.log(rates[known])))
-    squares, freedom = float((x**2).sum()), x.size - int(np.linalg.matrix_rank(beside)) - 1
-    if not squares > least * x.size:
+    columns = np.column_stack([x, np.log(np.where(known, rates, 1.0))])[known]
+    level, _, rank, _ = np.linalg.lstsq(beside[known], columns, rcond=None)
+    x, y = (columns - beside[known] @ level).T
+    squares, freedom = float((x**2).sum()), x.size - int(rank) - 1
+    if not squares > np.max(least, initial=0.0) * max(x.size, 1):
         return float("nan"), float("nan")
     slope = float((x * y).sum()) / squares
     variance = float(((y - slope * x) ** 2).sum()) / freedom if freedom > 0 else float("nan")

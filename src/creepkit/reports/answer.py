@@ -272,13 +272,14 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
 
 def _precision(fit: Identification) -> Iterator[str]:
     """What the tests do not determine, and what intervals leave out."""
+    rejected = fit.adequacy is not None and fit.adequacy.rejects  # whose exponents are not those of the tests
+    by = "by this law the tests" if rejected else "the tests"
     for verdict, words in ((NOT_DETERMINED, "do not determine"), (POORLY_DETERMINED, "hardly determine")):
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
-            yield f"the tests {words} {_named(names, 'parameter', quoted=False)}"
+            yield f"{by} {words} {_named(names, 'parameter', quoted=False)}"
     exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
-    rejected = fit.adequacy is not None and fit.adequacy.rejects  # whose exponents are not those of the tests
     if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
         yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
     change = combined_change_text(fit.unmodelled)
