@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 import sympy
@@ -37,7 +35,8 @@ def test_predictions_are_padded_to_the_longest_test() -> None:
     short = history(times=TIMES[:2], loading=constant_stress(50.0, "stress"))
     result = predicted(history(), short, values={"A": np.array([1e-13, 2e-13, 0.0]), "n": 4.0}, sensitivities=True)
     assert result.values.shape == (3, 2, 4, 1)
-    assert result.jacobian is not None and result.jacobian.shape == (3, 2, 4, 1, 2)
+    assert result.jacobian is not None
+    assert result.jacobian.shape == (3, 2, 4, 1, 2)
     assert result.lengths.tolist() == [4, 2]
     assert (result.status == Status.COMPLETE).all()
     np.testing.assert_allclose(result.of(0, 1)[:, 0], 2 * RATE * TIMES, rtol=1e-9)
@@ -268,7 +267,7 @@ def test_both_forms_predict_the_same(using: ck.Predictor, history: ck.History) -
 
 
 def test_a_loading_of_ones_own_that_does_not_say_holds_the_load_as_its_file_does(tmp_path):
-    own = SimpleNamespace(quantity="stress", program=lambda: Program.constant(80.0))
+    own = type("Own", (), {"quantity": "stress", "program": lambda _: Program.constant(80.0)})()
     run = ck.simulate("norton", "uniaxial", {"A": 1e-16, "n": 5.0}, loading=own, times=[1e4, 5e5])
     ck.write_history(run, tmp_path / "run.csv")
     held = ck.read_histories(tmp_path / "run.csv")[0].loading
