@@ -23,6 +23,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, P
 from creepkit.language import strain, temperature, time
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
+from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import Answer, Rich, as_text, ends, listed, number, plural, printable
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
@@ -465,8 +466,8 @@ def interval_digits(value: float, low: float, high: float) -> int:
 
 def constant_load_sentence(fit: Identification) -> str:
     """Where the exponent comes from in tests whose true stress rises with strain; "" where none has a constant load."""
-    loads = [h for h in fit.histories if "strain" in h.outputs and getattr(h.loading, "control", "") == "load"]
-    if not loads:
+    of_stress = [h for h in fit.histories if "strain" in h.outputs and h.loading.quantity == "stress"]
+    if not any(held_of(h.loading) == "load" for h in of_stress):
         return ""
     growth = fit.ranges["strain"][1]
     scatter = fit.noise_model.rate
