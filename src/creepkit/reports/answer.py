@@ -105,17 +105,14 @@ def _written_out(value: float, digits: int) -> str:
 def key_figures(fit: Identification) -> list[KeyFigure]:
     """Stress exponent, activation energy and creep rate at the tests; of a rejected law what was measured."""
     rates = compared_minimum_rates(fit)
-    (measured, half, predicted), of_rates = (
-        (exponents(rates, energy=one) if rates else _NONE) for one in (False, True)
-    )
-    heat, low, high = (1e-3 * (of_rates[0] + sign * of_rates[1]) for sign in (0, -1, 1))  # kJ/mol
+    slopes = ([math.nan] * 3 if not rates else exponents(rates, energy=energy) for energy in (False, True))
+    (measured, half, predicted), (heat, error, _) = slopes
+    of_heat = (heat, heat - error, heat + error)
+    by_rates = _with_interval("measured activation energy", _range(fit), of_heat, 1e-3, "kJ/mol")
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
         interval = (measured, measured - half, measured + half)
-        found = [
-            KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law),
-            KeyFigure("measured activation energy", _range(fit), heat, low, high, "kJ/mol"),
-        ]
+        found = [KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law), by_rates]
         return [one for one in found if math.isfinite(one.value)]
     r = fit.reference
     of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
@@ -124,13 +121,10 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
-        by_tests = f"{KeyFigure('', '', heat, low, high).text} by measured minimum rates" if math.isfinite(heat) else ""
+        by_tests = f"{by_rates.text} by measured minimum rates" if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with usual errors" if any(one.included for one in fit.unmodelled) else ""
     return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)]
-
-
-_NONE = (math.nan, math.nan, math.nan)
 
 
 def _with_interval(

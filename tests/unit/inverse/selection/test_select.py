@@ -302,11 +302,6 @@ SENTENCES = [
         f"{NONE.format(2)} as they are stated; {THINNER}; the best, norton (weight 0.99 of the laws tried), leaves",
     ),
     (ranking_of([0.5, 0.45, 0.05], challenges=(THINNER,)), f"{APART}; {THINNER}; the best is norton: it {EXPLAINS}"),
-    (
-        ranking_of([0.99, 0.01, 0.0], [EXPLAINS, LEFT, LEFT], further=("norton", "theta")),
-        "not decisive: the law asked for does not explain the tests; of 2 more that were tried, norton is not "
-        "contradicted by them (weight 0.99 of the laws tried): plan tests that can refute it",
-    ),
 ]
 
 
