@@ -9,6 +9,7 @@ import typer
 from creepkit.cli.shared import Json
 from creepkit.errors import PluginError
 from creepkit.registry import default_registry, kinds
+from creepkit.registry.plugin_registry import Registered
 from creepkit.reports import catalogue
 from creepkit.reports.terminal import print_json
 
@@ -33,15 +34,21 @@ def command(
         else:
             catalogue.print_plugins(plugins, conflicts)
         return
-    found = registry.all(chosen)
-    single = None
-    if name is not None:  # which says what is wrong with it
-        single = found[(registry.law(name) if chosen is kinds.LAWS else registry.specimen(name)).name]
-    if as_json:
-        written = {kinds.LAWS: catalogue.law_to_json, kinds.SPECIMENS: catalogue.specimen_to_json}
-        document: Any = written.get(chosen, catalogue.registered_to_json)
-        print_json([*map(document, found.values())] if single is None else document(single))
-    elif single is not None:
-        (catalogue.print_law if chosen is kinds.LAWS else catalogue.print_specimen)(single)
+    written = {kinds.LAWS: catalogue.law_to_json, kinds.SPECIMENS: catalogue.specimen_to_json}
+    document: Any = written.get(chosen, catalogue.registered_to_json)
+    if name is None:
+        found = registry.all(chosen)
+        if as_json:
+            print_json([*map(document, found.values())])
+        else:
+            catalogue.print_registered(chosen, found, registry.conflicts(chosen))
+        return
+    if chosen is kinds.LAWS:  # of several, such as a sum, the first that has brought one
+        law = registry.law(name)
+        single = Registered(law, registry.plugins_of(law)[0])
     else:
-        catalogue.print_registered(chosen, found, registry.conflicts() if chosen is kinds.LAWS else ())
+        single = registry.all(chosen)[registry.specimen(name).name]
+    if as_json:
+        print_json(document(single))
+    else:
+        (catalogue.print_law if chosen is kinds.LAWS else catalogue.print_specimen)(single)

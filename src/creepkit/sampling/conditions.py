@@ -19,7 +19,6 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import DatasetError, nearest, quoted
 from creepkit.language import Elastic
 from creepkit.records import (
-    ZERO_CELSIUS,
     Dimension,
     History,
     Load,
@@ -33,6 +32,7 @@ from creepkit.records import (
     loads_of,
     outputs_of,
 )
+from creepkit.records.units import ROOM_TEMPERATURE
 
 MODULUS, TEMPERATURE, END, JUMP = "modulus", "temperature", "end_time", "jump_time"
 """Conditions of any specimen, in MPa, K, s and s."""
@@ -272,10 +272,6 @@ class TimeGrid:
 
     def __hash__(self) -> int:
         return hash((self.values.tobytes(), self.relative))
-
-
-ROOM_TEMPERATURE = ZERO_CELSIUS + 20.0
-"""K; the temperature of tests of laws that do not depend on it."""
 
 
 def planned_test(specimen: Predictor, conditions: Mapping[str, float], grid: TimeGrid, name: str = "sample") -> History:

@@ -28,6 +28,7 @@ from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import Specimen, Status
 from creepkit.records.presentable import Presentable
+from creepkit.records.units import ROOM_TEMPERATURE
 from creepkit.sampling.coefficients import (
     draw_stress_scales,
     solve_coefficients,
@@ -39,7 +40,6 @@ from creepkit.sampling.conditions import (
     END,
     PAPER_END,
     PAPER_INTERVAL,
-    ROOM_TEMPERATURE,
     ConditionRanges,
     TimeGrid,
     condition_range,

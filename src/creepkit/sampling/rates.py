@@ -23,9 +23,9 @@ from creepkit.errors import DatasetError, nearest
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, time
 from creepkit.records import History, Specimen
+from creepkit.records.units import ROOM_TEMPERATURE
 from creepkit.sampling.conditions import (
     END,
-    ROOM_TEMPERATURE,
     TEMPERATURE,
     SpecimenConditions,
     TimeGrid,
