@@ -16,8 +16,7 @@ from creepkit.fem import simulation
 from creepkit.integration import core_structures
 from creepkit.integration.core_structures import IntegrationSettings, SettingsStructure
 from creepkit.integration.time_discretisation import SDIRK4, SMALLEST_EXPONENT
-from creepkit.records import Status
-from creepkit.records.units import ROOM_TEMPERATURE
+from creepkit.records import ROOM_TEMPERATURE, Status
 from creepkit.specimens.bulge.reduced_order_model import SEARCH_GROWTH, SEARCH_MODES, SEARCH_TOLERANCE
 from creepkit.specimens.finite_element_tests import EQUILIBRIUM_SHARE
 

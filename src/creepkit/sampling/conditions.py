@@ -19,6 +19,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import DatasetError, nearest, quoted
 from creepkit.language import Elastic
 from creepkit.records import (
+    ROOM_TEMPERATURE,
     Dimension,
     History,
     Load,
@@ -32,7 +33,6 @@ from creepkit.records import (
     loads_of,
     outputs_of,
 )
-from creepkit.records.units import ROOM_TEMPERATURE
 
 MODULUS, TEMPERATURE, END, JUMP = "modulus", "temperature", "end_time", "jump_time"
 """Conditions of any specimen, in MPa, K, s and s."""

@@ -26,9 +26,8 @@ from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.language import CreepLaw, temperature
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import POINT_VARIABLES
-from creepkit.records import Specimen, Status
+from creepkit.records import ROOM_TEMPERATURE, Specimen, Status
 from creepkit.records.presentable import Presentable
-from creepkit.records.units import ROOM_TEMPERATURE
 from creepkit.sampling.coefficients import (
     draw_stress_scales,
     solve_coefficients,
