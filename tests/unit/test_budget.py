@@ -22,7 +22,7 @@ BUDGET = {
     "dataset": 730,
     "discovery": 1400,
     "experiments": 1350,
-    "exporters": 2680,
+    "exporters": 2665,
     "extraction": 1300,
     "fem": 1450,
     "files": 1330,
@@ -31,11 +31,11 @@ BUDGET = {
     "integration": 800,
     "inverse": 10670,
     "jobs": 250,
-    "kernels": 1710,
+    "kernels": 1705,
     "language": 1500,
     "laws": 150,
     "modules": 750,
-    "quality": 1350,
+    "quality": 1380,
     "readers": 5970,
     "records": 2260,
     "registry": 640,
@@ -46,7 +46,7 @@ BUDGET = {
     "specimens": 3200,
     "studies": 3035,
     "surrogates": 1370,
-    "testing": 1820,
+    "testing": 1810,
 }
 """{package, or modules beside packages: lines}."""
 
