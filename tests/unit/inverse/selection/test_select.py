@@ -299,10 +299,6 @@ SENTENCES = [
         "stated noise) unexplained",
         "most in strain of 'bar 1' about 1.5 h, where it lies 0.004 % above what was measured",
     ),
-    (
-        ranking_of([0.99, 0.01], [LEFT, LEFT], challenges=(THINNER,)),
-        f"{NONE.format(2)} as they are stated; {THINNER}; the best, norton (weight 0.99 of the laws tried), leaves",
-    ),
     (ranking_of([0.5, 0.45, 0.05], challenges=(THINNER,)), f"{APART}; {THINNER}; the best is norton: it {EXPLAINS}"),
 ]
 
