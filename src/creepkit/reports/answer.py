@@ -23,6 +23,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, P
 from creepkit.language import strain, temperature, time
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
+from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, as_text, listed, named, number, plural, printable
 from creepkit.reports.description import tested_range
@@ -103,22 +104,24 @@ def _written_out(value: float, digits: int) -> str:
 def key_figures(fit: Identification) -> list[KeyFigure]:
     """Stress exponent, activation energy and creep rate at the tests; of a rejected law what was measured."""
     rates = compared_minimum_rates(fit)
-    measured, half, predicted = exponents(rates) if rates else (math.nan, math.nan, math.nan)
+    slopes = ([math.nan] * 3 if not rates else exponents(rates, energy=energy) for energy in (False, True))
+    (measured, half, predicted), (heat, error, _) = slopes
+    of_heat = (heat, heat - error, heat + error)
+    by_rates = _with_interval("measured activation energy", tested_range(fit), of_heat, 1e-3, "kJ/mol")
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
-        if not math.isfinite(measured):
-            return _lives(fit)
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
         interval = (measured, measured - half, measured + half)
-        return [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), *_lives(fit)]
+        found = [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), by_rates]
+        return [*(one for one in found if math.isfinite(one.value)), *_lives(fit)]
     r = fit.reference
     of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
     by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
-    low, high = fit.ranges["temperature"]
-    if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
-        figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol"))
+    if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
+        by_tests = f"{by_rates.text} by measured minimum rates" if math.isfinite(heat) else ""
+        figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with usual errors" if any(one.included for one in fit.unmodelled) else ""
     return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included), *_lives(fit)]
 
@@ -295,13 +298,14 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
 
 def _precision(fit: Identification) -> Iterator[str]:
     """What the tests do not determine, and what intervals leave out."""
+    rejected = fit.adequacy is not None and fit.adequacy.rejects  # whose exponents are not those of the tests
+    by = "by this law the tests" if rejected else "the tests"
     for verdict, kind in ((NOT_DETERMINED, "not determined"), (POORLY_DETERMINED, "hardly determined")):
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
-            yield _said(kind, names=named(names, "parameter"))
+            yield _said(kind, by=by, names=named(names, "parameter"))
     exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
-    rejected = fit.adequacy is not None and fit.adequacy.rejects  # whose exponents are not those of the tests
     if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
         yield _said("one test", test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
     change = combined_change_text(fit.unmodelled)
@@ -459,8 +463,8 @@ def interval_digits(value: float, low: float, high: float) -> int:
 
 def constant_load_sentence(fit: Identification) -> str:
     """Where the exponent comes from in tests whose true stress rises with strain; "" where none has a constant load."""
-    loads = [h for h in fit.histories if "strain" in h.outputs and getattr(h.loading, "control", "") == "load"]
-    if not loads:
+    of_stress = [h for h in fit.histories if "strain" in h.outputs and h.loading.quantity == "stress"]
+    if not any(held_of(h.loading) == "load" for h in of_stress):
         return ""
     growth = fit.ranges["strain"][1]
     scatter = fit.noise_model.rate
