@@ -246,7 +246,7 @@ def _bound_text(law: str, name: str, param: Param, *, at_upper: bool) -> str:
 
 
 def _said(kind: str, **values: object) -> str:
-    return CAUTIONS[kind].text.format(**values)
+    return CAUTIONS[kind].format(**values)
 
 
 def _contradictions(fit: Identification) -> Iterator[str]:

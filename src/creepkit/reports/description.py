@@ -90,7 +90,7 @@ def headline(fit: Identification) -> str:
     values = {"law": fit.law.name, "good": " and ".join(good), "bad": " and ".join(bad), "truth": _truth(fit)}
     values |= {"where": f" ({tested_range(fit)})", "described": f"; {' and '.join(good + bad)} so far" if items else ""}
     kind = "use in part" if good and bad else "use" if good else "use nothing" if bad else "fitted"
-    return HEADLINES[kind if fit.converged else "not found"].text.format(**values)
+    return HEADLINES[kind if fit.converged else "not found"].format(**values)
 
 
 def tested_range(fit: Identification) -> str:
@@ -106,12 +106,12 @@ def _truth(fit: Identification) -> str:
     elif adequacy.explains:
         kind = "explains"
     elif adequacy.is_explained:
-        return TRUTHS["explained"].text.format(cause=adequacy.explanations[0].headline)
+        return TRUTHS["explained"].format(cause=adequacy.explanations[0].headline)
     elif adequacy.contradicting is not None:
         kind = "two exponents"
     else:
         kind = "shape" if adequacy.misses_shape() else "noise"
-    return TRUTHS[kind].text
+    return TRUTHS[kind]
 
 
 def _plural(name: str) -> str:

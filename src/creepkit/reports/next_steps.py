@@ -26,23 +26,23 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
     names, laws = named(weak, "parameter"), [] if ranking is None else [r.fit for r in ranking.laws]
     if not fit.converged:
         bounds = f" and bounds for {names}" if weak else ""
-        return NEXT["search"].text.format(starts=2 * fit.settings.starts, bounds=bounds)
+        return NEXT["search"].format(starts=2 * fit.settings.starts, bounds=bounds)
     if adequacy is not None and adequacy.in_tests is not None:
         return adequacy.in_tests.next_step
     if adequacy is not None and adequacy.rejects:
         if further := law_to_try(fit, [one.law.name for one in laws]):
-            return NEXT["law"].text.format(law=further[0], why=TRY[further[1]].text)
-        return NEXT["laws" if len(laws) < 2 else "within"].text
+            return NEXT["law"].format(law=further[0], why=TRY[further[1]])
+        return NEXT["laws" if len(laws) < 2 else "within"]
     if adequacy is not None and adequacy.verdict == "cannot be judged" and adequacy.not_judged != (RUPTURE_OUTPUT,):
         stated = [one for one in adequacy.not_judged if one != RUPTURE_OUTPUT] or ["strain"]
         unit = "_1/s" if stated[0] == MINIMUM_RATE_OUTPUT else ""
-        return NEXT["noise"].text.format(column=f"{stated[0]}_sd{unit}")
+        return NEXT["noise"].format(column=f"{stated[0]}_sd{unit}")
     if ranking is not None and len(laws) > 1 and not ranking.decisive:
         if len(ranking.credible) > 1:
             return _test_text("separate", fit, ranking.credible[1].fit)
         if ranking.challenges:
-            return NEXT["separate otherwise"].text.format(first=fit.law.name, second=ranking.challenges[0].subject)
-    return _test_text("determine", fit, names=names) if weak else NEXT["use"].text
+            return NEXT["separate otherwise"].format(first=fit.law.name, second=ranking.challenges[0].subject)
+    return _test_text("determine", fit, names=names) if weak else NEXT["use"]
 
 
 def law_to_try(fit: Identification, tried: Sequence[str]) -> tuple[str, str] | None:
@@ -89,7 +89,7 @@ def _test_text(kind: str, fit: Identification, other: Identification | None = No
         stress, T, hours, factor = found
         values |= {"stress": f"{stress:.2g}" if stress < 100 else f"{stress:.0f}", "hours": f"{hours:.2g}"}
         values |= {"celsius": celsius_text(T, digits=0), "factor": f"{factor:.2g}"}
-    return NEXT[kind if found else f"{kind} otherwise"].text.format(**values)
+    return NEXT[kind if found else f"{kind} otherwise"].format(**values)
 
 
 def further_test(fit: Identification, other: Identification | None) -> tuple[float, float, float, float] | None:
