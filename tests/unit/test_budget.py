@@ -36,7 +36,7 @@ BUDGET = {
     "laws": 140,
     "modules": 740,
     "quality": 1380,
-    "readers": 5990,
+    "readers": 6000,
     "records": 2260,
     "registry": 635,
     "reports": 5770,
@@ -44,7 +44,7 @@ BUDGET = {
     "sampling": 1000,
     "screening": 580,
     "specimens": 3200,
-    "studies": 3035,
+    "studies": 3040,
     "surrogates": 1370,
     "testing": 1810,
 }
