@@ -399,7 +399,7 @@ def _record_place(conditions: StatedConditions, table: CellTable, specimen: str)
 _LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?([^\d\s]*)")
 
 
-_WORDS_OF_PIECES = {"dimple", "plate", "sheet", "disc", "specimen", "sample", "piece", "initial", "nominal"}
+_WORDS_OF_PIECES = {"plate", "sheet", "disc", "specimen", "sample", "piece", "initial", "nominal"}
 """That a head says beside the name of a length, such as "specimen thickness"."""
 
 
