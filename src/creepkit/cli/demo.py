@@ -97,7 +97,7 @@ def _run(data: Path, folder: Path) -> StudyResult:
     for failure in result.failures:
         raise FitError(f"{failure.stage}: {failure.sentence}")
     ranking = result.rankings[""]
-    tell(answer_text(ranking.best, ranking, result.report.name))
+    tell(answer_text(ranking.best, ranking, "report.html"))
     if data == MEASURED:
         _print_rupture_times(ranking.best)
     else:
