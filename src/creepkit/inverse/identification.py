@@ -166,6 +166,14 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
         return identification_comments(self, ranking)
 
     @property
+    def tested_point(self) -> ReferencePoint:
+        """Where rates and exponents are stated: the reference point, its stress amid those that the tests saw."""
+        low, high = self.ranges["stress"]
+        if low <= self.reference.stress <= high:
+            return self.reference
+        return replace(self.reference, stress=float(np.sqrt(low * high)))
+
+    @property
     def coordinates(self) -> Coordinates:
         """The map between conditioned coordinates and parameters."""
         return Coordinates(self.law, self.reference)
@@ -262,8 +270,8 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
         return np.sqrt(np.clip((NORMAL_QUANTILE * total) ** 2 - (high - value) ** 2, 0.0, (NORMAL_QUANTILE * own) ** 2))
 
     def activation_energy(self) -> tuple[float, float, float]:
-        """Activation energy -R d ln rate / d(1/T), J/mol, at the reference point with its 95 % interval."""
-        r = self.reference
+        """Activation energy -R d ln rate / d(1/T), J/mol, amid the tests with its 95 % interval."""
+        r = self.tested_point
         value, low, high = self.interval_of(activation_energy(self.coordinates, r.stress, r.temperature))
         return float(value), float(low), float(high)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.reference_conditions import simulated_stresses
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 
 SAME_TEMPERATURE = 2.0
@@ -22,8 +22,7 @@ def tested_points(fit: Identification) -> Floats:
     points = [
         (float(stress), T)
         for history in fit.histories
-        for stress in reference_stresses(history, fit.predictor)
-        if stress > 0
+        for stress in simulated_stresses(fit.law, fit.values, history, fit.predictor)
         for T in _distinct(history.temperature_program().at(history.used_times))
     ]
     return np.array(points, float).reshape(-1, 2)

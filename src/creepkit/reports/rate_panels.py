@@ -12,7 +12,7 @@ from creepkit.errors import CreepkitError
 from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.identified_values import MinimumRate, minimum_rates_of
 from creepkit.inverse.minimum_rates import apparent_energy, apparent_exponent
-from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_stresses
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, simulated_stresses
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
@@ -66,7 +66,7 @@ def has_rates(fit: Identification) -> bool:
 
 
 def _tested_stresses(fit: Identification) -> list[float]:
-    return [float(v) for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
+    return [float(v) for h in fit.histories for v in simulated_stresses(fit.law, fit.values, h, fit.predictor)]
 
 
 def draw_rates(axes: Axes, fit: Identification) -> None:
@@ -108,7 +108,7 @@ def own_rates(fit: Identification, test: int) -> list[tuple[float, float, float]
     """
     history, found = fit.histories[test], fit.tests[test]
     factor = 1.0 / found.minimum_rate.ratio if not found.outputs and found.minimum_rate else found.rate_factor
-    stresses = np.unique([v for v in reference_stresses(history, fit.predictor) if v > 0])
+    stresses = np.unique(simulated_stresses(fit.law, fit.values, history, fit.predictor))
     if factor == 1.0 or not np.isfinite(factor):
         return []
     return [
@@ -266,7 +266,8 @@ def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
 
 def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
     """Rates in %/h, 95 % intervals, at the median stress and strain of all; fits : (material, best law), in order."""
-    stress, strain = (float(v) for v in np.median([(f.reference.stress, f.reference.strain) for _, f in fits], axis=0))
+    points = [fit.tested_point for _, fit in fits]
+    stress, strain = (float(v) for v in np.median([(one.stress, one.strain) for one in points], axis=0))
     laws = list(dict.fromkeys(fit.law.name for _, fit in fits))
     colours = dict(zip(laws, distinct_colours(len(laws)), strict=True))
     rates = np.array([[float(v) for v in fit.rate(stress, strain=strain, warn=False)] for _, fit in fits])
