@@ -48,6 +48,9 @@ def simulate(
     law, using = resolve_law(law), resolve_predictor(using)
     if temperature is None and law.uses(symbols.temperature):
         raise SolveError(f"law '{law.name}' depends on temperature: give temperature= in K")
+    if law.conditions:
+        names = ", ".join(f"{one.name}=..." for one in law.conditions)
+        raise SolveError(f"law '{law.name}' depends on conditions of a test: give law.at({names}), in the law's units")
     planned_test = History(
         name=name,
         times=np.atleast_1d(np.asarray(times, float)),

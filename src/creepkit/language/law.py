@@ -83,9 +83,12 @@ class CreepLaw(LawRecord):
         return algebra.with_temperature(self, forms)
 
     @checked
-    def at(self, temperature: float) -> CreepLaw:
-        """The law at one temperature, in K; parameters that no longer matter there are dropped."""
-        return algebra.at(self, temperature)
+    def at(self, temperature: float | None = None, /, **conditions: float) -> CreepLaw:
+        """The law at one temperature, K, and at conditions, law.at(grain_size=0.02); parameters that no longer matter go.
+
+        conditions : in the units that the law gives them.
+        """
+        return algebra.at(self, temperature, conditions)
 
     @property
     def expr(self) -> Any:

@@ -14,7 +14,7 @@ from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.language.expression_trees import condition_from_tree, expression_from_tree, expression_to_tree
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT_VARIABLES, Param, ParameterScale, State, Symbol
+from creepkit.language.symbols import POINT_VARIABLES, ConditionSymbol, Param, ParameterScale, State, Symbol
 from creepkit.limits import numbers
 
 __all__ = ["LAW", "condition_from_tree", "expression_from_tree", "expression_to_tree", "law_from_json", "law_to_json"]
@@ -69,6 +69,14 @@ class StateDocument:
 
 
 @dataclass(frozen=True)
+class ConditionDocument:
+    """One condition that tests state."""
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
 class LawDocument:
     """A whole law; constraints are trees."""
 
@@ -80,6 +88,7 @@ class LawDocument:
     states: tuple[StateDocument, ...]
     constraints: tuple[Any, ...]
     references: tuple[str, ...]
+    conditions: tuple[ConditionDocument, ...] = ()
 
 
 _CODEC = RecordCodec(ranges={ParamDocument: {"limits": numbers(infinite=True)}})
@@ -102,6 +111,7 @@ def law_to_json(law: CreepLaw) -> dict[str, Any]:
         ),
         constraints=tuple(expression_to_tree(relation) for relation in law.constraints),
         references=tuple(law.references),
+        conditions=tuple(ConditionDocument(symbol.name, symbol.unit) for symbol in law.conditions),
     )
     return {**LAW.heading, **_CODEC.to_json(record)}
 
@@ -130,9 +140,10 @@ def law_from_json(data: Any, source: str = "law file") -> CreepLaw:
 
 def _law_of(record: LawDocument) -> CreepLaw:
     names = [param.name for param in record.params] + [state.name for state in record.states]
-    _check_unique(names, "parameter or state")
+    stated = {one.name: ConditionSymbol(one.name, one.unit) for one in record.conditions}
+    _check_unique([*names, *(one.name for one in record.conditions)], "parameter, state or condition")
     _check_unique([term.name for term in record.terms], "term")
-    symbols = {symbol.name: symbol for symbol in (*POINT_VARIABLES, *(Symbol(name) for name in names))}
+    symbols = {symbol.name: symbol for symbol in (*POINT_VARIABLES, *(Symbol(name) for name in names))} | stated
     return CreepLaw(
         name=record.name,
         title=record.title,
