@@ -11,7 +11,7 @@ from creepkit.arrays import ArrayLike
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError
 from creepkit.language import symbols
-from creepkit.records import History, Loading, Predictor, Program, Status, call_of_plugin
+from creepkit.records import History, LawWithValues, Loading, Predictor, Program, Status, call_of_plugin
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictor
 from creepkit.specimens.run import Run, run_from_outputs, unusual_values, with_explanation
@@ -38,7 +38,7 @@ def simulate(
 ) -> Run:
     """Return the history that a law with these values predicts: what a perfect test would have measured.
 
-    using : a specimen, a surrogate or a closed form; values : {parameter: value} in the law's units.
+    using : a specimen, a surrogate or a closed form; values : {parameter or condition: value} in the law's units.
     loading : holds its last value beyond its last breakpoint. times : (frames,) s; temperature : K.
     elastic : E in MPa; a bulge test needs it, and a uniaxial strain then includes the elastic part.
 
@@ -48,9 +48,11 @@ def simulate(
     law, using = resolve_law(law), resolve_predictor(using)
     if temperature is None and law.uses(symbols.temperature):
         raise SolveError(f"law '{law.name}' depends on temperature: give temperature= in K")
+    valued = LawWithValues(law, values)
+    law, values = valued.law, valued.values
     if law.conditions:
-        names = ", ".join(f"{one.name}=..." for one in law.conditions)
-        raise SolveError(f"law '{law.name}' depends on conditions of a test: give law.at({names}), in the law's units")
+        names = ", ".join(f"'{one.name}'" for one in law.conditions)
+        raise SolveError(f"law '{law.name}' depends on {names}: give values for it as well, in the law's units")
     planned_test = History(
         name=name,
         times=np.atleast_1d(np.asarray(times, float)),
@@ -62,7 +64,6 @@ def simulate(
         includes_elastic=elastic is not None and loading.quantity == "stress",
         source=f"simulation of law '{law.name}'",
     )
-    values = law.values(values)
     explanation = unusual_values(law, values, elastic)
     try:
         return with_explanation(_simulated(law, using, values, planned_test), explanation)

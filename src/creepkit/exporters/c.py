@@ -156,6 +156,7 @@ class CExporter:
     """A C file: NAME_rate, NAME_log_rate with slopes and, for laws with internal variables, NAME_state_rates."""
 
     serves = ("c++", "cpp")
+    takes_conditions = True
     name = "c"
     title = "C99 file with the rate and its derivatives"
     suffix = ".c"
@@ -212,6 +213,7 @@ class _CFile:
             "Declarations for the code that calls this file (exported by creepkit; link with -lm):",
             *(f"  {declaration};" for _, declaration, *_ in functions),
             f"Slopes are derivatives to {', '.join(map(str, self.arguments))}, in this order.",
+            *(f"{c} in {s.unit}" for c, s in zip(self.code.conditions, self.law.conditions, strict=True)),
         ]
         return c_block_comment([*comment_lines(header_lines, " *", _LINE_LENGTH), *comment_lines(declared, " *")])
 
@@ -271,10 +273,10 @@ class _CFile:
         self, comment: str, kind: str, name: str, outputs: Sequence[str], function: CodeFunction, results: Sequence[str]
     ) -> list[str]:
         """Comment, declaration and body; stress and time come in the law's own units from the first statements on."""
-        inputs = [f"double {s}" for s in self.arguments]
+        inputs = [f"double {s}" for s in (*self.arguments, *self.code.conditions)]
         scales = [(s, self.unit_factors[k]) for k, s in zip(self.input_indices, self.arguments, strict=True)]
         body = [
-            *(f"(void){s};" for s in self.arguments if s not in function.inputs),
+            *(f"(void){s};" for s in (*self.arguments, *self.code.conditions) if s not in function.inputs),
             *(f"{s} *= {scale!r};" for s, scale in scales if scale != 1 and s in function.inputs),
             *(f"const double {ln} = log({plain});" for ln, plain in self.code.logarithms_used(function).items()),
             *c_assignments(function.assignments),

@@ -53,6 +53,7 @@ class LatexExporter:
 
     serves = ("tex",)
     name = "latex"
+    takes_conditions = True
     title = "LaTeX equation and table of values"
     suffix = ".tex"
 
@@ -129,6 +130,7 @@ class MarkdownExporter:
 
     serves = ("md",)
     name = "markdown"
+    takes_conditions = True
     title = "Markdown with the equation, a table of values, notes and references"
     suffix = ".md"
 
@@ -185,6 +187,7 @@ class MathmlExporter:
     """A page with the law's equations as presentation MathML."""
 
     name = "mathml"
+    takes_conditions = True
     title = "MathML in a page of XHTML, with a table of values, notes and references"
     suffix = ".xhtml"
 

@@ -94,6 +94,12 @@ def law_with_values(
 
 def exported_text(exporter: Exporter, source: LawWithValues) -> str:
     """The text of an exporter; ExportError where text() raises another error or returns no text."""
+    if source.law.conditions and not getattr(exporter, "takes_conditions", False):
+        names = ", ".join(one.name for one in source.law.conditions)
+        raise ExportError(
+            f"target '{exporter.name}' has no place for conditions of law '{source.law.name}'; give {names} a value "
+            f"as well, in the law's unit: in a command --set {source.law.conditions[0].name}=0.05"
+        )
     what = f"exporter '{exporter.name}': text()"
     text = call_of_plugin(lambda: exporter.text(source), exporter, what, ExportError)
     if not isinstance(text, str):

@@ -110,7 +110,8 @@ class CodeFunction:
 class LawCode:
     """A law with its values, reduced of what is off, as functions in names of a target's language.
 
-    source : what is exported, reduced. point, states : symbols of the six variables of the point and of the states.
+    source : what is exported, reduced. point, states, conditions : symbols of the six variables of the point, of the
+        states, and of what tests state besides.
     parameters : {symbol: the author's value}; logarithms : {symbol: the parameter it is the logarithm of}.
     """
 
@@ -137,6 +138,9 @@ class LawCode:
         requested = [(target_names or {}).get(s.name, s.name) for s in (*POINT_VARIABLES, *self.law.states)]
         symbols = [self._new_symbol(symbol, name) for symbol, name in zip(inputs, requested, strict=False)]
         self.point, self.states = tuple(symbols[: len(POINT_VARIABLES)]), tuple(symbols[len(POINT_VARIABLES) :])
+        self.conditions = tuple(
+            self._new_symbol(s, (target_names or {}).get(s.name, s.name)) for s in self.law.conditions
+        )
         self.parameters: dict[sympy.Symbol, float] = {}
         self.logarithms: dict[sympy.Symbol, sympy.Symbol] = {}
         for theta, (name, param) in zip(inputs[size:], self.law.table.items(), strict=True):
@@ -202,7 +206,9 @@ class LawCode:
             if self._symbols[s] not in self.parameters
         }
         full = CodeFunction((), tuple(definitions.items()), tuple(e.xreplace(self._symbols) for e in outputs))
-        return replace(full, inputs=tuple(s for s in (*self.point, *self.states) if s in full.symbols))
+        return replace(
+            full, inputs=tuple(s for s in (*self.point, *self.states, *self.conditions) if s in full.symbols)
+        )
 
     def logarithms_used(self, function: CodeFunction) -> dict[sympy.Symbol, sympy.Symbol]:
         """The logarithms of parameters that a function reads: {ln_A: A}."""
@@ -210,5 +216,8 @@ class LawCode:
 
     def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that the target could not keep."""
-        original_names = {*self.law.names, *(s.name for s in (*POINT_VARIABLES, *self.law.states))}
+        original_names = {
+            *self.law.names,
+            *(s.name for s in (*POINT_VARIABLES, *self.law.states, *self.law.conditions)),
+        }
         return self.identifiers.renaming_notes(original_names)

@@ -33,6 +33,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import is_open
 from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, output_unit
+from creepkit.records.conditions import stated_condition
 
 
 @dataclass(frozen=True)
@@ -290,6 +291,7 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked
     fit, temperatures = best.draws.fit, history.temperature_program().at(history.times)
     stresses = reference_stresses(history, predictor)
     point = {"stress": stresses[stresses > 0], "temperature": temperatures, "time": history.times[-1:]}
+    point |= {one.name: np.array(stated_condition(history, one)[:1]) for one in fit.law.conditions}
     if "stress" in best.central.outputs:
         point["stress"] = best.central.of("stress", history.times)[0]
     if "strain" in best.central.outputs:
@@ -311,7 +313,9 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked
 
 def extrapolated_names(text: str) -> list[str]:
     """Which quantities a sentence on an extrapolation begins its parts with."""
-    return [name for name in ("stress", "temperature", "time", "strain") if re.search(rf"(^|, ){name} [0-9]", text)]
+    known = [name for name in ("stress", "temperature", "time", "strain") if re.search(rf"(^|, ){name} [0-9]", text)]
+    others = re.findall(r"(?:^|, |: )(\w+) [-0-9.e]+ \(the tests cover", text)  # conditions of the law
+    return [*known, *(name.replace("_", " ") for name in others if name not in known)]
 
 
 def _extrapolated_times(fit: Identification, asked: Sequence[TimeForecast]) -> list[str]:

@@ -84,9 +84,9 @@ class CreepLaw(LawRecord):
 
     @checked
     def at(self, temperature: float | None = None, /, **conditions: float) -> CreepLaw:
-        """The law at one temperature, K, and at conditions, law.at(grain_size=0.02); parameters that no longer matter go.
+        """The law at one temperature, K, and at conditions, in its units; parameters that no longer matter are dropped.
 
-        conditions : in the units that the law gives them.
+        law.at(1073.15), law.at(grain_size=0.02)
         """
         return algebra.at(self, temperature, conditions)
 

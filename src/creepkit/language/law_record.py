@@ -78,7 +78,9 @@ def _check_names(law: LawRecord, origin: str) -> None:
         if name in reserved:
             raise LawError(f"{origin}: '{name}' is a word of the language and cannot name a parameter or state")
         if names.count(name) > 1:
-            raise LawError(f"{origin}: the name '{name}' is used twice; give each parameter, state and condition its own")
+            raise LawError(
+                f"{origin}: the name '{name}' is used twice; give each parameter, state and condition its own"
+            )
         if not name.isidentifier():
             raise LawError(f"{origin}: '{name}' is not a plain name; use letters, digits and underscores")
 
@@ -113,7 +115,7 @@ def _check_symbols(law: LawRecord, origin: str) -> None:
         allowed = ", ".join(sorted(str(s) for s in declared))
         raise LawError(
             f"{origin}: unknown symbol {', '.join(unknown)} in a rate; declared are {allowed}; "
-            f"add {'it' if len(unknown) == 1 else 'them'} to params= or states=, or make it with conditions() if tests state it"
+            f"add {'it' if len(unknown) == 1 else 'them'} to params= or states=, or make it with conditions()"
         )
     unused = sorted(str(s) for s in set(law.params) - used)
     if unused:

@@ -26,7 +26,9 @@ _HEAD = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)|/\s*
 """Names with their units: grain size (um), grain size [um], dose / dpa, d, um."""
 
 
-_VALUE = re.compile(r"^\s*(?P<number>[-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*(?:(?:±|\+/?-)\s*(?P<sd>[\d.,]+))?\s*(?P<unit>.*?)\s*$")
+_VALUE = re.compile(
+    r"^\s*(?P<number>[-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*(?:(?:±|\+/?-)\s*(?P<sd>[\d.,]+))?\s*(?P<unit>.*?)\s*$"
+)
 """Numbers as labels hold them: 50, 0,05 mm, 12.5 ± 0.3 wt%."""
 
 

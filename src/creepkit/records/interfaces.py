@@ -33,7 +33,8 @@ class Reader(Protocol):
 class Exporter(Protocol):
     """Writes a law with its values as text: to read, or for another program.
 
-    Optional attribute: `serves`, other words that users ask for it by, such as ("umat",).
+    Optional attributes: `serves`, other words that users ask for it by, such as ("umat",); `takes_conditions`, whether
+    a law may use conditions, which the text then asks for.
     """
 
     @property

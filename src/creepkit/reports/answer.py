@@ -113,7 +113,9 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         return [KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law)]
     r = fit.reference
     of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
-    at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}"
+    units = {one.name: one.unit for one in fit.law.conditions}
+    stated = [f", {name.replace('_', ' ')} {value:.3g} {units[name]}" for name, value in r.conditions]
+    at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{''.join(stated)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
     by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
