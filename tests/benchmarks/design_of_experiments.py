@@ -143,7 +143,7 @@ def bar_precision(kind, k):
     nuisances = [ck.Nuisance("rate")] if scatter else []
     settings = {"weights": "likelihood", "nuisances": nuisances}
     fit = ck.identify(law, tests, "uniaxial", **settings)
-    rig = rigs_of(fit.histories, fit.predictor)[0].replace(levels=(50.0, 110.0), longest_hours=100.0)
+    rig = replace(rigs_of(fit.histories, fit.predictor)[0], levels=(50.0, 110.0), longest_hours=100.0)
     start = time.process_time()
     design = ck.design(fit, rig=rig, goal=ck.rate_at(SERVICE[kind]))
     cpu = time.process_time() - start
@@ -160,7 +160,7 @@ def dimple_precision(k):
     first = made_dimple(alloy, blank_dimple("first", 0.5, FIRST_RUN, FIRST_END), dimple, rng)
     settings = {"weights": "likelihood", "nuisances": [planted.MODULUS]}
     fit = ck.identify(law, [first], dimple, **settings)
-    rig = rigs_of(fit.histories, dimple)[0].replace(levels=(4.0, 14.0), longest_hours=12.0, largest_output=0.8)
+    rig = replace(rigs_of(fit.histories, dimple)[0], levels=(4.0, 14.0), longest_hours=12.0, largest_output=0.8)
     start = time.process_time()
     design = ck.design(fit, rig=rig, goal=ck.rate_at(SERVICE["dimples"]))
     cpu = time.process_time() - start
@@ -224,7 +224,7 @@ def law_bar_campaign(job):
         row = {"k": k, "truth": law.name, "cpu": [], "directions": [], "first": verdict_row(ranking, law, 0.0)}
         if len(ranking.credible) < 2:
             return row
-        rig = rigs_of(tests, ranking.best.predictor)[0].replace(levels=(50.0, 110.0), longest_hours=100.0)
+        rig = replace(rigs_of(tests, ranking.best.predictor)[0], levels=(50.0, 110.0), longest_hours=100.0)
         start = time.process_time()
         design = ck.design(ranking, rig=rig, goal="law", seed=k)
         row["cpu"].append(time.process_time() - start)
@@ -292,7 +292,8 @@ def designed_row(name, campaign, share, rng, row):
     """The verdict after the runs that are proposed for the rest of the hours."""
     alloy, first, ranking, dimple, k = campaign
     spent = FIRST_END / 3600.0 + 1.0
-    rig = rigs_of(first, dimple)[0].replace(
+    rig = replace(
+        rigs_of(first, dimple)[0],
         levels=(4.0, 14.0), longest_hours=12.0, tests_per_run=3, frame_interval=FRAME_INTERVAL, largest_output=0.8,
         dimensions={"apex_thickness": THICKNESSES},
     )  # fmt: skip

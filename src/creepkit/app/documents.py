@@ -41,6 +41,7 @@ from creepkit.records import (
     outputs_of,
     typical_history,
 )
+from creepkit.records.loading import held_of
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
@@ -270,7 +271,7 @@ def test_document(history: History, contents: PageContents) -> dict[str, Any]:
         # what was added before creep began, as loading strain is, of the first law's identification
         "offset": {o.output: float(o.offset) for one in fits for o in one.outputs if o.offset},
         "load": history.loading.quantity,
-        "control": getattr(history.loading, "control", "load"),
+        "control": held_of(history.loading),
         "program": _program_rows(history.loading.program()),
         "temperature": float(np.mean(temperature.values)),
         "temperature_program": _program_rows(temperature),

@@ -79,15 +79,16 @@ def print_result(result: StudyResult) -> None:
         count = len(exclusion.frames)
         frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""
         tell(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
-    for group, ranking in result.rankings.items():
-        tell(f"{group}: {ranking.best.headline}" if len(result.rankings) > 1 else str(ranking))
     if result.forecasts or result.rupture:
         from creepkit.reports.answer import asked_figures, strength_figures
 
-        figures = [one for forecast in result.forecasts.values() for one in asked_figures(forecast)]
-        figures += [one for assessment in result.rupture.values() for one in strength_figures(assessment)]
-        for figure in figures[:MOST_FIGURES]:
-            tell(figure.line)
+        of = {name: f"{group}: " if len(result.rankings) > 1 else "" for name, group in result.forecast_groups.items()}
+        lines = [f"{of[name]}{one.line}" for name, found in result.forecasts.items() for one in asked_figures(found)]
+        lines += [one.line for assessment in result.rupture.values() for one in strength_figures(assessment)]
+        for line in lines[:MOST_FIGURES]:
+            tell(line)
+    for group, ranking in result.rankings.items():
+        tell(f"{group}: {ranking.best.headline}" if len(result.rankings) > 1 else str(ranking))
     if result.report is not None:
         tell(f"report: {result.report}")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, replace
 from itertools import product
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from creepkit.records import (
     load_unit,
     loading_of,
 )
+from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, time_text
 
 LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
@@ -351,10 +352,9 @@ def _loadings(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loadin
     quantity, change = base.loading.quantity, CHANGE_AT * duration
     unit = "" if quantity == "strain" else f" {load_unit(base)}".rstrip()
     ramp = None if quantity == "stress" else min(_ramp_of(base), 0.1 * duration)
-    control: Literal["load", "stress"] = getattr(base.loading, "control", "stress")
 
     def made(value: float | TwoLevels, end: float) -> Loading:
-        return loading_of(quantity, value, control=control, ramp=ramp, end=end)
+        return loading_of(quantity, value, control=held_of(base.loading), ramp=ramp, end=end)
 
     prefix = "a strain of " if quantity == "strain" else ""
     for level in _levels(rig):

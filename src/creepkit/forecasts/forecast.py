@@ -47,6 +47,7 @@ class Forecast(Presentable, Plotted, Tabulated):
     a time, of a single test, if the law is right. tests : one forecast each.
     rejected : whether the tests contradict the law of most weight, so that bands and intervals do not have this
     probability. draws : of the law, of each test's own rate and of its dimensions, in each test; the largest number.
+    asked : whether times to values were asked for, and not what is shown at the end of each test.
     """
 
     laws: Mapping[str, float]
@@ -55,6 +56,7 @@ class Forecast(Presentable, Plotted, Tabulated):
     left_out: int = 0
     rejected: bool = False
     draws: int = 0
+    asked: bool = False
 
     def __repr__(self) -> str:
         return f"<Forecast of {', '.join(test.name for test in self.tests)} by {', '.join(self.laws)}>"
@@ -146,7 +148,7 @@ def forecast(
     weights: dict[str, float] = {}  # identifications of one law add theirs
     for fit, weight in weighted:
         weights[fit.law.name] = weights.get(fit.law.name, 0.0) + float(weight)
-    return Forecast(weights, level, tuple(made), tried - len(weighted), rejected, most_draws)
+    return Forecast(weights, level, tuple(made), tried - len(weighted), rejected, most_draws, targets is not None)
 
 
 def _predictor(

@@ -82,19 +82,13 @@ def correct_defect(problem: LeastSquaresProblem, x: Floats) -> tuple[LeastSquare
     return problem.with_correction(correction), NumericalError(**error, incomplete=incomplete)  # type: ignore[arg-type]
 
 
-def difference_of_predictors(problem: LeastSquaresProblem, x: Floats, predictor: Predictor) -> Floats:
-    """(tests, observations) what a problem predicts at x (unknowns,) less what another predictor does, in its unit."""
-    observations, other = problem.observations, problem.with_predictor(predictor)
-    own, others = (
-        observations.inverse(p.residuals(x).values + observations.transformed_values) for p in (problem, other)
-    )
-    return np.asarray(own - others)
-
-
 def with_cheaper_predictor(problem: LeastSquaresProblem, x: Floats, predictor: Predictor) -> LeastSquaresProblem:
     """The problem through a cheaper predictor, which is corrected at x (unknowns,) so that it agrees there."""
-    difference = difference_of_predictors(problem, x, predictor)
-    return problem.with_predictor(predictor).with_correction(difference)
+    observations, cheaper = problem.observations, problem.with_predictor(predictor)
+    own, others = (
+        observations.inverse(p.residuals(x).values + observations.transformed_values) for p in (problem, cheaper)
+    )
+    return cheaper.with_correction(np.asarray(own - others))
 
 
 def with_correction_at_frames(

@@ -20,6 +20,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.perturbations import with_derivatives_to_lengths
 from creepkit.inverse.problem import LARGEST_FACTOR, NOTEWORTHY_FACTOR, LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
 from creepkit.inverse.variance_components import LinearisedProblem, restricted_log_likelihood, scaled_inverse
@@ -106,7 +107,8 @@ def estimate_iteratively(
     robust, by_likelihood = estimator.settings.test_loss == "student", estimator.by_likelihood
     residuals, best, is_near = problem.residuals(x), None, noise is not None
     noise = noise or estimator.starting_noise(len(problem.histories))
-    tolerances = Tolerances(limits.steps, max(limits.tolerance, LIKELIHOOD_TOLERANCE * by_likelihood))
+    gain = LIKELIHOOD_TOLERANCE * by_likelihood
+    tolerances = Tolerances(limits.steps, max(limits.tolerance, gain), gain)
     for round_index in range(limits.rounds):
         previous_weights = residuals.test_weights
         if robust:
@@ -151,7 +153,7 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
     Values are moved to the optimum under the covariance that holds the errors of tests, by Gauss-Newton steps with
     errors and residuals made linear at each.
     """
-    problem, linear, noise = found.problem, found.linear, found.noise
+    problem, linear, noise = with_derivatives_to_lengths(found.problem), found.linear, found.noise
     free, first, left = linear.free, None, 0.0
     for _ in range(MOST_LAST_STEPS):
         expected = with_expected_scatter(problem, linear, noise)
@@ -161,7 +163,7 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         linear = replace(problem.linearised(linear.x, residuals), free=free)
         errors = errors_of_tests(problem, linear.x, linear, noise)
         factor = CovarianceFactor.of_residuals(linear.with_errors(errors).residuals, expected)
-        found = replace(found, problem=problem, linear=linear, errors=errors)
+        found = replace(found, problem=replace(problem, lengths={}), linear=linear, errors=errors)
         first = first or found
         problem, linear, left = _stepped(problem, linear, factor, expected, LAST_STEP)
         if left <= LAST_STEP or linear is found.linear:

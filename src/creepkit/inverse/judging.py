@@ -35,7 +35,7 @@ from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NEGLIGIBLE_DISCREPANCY, NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
-from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.perturbation import DRIFT, Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, LinearSolution
@@ -165,15 +165,22 @@ class Judge:
     def adequacy_with_remedies(
         self, linear: LinearisedProblem, effects: Sequence[Perturbation], explanations: tuple[Explanation, ...]
     ) -> Adequacy:
-        """The same, rejected where rates of tests are explained otherwise, with effects that would explain them."""
+        """The same, rejected where rates of tests are explained otherwise, with effects that would explain them.
+
+        A drift in one test alone is a rate that changes with time, which a law may have: nothing tells the two apart.
+        """
         adequacy = self.adequacy(linear)
         if not adequacy.rejects:
             return adequacy.with_explanations(explanations)
         remedies = []
         for effect in effects:
-            if not effect.common and self.adequacy(linear.with_effects([effect])).explains:
+            is_of_law = effect.common or (effect.kind == DRIFT and effect.tests == 1)
+            if not is_of_law and self.adequacy(linear.with_effects([effect])).explains:
                 largest = float(np.abs(sizes_of_effect(linear, effect, self.noise_model)).max())
-                remedies.append(replace(effect, size=effect.size * largest).description)
+                taken = replace(effect, size=effect.size * largest)
+                change = 100 * np.expm1(effect.per_kelvin * taken.size)
+                by_rate = f" ({change:.2g} % of the rate, by an assumed activation energy)" if effect.assumed else ""
+                remedies.append(f"{taken.description}{by_rate}")
         return replace(adequacy, remedies=tuple(remedies)).with_explanations(explanations)
 
     @property

@@ -34,16 +34,7 @@ from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, lo
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import temperature, time
 from creepkit.language.symbols import GAS_CONSTANT
-from creepkit.records import (
-    Dimension,
-    History,
-    Nuisance,
-    Program,
-    RecordedLoading,
-    dimension_named,
-    dimensions_of,
-    output_unit,
-)
+from creepkit.records import History, Nuisance, Program, RecordedLoading, dimension_named, dimensions_of, output_unit
 
 OFFSET_IN_NOISES = 3.0
 """Size of an offset that nobody models, in noises of a frame."""
@@ -142,14 +133,23 @@ def of_lengths_and_instruments(
 
     Those for which no nuisance parameter stands. x : (unknowns,).
     """
-    nuisances, own, common = problem.settings.nuisances, list[Perturbation](), list[Perturbation]()
-    kinds, shared = {n.kind for n in nuisances}, {n.kind for n in nuisances if n.scope != "test"}
-    for dimension in tolerated_dimensions(problem):
-        if shared.isdisjoint(dimension.names):
-            found = _length(problem, x, linear, dimension.names[-1])
-            own += found if kinds.isdisjoint(dimension.names) else []
-            common += [replace(one, common=True) for one in found if one.tests > 1]
+    own, common = list[Perturbation](), list[Perturbation]()
+    kinds, included = {n.kind for n in problem.settings.nuisances}, problem.settings.included_errors
+    for names, nominal, tolerances in uncertain_lengths(problem):
+        slope, sizes = _slope(problem, x, names[-1], nominal), included.get("dimensions", 1.0) * tolerances
+        form: dict[str, Any] = {"tests": len(sizes), "included": "dimensions" in included}
+        form["residual_change"] = linear.residuals.offset_sensitivity * slope * sizes[:, None]
+        found = Perturbation(names[-1], float(np.median(sizes)), "mm", **form)
+        own += [found] if found.size > 0 and kinds.isdisjoint(names) else []
+        common += [replace(found, common=True)] if found.size > 0 and found.tests > 1 else []
     return (*own, *common_errors(problem, x, linear), *common)
+
+
+def with_derivatives_to_lengths(problem: LeastSquaresProblem) -> LeastSquaresProblem:
+    """The problem whose predictions have derivatives to lengths known to a tolerance only, which then cost no more."""
+    if not problem.settings.included_errors or problem.observations.followed_to_rupture.any():
+        return problem
+    return replace(problem, lengths={names[-1]: nominal[None] for names, nominal, _ in uncertain_lengths(problem)})
 
 
 def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> list[Perturbation]:
@@ -177,27 +177,20 @@ def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedPro
     return made
 
 
-def tolerated_dimensions(problem: LeastSquaresProblem) -> list[Dimension]:
-    """The lengths of the test pieces that their specimens know to a tolerance only, each once."""
-    predictors = [problem.predictor.for_history(h) for h in problem.histories]
-    return list({d.name: d for p in predictors for d in dimensions_of(p) if d.tolerance > 0.0}.values())
+def uncertain_lengths(problem: LeastSquaresProblem) -> list[tuple[tuple[str, ...], Floats, Floats]]:
+    """Names, values (tests,) and tolerances (tests,), mm, of lengths that all specimens know to a tolerance only.
 
-
-def _length(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, kind: str) -> list[Perturbation]:
-    """A length that every test piece has, known to its tolerance only."""
-    predictors = [problem.predictor.for_history(h) for h in problem.histories]
-    lengths = [dimension_named(p, kind) if p.follows(kind) else None for p in predictors]
-    tolerances = [0.0 if length is None else length.tolerance for length in lengths]
-    if not all(tolerances):
-        return []
-    nominal = np.array([prior_mean(Nuisance(kind), h, problem.predictor) for h in problem.histories])
-    included = problem.settings.included_errors
-    share = included.get("dimensions", 1.0)
-    slope, sizes = _slope(problem, x, kind, nominal), share * nominal * np.array(tolerances)
-    change = linear.residuals.offset_sensitivity * slope * sizes[:, None]
-    form: dict[str, Any] = {"tests": len(sizes), "included": "dimensions" in included}
-    made = Perturbation(kind, float(np.median(sizes)), "mm", residual_change=change, **form)
-    return [made] if made.size > 0 else []
+    Those for which no nuisance parameter of several tests stands.
+    """
+    shared = {n.kind for n in problem.settings.nuisances if n.scope != "test"}
+    predictors, lengths = [problem.predictor.for_history(h) for h in problem.histories], []
+    for names in {d.name: d.names for p in predictors for d in dimensions_of(p) if d.tolerance > 0.0}.values():
+        known = [dimension_named(p, names[-1]) if p.follows(names[-1]) else None for p in predictors]
+        tolerances = np.array([0.0 if length is None else length.tolerance for length in known])
+        if shared.isdisjoint(names) and tolerances.all():
+            nominal = [prior_mean(Nuisance(names[-1]), h, problem.predictor) for h in problem.histories]
+            lengths.append((names, np.array(nominal), nominal * tolerances))
+    return lengths
 
 
 def _offsets(problem: LeastSquaresProblem, linear: LinearisedProblem) -> Iterator[Perturbation]:
@@ -261,12 +254,14 @@ def _slope(problem: LeastSquaresProblem, x: Floats, kind: str, at: Floats | None
 
     at : (tests,) its values, by default those of the fit, or zero.
     """
-    theta, nuisances = _values(problem, x)
-    values = nuisances.get(kind, np.zeros((1, len(problem.histories)))) if at is None else at[None]
-    nuisances = {**nuisances, kind: values}
-    prediction = problem.predictor.predict(
-        problem.law, theta[None], problem.histories, nuisances=nuisances, sensitivities=True
-    )
+    if kind in problem.lengths:
+        prediction = problem.prediction(x)
+    else:
+        theta, nuisances = _values(problem, x)
+        values = nuisances.get(kind, np.zeros((1, len(problem.histories)))) if at is None else at[None]
+        prediction = problem.predictor.predict(
+            problem.law, theta[None], problem.histories, nuisances={**nuisances, kind: values}, sensitivities=True
+        )
     slope = problem.observations.select_outputs(prediction.nuisance_jacobian[kind], prediction)[0]
     return np.where(np.isfinite(slope), slope, 0.0)
 

@@ -11,7 +11,7 @@ ranking, intervals, profiles, posterior samples, term selection and the design o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -86,21 +86,30 @@ own rate before it was measured."""
 
 
 class EvaluationCache:
-    """The residuals of the last few points, and how many candidates were evaluated; one candidate is all tests once.
+    """Predictions and residuals of the last few points, and how many candidates were evaluated, all tests of each.
 
     failures : the candidates among them of which nothing was predicted.
     """
 
     def __init__(self) -> None:
         self.count, self.failures = 0, PredictionFailures()
+        self._predictions: dict[bytes, Prediction] = {}
         self._residuals: dict[bytes, Residuals] = {}
 
+    def prediction(self, key: bytes, nuisances: Iterable[str], evaluate: Callable[[], Prediction]) -> Prediction:
+        """The prediction of a point with derivatives to nuisances, evaluated unless it is cached."""
+        known = self._predictions.get(key)
+        if known is None or not known.nuisance_jacobian.keys() >= {*nuisances}:
+            self._predictions = dict([*self._predictions.items()][1 - CACHED_EVALUATIONS :])
+            self._predictions[key] = evaluate()
+            self.count += 1
+        return self._predictions[key]
+
     def residuals(self, key: bytes, evaluate: Callable[[], Residuals]) -> Residuals:
-        """The residuals of a point, evaluated unless they are cached."""
+        """The residuals of a point, made of its prediction unless they are cached."""
         if key not in self._residuals:
             self._residuals = dict([*self._residuals.items()][1 - CACHED_EVALUATIONS :])
             self._residuals[key] = evaluate()
-            self.count += 1
         return self._residuals[key]
 
 
@@ -120,7 +129,9 @@ class LeastSquaresProblem:
     rate_shift : (tests, observations) -, d b of them, or None.
     stopped : what tests that were stopped before rupture say; None before any noise is known, as in a search: they
         then count where they lasted longer than is predicted.
-    evaluations : the last residuals, shared by the problems that differ in covariance or priors alone.
+    lengths : {length: (1, tests) mm} of the tests, to which predictions have derivatives as well.
+    evaluations : the last predictions and residuals, shared by problems that differ in covariance, priors or correction
+        alone.
     """
 
     histories: tuple[History, ...]
@@ -137,6 +148,7 @@ class LeastSquaresProblem:
     log_factors: Floats | None = None
     rate_shift: Floats | None = None
     stopped: StoppedTests | None = None
+    lengths: NuisanceValues = field(default_factory=dict)
     evaluations: EvaluationCache = field(default_factory=EvaluationCache, repr=False)
 
     @classmethod
@@ -193,7 +205,7 @@ class LeastSquaresProblem:
 
     def with_correction(self, correction: Floats | None) -> LeastSquaresProblem:
         """The same with a correction (tests, observations), in the output's unit, added to predictions."""
-        return replace(self, correction=correction, evaluations=EvaluationCache())
+        return replace(self, correction=correction)
 
     def about_rates(self, x: Floats, log_factors: Floats | None) -> LeastSquaresProblem:
         """The same about other rates of tests near x (unknowns,); log_factors : (tests,) their ln, or None.
@@ -260,9 +272,8 @@ class LeastSquaresProblem:
 
     def _residuals(self, x: Floats) -> Residuals:
         """The same with ends of stopped tests as if these had broken then."""
-        held = [self.nuisance_parameters.mean if self.nuisance_parameters.fixed else None, self.log_factors]
-        key = x.tobytes() + b"".join(b"" if values is None else values.tobytes() for values in held)
-        residuals = self.evaluations.residuals(key, lambda: self._evaluated(x))
+        correction = b"" if self.correction is None else self.correction.tobytes()
+        residuals = self.evaluations.residuals(self._key(x) + correction, lambda: self._evaluated(x))
         return replace(residuals, values=self._about_rates(residuals.values))
 
     def candidate_residuals(self, u: Floats) -> Floats:
@@ -332,10 +343,25 @@ class LeastSquaresProblem:
             prediction = self.predictor.predict(*tests, nuisances=nuisances, sensitivities=sensitivities)
         return with_minimum_rates(prediction, self.predictor, *tests, nuisances, sensitivities=sensitivities)
 
-    def _evaluated(self, x: Floats) -> Residuals:
+    def prediction(self, x: Floats) -> Prediction:
+        """What is predicted at one x (unknowns,), without correction, with derivatives; the last few are cached."""
         u, e = x[: self.parameter_count], x[self.parameter_count :]
-        prediction = self._predicted(u[None], self.nuisance_parameters.predictor_values(e), True)
-        self.evaluations.failures.record(prediction, self.histories)
+
+        def evaluated() -> Prediction:
+            nuisances = {**self.lengths, **self.nuisance_parameters.predictor_values(e)}
+            prediction = self._predicted(u[None], nuisances, True)
+            self.evaluations.failures.record(prediction, self.histories)
+            return prediction
+
+        return self.evaluations.prediction(self._key(x), self.lengths, evaluated)
+
+    def _key(self, x: Floats) -> bytes:
+        """What a prediction at x (unknowns,) depends on."""
+        held = [self.nuisance_parameters.mean if self.nuisance_parameters.fixed else None, self.log_factors]
+        return b"".join(b"" if values is None else values.tobytes() for values in (x, *held))
+
+    def _evaluated(self, x: Floats) -> Residuals:
+        u, prediction = x[: self.parameter_count], self.prediction(x)
         coordinates = self.coordinates
         residuals = residuals_of_prediction(
             self.observations,

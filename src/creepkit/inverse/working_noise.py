@@ -137,13 +137,16 @@ class WorkingNoiseEstimator:
             offset = initial_sd(nuisances, "offset", scale.floor, name)
             misfit = INITIAL_SINGLE_VALUE_SD if name in SINGLE_VALUES else 0.03 if is_logarithmic(name) else 0.0
             by_output[name] = OutputNoise(max(float(noise), SMALLEST_NOISE * scale.floor), misfit, offset)
-        rate_nuisances = [n for n in nuisances if n.kind == "rate" and (n.sd is not None or tests >= MINIMUM_TESTS)]
         units = self.observations.discrepancy_unit[self.observations.present & self.observations.leading_output]
         units = units[units > 0]
         discrepancy = INITIAL_AUTOCORRELATION / float(np.median(units)) if units.size else 0.0
-        return without_confounded_misfit(
-            NoiseModel(by_output, initial_sd(rate_nuisances, "rate", ASSUMED_RATE_SD), discrepancy)
-        )
+        return without_confounded_misfit(NoiseModel(by_output, self._likely_rate(tests), discrepancy))
+
+    def _likely_rate(self, tests: int) -> float:
+        """Where an estimate of the scatter of rates between so many tests begins."""
+        nuisances = [n for n in self.settings.nuisances if n.kind == "rate"]
+        known = [n for n in nuisances if n.sd is not None or tests >= MINIMUM_TESTS]
+        return initial_sd(known, "rate", ASSUMED_RATE_SD)
 
     def _by_restricted_likelihood(self, linearised: LinearisedProblem, previous: NoiseModel) -> NoiseModel:
         """The noise model of largest restricted likelihood; autocorrelated where that is significantly more likely.
@@ -153,9 +156,10 @@ class WorkingNoiseEstimator:
         replace: a discrepancy of all outputs rather than drifts of each. A drift whose correlation is as long as may be
         is no noise of an instrument: the discrepancy stays in its place.
         """
+        tests = len(linearised.residuals.values)
 
         def estimated(*, drift: bool, discrepancy: bool) -> tuple[NoiseModel, float]:
-            start = self._initial_components(previous, drift=drift, discrepancy=discrepancy)
+            start = self._initial_components(previous, tests, drift=drift, discrepancy=discrepancy)
             noise_model = estimate_variance_components(
                 linearised.residuals,
                 start,
@@ -200,9 +204,13 @@ class WorkingNoiseEstimator:
             if self.predictor_errors.get(n, 0.0) > 0
         }
 
-    def _initial_components(self, noise_model: NoiseModel, *, drift: bool, discrepancy: bool) -> NoiseModel:
-        """Where an estimate begins: with the noise that was measured, and the autocorrelated parts asked for."""
-        observations = self.observations
+    def _initial_components(self, noise_model: NoiseModel, tests: int, *, drift: bool, discrepancy: bool) -> NoiseModel:
+        """Where an estimate begins: with the noise that was measured, and the autocorrelated parts asked for.
+
+        No component begins smaller than in a first estimate: the likelihood hardly depends on one that has vanished, as
+        far from the optimum, and it would never come back.
+        """
+        observations, nuisances = self.observations, self.settings.nuisances
         for name, noise, stated, scale in zip(
             observations.outputs, observations.noise, observations.stated, observations.transforms, strict=True
         ):
@@ -211,12 +219,13 @@ class WorkingNoiseEstimator:
             noise_model = noise_model.with_output(
                 name,
                 noise=initial_noise,
+                offset=max(noise_model[name].offset, initial_sd(nuisances, "offset", scale.floor, name)),
                 drift=initial_drift,
                 correlation_length=INITIAL_DRIFT_LENGTH,
                 stated=initial_noise if stated else 0.0,
             )
-        size = max(noise_model.discrepancy, INITIAL_DISCREPANCY) if discrepancy else 0.0
-        return replace(noise_model, discrepancy=size, discrepancy_length=1.0)
+        size, rate = max(noise_model.discrepancy, INITIAL_DISCREPANCY), max(noise_model.rate, self._likely_rate(tests))
+        return replace(noise_model, rate=rate, discrepancy=size if discrepancy else 0.0, discrepancy_length=1.0)
 
     def _in_ratio_of_weights(self, noise_model: NoiseModel, scale: float) -> NoiseModel:
         """Misfits in the ratio that the weights ask for, without noise of their own."""

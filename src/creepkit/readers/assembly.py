@@ -60,6 +60,7 @@ from creepkit.records import (
     specimen_of,
 )
 from creepkit.records.specimen_lookup import lengths_by_default
+from creepkit.specimens.elastic_part import with_elastic_part
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -122,8 +123,10 @@ def assemble_history(
         stated = conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
         elastic_included = stated == "yes"
         if stated == "no" and not any(name.startswith("strain") for name in outputs):
-            what = f"the elastic part in {' and '.join(outputs)} all the same; that of a {specimen} always includes it"
-            conditions.record_assumption(what.replace(",", ";"))
+            plan = History(
+                name, frames.times, {}, loading, temperature, specimen, elastic, geometry=conditions.geometry
+            )
+            outputs = with_elastic_part(plan, outputs, conditions.record_assumption)
     outputs = without_steps(conditions, frames.times, outputs, used, temperature)
     merged = {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
     rupture_time, unruptured = _end_of_test(conditions, frames, used, name, loading.quantity != "strain")

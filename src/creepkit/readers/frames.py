@@ -13,9 +13,10 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError
+from creepkit.files.delimited_text import is_number
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column
 from creepkit.readers.questions import Question, collected, raise_all
-from creepkit.readers.table import CellTable, some_of
+from creepkit.readers.table import CellTable, cells_of, some_of
 from creepkit.readers.vocabulary import HeaderVocabulary, NameTable, Terms, split_unit, split_written_name, unit_suffix
 from creepkit.records.quantities import FORCE, LENGTH, STRAIN, STRESS, TEMPERATURE, QuantityKind
 
@@ -171,9 +172,9 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
             meant, near, likely = f"{meant}over sqrt(3); add them as columns such as stress_MPa and strain_pct", [], []
         elif _OF_TUBES.search(written):
             near, likely = (["pressure"] if "pressure" in kinds and "hoop" not in written.casefold() else []), []
-        raise column_question(
-            table, meant, *({written: f"{one} ({unit})"} for one in (*near, *likely)), {written: UNUSED}
-        )
+        named = [] if all(is_number(cell, table.dialect) for cell in cells_of(table.rows, k)) else [{written: "test"}]
+        options = [{written: f"{one} ({unit})"} for one in (*near, *likely)]
+        raise column_question(table, meant, *options, *named, {written: UNUSED})
     quantity, suffix = result
     kinds[quantity].unit(suffix, location, written)
     in_unit = unit_suffix(split_written_name(written)[1])

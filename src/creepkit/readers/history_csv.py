@@ -47,11 +47,11 @@ from creepkit.records import (
     PointLoading,
     PressureJump,
     Program,
-    RecordedLoading,
     StrainSteps,
     StressSteps,
     load_unit,
 )
+from creepkit.records.loading import held_of
 from creepkit.records.quantities import LENGTH
 
 
@@ -216,7 +216,7 @@ def _loading_lines(history: History) -> Iterator[tuple[str, str]]:
     else:
         yield f"{loading.quantity}_program", _program_text(loading.program(), load_unit(history))
     if loading.quantity == "stress":
-        yield "control", loading.control if isinstance(loading, (StressSteps, RecordedLoading)) else "load"
+        yield "control", held_of(loading)
 
 
 def _temperature_lines(history: History) -> Iterator[tuple[str, str]]:

@@ -107,12 +107,37 @@ _GROUP = "test no"
 """Name of the column that numbers the tests of a table whose times begin anew."""
 
 
+def with_names(table: CellTable, known: Terms) -> CellTable:
+    """The table with the column that names tests called so: as its name or its answer says, else as its cells do.
+
+    They do where a column of no known quantity has another text wherever time falls, and nowhere else: tubes, joints
+    or bars below one another. Kinds of specimens are no names.
+    """
+    answers, columns = known.vocabulary.synonyms, {k: set(cells_of(table.rows, k)) for k in range(len(table.columns))}
+    meant = {k: answers.get(table.columns[k], table.columns[k]) for k in columns}
+    specimens = [k for k, one in meant.items() if words_of(one) == "specimen" and len(columns[k] - {""}) > 1]
+    keys = [k for k, one in meant.items() if names_tests(one) or (one == "name" and table.columns[k] in answers)]
+    keys += [k for k in specimens if not {cell.casefold() for cell in columns[k]} & known.outputs.keys()]
+    time = next((list(cells_of(table.rows, k)) for k, one in meant.items() if known.quantity(one) == "time"), [])
+    if not keys and time and all(is_number(cell, table.dialect) for cell in time):
+        hours = list(map(float_of, time))
+        starts = [0, *(k for k in range(1, len(hours)) if hours[k] < hours[k - 1]), len(hours)]
+        unknown = [k for k, one in meant.items() if not (known.quantity(one) or known.is_condition(one))]
+        unknown = [
+            k for k in unknown if not split_written_name(meant[k])[1] and meant[k] not in known.vocabulary.labels
+        ]
+        for k in unknown if len(starts) > 2 else ():
+            texts = [{row.cells[k] for row in table.rows[a:b]} - {""} for a, b in pairwise(starts)]
+            keys += [k] if {*map(len, texts)} == {1} and len(set.union(*texts)) == len(texts) else []
+    return replace(table, columns=[_GROUP if k in keys[:1] else one for k, one in enumerate(table.columns)])
+
+
 def with_groups(table: CellTable, known: Terms) -> CellTable:
     """The table with conditions and names of tests in all rows of a group, where they stand in its first row alone.
 
     A group begins where time falls. Groups that no name tells apart, but a condition does, get numbers.
     """
-    keys = [k for k, name in enumerate(table.columns) if names_tests(name) or words_of(name) == "specimen"]
+    keys = [k for k, name in enumerate(table.columns) if names_tests(name)]
     stated = keys + [k for k, name in enumerate(table.columns) if known.may_state(name) and known.is_condition(name)]
     filled = {k: [row for row, cell in enumerate(cells_of(table.rows, k)) if not is_missing(cell)] for k in stated}
     sparse = [k for k, rows in filled.items() if rows and rows[0] == 0 and len(rows) < len(table.rows)]
@@ -146,7 +171,6 @@ def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Ter
         if column not in known.declared and known.quantity(column) in (None, *known.length_kinds)
     ]
     keys = [k for k in foreign if names_tests(table.columns[k])]
-    keys += [k for k in foreign if not keys and _names_specimens(table, k, known)]
     if not foreign:
         return [TabulatedTest("", entries, table)]
 
@@ -171,12 +195,6 @@ def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Ter
         notes = {key: entry for key, entry in entries.items() if key not in others}
         tests.append(TabulatedTest(name, {**notes, **own}, part))
     return tests
-
-
-def _names_specimens(table: CellTable, column: int, known: Terms) -> bool:
-    """Whether a column of specimens holds the names of tests, and not those of kinds of specimens."""
-    cells = {cell.casefold() for cell in cells_of(table.rows, column)}
-    return words_of(table.columns[column]) == "specimen" and len(cells) > 1 and not cells & known.outputs.keys()
 
 
 def _states_condition(table: CellTable, column: int, rows: Sequence[TableRow], known: Terms) -> bool:
@@ -483,7 +501,8 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
     table, footers = _without_remarks_around(headed.table, head.entries)
     table = without_clocks(named_columns(table), headed.known)
     table = replace(table.assuming(*head.assumptions, *footers), sources=tuple(head.sources))
-    table = with_groups(without_remarks(table, head.entries, headed.known.vocabulary.labels), headed.known)
+    table = without_remarks(table, head.entries, headed.known.vocabulary.labels)
+    table = with_groups(with_names(table, headed.known), headed.known)
     return rows_by_test(table, {**table.header, **head.entries}, headed.known)
 
 

@@ -235,13 +235,13 @@ class TestTable:
                 column = replace(column, unit=column.unit or _unit_of_cells(cells))
                 if column.unit not in kind.units:
                     self.errors.append(self._wrong_unit(column, written, cells))
+            elif self._tells_tests_apart(k, column, cells):
+                column = TestColumn("name")
             elif not column.quantity:
                 if meant == written and not is_label:
                     collected(self.errors, partial(self._refuse_misspelt, written))
                     collected(self.errors, partial(self._ask_of_quantity, written))
                 column = TestColumn(meant if meant.startswith(("label ", "geometry ")) else f"label {meant}")
-            elif column.quantity == "specimen" and self._tells_tests_apart(cells):
-                column = TestColumn("name")
             quantities = [one.quantity for one in found]
             if column.quantity in quantities:
                 self.errors.append(self._twice(written, self.names[quantities.index(column.quantity)]))
@@ -254,16 +254,19 @@ class TestTable:
             found.append(column)
             yield column
 
-    def _tells_tests_apart(self, cells: Sequence[str]) -> bool:
-        """Whether a column of specimens holds the names of the tests, and no kinds, and no other column does.
+    def _tells_tests_apart(self, k: int, column: TestColumn, cells: Sequence[str]) -> bool:
+        """Whether a column of specimens, or a first one of words, holds the names of the tests, and no other does.
 
         A column of kinds of specimens, such as uniaxial, has the same word in several rows, or words that are
         registered.
         """
-        texts = [cell for cell in cells if not is_missing(cell)]
+        texts, name = [cell for cell in cells if not is_missing(cell)], self.names[k]
+        words = k == 0 and not column.quantity and not any(is_number_like(one, self.table.dialect) for one in texts)
+        may_name = column.quantity == "specimen" or (words and not kind_of_column(name) and len(texts) == len(cells))
         kinds = set(HeaderVocabulary().terms("").outputs)
-        is_named = any(column_called(name).quantity == "name" for name in self.names)
-        return not is_named and len(set(texts)) == len(texts) and not {text.casefold() for text in texts} & kinds
+        is_named = any(column_called(name).quantity == "name" for name in self.names) or name in self.vocabulary.labels
+        is_told = len(set(texts)) == len(texts) and not {text.casefold() for text in texts} & kinds
+        return may_name and is_told and not is_named
 
     def _twice(self, written: str, other: str) -> HistoryError:
         what = f"'{quoted(other, 60)}' and '{quoted(written, 60)}' mean the same; keep one of them"

@@ -89,7 +89,10 @@ class Program:
 
 @runtime_checkable
 class Loading(Protocol):
-    """What drives a specimen: one prescribed quantity as a piecewise linear program."""
+    """What drives a specimen: one prescribed quantity as a piecewise linear program.
+
+    One of a stress may say by `control` what is held, as StressSteps does; see held_of().
+    """
 
     @property
     def quantity(self) -> Quantity:
@@ -97,6 +100,11 @@ class Loading(Protocol):
 
     def program(self) -> Program:
         """The prescribed quantity over time: MPa, or a strain."""
+
+
+def held_of(loading: Loading) -> Literal["load", "stress"]:
+    """What a loading of a stress holds: the load, or the true stress where it says so."""
+    return "stress" if getattr(loading, "control", "load") == "stress" else "load"
 
 
 @checked

@@ -11,7 +11,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.records.history import History
-from creepkit.records.loading import Program, RecordedLoading
+from creepkit.records.loading import Program, RecordedLoading, held_of
 from creepkit.records.prediction import PROGRAM_NUISANCES, RATE_NUISANCES, kind_and_start
 
 STEP_DURATION = 5.0
@@ -46,7 +46,7 @@ def changed_fields(history: History, values: Mapping[str, float]) -> dict[str, A
                 )
             merged = _with_breakpoints(loading.program(), step_program(start))
             load = Program(merged.times, merged.values * (1.0 + value * step_program(start).at(merged.times)))
-            changed["loading"] = RecordedLoading(load, loading.quantity, getattr(loading, "control", "load"))
+            changed["loading"] = RecordedLoading(load, loading.quantity, held_of(loading))
         elif kind in PROGRAM_NUISANCES or kind == "rate step":
             shape = step_program(start) if start else drift_program(history)
             temperature = changed.get("temperature", history.temperature)

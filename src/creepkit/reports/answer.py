@@ -23,6 +23,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, P
 from creepkit.language import strain, temperature, time
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
+from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import Answer, Rich, as_text, ends, listed, number, plural, printable
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
@@ -46,8 +47,8 @@ AT_BOUND = 1e-3
 """Of the width of a search, from whose upper end on a value is held there."""
 
 
-MOST_ASKED = 2
-"""Forecasts on the first screen."""
+MOST_ASKED = 4
+"""Numbers of forecasts on the first screen."""
 
 
 MOST_NAMED = 4
@@ -135,9 +136,12 @@ def _with_interval(
 
 
 def asked_figures(forecast: Forecast) -> list[KeyFigure]:
-    """What a forecast says of each test: its life, or what it shows at the end, with the interval of a single test."""
+    """What a forecast was asked for of each test, with the interval of a single test: times to values, and a life.
+
+    Where no values were asked for, or none is reached, what a test shows at its end, or its life where it ends before.
+    """
     level = "" if forecast.level == 0.95 else f"{100 * forecast.level:g} % interval"
-    shown = filter(None, map(_shown, forecast.tests))
+    shown = (figure for test in forecast.tests for figure in _shown(test, times=forecast.asked))
     return [replace(one, remark=", ".join(filter(None, (level, one.remark)))) for one in shown]
 
 
@@ -148,23 +152,24 @@ def event_text(one: TimeForecast) -> str:
     return f"{100 * one.target:g} % {one.event.rpartition(' ')[0]}"
 
 
-def _shown(test: TestForecast) -> KeyFigure | None:
+def _shown(test: TestForecast, *, times: bool) -> Iterator[KeyFigure]:
+    """times : to values are asked for."""
     condition = test.history.condition
-    where = condition if test.name in condition else f"{test.name}: {condition}"
-    for one in test.times:
-        if math.isfinite(one.median):
-            times = (one.median, one.low, one.high)
-            label = f"time to {event_text(one)}"
-            return _with_interval(label, where, times, 1 / SECONDS_PER_HOUR, "h", test.extrapolated(one))
-    for name, output in test.outputs.items():
-        alive = np.flatnonzero(np.isfinite(output.value))
-        if alive.size:
-            k = int(alive[-1])
-            unit, factor = ("%", 100.0) if is_logarithmic(name) else (output_unit(name), 1.0)
-            values = (output.value[k], output.band.low[k], output.band.high[k])
-            label = f"{name.replace('_', ' ')} at {time_text(float(output.times[k]))}"
-            return _with_interval(label, where, values, factor, unit, test.extrapolated())
-    return None
+    where, end = condition if test.name in condition else f"{test.name}: {condition}", float(test.history.times[-1])
+    reached = [one for one in test.times if math.isfinite(one.median)]
+    life = [one for one in reached if not one.output and (one.median <= end or (times and len(test.times) == 1))]
+    wanted = [*([one for one in reached if one.output] if times else ()), *life]
+    for one in wanted:
+        hours = (one.median, one.low, one.high)
+        label = f"time to {event_text(one)}"
+        yield _with_interval(label, where, hours, 1 / SECONDS_PER_HOUR, "h", test.extrapolated(one))
+    predicted = [(name, one) for name, one in test.outputs.items() if np.isfinite(one.value).any()]
+    for name, output in [] if wanted else predicted[:1]:
+        k = int(np.flatnonzero(np.isfinite(output.value))[-1])
+        unit, factor = ("%", 100.0) if is_logarithmic(name) else (output_unit(name), 1.0)
+        values = (output.value[k], output.band.low[k], output.band.high[k])
+        label = f"{name.replace('_', ' ')} at {time_text(float(output.times[k]))}"
+        yield _with_interval(label, where, values, factor, unit, test.extrapolated())
 
 
 def strength_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
@@ -454,8 +459,8 @@ def interval_digits(value: float, low: float, high: float) -> int:
 
 def constant_load_sentence(fit: Identification) -> str:
     """Where the exponent comes from in tests whose true stress rises with strain; "" where none has a constant load."""
-    loads = [h for h in fit.histories if "strain" in h.outputs and getattr(h.loading, "control", "") == "load"]
-    if not loads:
+    of_stress = [h for h in fit.histories if "strain" in h.outputs and h.loading.quantity == "stress"]
+    if not any(held_of(h.loading) == "load" for h in of_stress):
         return ""
     growth = fit.ranges["strain"][1]
     scatter = fit.noise_model.rate

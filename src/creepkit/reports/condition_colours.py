@@ -15,7 +15,6 @@ from creepkit.records import ZERO_CELSIUS, History, Predictor
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 USED_SHARE, SAME, LABELS = 0.8, 1e-6, 5
@@ -57,8 +56,8 @@ class ColourScale:
         """The colour of each test."""
         return [self(value) for value in self.values]
 
-    def add_bar(self, figure: Figure, panels: Sequence[Axes]) -> None:
-        """The colour bar of the scale at the right of panels, with a label at either end."""
+    def add_bar(self, axes: Axes) -> None:
+        """The colour bar of the scale at the right of a panel, with a label at either end."""
         from matplotlib import colormaps
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import ListedColormap, LogNorm, Normalize
@@ -67,7 +66,7 @@ class ColourScale:
         low, high = self.ends
         norm = (LogNorm if self.logarithmic else Normalize)(low, high)
         colours = ListedColormap(colormaps[self.colour_map](np.linspace(0.0, USED_SHARE, 256)))
-        bar = figure.colorbar(ScalarMappable(norm, colours), ax=list(panels), label=self.label, pad=0.01, aspect=30)
+        bar = axes.figure.colorbar(ScalarMappable(norm, colours), ax=axes, label=self.label, pad=0.01, aspect=30)
         ticks = (np.geomspace if self.logarithmic else np.linspace)(low, high, LABELS)
         bar.set_ticks(list(ticks), labels=[f"{float(f'{v:.3g}'):g}" for v in ticks])
         bar.ax.yaxis.set_minor_locator(NullLocator())

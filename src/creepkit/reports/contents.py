@@ -146,7 +146,7 @@ class ReportContents:
     own, which is the name of their group or of their file. imposed : {test: what its
     instrument recorded}. exports : laws to download. failures : of stages.
     attachments : study, lock and data. notes : further remarks, one sentence each. data_citations : where the data
-    were published, as a list of references has them.
+    were published, as a list of references has them. forecast_groups : {name of a forecast: name of its group}.
     """
 
     title: str
@@ -165,6 +165,7 @@ class ReportContents:
     attachments: tuple[Attachment, ...] = ()
     notes: tuple[str, ...] = ()
     data_citations: tuple[str, ...] = ()
+    forecast_groups: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def identified(self) -> list[ReportGroup]:
@@ -172,7 +173,7 @@ class ReportContents:
         return [group for group in self.groups if group.fits]
 
     def __post_init__(self) -> None:
-        _freeze(self, "temperature", "forecasts", "design", "rupture", "extractions", "imposed")
+        _freeze(self, "temperature", "forecasts", "design", "rupture", "extractions", "imposed", "forecast_groups")
 
 
 def versions_of(packages: Iterable[str]) -> dict[str, str]:

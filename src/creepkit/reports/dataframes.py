@@ -102,11 +102,8 @@ def _(assessment: RuptureAssessment) -> tuple[Any, str]:
 
 @_rows.register
 def _(fit: Identification) -> tuple[Any, str]:
-    rows = [
-        {"parameter": e.name, "value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
-        for e in fit.estimates
-    ]
-    return rows, "parameter"
+    names = ("value", "low", "high", "unit", "verdict")
+    return [{"parameter": e.name, **{name: getattr(e, name) for name in names}} for e in fit.estimates], "parameter"
 
 
 @_rows.register

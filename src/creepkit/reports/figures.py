@@ -224,7 +224,7 @@ def draw_over_time(axes: Axes, panels: Panels, time: str = "time, h") -> None:
     axes.set(xlabel=time, ylabel=label)
     axes.grid(alpha=0.25)
     if len(courses) > 1:
-        place_legend_right(axes)
+        place_legend(axes)
 
 
 def draw_parity(axes: Axes, *values: Any, logarithmic: bool = False, margin: float = 1.0, factor: float = 0.0) -> None:
@@ -272,10 +272,22 @@ def power_of_ten(value: float) -> str:
     return f"$10^{{{exponent}}}$" if abs(mantissa - 1.0) < 1e-6 else f"${mantissa:g}\\times10^{{{exponent}}}$"
 
 
-def place_legend_right(axes: Axes, title: str | None = None, size: float = 8.0) -> None:
-    """The legend of a panel to its right, where it covers no data."""
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(fontsize=size, title=title, title_fontsize=size, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+BELOW_LABELS, LEGEND_WIDTH = 34.0, 56
+"""Points below a panel where the labels of its axis end, and characters of a line of the legend below these."""
+
+
+def place_legend(axes: Axes, title: str | None = None, size: float = 8.0, *, below: bool = False) -> None:
+    """The legend of a panel to its right, or below the labels of a narrow one, where it covers no data."""
+    from matplotlib.transforms import ScaledTranslation
+
+    labels = axes.get_legend_handles_labels()[1]
+    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
+    if below and labels:
+        columns = max(1, min(len(labels), LEGEND_WIDTH // (max(map(len, labels)) + 6)))
+        moved = axes.transAxes + ScaledTranslation(0.0, -BELOW_LABELS / 72.0, axes.figure.dpi_scale_trans)
+        place = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": moved, "ncols": columns}
+    if labels:
+        axes.legend(fontsize=size, title=title, title_fontsize=size, frameon=not below, **place)
 
 
 def wrapped(text: str, figure_width: float, size: float = 10.0) -> str:

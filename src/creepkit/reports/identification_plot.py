@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
 from creepkit.reports.compared_values import judged_readings
 from creepkit.reports.condition_colours import ColourScale, stress_scale, temperature_scale
-from creepkit.reports.figures import empty_figure, shortened, span, wrapped
+from creepkit.reports.figures import empty_figure, panel_grid, shortened, span, wrapped
 from creepkit.reports.prediction_bands import (
     FittedCurves,
     TestCurve,
@@ -23,7 +24,7 @@ from creepkit.reports.prediction_bands import (
     set_time_range,
     unit_of,
 )
-from creepkit.reports.rate_panels import draw_rates, draw_ruptures, rupture_rows
+from creepkit.reports.rate_panels import draw_rates, draw_ruptures, has_rates, rupture_rows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,8 +49,12 @@ BAND_OPACITY = 0.2
 """Of the bands of one condition."""
 
 
-SUMMARY_WIDTH, CURVES_HEIGHT, PANELS_HEIGHT = 8.6, 3.6, 2.9
-"""Inches of the figure of an answer and of its rows."""
+PANEL_WIDTH, PANEL_HEIGHT = 4.1, 3.4
+"""Inches of a panel of an answer: so small that a telephone shows it as it was drawn."""
+
+
+LABEL_DISTANCE = 9.0
+"""Points between labels at the least; of those that would cover one another the first stands."""
 
 
 MOST_LABELLED = 16
@@ -58,7 +63,10 @@ MOST_LABELLED = 16
 
 def identification_figure(fit: Identification) -> Figure:
     """Draw the tests over time with bands, creep rates over stress, and times to rupture."""
-    figure = summary_figure(fit)
+    drawn = [*summary_panels(fit).values()]
+    figure, panels = panel_grid(len(drawn), len(drawn), PANEL_WIDTH, PANEL_HEIGHT)
+    for draw, axes in zip(drawn, panels, strict=True):
+        draw(axes)
     figure.suptitle(wrapped(fit.headline, float(figure.get_size_inches()[0])), fontsize=10)
     return figure
 
@@ -81,24 +89,26 @@ def leading_outputs(fit: Identification) -> dict[str, list[int]]:
     return outputs
 
 
-def summary_figure(fit: Identification) -> Figure:
-    """Curves (dots measured, lines by the law) coloured by stress, or by temperature where it varies; rates; lives."""
+def summary_panels(fit: Identification) -> dict[str, Callable[[Axes], None]]:
+    """{what a panel shows: how it is drawn}: curves coloured by stress or temperature; rates over stress; lives."""
     scale, leading = _curve_scale(fit), leading_outputs(fit)
-    below = ["rates", "ruptures"] if rupture_rows(fit) else ["rates"]
-    figure = empty_figure(SUMMARY_WIDTH, (CURVES_HEIGHT if leading else 0.0) + PANELS_HEIGHT)
-    lower: Any = figure
+    panels: dict[str, Callable[[Axes], None]] = {}
     if leading:
-        heights = (CURVES_HEIGHT, PANELS_HEIGHT)
-        upper, lower = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
-        axes = upper.subplots()
-        _draw_leading(axes, fit, leading, scale)
-        if np.ptp(scale.values) > 0:
-            scale.add_bar(upper, [axes])
-    panels = np.atleast_1d(lower.subplots(1, len(below)))
-    draw_rates(panels[0], fit)
-    if len(below) > 1:
-        draw_ruptures(panels[1], fit, scale.colours)
-    return figure
+        panels["curves over time"] = partial(_draw_leading, fit=fit, leading=leading, scale=scale, bar=True)
+    if has_rates(fit):
+        panels["creep rate over stress"] = partial(draw_rates, fit=fit)
+    if rupture_rows(fit):
+        panels["times to rupture"] = partial(draw_ruptures, fit=fit, colours=scale.colours)
+    return panels
+
+
+def summary_figures(fit: Identification) -> dict[str, Figure]:
+    """{what it shows: figure} of each panel, which a page sets side by side, or one below the other."""
+    figures = {}
+    for name, draw in summary_panels(fit).items():
+        figures[name] = empty_figure(PANEL_WIDTH, PANEL_HEIGHT)
+        draw(figures[name].subplots())
+    return figures
 
 
 def _curve_scale(fit: Identification) -> ColourScale:
@@ -108,28 +118,39 @@ def _curve_scale(fit: Identification) -> ColourScale:
     return by_temperature if varies else stress_scale(fit.histories, fit.predictor)
 
 
-def _draw_leading(axes: Axes, fit: Identification, leading: dict[str, list[int]], scale: ColourScale) -> None:
-    """The curves of the output that most tests have, their stresses beside them where colours are temperatures."""
+def _draw_leading(
+    axes: Axes, fit: Identification, leading: dict[str, list[int]], scale: ColourScale, *, bar: bool = False
+) -> None:
+    """The curves of the output that most tests have, their stresses beside them where colours are temperatures.
+
+    bar : whether the scale of colours stands beside them.
+    """
     output, tests = max(leading.items(), key=lambda pair: len(pair[1]))
     _draw_curves(axes, fit, fitted_curves(fit), output, tests, scale.colours)
     axes.set_title("measured (dots) and by the law (lines, 95 % band)", fontsize=9)
     by_stress = stress_scale(fit.histories, fit.predictor)
     if scale.label != by_stress.label and len(tests) <= MOST_LABELLED:
         _label_stresses(axes, fit, by_stress.values, tests, scale.colours)
+    if bar and np.ptp(scale.values) > 0:
+        scale.add_bar(axes)
 
 
 def _label_stresses(
     axes: Axes, fit: Identification, stresses: Floats, tests: Sequence[int], colours: Sequence[Any]
 ) -> None:
     """The stress of each test, MPa, at the end of its curve; stresses : (tests,)."""
-    lines = [line for line in axes.lines if line.get_linestyle() != "None"]
+    lines, shown = [line for line in axes.lines if line.get_linestyle() != "None"], list[Floats]()
     for k, line in zip(tests, lines, strict=True):
         points = np.asarray(line.get_xydata())
         known = points[np.isfinite(points).all(axis=1)]
         if known.size:
             place = (float(known[-1, 0]), float(known[-1, 1]))
+            pixels = axes.transData.transform(place) * 72.0 / axes.figure.dpi
+            if any(np.linalg.norm(pixels - one) < LABEL_DISTANCE for one in shown):
+                continue
+            shown.append(pixels)
             axes.annotate(
-                f"{stresses[k]:.3g}", place, (2, -3), textcoords="offset points", fontsize=7, color=colours[k]
+                f"{stresses[k]:.3g}", place, (2, -3), textcoords="offset points", fontsize=8, color=colours[k]
             )
 
 

@@ -11,10 +11,10 @@ import sympy
 
 from creepkit.exporters.documents import equations_in_latex, expression_mathml
 from creepkit.exporters.law_description import comment_lines
-from creepkit.language import CreepLaw, mean_stress, parameters, principal_stress, strain, stress, temperature, time
+from creepkit.language import mean_stress, parameters, principal_stress, strain, stress, temperature, time
 from creepkit.language.printing import arrhenius_exponent
 from creepkit.language.symbols import GAS_CONSTANT
-from creepkit.reports.answer import equations
+from creepkit.reports.answer import equations, symbols_of
 from creepkit.reports.blocks import Block, Formula, Paragraph, Rich, Table, Verbatim, number, printable, printable_lines
 
 if TYPE_CHECKING:
@@ -108,14 +108,10 @@ def definition_blocks(laws: Iterable[CreepLaw]) -> list[Block]:
 
 def _symbols(k: int, law: CreepLaw) -> Table:
     """The parameters and internal variables of a law."""
+    symbols = symbols_of(law)
     rows = [
-        (
-            _symbol(symbol),
-            law.table[str(symbol)].meaning,
-            "1" if param.unit == "1" else param.unit,
-            f"{number(param.bounds[0], 3)} to {number(param.bounds[1], 3)}",
-        )
-        for symbol, param in law.params.items()
+        (symbols[name], param.meaning, param.unit, f"{number(param.bounds[0], 3)} to {number(param.bounds[1], 3)}")
+        for name, param in law.table.items()
     ]
     for symbol, state in law.states.items():
         end = "" if state.limit is None else f"; the material ruptures where it reaches {state.limit:.10g}"

@@ -10,6 +10,7 @@ import numpy as np
 from creepkit.inverse.held_levels import holds, is_isothermal, last_data_time, temperature_holds
 from creepkit.inverse.reference_conditions import HELD_LOAD
 from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program, load_unit
+from creepkit.records.loading import held_of
 from creepkit.records.units import time_text
 
 MOST_HOLDS = 3
@@ -59,7 +60,7 @@ def kind_of_test(history: History) -> str:
     if loading.quantity == "strain":
         return f"{levels} strain{', at which the stress relaxes' if pieces else ''}"
     if loading.quantity == "stress":
-        held = "true stress" if getattr(loading, "control", "load") == "stress" else "load"
+        held = "true stress" if held_of(loading) == "stress" else "load"
         return f"creep under {levels} {held}"
     return f"creep under {levels} {loading.quantity}"
 

@@ -21,6 +21,7 @@ from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
 from creepkit.language.printing import arrhenius_exponent
 from creepkit.laws.paper import PAPER
 from creepkit.limits import SIGNIFICANCE
+from creepkit.records.loading import held_of
 from creepkit.reports.blocks import ends, listed, number, plural, printable, sentence, typeset
 from creepkit.reports.compared_values import compared_observations, reading_counts
 from creepkit.reports.design import order_text
@@ -135,7 +136,7 @@ def _transforms(fit: Identification) -> Iterator[str]:
 
 def _loading(fit: Identification) -> Iterator[str]:
     """What was held in uniaxial tests, what their strains are, and the elastic data that were used."""
-    controls = {str(getattr(h.loading, "control", "")) for h in fit.histories} - {""}
+    controls = {held_of(h.loading) for h in fit.histories if h.loading.quantity == "stress"}
     held = {"load": "Loads were held, so that the true stress grows with strain.", "stress": "True stresses were held."}
     yield from (text for control, text in held.items() if control in controls)
     strains = {(h.strain_measure, h.includes_elastic) for h in fit.histories if "strain" in h.outputs}

@@ -16,7 +16,7 @@ from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_st
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
-from creepkit.reports.figures import draw_parity, panels_of, place_legend_right, shortened, span
+from creepkit.reports.figures import draw_parity, panels_of, place_legend, shortened, span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,12 +60,21 @@ class RatePoints(NamedTuple):
     rate: Floats
 
 
+def has_rates(fit: Identification) -> bool:
+    """Whether there are creep rates over stress to draw."""
+    return bool(compared_minimum_rates(fit)) or any(_tested_stresses(fit))
+
+
+def _tested_stresses(fit: Identification) -> list[float]:
+    return [float(v) for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
+
+
 def draw_rates(axes: Axes, fit: Identification) -> None:
     """Creep rates over stress: measured minimum rates and the law's, or the law's rate at the reference point."""
     minimum_rates = compared_minimum_rates(fit)
     if minimum_rates:
         draw_minimum_rates(axes, fit, minimum_rates)
-    elif any(v > 0 for h in fit.histories for v in reference_stresses(h, fit.predictor)):
+    elif any(_tested_stresses(fit)):
         _draw_reference_rates(axes, fit)
     else:
         axes.set_axis_off()
@@ -74,16 +83,16 @@ def draw_rates(axes: Axes, fit: Identification) -> None:
 def _draw_reference_rates(axes: Axes, fit: Identification) -> None:
     """Identified rate over stress with its 95 % band at some temperatures, and the own rate of each test."""
     own = [rate for k in range(len(fit.tests)) for rate in own_rates(fit, k)]
-    stresses = [v for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
+    stresses = _tested_stresses(fit)
     grid = np.geomspace(0.8 * min(stresses), 1.25 * max(stresses), 60)
     curves = [
         RateCurve(celsius, grid, *fit.rate(grid, np.full_like(grid, celsius + ZERO_CELSIUS), warn=False))
         for celsius in _drawn_temperatures(tested_temperatures(fit.histories))
     ]
-    points = [RatePoints("law × own rate\nof each test", *np.array(own).T)] if own else []
-    _draw(axes, fit, curves, points, "95 % band:\nlaw")
+    points = [RatePoints("law × own rate of each test", *np.array(own).T)] if own else []
+    _draw(axes, fit, curves, points, "95 % band: law")
     reference = fit.reference
-    initial = "\ninternal variables as at the start, not those of a test" if fit.law.states else ""
+    initial = "\nwith internal variables as at the start" if fit.law.states else ""
     axes.set(xlabel="von Mises stress, MPa", ylabel="creep rate, %/h")
     axes.set_title(
         f"the law's rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h{initial}",
@@ -119,10 +128,9 @@ def draw_minimum_rates(axes: Axes, fit: Identification, rates: Sequence[MinimumR
             celsius, *columns = _columns(known, "temperature", "stress", "predicted", "low", "high")
             curves.append(RateCurve(float(celsius.mean()), *columns))
     points = RatePoints("measured", *_columns(rates, "temperature", "stress", "measured"))
-    _draw(axes, fit, curves, [points], "line: by the law;\nband: 95 % of\na single test")
-    sentence = exponent_sentence(rates)
+    _draw(axes, fit, curves, [points], "line: by the law; band: 95 % of a single test")
     axes.set(xlabel="stress, MPa", ylabel="minimum creep rate, %/h")
-    axes.set_title(f"minimum creep rate of the tests{sentence and chr(10)}{sentence}", fontsize=9)
+    axes.set_title(exponent_sentence(rates), fontsize=9)
 
 
 def _columns(rates: Sequence[Any], *names: str) -> list[Floats]:
@@ -157,7 +165,7 @@ def _draw(
     ends = ends[(ends > centre.min() / DRAWN_FACTOR) & (ends < centre.max() * DRAWN_FACTOR)]
     span(axes, "x", *(one.stress for one in drawn), logarithmic=True, margin=1.07)
     span(axes, "y", centre, ends, logarithmic=True, margin=1.25, most=8)
-    place_legend_right(axes, legend)
+    place_legend(axes, legend, below=True)
 
 
 def _drawn_temperatures(tested: Sequence[float]) -> list[float]:
@@ -188,12 +196,10 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
             ends = [[max(predicted - low, 0.0)], [max(high - predicted, 0.0)]]
             axes.errorbar(measured, predicted, yerr=ends, fmt=marker, ms=4.5, lw=0.7, color=colour, mfc=face)
     if any(r.censored for r, _ in ruptures):
-        axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped: broke\nlater, if at all")
+        axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped: broke later, if at all")
     axes.set(xlabel="measured time to rupture, h", ylabel="predicted time to rupture, h")
-    place_legend_right(axes)
-    axes.set_title(
-        "time to rupture; bars: 95 % of a single test\n(if the law is right; with scatter between tests)", fontsize=9
-    )
+    place_legend(axes, below=True)
+    axes.set_title("bars: 95 % of a single test, if the law is right", fontsize=9)
 
 
 # ---- minimum rates ---------------------------------------------------------------------------------------------------
@@ -231,7 +237,7 @@ def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
     measured, _, predicted = exponents(rates)
     if not np.isfinite([measured, predicted]).all():
         return ""
-    return f"apparent stress exponent: measured {measured:.2g}, by the law {predicted:.2g}"
+    return f"stress exponent: {measured:.2g} measured, {predicted:.2g} by the law"
 
 
 # ---- the map of a plate ----------------------------------------------------------------------------------------------
@@ -284,4 +290,4 @@ def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
     axes.set_yticks(range(len(fits)), [shortened(name, 24) for name, _ in fits], fontsize=7 if len(fits) > 20 else 8)
     axes.set_ylim(len(fits) - 0.5, -0.5)
     axes.set(xlabel=f"creep rate at {stress:.3g} MPa and {100 * strain:.2g} % strain, %/h")
-    place_legend_right(axes, "law; open:\ncontradicted\nby its tests")
+    place_legend(axes, "law; open:\ncontradicted\nby its tests")

@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.errors import FitError
 from creepkit.reports.blocks import aligned
-from creepkit.reports.figures import empty_figure, place_legend_right
+from creepkit.reports.figures import empty_figure, place_legend
 from creepkit.reports.rate_panels import draw_plate, plate_size
 from creepkit.reports.terminal import print_json, print_table, tell
 from creepkit.screening.results import (
@@ -125,7 +125,7 @@ def _draw_law_fractions(axes: Axes, plate: ScreeningResult) -> None:
     axes.set_xticks(positions, [f"{name}\n{len(m)} alloy{'s' if len(m) > 1 else ''}" for name, m in classes.items()])
     axes.set(ylim=(0, 1), xlim=(-0.6, max(len(classes), 3) - 0.4), ylabel="share of alloys")
     axes.set_title("identified laws by class; hatched: shared out by weight where not decisive", fontsize=10)
-    place_legend_right(axes)
+    place_legend(axes)
 
 
 def _law_fraction(members: tuple[AlloyResult, ...], law: str, decisive: bool) -> float:

@@ -11,15 +11,7 @@ import numpy as np
 from creepkit.errors import SurrogateError
 from creepkit.records import output_named
 from creepkit.reports.blocks import aligned
-from creepkit.reports.figures import (
-    draw_parity,
-    make_folder,
-    panel_grid,
-    panels_of,
-    place_legend_right,
-    save_figure,
-    span,
-)
+from creepkit.reports.figures import draw_parity, make_folder, panel_grid, panels_of, place_legend, save_figure, span
 from creepkit.surrogates.evaluation import PredictionComparison, evaluate
 from creepkit.surrogates.parameter_gru import SurrogateMetadata
 
@@ -52,7 +44,7 @@ def training_curves(metadata: SurrogateMetadata, path: str | Path | None = None)
         axes.axvline(epoch, color="grey", lw=0.8, ls=":", label="rate falls" if k == 0 else None)
     axes.set(xlabel="epoch", ylabel="loss", title=f"{metadata.law.name}, {metadata.specimen.name}")
     span(axes, "y", *(curves[name] for name in drawn), logarithmic=True, most=8)
-    place_legend_right(axes)
+    place_legend(axes)
     return save_figure(figure, path)
 
 

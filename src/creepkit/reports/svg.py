@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
@@ -49,21 +49,30 @@ class PageFigures:
         self.count, self.prefix = 0, prefix
 
     def picture(
-        self, draw: Callable[[], Figure], title: str, description: str, caption: str, *, shows_values: bool = False
+        self,
+        draw: Callable[[], Figure | Mapping[str, Figure]],
+        title: str,
+        description: str,
+        caption: str,
+        *,
+        shows_values: bool = False,
     ) -> Picture | Paragraph:
         """What `draw` draws with its alternative text (title and description) and a caption, which gets its number.
 
-        Its own heading is left out: the page says the same above it. A figure that cannot be drawn is a paragraph that
-        says why.
+        It draws one figure, or panels as {what it shows: figure}. Their own headings are left out: the page says the
+        same above them. A figure that cannot be drawn is a paragraph that says why.
         """
         try:
-            figure = draw()
+            drawn = draw()
         except CreepkitError as error:
             return Paragraph(f"{title}: no figure, for {error}", "note")
         self.count += 1
-        figure.suptitle("")
-        svg = svg_text(figure, f"{self.prefix}{self.count}", title, description)
-        return Picture(Markup(svg), f"Figure {self.count}. {caption}", shows_values)
+        panels, svgs = drawn if isinstance(drawn, Mapping) else {"": drawn}, []
+        for k, (name, figure) in enumerate(panels.items()):
+            figure.suptitle("")
+            identifier = f"{self.prefix}{self.count}{chr(ord('a') + k) if name else ''}"
+            svgs.append(svg_text(figure, identifier, f"{title}: {name}" if name else title, description))
+        return Picture(Markup("".join(svgs)), f"Figure {self.count}. {caption}", shows_values)
 
 
 def svg_text(figure: Figure, identifier: str, title: str, description: str) -> str:
@@ -85,11 +94,13 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
         if engine is not None:
             engine.execute(figure)  # axes have their places and ranges from here on
             figure.set_layout_engine("none")
-        texts = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
-        _thin(figure)
+        artists: list[Any] = figure.findobj()
+        texts = [one for one in artists if isinstance(one, Text) and one.get_text() and one.get_visible()]
+        _thin(figure, artists)
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(buffer, metadata={"Date": None})
-    root = ElementTree.fromstring("".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in buffer.getvalue()))
+    lines = (line if line.isprintable() else printable(line, len(line) + 1) for line in buffer.getvalue().split("\n"))
+    root = ElementTree.fromstring("\n".join(lines))
     _compact(root, identifier)
     # pixels of 1/96 inch of points of 1/72 inch: as wide as it was drawn, and the least at which it can be read
     natural = 4.0 * float(str(root.get("viewBox")).split()[2]) / 3.0
@@ -112,15 +123,18 @@ def svg_text(figure: Figure, identifier: str, title: str, description: str) -> s
 # ---- fewer bytes -----------------------------------------------------------------------------------------------------
 
 
-def _thin(figure: Figure) -> None:
-    """Bands and dots of a figure that has been laid out reduced to what a screen shows; matplotlib does it of lines."""
+def _thin(figure: Figure, artists: Sequence[Any]) -> None:
+    """Bands and dots of a figure that has been laid out reduced to what a screen shows; matplotlib does it of lines.
+
+    artists : all of the figure.
+    """
     from matplotlib.collections import PathCollection, PolyCollection
     from matplotlib.lines import Line2D
     from matplotlib.path import Path
 
-    lines: list[Any] = figure.findobj(Line2D)
-    bands: list[Any] = figure.findobj(PolyCollection)
-    maps: list[Any] = figure.findobj(PathCollection)
+    lines, bands, maps = (
+        [one for one in artists if isinstance(one, kind)] for kind in (Line2D, PolyCollection, PathCollection)
+    )
     with np.errstate(all="ignore"):
         for line in (one for one in lines if one.get_linestyle() in ("None", "none", " ", "")):
             points = np.column_stack([line.get_xdata(orig=False), line.get_ydata(orig=False)])

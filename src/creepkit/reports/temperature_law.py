@@ -15,7 +15,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, 
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import equations, unit_text, value_cells
 from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, Verbatim, as_text
-from creepkit.reports.figures import panel_grid, place_legend_right, span
+from creepkit.reports.figures import panel_grid, place_legend, span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,7 +89,7 @@ def draw_parameter(axes: Axes, temperature_law: TemperatureLaw, k: int = 0) -> N
     span(axes, "y", lowest - margin, highest + margin, most=8)
     axes.set(xlabel="temperature, K")
     axes.set_title(_panel_title(temperature_law, coordinates, k, name), fontsize=9)
-    place_legend_right(axes, "form, weight", size=7)
+    place_legend(axes, "form, weight", size=7)
 
 
 def _form_weight(temperature_law: TemperatureLaw, k: int, form: str) -> float:

@@ -31,6 +31,7 @@ from creepkit.records import (
     StressSteps,
     TimesToStrain,
 )
+from creepkit.records.loading import held_of
 from creepkit.specimens.bar import Bar, elastic_strain, observed_strain
 from creepkit.specimens.load_scaling import LoadScaling
 
@@ -137,7 +138,7 @@ def point_test(history: History) -> PointTest:
         driving=history.loading.program(),
         temperature=history.temperature_program(),
         times=history.times,
-        constant_load=getattr(history.loading, "control", "stress") == "load",
+        constant_load=held_of(history.loading) == "load",
     )
 
 

@@ -149,6 +149,11 @@ class StudyResult:
         return {one.name.removeprefix("forecast of "): self.results[one.name] for one in self._with_result("forecast")}
 
     @property
+    def forecast_groups(self) -> dict[str, str]:
+        """{name of a forecast: group whose law forecasts}."""
+        return {one.name.removeprefix("forecast of "): one.group for one in self._with_result("forecast")}
+
+    @property
     def exports(self) -> tuple[ExportedFile, ...]:
         """Laws as text."""
         return tuple(self.results[one.name] for one in self._with_result("export"))
@@ -188,6 +193,7 @@ class StudyResult:
             exclusions=self.exclusions,
             temperature=_titled(self.temperature),
             forecasts=dict(self.forecasts),
+            forecast_groups=self.forecast_groups,
             design=_titled(self.designs),
             rupture=_titled(self.rupture),
             extractions=self.extractions,

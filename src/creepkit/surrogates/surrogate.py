@@ -34,6 +34,7 @@ from creepkit.records import (
     outputs_of,
     unpredicted,
 )
+from creepkit.records.loading import held_of
 from creepkit.records.presentable import Presentable
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid, specimen_conditions
@@ -94,8 +95,8 @@ def check_history(metadata: SurrogateMetadata, history: History) -> None:
     quantity = specimen_conditions(specimen).load.name
     if history.loading.quantity != quantity:
         raise SurrogateError(f"{where}: its {history.loading.quantity} is prescribed; the surrogate knows {quantity}")
-    control = getattr(history.loading, "control", None)
-    if control not in (None, "load") and quantity == "stress" and metadata.provenance.get("control", "load") != control:
+    is_stress = quantity == "stress" and held_of(history.loading) == "stress"
+    if is_stress and metadata.provenance.get("control", "load") != "stress":
         raise SurrogateError(f"{where}: true stress is held, and the surrogate was trained under held loads")
     last = float(history.times[-1])
     if not metadata.grid.relative and last > metadata.grid.end * (1 + RELATIVE_TOLERANCE):

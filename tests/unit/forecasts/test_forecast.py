@@ -313,6 +313,7 @@ def test_what_is_shown_is_extrapolated_in_its_own_condition_alone():
         found = fit.forecast(plan, targets={"strain": 0.002})
         assert "time 2.778e+04 h" in found.tests[0].extrapolation  # of its end, 2.8e4 h
         assert asked_figures(found)[0].remark == said
+        assert asked_figures(fit.forecast(plan))[0].name == "strain at 2.778e+04 h"  # where no value was asked for
 
 
 def test_celsius_is_refused_and_may_be_insisted_on(fit):

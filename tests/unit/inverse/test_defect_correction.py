@@ -6,12 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from creepkit.inverse.defect_correction import (
-    correct_defect,
-    difference_of_predictors,
-    shift_of_values,
-    with_cheaper_predictor,
-)
+from creepkit.inverse.defect_correction import correct_defect, shift_of_values, with_cheaper_predictor
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
 from creepkit.inverse.identify import identify
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -189,7 +184,7 @@ def test_a_cheaper_predictor_agrees_where_it_is_corrected():
     cheap = with_cheaper_predictor(problem, x, Coarse(relative))
     assert cheap.predictor == Coarse(relative)
     np.testing.assert_allclose(cheap.residuals(x).values, problem.residuals(x).values, atol=1e-10)
-    difference = difference_of_predictors(problem, x, Coarse())
+    difference = with_cheaper_predictor(problem, x, Coarse()).correction
     mask = problem.observations.output_index == 0
     share = problem.observations.times / problem.observations.times.max(axis=1, keepdims=True)
     np.testing.assert_allclose(difference[mask], -0.02 * np.sin(2.5 * share[mask]), atol=1e-10)

@@ -102,6 +102,16 @@ def test_independent_drifts_move_the_rate_by_no_more_than_their_own_mean(law, no
     assert 0.3 < drift.rate_change / (0.5 * USUAL_DRIFT * drift.per_kelvin / np.sqrt(3.0)) < 1.0
 
 
+def test_a_drift_of_one_test_alone_is_no_cause_and_one_of_several_is_given_in_rate():
+    """Rates that drift by 10, -8 and 6 % over tests at one temperature: kelvins are those of an assumed energy."""
+    tests = bars(NORTON_AT, [constant_stress(s, "stress") for s in (70.0, 90.0, 110.0)])
+    ahead = [1 + 0.5 * drift * TIMES / END for drift in (0.1, -0.08, 0.06)]
+    drifted = [one.replace(outputs={"strain": one.outputs["strain"] * a}) for one, a in zip(tests, ahead, strict=True)]
+    three, alone = (identify(NORTON, one, BAR, settings=SETTINGS).adequacy for one in (drifted, drifted[2:]))
+    assert "(10 % of the rate, by an assumed activation energy)" in three.remedies[0]
+    assert (alone.rejects, [one for one in alone.remedies if DRIFT in one]) == (True, [])
+
+
 # ---- what an effect does to the rate ------------------------------------------------------------------------------
 
 

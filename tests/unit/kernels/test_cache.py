@@ -106,18 +106,10 @@ def test_processes_may_build_the_same_law_at_once(cache: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "damage", "factor"),
     [
-        (SOURCE_FILE, "truncated", 2),
-        (SOURCE_FILE, "changed", 3),
-        (CODE_FILE, "emptied", 5),
-        (CODE_FILE, "truncated", 7),
-        (CODE_FILE, "changed", 11),
-        (CODE_FILE, "removed", 13),
-        (CHECKSUM_FILE, "removed", 17),
-        (CHECKSUM_FILE, "emptied", 41),
-        (CHECKSUM_FILE, "truncated", 43),
-        (CHECKSUM_FILE, "pipe", 47),
-        (CODE_FILE, "pipe", 53),
-        (CODE_FILE, "link", 59),
+        *((SOURCE_FILE, *one) for one in (("truncated", 2), ("changed", 3))),
+        *((CODE_FILE, *one) for one in (("emptied", 5), ("truncated", 7), ("changed", 11), ("removed", 13))),
+        *((CODE_FILE, *one) for one in (("pipe", 53), ("link", 59))),
+        *((CHECKSUM_FILE, *one) for one in (("removed", 17), ("emptied", 41), ("truncated", 43), ("pipe", 47))),
     ],
 )
 def test_what_is_damaged_is_made_anew(cache: Path, made: list[str], name: str, damage: str, factor: int) -> None:

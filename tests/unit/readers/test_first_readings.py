@@ -106,12 +106,30 @@ def test_a_preload_and_a_ramp_are_no_creep(read, frames_of_ramp):
 
 
 def test_tubes_of_several_diameters(read):
-    """What their growth holds of the elastic part cannot be chosen, which is said."""
-    tests = read(TUBES)
+    """Growth that was read after unloading gets the elastic part of Lame's thick tube with closed ends."""
+    assert "the elastic part in diameter_growth all the same; no modulus" in read(TUBES)[0].labels["assumed"]
+    tests = read("# modulus_GPa: 75\n" + TUBES)
     assert [(one.name, one.geometry["outer_diameter"]) for one in tests] == [("T1", 9.5), ("T2", 11.2)]
-    assert "that of a tube always includes it" in tests[0].labels["assumed"]
+    for test, outer in zip(tests, (9.5, 11.2), strict=True):
+        lame = 10.0 * (outer - 1.0) ** 2 * outer * (2 - 0.3) / (75e3 * (outer**2 - (outer - 1.0) ** 2))
+        added = test.outputs["diameter_growth"] - test.times / 3600e4
+        np.testing.assert_allclose(added, [0, lame, lame], rtol=0.01)
     with pytest.raises(HistoryError, match='specimen = "tube" \\(or specimen = "open-tube"\\)'):
         read(TUBES.replace("# specimen: tube\n", ""))
+
+
+@pytest.mark.parametrize(("column", "first"), [("Tube", "T"), ("Joint", "J-"), ("Probe Nr.", ""), ("Bar", "B")])
+def test_names_of_tests_whatever_they_are_called(read, tmp_path, column, first):
+    """Their cells change where time falls; in the order of time, and in rows of tests, an answer or the words tell."""
+    rows = [f"{first}{k};600;{100 + 10 * k};{t};{k * t / 1e3}\n" for k in (1, 2) for t in (0, 10, 100)]
+    head, names = f"{column};T (C);Stress (MPa);Time (h);Strain (%)\n", [f"{first}1", f"{first}2"]
+    assert [one.name for one in read(head + "".join(rows))] == names
+    if first:
+        assert [
+            one.name for one in read(head.split("Time")[0] + f"Rupture (h)\n{rows[1][:-6]}\n{rows[5][:-5]}\n")
+        ] == names
+    (tmp_path / "tests.toml").write_text(f'["*.csv"]\ncolumns = {{"{column}" = "test"}}\n')
+    assert [one.name for one in read(head + "".join(sorted(rows, key=lambda row: float(row.split(";")[3]))))] == names
 
 
 def test_points_of_a_plot(tmp_path):
@@ -157,10 +175,8 @@ def test_relative_growths_and_diameters_of_bars(read):
     assert test.outputs["strain"][-1] == pytest.approx((10.01 / 9.91) ** 2 - 1.0)
     tubes = "OD (mm),9.5,9.5\nWall (mm),1,1\nTemp (C),400,400\nPressure (MPa),12,{}\nTime (h),D1 (mm),D2 (mm)\n"
     tubes = TUBE.splitlines()[-1] + "\n" + tubes + "0,9.5,9.5\n9,9.52,9.51\n"
-    assert [f"{one.condition}: {one.outputs['diameter_growth'][-1]:.3g}" for one in read(tubes.format(10))] == [
-        "400 °C, 12 MPa: 0.02",
-        "400 °C, 10 MPa: 0.01",
-    ]
+    said = [f"{one.condition}: {one.outputs['diameter_growth'][-1]:.3g}" for one in read(tubes.format(10))]
+    assert said == ["400 °C, 12 MPa: 0.02", "400 °C, 10 MPa: 0.01"]
     with pytest.raises(HistoryError, match="no conditions above each, may be tests or sensors of one"):
         read(tubes.format(12))
 

@@ -113,7 +113,8 @@ def test_identifiers_are_unique_and_found(page: str) -> None:
 
 def test_every_figure_has_words_for_those_who_do_not_see_it(page: str) -> None:
     figures = [e for e in elements(parsed(page)) if tag(e) == "svg" and e.get("aria-hidden") is None]
-    assert len(figures) == 4  # the answer, the tests one by one, laws compared, forecast
+    assert len(figures) == 5  # two panels of the answer, the tests one by one, laws compared, forecast
+    assert all(float(e.get("viewBox").split()[2]) < 300 for e in figures[:2])  # as narrow as a telephone, 1/72 inch
     for figure in figures:
         title, description = (next(e for e in figure if tag(e) == kind) for kind in ("title", "desc"))
         assert figure.get("role") == "img"

@@ -264,3 +264,12 @@ def test_both_forms_predict_the_same(using: ck.Predictor, history: ck.History) -
     )
     assert np.ptp(one[:, 0]) > 0
     np.testing.assert_allclose(other, one, rtol=1e-12)
+
+
+def test_a_loading_of_ones_own_that_does_not_say_holds_the_load_as_its_file_does(tmp_path):
+    own = type("Own", (), {"quantity": "stress", "program": lambda _: Program.constant(80.0)})()
+    run = ck.simulate("norton", "uniaxial", {"A": 1e-16, "n": 5.0}, loading=own, times=[1e4, 5e5])
+    ck.write_history(run, tmp_path / "run.csv")
+    held = ck.read_histories(tmp_path / "run.csv")[0].loading
+    again = ck.simulate("norton", "uniaxial", {"A": 1e-16, "n": 5.0}, loading=held, times=[1e4, 5e5])
+    np.testing.assert_allclose(run.outputs["strain"], again.outputs["strain"], rtol=1e-9)

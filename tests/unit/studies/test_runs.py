@@ -18,6 +18,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import StudyError
 from creepkit.files.writing import write_text
+from creepkit.reports.html.page import report_html
 from creepkit.studies.lock import changes
 from helpers.study_runs import ONE_FIT, STUDY, made, numbers, study_in
 
@@ -29,6 +30,7 @@ def test_only_what_changed_runs_again(study: Path) -> None:
     everything = {"quality", "forecast of next", *groups}
     first = ck.Study.load(study).run()
     assert made(first) == everything
+    assert "A: strain at 50 h, " in report_html(first.report_contents()).partition('id="materials"')[0]
     assert made(ck.Study.load(study).run()) == set()
 
     one = study.parent / "data" / "planted_850C_70MPa.csv"

@@ -5,8 +5,9 @@ The trust region reflective method of scipy, with analytic Jacobians.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.optimize import least_squares
 
 from creepkit.arrays import Floats
 from creepkit.inverse.bounds import Bounds
+from creepkit.inverse.variance_components import BOUND_TOLERANCE
 
 IterationCallback = Callable[[str, int, int], None]
 """Reports the progress of a search: (name of the step, how many are done, how many there are)."""
@@ -49,10 +51,19 @@ class Minimum:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """When a local refinement ends: after so many steps, or at this relative change of the cost."""
+    """When a local refinement ends.
+
+    After so many steps, at this relative change of the cost, or where a step of Gauss and Newton promises less than the
+    relative gain, which is judged before the step is simulated.
+    """
 
     max_steps: int = 30
     tolerance: float = 1e-5
+    gain: float = 0.0
+
+
+class _PromisesNothing(Exception):
+    """Ends a refinement at a point from which a step would gain too little."""
 
 
 def bounded_least_squares(
@@ -72,34 +83,62 @@ def bounded_least_squares(
     fixed : {position: value} of unknowns that keep their values.
     """
     free = np.setdiff1d(np.arange(start.size), list(fixed))
-    cache: dict[bytes, tuple[Floats, Floats]] = {}
+    lower, upper, cache = bounds.lower[free], bounds.upper[free], dict[bytes, tuple[Minimum, Floats]]()
+    count = itertools.count(1)
 
-    def at(free_values: Floats) -> Floats:
-        x = start.copy()
-        x[free] = free_values
-        return x
-
-    def evaluate(free_values: Floats) -> tuple[Floats, Floats]:
+    def evaluate(free_values: Floats) -> tuple[Minimum, Floats]:
+        """The point as an end, and the derivatives there."""
         key = free_values.tobytes()
         if key not in cache:
             cache.clear()
-            values, jacobian = system(at(free_values))
-            cache[key] = values, jacobian[:, free]
+            x = start.copy()
+            x[free] = free_values
+            values, jacobian = system(x)
+            weights = 1.0 / np.sqrt(1.0 + values**2) if robust else np.ones_like(values)
+            cost = 0.5 * float((robust_loss(values**2) if robust else values**2).sum())
+            gain = _promised_gain(values, jacobian[:, free], weights, lower - free_values, upper - free_values)
+            ends = gain <= tolerances.gain * cost
+            cache[key] = Minimum(x, cost, ends, next(count), values), jacobian[:, free]
         return cache[key]
 
-    result = least_squares(
-        lambda part: evaluate(part)[0],
-        start[free],
-        jac=lambda part: evaluate(part)[1],
-        bounds=(bounds.lower[free], bounds.upper[free]),
-        x_scale=scale[free],
-        loss="soft_l1" if robust else "linear",
-        max_nfev=tolerances.max_steps,
-        ftol=tolerances.tolerance,
-        xtol=10 * tolerances.tolerance,
-        gtol=tolerances.tolerance,
-    )
-    return Minimum(at(np.asarray(result.x)), float(result.cost), bool(result.status > 0), int(result.nfev), result.fun)
+    def jacobian(free_values: Floats) -> Floats:
+        end, derivatives = evaluate(free_values)
+        if end.converged:
+            raise _PromisesNothing
+        return derivatives
+
+    try:
+        result = least_squares(
+            lambda part: np.asarray(evaluate(part)[0].whitened_residuals),
+            start[free],
+            jac=jacobian,
+            bounds=(lower, upper),
+            x_scale=scale[free],
+            loss="soft_l1" if robust else "linear",
+            max_nfev=tolerances.max_steps,
+            ftol=tolerances.tolerance,
+            xtol=10 * tolerances.tolerance,
+            gtol=tolerances.tolerance,
+        )
+    except _PromisesNothing:
+        return next(iter(cache.values()))[0]
+    return replace(evaluate(result.x)[0], converged=result.status > 0, evaluations=int(result.nfev))
+
+
+def _promised_gain(values: Floats, jacobian: Floats, weights: Floats, below: Floats, above: Floats) -> float:
+    """How much lower than here the cost is by its linear model at the end of a step of Gauss and Newton.
+
+    values : (rows,), jacobian : (rows, unknowns) there. weights : (rows,) derivative of the loss to squares.
+    below, above : (unknowns,) steps to the bounds; an unknown that a bound holds takes no part.
+    """
+    gradient, tolerance = jacobian.T @ (weights * values), BOUND_TOLERANCE * (above - below)
+    moves = ~((below > -tolerance) & (gradient > 0.0) | (above < tolerance) & (gradient < 0.0))
+    normal_matrix = (jacobian[:, moves] * weights[:, None]).T @ jacobian[:, moves]
+    size = np.sqrt(np.maximum(np.diag(normal_matrix), 1e-300))
+    if not (np.isfinite(normal_matrix).all() and np.isfinite(gradient).all()):
+        return np.inf
+    scaled = gradient[moves] / size
+    return 0.5 * float(scaled @ np.linalg.lstsq(normal_matrix / np.outer(size, size), scaled, rcond=1e-12)[0])
 
 
 def robust_loss(squared: Floats) -> Floats:

@@ -19,7 +19,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -29,7 +29,7 @@ from scipy.stats import chi2
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, FitError
-from creepkit.inverse.defect_correction import difference_of_predictors
+from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances
@@ -62,7 +62,11 @@ APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3)
 """Of the reduced-order model, from which the last steps begin."""
 
 
-LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6)
+LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6, gain=1e-4)
+
+
+FAR_EXCLUDED = 10.0 * NOT_EXCLUDED
+"""Increase of chi-square by the reduced-order model, from which on a sum is excluded without a further run."""
 
 
 SAME_FUNCTION = 0.05
@@ -174,6 +178,12 @@ class FittedLaw:
     def law(self) -> CreepLaw:
         """The law."""
         return self.problem.law
+
+    @cached_property
+    def reduced(self) -> LeastSquaresProblem | None:
+        """The problem through the reduced-order model, corrected at x; None where there is none."""
+        reduced = self.problem.predictor.reduced_order_model()
+        return None if reduced is None else with_cheaper_predictor(self.problem, self.x, reduced)
 
     @property
     def u(self) -> Floats:
@@ -291,15 +301,17 @@ def _least_excess(
 ) -> tuple[float, Floats]:
     """The least chi-square from x (unknowns,) above that of the best law, and where.
 
-    It is sought by the reduced-order model, then by the predictor itself.
+    It is sought by the reduced-order model, then by the predictor itself where that does not exclude it by far.
     """
-    reduced = problem.predictor.reduced_order_model()
-    if reduced is not None:
-        difference = difference_of_predictors(best.problem, best.x, reduced)
-        cheap = problem.with_predictor(reduced).with_correction(difference)
-        x = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS).x
+    least = _chi_square(best.problem, best.x)
+    if best.reduced is not None:
+        cheap = problem.with_predictor(best.reduced.predictor).with_correction(best.reduced.correction)
+        found = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS)
+        x, excess = found.x, _chi_square(cheap, found.x) - least
+        if found.converged and excess > FAR_EXCLUDED:
+            return excess, x
     x = problem.minimise(x, additional=share, fixed=fixed, tolerances=LAST_STEPS).x
-    return _chi_square(problem, x) - _chi_square(best.problem, best.x), x
+    return _chi_square(problem, x) - least, x
 
 
 def _chi_square(problem: LeastSquaresProblem, x: Floats) -> float:

@@ -194,31 +194,33 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
     Fitted to draws about the optimum, and judged at draws of what it says itself, which improve it where it fails; at
     last these draws are weighted by what predictions say of them.
     """
-    count = max(LEAST_POINTS, 2 * quadratic_terms(centre.size))
+    terms = quadratic_terms(centre.size)
+    count = max(LEAST_POINTS, 2 * terms // (1 + centre.size))
     drawn = _drawn(centre, shape, seed, MOST_DRAWS)
-    u = drawn[posterior.inside(drawn)][:count]
-    if len(u) < count:
+    judged, known = drawn[posterior.inside(drawn)][:count], list[tuple[Floats, ...]]()
+    samples: Floats = judged
+    density: Callable[[Floats], Floats] = posterior
+    if len(judged) < count:
         return None
-    residuals, rate_effect = posterior.residuals(u)
-    log_density = posterior.log_density(residuals, rate_effect)
     for k, points in enumerate(JUDGED_POINTS):
-        usable = np.isfinite(log_density) & np.isfinite(residuals).all(axis=(1, 2))
-        if usable.sum() < 1.5 * quadratic_terms(centre.size):
-            return None
-        weights = np.exp(0.5 * np.maximum(log_density[usable] - log_density.max(), LEAST_LOG_WEIGHT))
-        surface = QuadraticResiduals.fitted(u[usable], residuals[usable], weights, centre, shape)
-        density = _corrected(replace(posterior, quadratic=surface, errors=0.0), u[usable], log_density[usable], weights)
-        samples = posterior_samples(density, centre, shape, seed + k, least=2.0 * SAMPLES)
-        if samples is None:
-            return None
-        judged = samples[:: len(samples) // points][:points]
-        further, further_effect = posterior.residuals(judged)
-        exact = posterior.log_density(further, further_effect)
-        errors = exact - density(judged)
-        if float(np.std(errors)) < LARGEST_ERROR:
+        residuals, rate_effect, jacobian = posterior.residuals_and_jacobian(judged)
+        exact = posterior.log_density(residuals, rate_effect)
+        if k and float(np.std(exact - density(judged))) < LARGEST_ERROR:
             return samples
-        u, residuals = np.concatenate([u, judged]), np.concatenate([residuals, further])
-        log_density = np.concatenate([log_density, exact])
+        usable = np.isfinite(exact) & np.isfinite(residuals).all((1, 2)) & np.isfinite(jacobian).all((1, 2, 3))
+        known.append(tuple(part[usable] for part in (judged, residuals, jacobian, exact)))
+        u, residuals, jacobian, log_density = (np.concatenate(parts) for parts in zip(*known, strict=True))
+        if len(u) * (1 + centre.size) < 1.5 * terms:
+            return None
+        weights = np.exp(0.5 * np.maximum(log_density - log_density.max(), LEAST_LOG_WEIGHT))
+        surface = QuadraticResiduals.fitted(u, residuals, weights, centre, shape, jacobian)
+        density = _corrected(replace(posterior, quadratic=surface, errors=0.0), u, log_density, weights)
+        found = posterior_samples(density, centre, shape, seed + k, least=2.0 * SAMPLES)
+        if found is None:
+            return None
+        samples, judged = found, found[:: len(found) // points][:points]
+    further, further_effect = posterior.residuals(judged)
+    errors = posterior.log_density(further, further_effect) - density(judged)
     return _resampled(judged, errors, LEAST_EFFECTIVE_SIZE, SAMPLES)
 
 
@@ -230,6 +232,8 @@ def _corrected(quadratic: Posterior, u: Floats, log_density: Floats, weights: Fl
     """
     assert quadratic.quadratic is not None
     centre, root = quadratic.quadratic.centre, quadratic.quadratic.root
+    if len(u) < 1.5 * quadratic_terms(u.shape[1]):
+        return quadratic
     errors = log_density - quadratic(u)
     surface = QuadraticResiduals.fitted(u, errors[:, None, None], weights, centre, root @ root.T)
 
@@ -240,12 +244,13 @@ def _corrected(quadratic: Posterior, u: Floats, log_density: Floats, weights: Fl
     return density
 
 
-LEAST_POINTS = 32
-"""Simulated points that quadratic residuals are fitted to at least."""
+LEAST_POINTS = 10
+"""Simulated points, with derivatives, that quadratic residuals are fitted to at least."""
 
 
-JUDGED_POINTS = (32, 32, 400)
-"""Draws at which each of the fits of quadratic residuals is judged; the last are weighted by what predictions say."""
+JUDGED_POINTS = (10, 16, 400)
+"""Draws at which each of the fits of quadratic residuals is judged, and which improve the next; the last are weighted
+by what predictions say."""
 
 
 LEAST_LOG_WEIGHT = -20.0

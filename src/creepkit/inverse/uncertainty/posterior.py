@@ -31,6 +31,10 @@ REFIT_TOLERANCES = Tolerances(max_steps=25, tolerance=1e-7)
 """Of minima about an optimum that is known."""
 
 
+OPTIMUM_TOLERANCES = Tolerances(gain=1e-3)
+"""Of the optimum that a posterior is about: ln p is right there to a tenth."""
+
+
 def residuals_with_errors(fit: Identification) -> tuple[Residuals, NoiseModel]:
     """Residuals at the optimum, and the noise, under whose covariance values are found by likelihood.
 
@@ -112,7 +116,7 @@ class Posterior:
         )
         if fit.error_covariance is None or fit.settings.weights != "likelihood":
             whole = problem.with_covariance(all_noise)
-            x = whole.minimise(fit.x).x
+            x = whole.minimise(fit.x, tolerances=OPTIMUM_TOLERANCES).x
             return replace(found, optimum=x[:count], least_chi_square=whole.chi_square(x))
         found = replace(found, errors=predicted_errors(fit, all_noise))
         return replace(found, least_chi_square=float(found.chi_square(*found.residuals(fit.u[None]))[0]))
@@ -162,19 +166,26 @@ class Posterior:
         A factor on all rates moves every coefficient, each of which is a coordinate's own. Where a term has none, and
         for tests compared over their whole life, whose derivatives are expensive, that effect is taken at the optimum.
         """
+        if self._rates_are_coefficients:
+            return self.residuals_and_jacobian(u)[:2]
+        return (self.quadratic or self.problem).candidate_residuals(u) - self.errors, self.rate_effect
+
+    def residuals_and_jacobian(self, u: Floats) -> tuple[Floats, Floats, Floats]:
+        """The same, and derivatives (candidates, tests, observations, parameters) of the residuals to u."""
+        residuals, jacobian = (self.quadratic or self.problem).candidate_jacobian(u)
+        effect = self.rate_effect
+        if self._rates_are_coefficients:
+            rate_scatter = self.rate_sd / np.sqrt(self.test_weights)[:, None]
+            of_rates = jacobian[..., list(self.problem.coordinates.coefficients)].sum(axis=-1)
+            effect = 0.5 * (self.rate_effect + of_rates * rate_scatter)
+        return residuals - self.errors, effect, jacobian
+
+    @property
+    def _rates_are_coefficients(self) -> bool:
+        """Whether the effect of a test's own rate is taken where a candidate is."""
         problem, law = self.problem, self.problem.law
-        predicted = self.quadratic or problem
-        coefficients = list(problem.coordinates.coefficients)
-        is_separable = (
-            len(coefficients) == len(law.terms) + len(law.states) and not problem.observations.followed_to_rupture.any()
-        )
-        if not (is_separable and self.rate_sd > 0):
-            return predicted.candidate_residuals(u) - self.errors, self.rate_effect
-        residuals, jacobian = predicted.candidate_jacobian(u)
-        rate_scatter = self.rate_sd / np.sqrt(self.test_weights)[:, None]
-        return residuals - self.errors, 0.5 * (
-            self.rate_effect + jacobian[..., coefficients].sum(axis=-1) * rate_scatter
-        )
+        is_separable = len(problem.coordinates.coefficients) == len(law.terms) + len(law.states)
+        return is_separable and not problem.observations.followed_to_rupture.any() and self.rate_sd > 0
 
     def inside(self, u: Floats) -> Bools:
         """(candidates,) whether the bounds of u and of the law's parameters, and its constraints, hold.

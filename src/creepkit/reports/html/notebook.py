@@ -26,8 +26,8 @@ from creepkit.reports.svg import PageFigures
 from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 STYLE = (
-    ".creepkit .answer{display:grid;grid-template-columns:minmax(0,1.75fr) minmax(16rem,1fr);gap:0 2rem}"
-    ".creepkit .law{grid-column:1/-1}.creepkit .formula math{width:fit-content;margin:0}"
+    ".creepkit .seen .scroll{display:grid;grid-template-columns:repeat(auto-fit,minmax(18rem,1fr));gap:0 1rem}"
+    ".creepkit .formula math{width:fit-content;margin:0}"
     ".creepkit .lead{font-weight:600}.creepkit dd{margin:0 0 .4rem;font-weight:600}.creepkit figure{margin:.5rem 0}"
     ".creepkit dl span{display:block;font-weight:400;opacity:.7}.creepkit .drawing svg{width:100%;height:auto}"
     ".creepkit table{border-collapse:collapse}.creepkit caption{text-align:left;opacity:.7}"

@@ -53,7 +53,7 @@ from creepkit.reports.identification import (
     value_blocks,
     worst_tests,
 )
-from creepkit.reports.identification_plot import summary_figure
+from creepkit.reports.identification_plot import summary_figures
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.law_names import LawNames
 from creepkit.reports.ranking import equivalents_among_remaining, explanation, ranking_blocks
@@ -86,7 +86,7 @@ def report_html(contents: ReportContents) -> str:
     names = LawNames(fit for one in found for fit in one.fits)
     sections = [
         findings_section(contents, figures),
-        *_group_sections(found, figures),
+        *_group_sections(contents, figures),
         data_section(contents),
         *_stage_sections(contents, figures, identified=bool(found)),
         *closing_sections(contents),
@@ -189,6 +189,8 @@ def findings_section(contents: ReportContents, figures: PageFigures) -> PageSect
         title = f"Creep rates of {plural(len(found), 'material')}"
         caption = f"{title}, by law, with 95 % intervals; open marks: the tests contradict the law."
         drawn = [(one.name, one.fit) for one in _by_law(found)]
+        said = [(contents.forecast_groups.get(name, name), one) for name, one in contents.forecasts.items()]
+        blocks.append(Items([f"{group}: {figure.line}" for group, one in said for figure in asked_figures(one)]))
         blocks.append(Paragraph(_overview(contents), "lead"))
         blocks.append(
             figures.picture(lambda: plate_figure(drawn), title, f"{title}; the table holds the numbers.", caption)
@@ -203,7 +205,7 @@ def group_answer(found: ReportGroup, figures: PageFigures, *, asked: Sequence[Ke
         rupture = ", and times to rupture, predicted over measured" if rupture_rows(fit) else ""
         title = f"The law over the tests{found.of}"
         description = f"Curves of {plural(len(fit.tests), 'test')} over time, creep rate over stress{rupture}."
-        picture = figures.picture(lambda: summary_figure(fit), title, description, f"{title}: {tests_text(fit)}.")
+        picture = figures.picture(lambda: summary_figures(fit), title, description, f"{title}: {tests_text(fit)}.")
     return answer(fit, found.ranking, asked=asked, picture=picture, **page)
 
 
@@ -232,15 +234,17 @@ def _overview(contents: ReportContents) -> str:
 # ---- materials -------------------------------------------------------------------------------------------------------
 
 
-def _group_sections(found: Sequence[ReportGroup], figures: PageFigures) -> Iterator[PageSection]:
+def _group_sections(contents: ReportContents, figures: PageFigures) -> Iterator[PageSection]:
     """The sections of one material; of several a table of all, and one for each."""
+    found = contents.identified
     drawn, most = len(found) <= MOST_RANKINGS_DRAWN, max(MOST_TEST_FIGURES // max(len(found), 1), 1)
     if len(found) == 1:
         yield from _sections_of(found[0], figures, "", most, drawn=drawn)
     elif found:
         yield PageSection("materials", "Materials", [_table_of_groups(found)], result="rates and exponents, a table")
         for k, one in enumerate(_by_law(found), start=1):
-            first = group_answer(one, figures)
+            own = [contents.forecasts[name] for name, group in contents.forecast_groups.items() if group == one.name]
+            first = group_answer(one, figures, asked=[figure for forecast in own for figure in asked_figures(forecast)])
             inner = [*_sections_of(one, figures, f"m{k}-", most, drawn=drawn)]
             yield PageSection(f"m{k}", one.name or f"Material {k}", [first], inner, first.headline)
 

@@ -297,11 +297,6 @@ SENTENCES = [
         "stated noise) unexplained",
         "most in strain of 'bar 1' about 1.5 h, where it lies 0.004 % above what was measured",
     ),
-    # of the best law an effect stands in its adequacy; of another one it is said beside it
-    (
-        ranking_of([1.0, 0.0], [LEFT, replace(LEFT, remedies=("thickness", "temperature drift"))]),
-        "; with thickness or temperature drift, which nobody modelled, sinh would explain them)",
-    ),
     (
         ranking_of([0.99, 0.01], [LEFT, LEFT], challenges=(THINNER,)),
         f"{NONE.format(2)} as they are stated; {THINNER}; the best, norton (weight 0.99 of the laws tried), leaves",
@@ -311,11 +306,6 @@ SENTENCES = [
         ranking_of([0.99, 0.01, 0.0], [EXPLAINS, LEFT, LEFT], further=("norton", "theta")),
         "not decisive: the law asked for does not explain the tests; of 2 more that were tried, norton is not "
         "contradicted by them (weight 0.99 of the laws tried): plan tests that can refute it",
-    ),
-    (
-        ranking_of([0.99, 0.01], challenges=(SUM, DRIFT)),
-        "not decisive: of 2 laws tried norton has nearly all the weight (weight 0.99 of the laws tried) and is not "
-        f"contradicted by the tests; but {SUM}; and {DRIFT}",
     ),
 ]
 
