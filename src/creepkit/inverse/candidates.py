@@ -23,7 +23,7 @@ from creepkit.inverse.reference_conditions import (
     reference_temperature,
 )
 from creepkit.language import CreepLaw
-from creepkit.quality.curve_shapes import shows_primary_creep, shows_tertiary_creep
+from creepkit.quality.curve_shapes import falls_logarithmically, shows_primary_creep, shows_tertiary_creep
 from creepkit.records import History, growing_output, is_logarithmic
 from creepkit.registry import default_registry
 
@@ -50,8 +50,9 @@ def candidates(histories: Sequence[History]) -> list[CreepLaw]:
 
     Laws of steady creep are Norton's and, where three stresses or more differ by half, Garofalo's sine, or a threshold
     stress, constant or linear in temperature, where minimum rates prefer it; with primary creep where a third of the
-    curves show it, with and without where a third relax, else beside hardening by strain and by time. Where a third of
-    the curves show tertiary creep, or where a table states rupture times, laws with damage are added.
+    curves show it, with and without where a third relax, and logarithmic creep where a third of them go with ln t, else
+    beside hardening by strain and by time. Where a third of the curves show tertiary creep, or where a table states
+    rupture times, laws with damage are added.
     """
     return list(named_candidates(histories).values())
 
@@ -61,8 +62,7 @@ def named_candidates(histories: Sequence[History]) -> dict[str, CreepLaw]:
     tests = [h for h in histories if h.outputs or h.minimum_rate is not None]
     if not tests:
         raise FitError("none of the tests has a curve or a minimum creep rate, from which a law could be identified")
-    curves = [h for h in tests if h.outputs]
-    several = _several_stresses(tests)
+    curves, several = [h for h in tests if h.outputs], _several_stresses(tests)
     steady = ["norton", *(["hyperbolic-sine"] if several else [])]
     if several:
         steady += threshold_laws(tests)
@@ -74,7 +74,8 @@ def named_candidates(histories: Sequence[History]) -> dict[str, CreepLaw]:
     elif _share(curves, _relaxes) > SHARE:
         names = [*steady, *(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening"]
     elif _share(_strained(curves), shows_primary_creep) > SHARE:
-        names = [*(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening"]
+        exhaustion = ["logarithmic"] * (_share(_strained(curves), falls_logarithmically) > SHARE)
+        names = [*(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening", *exhaustion]
     else:
         names = ["norton", "strain-hardening", "time-hardening", *steady[1:]]
     named = {name: law for name in names if (law := _law(name)) is not None}

@@ -24,6 +24,7 @@ from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import CreepLaw, strain, time
+from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import (
     History,
     NuisanceValues,
@@ -265,18 +266,34 @@ def apparent_exponent(stresses: Floats, rates: Floats, temperatures: Floats) -> 
     stresses, rates, temperatures : (tests,) MPa, 1/s and K. NaN where the stresses do not differ; an interval by
     Student's t from the scatter of the rates, NaN where no test is left to show it.
     """
+    levels = np.round(temperatures / ISOTHERMAL_RANGE)
+    return _slope(np.log(stresses), (levels[:, None] == np.unique(levels)).astype(float), rates, LEAST_SPREAD)
+
+
+def apparent_energy(stresses: Floats, rates: Floats, temperatures: Floats) -> tuple[float, float]:
+    """-R d ln rate / d(1/T), J/mol, by regression beside one stress exponent, and half of its 95 % interval.
+
+    As apparent_exponent; NaN where the temperatures do not differ, or not apart from the stresses.
+    """
+    per_energy, beside = -1.0 / (GAS_CONSTANT * temperatures), np.column_stack([np.ones(rates.size), np.log(stresses)])
+    return _slope(per_energy, beside, rates, (ISOTHERMAL_RANGE * per_energy / temperatures) ** 2)
+
+
+def _slope(x: Floats, beside: Floats, rates: Floats, least: Floats | float) -> tuple[float, float]:
+    """Slope of ln rate over x (tests,) beside other columns (tests, columns), and half of its 95 % interval.
+
+    NaN of rates that are not known, and of x that differs by less than `least` in mean square.
+    """
     known = np.isfinite(rates) & (rates > 0)
-    x, y, levels = np.log(stresses[known]), np.log(rates[known]), np.round(temperatures[known] / ISOTHERMAL_RANGE)
-    for level in np.unique(levels):
-        same = levels == level
-        x[same] -= x[same].mean()
-        y[same] -= y[same].mean()
-    squares, freedom = float((x**2).sum()), x.size - np.unique(levels).size - 1
-    if not squares > LEAST_SPREAD * max(x.size, 1):
+    columns = np.column_stack([x, np.log(np.where(known, rates, 1.0))])[known]
+    level, _, rank, _ = np.linalg.lstsq(beside[known], columns, rcond=None)
+    x, y = (columns - beside[known] @ level).T
+    squares, freedom = float((x**2).sum()), x.size - int(rank) - 1
+    if not squares > np.max(least, initial=0.0) * max(x.size, 1):
         return float("nan"), float("nan")
-    exponent = float((x * y).sum()) / squares
-    variance = float(((y - exponent * x) ** 2).sum()) / freedom if freedom > 0 else float("nan")
-    return exponent, float(student.ppf(0.975, max(freedom, 1))) * (variance / squares) ** 0.5
+    slope = float((x * y).sum()) / squares
+    variance = float(((y - slope * x) ** 2).sum()) / freedom if freedom > 0 else float("nan")
+    return slope, float(student.ppf(0.975, max(freedom, 1))) * (variance / squares) ** 0.5
 
 
 LEAST_SPREAD = 0.03**2

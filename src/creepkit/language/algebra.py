@@ -271,6 +271,11 @@ def fix(law: Law, values: Mapping[str, float]) -> Law:
     return _substituted(law, replacements, f"{law.name}({description})", f"{law.title} with {description}")
 
 
+def fixed_values(law: LawRecord) -> dict[str, float]:
+    """{parameter: value} of what fix() has put into a law, as it wrote into the name."""
+    return {name: float(value) for name, value in re.findall(r"[(,] ?(\w+)=([-+.\de]+)(?=[,)])", law.name)}
+
+
 def with_bounds(law: Law, bounds: Mapping[str, tuple[float, float]]) -> Law:
     """Change bounds of parameters; LawError for an unknown parameter and for what bounds cannot be."""
     stated = {law.symbol(name): limits for name, limits in bounds.items()}

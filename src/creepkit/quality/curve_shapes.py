@@ -42,6 +42,10 @@ CUT_LABEL = "cut at strain"
 """Label of a history whose later frames were left out."""
 
 
+EARLY, FIRST_RISE = 1 / 3, 1.2
+"""Share of the time within which a rate may fall at first; and the rate there over that of the line behind it."""
+
+
 FEWEST_FRAMES = 12
 """Of a part that is judged."""
 
@@ -77,7 +81,48 @@ def shows_primary_creep(history: History) -> bool:
     if not segments or not segments[0].is_first:
         return False
     times, values = _curve(history, segments[0].frames)
-    return bool(np.ptp(times) > 0 and values[-1] > values[0] and _rises_in_a_part(values, times, PARTS_OF_STRAIN))
+    grows = np.ptp(times) > 0 and values[-1] > values[0]
+    return bool(grows and (_rises_in_a_part(values, times, PARTS_OF_STRAIN) or _falls_at_first(times, values)))
+
+
+def falls_logarithmically(history: History) -> bool:
+    """Whether the output grows under the first load by ln(1 + t/t_0) rather than by t^m or an exponential and a line.
+
+    By BIC of least squares, each with a strain of loading.
+    """
+    if not shows_primary_creep(history):
+        return False
+    times, values = _curve(history, load_segments(history)[0].frames)
+    x = (times / times[-1])[:, None]
+    starts, powers = np.geomspace(1e-4, 3.0, 40), np.linspace(0.02, 0.98, 49)
+    shapes = [
+        [np.log1p(x / t) for t in starts],
+        [x**m for m in powers],
+        [np.hstack([np.exp(-x / t), x]) for t in starts],
+    ]
+    scores = []
+    for shape in shapes:
+        columns = [np.hstack([np.ones_like(x), one]) for one in shape]
+        left = min(float(((one @ np.linalg.lstsq(one, values)[0] - values) ** 2).sum()) for one in columns)
+        scores.append(x.size * np.log(max(left, 1e-300)) + columns[0].shape[1] * np.log(x.size))
+    return bool(scores[0] < min(scores[1:]))
+
+
+def _falls_at_first(times: Floats, values: Floats) -> bool:
+    """Whether the first rate is FIRST_RISE times the later one, and the second reading below the line of later ones.
+
+    By more than chance: the first reading alone may be before the load. A line through the last two thirds of the time.
+    """
+    later = times > times[0] + EARLY * np.ptp(times)
+    if later.sum() < FEWEST_FRAMES or later[1]:
+        return False
+    (slope, level), covariance = np.polyfit(times[later], values[later], 1, cov=True)
+    variance = covariance[0, 0] * times[1] ** 2 + 2.0 * covariance[0, 1] * times[1] + covariance[1, 1]
+    noise = float(np.var(values[later] - level - slope * times[later], ddof=2))
+    below = level + slope * times[1] - values[1]
+    first = (values[1] - values[0]) / (times[1] - times[0])
+    limit = float(student.isf(SIGNIFICANCE, int(later.sum()) - 2)) * np.sqrt(variance + noise)
+    return bool(slope > 0.0 and first > FIRST_RISE * slope and below > limit)
 
 
 def _curve(history: History, frames: Ints) -> tuple[Floats, Floats]:

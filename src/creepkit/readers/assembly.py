@@ -48,7 +48,7 @@ from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.table_heads import with_weak_sources
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms, words_of
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_written_name, unit_suffix, words_of
 from creepkit.records import (
     SECONDS_PER_HOUR,
     UNKNOWN_DURATION,
@@ -59,6 +59,7 @@ from creepkit.records import (
     known_specimens,
     specimen_of,
 )
+from creepkit.records.quantities import LENGTH
 from creepkit.records.specimen_lookup import lengths_by_default
 from creepkit.specimens.elastic_part import with_elastic_part
 
@@ -357,13 +358,18 @@ def _record_unstated(conditions: StatedConditions, specimen: str, is_named: bool
     names = {alias: one.name for one in dimensions_of(known_specimens().get(specimen)) for alias in one.names}
     conditions.geometry = {names.get(name, name): length for name, length in conditions.geometry.items()}
     lengths = lengths_by_default(specimen, conditions.geometry)
-    for name in lengths:
-        words = {*name.split("_")}
-        said = {key: _LENGTH.fullmatch(text) for key, text in conditions.labels.items()}
-        if found := {key: one for key, one in said.items() if one and words <= {*words_of(key).split()}}:
-            label = quoted(next(iter(found)), 60)
-            what = f"'{label}' is a label, and no {name} of the {specimen} is stated; how many mm is it?"
-            raise conditions.question(what, f"{name}_mm", *(float(one[1].replace(",", ".")) for one in found.values()))
+    for name in [*lengths]:
+        words, piece = {*name.split("_")}, {*specimen.split("-")} | _WORDS_OF_PIECES
+        labels = [key for key in conditions.labels if words <= {*words_of(split_written_name(key)[0]).split()}]
+        said = {key: _length_said(key, conditions.labels[key]) for key in labels}
+        found = {key: length for key, length in said.items() if length}
+        label = next(iter(found), "")
+        if len(found) == 1 and {*words_of(split_written_name(label)[0]).split()} <= words | piece:
+            conditions.geometry[name] = found[label]  # "dimple radius [mm]"
+            del conditions.labels[label], lengths[name]
+        elif found:
+            what = f"'{quoted(label, 60)}' is a label, and no {name} of the {specimen} is stated; how many mm is it?"
+            raise conditions.question(what, f"{name}_mm", *found.values())
     if lengths and (not is_named or len(conditions.geometry.keys() & conditions.terms.dimensions) >= len(lengths)):
         listed = "; ".join(f"{name} {length:g}" for name, length in lengths.items())
         what = "lengths by default: " if is_named else _BY_ITS_COLUMNS.format(specimen)
@@ -390,7 +396,19 @@ def _record_place(conditions: StatedConditions, table: CellTable, specimen: str)
                 conditions.record_assumption(f"{one.long_name} ({name} has the {two.long_name})")
 
 
-_LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?mm")
+_LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?([^\d\s]*)")
+
+
+_WORDS_OF_PIECES = {"dimple", "plate", "sheet", "disc", "specimen", "sample", "piece", "initial", "nominal"}
+"""That a head says beside the name of a length, such as "specimen thickness"."""
+
+
+def _length_said(head: str, text: str) -> float | None:
+    """mm, of a label that is a number with a unit of length in it or in its head; None of others."""
+    if not (match := _LENGTH.fullmatch(text.strip())):
+        return None
+    unit = unit_suffix(match[2] or split_written_name(head)[1]) or ""
+    return LENGTH.units[unit].factor * float(match[1].replace(",", ".")) if unit in LENGTH.units else None
 
 
 def questions_of_assumed(history: History) -> list[Question]:

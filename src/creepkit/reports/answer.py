@@ -105,13 +105,15 @@ def _written_out(value: float, digits: int) -> str:
 def key_figures(fit: Identification) -> list[KeyFigure]:
     """Stress exponent, activation energy and creep rate at the tests; of a rejected law what was measured."""
     rates = compared_minimum_rates(fit)
-    measured, half, predicted = exponents(rates) if rates else (math.nan, math.nan, math.nan)
+    slopes = ([math.nan] * 3 if not rates else exponents(rates, energy=energy) for energy in (False, True))
+    (measured, half, predicted), (heat, error, _) = slopes
+    of_heat = (heat, heat - error, heat + error)
+    by_rates = _with_interval("measured activation energy", _range(fit), of_heat, 1e-3, "kJ/mol")
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
-        if not math.isfinite(measured):
-            return []
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
         interval = (measured, measured - half, measured + half)
-        return [KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law)]
+        found = [KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law), by_rates]
+        return [one for one in found if math.isfinite(one.value)]
     r = fit.reference
     of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
     units = {one.name: one.unit for one in fit.law.conditions}
@@ -120,9 +122,9 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     rate, exponent, energy = rate_exponent_and_energy(fit)
     by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
-    low, high = fit.ranges["temperature"]
-    if fit.law.uses(temperature) and high - low > ISOTHERMAL_RANGE:
-        figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol"))
+    if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
+        by_tests = f"{by_rates.text} by measured minimum rates" if math.isfinite(heat) else ""
+        figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with usual errors" if any(one.included for one in fit.unmodelled) else ""
     return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)]
 
@@ -267,13 +269,14 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
 
 def _precision(fit: Identification) -> Iterator[str]:
     """What the tests do not determine, and what intervals leave out."""
+    rejected = fit.adequacy is not None and fit.adequacy.rejects  # whose exponents are not those of the tests
+    by = "by this law the tests" if rejected else "the tests"
     for verdict, words in ((NOT_DETERMINED, "do not determine"), (POORLY_DETERMINED, "hardly determine")):
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
-            yield f"the tests {words} {_named(names, 'parameter', quoted=False)}"
+            yield f"{by} {words} {_named(names, 'parameter', quoted=False)}"
     exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
-    rejected = fit.adequacy is not None and fit.adequacy.rejects  # whose exponents are not those of the tests
     if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
         yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
     change = combined_change_text(fit.unmodelled)

@@ -11,7 +11,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
 from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.identified_values import MinimumRate, minimum_rates_of
-from creepkit.inverse.minimum_rates import apparent_exponent
+from creepkit.inverse.minimum_rates import apparent_energy, apparent_exponent
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_stresses
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
@@ -222,13 +222,14 @@ def compared_minimum_rates(fit: Identification) -> list[MinimumRate]:
     return rates if 2 * len(rates) >= len(fit.tests) else []
 
 
-def exponents(rates: Sequence[MinimumRate]) -> tuple[float, float, float]:
+def exponents(rates: Sequence[MinimumRate], *, energy: bool = False) -> tuple[float, float, float]:
     """The apparent stress exponent of measured minimum rates with half of its 95 % interval, and of predicted ones.
 
-    NaN of tests at one stress.
+    NaN of tests at one stress. energy : the activation energy instead, J/mol, NaN of tests at one temperature.
     """
+    apparent = apparent_energy if energy else apparent_exponent
     celsius, stresses, *columns = _columns(rates, "temperature", "stress", "measured", "predicted")
-    measured, predicted = (apparent_exponent(stresses, one, celsius + ZERO_CELSIUS) for one in columns)
+    measured, predicted = (apparent(stresses, one, celsius + ZERO_CELSIUS) for one in columns)
     return *measured, predicted[0]
 
 

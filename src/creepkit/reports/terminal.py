@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
+import threading
 import time
 from collections.abc import Iterable, Sequence
 from types import TracebackType
@@ -12,7 +14,7 @@ from typing import Any
 import typer
 
 from creepkit import errors
-from creepkit.jobs.progress import series_of_task
+from creepkit.jobs.progress import duration_text, series_of_task
 
 
 def printable(text: str) -> str:
@@ -64,13 +66,13 @@ def print_json(value: Any) -> None:
 class ProgressBar:
     """Use as a context; call `tick(task, done, total)`, maybe with a note, from the work. Writes to stderr."""
 
-    LONG_STAGE = 60.0
+    LONG_STAGE = 20.0
     """s after which a stage that goes on has a plain line more, the next one after twice that time, and so on."""
 
     def __init__(self) -> None:
         self._bar: Any = None
         self._tasks: dict[str, Any] = {}
-        self._stage, self._due = "", time.monotonic() + self.LONG_STAGE
+        self._stage, self._said, self._begun, self._due, self._ended = "", "", 0.0, math.inf, threading.Event()
 
     def __enter__(self) -> ProgressBar:
         if sys.stderr.isatty():
@@ -87,13 +89,24 @@ class ProgressBar:
             )
             self._bar = Bar(*columns, console=Console(stderr=True))
             self._bar.start()
+        else:
+            threading.Thread(target=self._watch, daemon=True).start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._ended.set()
         if self._bar is not None:
             self._bar.stop()
+
+    def _watch(self) -> None:
+        """Say how far a long stage is, whether or not a part of it ends: a part may take minutes."""
+        while not self._ended.wait(min(1.0, 0.2 * self.LONG_STAGE)):
+            now = time.monotonic()
+            if now > self._due:
+                self._due += 2.0 * (now - self._begun)
+                tell(f"{self._said} ({duration_text(now - self._begun)} so far)", err=True)
 
     def tick(self, task: str, done: int, total: int, note: str = "") -> None:
         """Report that `done` of `total` parts of a task are finished; note : what else there is to say."""
@@ -104,9 +117,11 @@ class ProgressBar:
             if task not in self._tasks:
                 self._tasks[task] = self._bar.add_task(task, total=total, note=note)
             self._bar.update(self._tasks[task], completed=done, total=total, note=note)
-        elif f"{task} {member}" != self._stage:
-            self._stage, self._due = f"{task} {member}", time.monotonic() + self.LONG_STAGE
+            return
+        now = time.monotonic()
+        if f"{task} {member}" != self._stage:
+            self._stage, self._begun, self._due = f"{task} {member}", now, now + self.LONG_STAGE
             tell(f"{task}{member and f' {member}'} ...", err=True)
-        elif time.monotonic() > self._due:
-            self._due += 2 * (time.monotonic() - self._due + self.LONG_STAGE)
-            tell(f"{task}: {done} of {total}{note and f' ({note})'}", err=True)
+        left = f", about {duration_text((now - self._begun) * (total / done - 1))} more" if 0 < done < total else ""
+        more = note.removeprefix(member).lstrip(", ")
+        self._said = f"{self._stage.strip()}: {done} of {total}{more and f' ({more})'}{left}"

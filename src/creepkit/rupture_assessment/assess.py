@@ -222,6 +222,7 @@ def _fit(
         degree=degree,
         fixed=settings.fixed.get(name, {}),
         level=settings.level,
+        usual=settings.usual_scatter,
     )
 
 
@@ -232,7 +233,7 @@ def _relation(
     if not asked and known.sum() < LEAST_RATES:
         return None
     try:
-        return fit_relation(tests, with_rate, level=settings.level)
+        return fit_relation(tests, with_rate, level=settings.level, usual=settings.usual_scatter)
     except FitError:
         if asked:
             raise

@@ -59,7 +59,8 @@ class RuptureSettings(Options, title="settings of an assessment"):
 
     degrees : of polynomials of log10 of the stress that are tried.
     fixed : {method: {constant: value}} that are given in the place of fitted ones, {"larson-miller": {"C": 20.0}}.
-    random_effects : whether heats and laboratories scatter. level : of intervals and bounds.
+    random_effects : whether heats and laboratories scatter. usual_scatter : of one test of a heat, of log10 of time,
+    which counts as that of two tests more; 0 for none. level : of intervals and bounds.
     seed : of the tests that a check of repeatability leaves out.
     """
 
@@ -68,6 +69,9 @@ class RuptureSettings(Options, title="settings of an assessment"):
         dict, "A constant that is given.", flag="fix", example="larson-miller.C=20"
     )
     random_effects: bool = option(True, "Whether heats and laboratories scatter.")
+    usual_scatter: float = option(
+        0.1, "Scatter of log10 of the life of a test, which counts as two tests more; 0: none.", numbers(0, 1)
+    )
     level: float = option(0.95, "Probability of intervals and bounds.", PROBABILITY)
     seed: int = option(0, "Of the tests that a check of repeatability leaves out.", SEED)
 

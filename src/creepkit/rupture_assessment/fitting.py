@@ -12,6 +12,9 @@ rounding, without run-outs: there the integrand is Gaussian.
 
 All functions take several candidates at once, so that derivatives by differences cost one call.
 
+Few tests may by chance lie so near to a curve of many constants that their scatter seems to be none. So a scatter that
+is usual counts as that of USUAL_TESTS tests more: a scaled inverse chi-square distribution of the variance.
+
 Monkman-Grant's relation is two such fits: rupture times by minimum creep rates, and these by a rate law.
 """
 
@@ -51,6 +54,10 @@ MODE_STEPS = 30
 
 LARGEST_STEP = 4.0
 """Of an effect in one Newton step, in scales: e^z is steep."""
+
+USUAL_TESTS = 2.0
+"""As which the usual scatter counts: for 7 tests of 3 temperatures, whose lives scatter by 0.1 to 0.2, intervals of a
+strength at 1e5 h hold it in 93 % of plans with it, and in 87 % without; for 10 tests in 94 % with and without."""
 
 LEAST_SCATTER = 1e-9
 """Standard deviation of an effect that is none, log10 of time."""
@@ -183,13 +190,18 @@ Cost = Callable[[Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class _Scaled:
-    """The problem in coordinates of order one: mean = offset + U c + k V c, with U orthogonal."""
+    """The problem in coordinates of order one: mean = offset + U c + k V c, with U orthogonal.
+
+    usual : standard deviation of log10 of time that counts as that of so many tests added.
+    """
 
     times: GroupedTimes
     offset: Floats
     linear: Floats
     bilinear: Floats | None
     transform: Floats  # coefficients = transform @ scaled coefficients
+    usual: float
+    added: float
 
     @property
     def location_count(self) -> int:
@@ -222,6 +234,7 @@ class _Scaled:
         rows = max(MOST_NUMBERS // mean.shape[1], 1)
         parts = [slice(k, k + rows) for k in range(0, len(candidates), rows)]
         value = -np.concatenate([self.times.log_likelihood(mean[p], scale[p], scatter[p]) for p in parts])
+        value += self.added * (np.log(scale) + 0.5 * (self.usual / scale) ** 2)
         return np.where(np.isfinite(value), value, 1e30)
 
 
@@ -256,19 +269,30 @@ def centre_of(tests: RuptureTests) -> Centre:
 
 
 def fit_method(
-    method: RuptureMethod, tests: RuptureTests, at: Conditions, *, degree: int, fixed: Mapping[str, float], level: float
+    method: RuptureMethod,
+    tests: RuptureTests,
+    at: Conditions,
+    *,
+    degree: int,
+    fixed: Mapping[str, float],
+    level: float,
+    usual: float = 0.0,
 ) -> RuptureFit:
-    """The maximum of the likelihood; FitError where the tests do not determine the coefficients."""
+    """The maximum of the likelihood; FitError where the tests do not determine the coefficients.
+
+    usual : scatter of log10 of the time of a test that counts beside that of the tests; 0 for none.
+    """
     centre = centre_of(tests)
     basis = method.basis(at, degree, fixed, centre)
     times = GroupedTimes.of(tests.log_time, tests.censored, tests.groups)
-    problem = _scaled(method, basis, times, tests.ruptured)
+    problem = _scaled(method, basis, times, tests.ruptured, usual)
     point = _minimum(problem, _start(problem, tests))
     location, count = problem.location_count, problem.linear.shape[1]
     scale, scatter = float(np.exp(point[location])), np.abs(point[location + 1 :])
-    freedom = float(max(tests.ruptured - location, 1))
+    broke = tests.ruptured + problem.added
+    freedom = float(max(broke - location, 1))
     levels = [m.shape[1] for m in times.members]
-    scale_corrected = scale * float(np.sqrt(tests.ruptured / freedom))
+    scale_corrected = scale * float(np.sqrt(broke / freedom))
     scatter_corrected = scatter * np.sqrt([h / (h - 1.0) for h in levels])
     corrected = np.array([*point[:location], np.log(scale_corrected), *scatter_corrected])
     covariance = _covariance(problem, point, corrected)
@@ -337,7 +361,7 @@ def too_few_tests(
     return f"{broke}, and {constants} constants with {scatters} take {needed} or more; add tests"
 
 
-def _scaled(method: RuptureMethod, basis: Basis, times: GroupedTimes, ruptured: int) -> _Scaled:
+def _scaled(method: RuptureMethod, basis: Basis, times: GroupedTimes, ruptured: int, usual: float) -> _Scaled:
     size = np.linalg.norm(basis.linear, axis=0)
     count = basis.linear.shape[1] + method.bilinear
     broken = (basis.linear / np.maximum(size, 1e-300))[~times.censored]
@@ -349,7 +373,7 @@ def _scaled(method: RuptureMethod, basis: Basis, times: GroupedTimes, ruptured: 
     _, R = np.linalg.qr(basis.linear)
     transform = np.linalg.inv(R) * np.sqrt(times.log_time.size)
     bilinear = None if basis.bilinear is None else basis.bilinear @ transform
-    return _Scaled(times, basis.offset, basis.linear @ transform, bilinear, transform)
+    return _Scaled(times, basis.offset, basis.linear @ transform, bilinear, transform, usual, USUAL_TESTS * (usual > 0))
 
 
 def _start(problem: _Scaled, tests: RuptureTests) -> Floats:
@@ -402,7 +426,7 @@ def _variance_freedom(problem: _Scaled, point: Floats, scale: float, scatter: Fl
     if problem.bilinear is not None:
         columns = np.column_stack([columns + point[count] * problem.bilinear, problem.bilinear @ point[:count]])
     members = [m[broken] for m in problem.times.members]
-    return variance_freedom(columns[broken], members, scale**2, [float(v) for v in scatter**2])
+    return variance_freedom(columns[broken], members, scale**2, [float(v) for v in scatter**2], problem.added)
 
 
 def _covariance(problem: _Scaled, point: Floats, corrected: Floats) -> Floats:
@@ -473,20 +497,23 @@ class MinimumRateRelation:
         return self.times.test_scatter(at)
 
 
-def fit_relation(tests: RuptureTests, with_rate: RuptureTests, *, level: float) -> MinimumRateRelation:
+def fit_relation(
+    tests: RuptureTests, with_rate: RuptureTests, *, level: float, usual: float = 0.0
+) -> MinimumRateRelation:
     """The relation and its rate law; FitError, in one sentence, where rates are missing or too few."""
     known = np.isfinite(tests.minimum_rate)
     if not known.any():
         raise FitError("no test has a minimum creep rate, which monkman-grant needs; add minimum_rate to the tests")
     both = tests[known]
-    times = fit_method(MONKMAN_GRANT, both, conditions_of(both), degree=1, fixed={}, level=level)
+    times = fit_method(MONKMAN_GRANT, both, conditions_of(both), degree=1, fixed={}, level=level, usual=usual)
     log_rates = replace(
         with_rate,
         log_time=frozen(np.log10(with_rate.minimum_rate * SECONDS_PER_HOUR)),
         censored=frozen(np.zeros(len(with_rate)), dtype=bool),
     )
     fixed = {"Q": UNUSED_ENERGY} if with_rate.isothermal else {}
-    rates = fit_method(MINIMUM_RATE, log_rates, conditions_of(with_rate), degree=1, fixed=fixed, level=level)
+    at = conditions_of(with_rate)
+    rates = fit_method(MINIMUM_RATE, log_rates, at, degree=1, fixed=fixed, level=level, usual=usual)
     return MinimumRateRelation(times, rates)
 
 

@@ -72,12 +72,12 @@ class VarianceFreedom:
 
 
 def variance_freedom(
-    columns: Floats, members: Sequence[Floats], within: float, between: Sequence[float]
+    columns: Floats, members: Sequence[Floats], within: float, between: Sequence[float], added: float = 0.0
 ) -> VarianceFreedom:
     """Of a linear model with effects.
 
     columns : (tests, location). members : (tests, levels) of zeros and ones, one for each kind. within : variance of a
-    test. between : variances of effects.
+    test. between : variances of effects. added : tests as which a usual variance of a test counts beside these.
     """
     kept = [(Z, v) for Z, v in zip(members, between, strict=True) if Z.shape[1] <= MOST_LEVELS]
     levels = [Z.shape[1] for Z, _ in kept]
@@ -100,7 +100,7 @@ def variance_freedom(
     trace = (free - float(spread @ np.diag(ZPZ))) / within
     square = (trace - sum(v * m for (_, v), m in zip(kept, mixed, strict=True))) / within
     information = np.empty((len(kept) + 1, len(kept) + 1))
-    information[0, 0] = square
+    information[0, 0] = square + added / within**2
     information[0, 1:] = information[1:, 0] = mixed
     for i, one in enumerate(parts):
         for j, other in enumerate(parts):
@@ -110,7 +110,9 @@ def variance_freedom(
         side = C @ (columns.T @ VZ[:, part])
         slopes.append(side @ side.T)
     uncertainty = np.linalg.pinv(0.5 * information, rcond=LEAST_INFORMATION, hermitian=True)
-    return VarianceFreedom(frozen([within, *(v for _, v in kept)]), frozen(uncertainty), frozen(np.array(slopes)), free)
+    return VarianceFreedom(
+        frozen([within, *(v for _, v in kept)]), frozen(uncertainty), frozen(np.array(slopes)), free + added
+    )
 
 
 BISECTIONS = 50

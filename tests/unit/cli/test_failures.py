@@ -6,9 +6,11 @@ import importlib
 import inspect
 import io
 import os
+import re
 import shlex
 import subprocess
 import sys
+import time
 import types
 from pathlib import Path
 from typing import Annotated, Union, get_args, get_origin, get_type_hints
@@ -155,6 +157,14 @@ def test_a_terminal_is_not_steered_by_tasks_of_a_progress_bar(monkeypatch: pytes
         progress.tick("red \x1b]0;owned\x07 [/red]", 1, 1)
     assert "\x1b]0;" not in stream.getvalue()
     assert "[/red]" in stream.getvalue()
+
+
+def test_a_long_part_of_a_stage_is_told_without_a_tick(monkeypatch, capsys) -> None:
+    monkeypatch.setattr(terminal.ProgressBar, "LONG_STAGE", 0.05)
+    with terminal.ProgressBar() as progress:
+        progress.tick("start", 1, 4)
+        time.sleep(0.3)
+    assert re.search(r"start: 1 of 4, about \d+ s more \(\d+ s so far\)", capsys.readouterr().err)
 
 
 @pytest.mark.parametrize("target", ["latex", "python", "json"])

@@ -7,7 +7,7 @@ from scipy.stats import binom, ttest_1samp
 import creepkit as ck
 from creepkit.inverse.identified_values import minimum_rates_of
 from creepkit.inverse.identify import identify
-from creepkit.inverse.minimum_rates import apparent_exponent, least_slope, with_minimum_rates
+from creepkit.inverse.minimum_rates import apparent_energy, apparent_exponent, least_slope, with_minimum_rates
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
@@ -286,6 +286,10 @@ def test_the_apparent_exponent_is_that_of_a_power_law_at_each_temperature() -> N
     rates = 1e-18 * stresses**6.5 * np.where(temperatures > 950.0, 40.0, 1.0)
     assert apparent_exponent(stresses, rates, temperatures) == pytest.approx((6.5, 0.0), abs=1e-9)
     assert np.isnan(apparent_exponent(np.full(3, 50.0), rates[:3], temperatures[:3])).all()
+    energy = 8.314462618 * np.log(40.0) / (1 / 900 - 1 / 1000)
+    assert apparent_energy(stresses, rates, temperatures) == pytest.approx((energy, 0.0), abs=1e-3)
+    assert np.isnan(apparent_energy(stresses[:3], rates[:3], temperatures[:3])).all()
+    assert np.isnan(apparent_energy(stresses[2:4], rates[2:4], temperatures[2:4])).all()
 
 
 def test_the_interval_of_the_apparent_exponent_holds_it_in_95_per_cent_of_draws() -> None:

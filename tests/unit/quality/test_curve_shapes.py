@@ -5,12 +5,14 @@ tests without tertiary creep 0.1 % are taken for it with white noise, 1.1 % with
 frame and 4.8 % with one of 0.9; of tests with tertiary creep 96 % are seen where noise is at most 3 % of the strain.
 """
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 import creepkit as ck
 from creepkit.quality import check_data_quality, repeated_row_notes, without_copies
-from creepkit.quality.curve_shapes import shows_primary_creep, shows_tertiary_creep
+from creepkit.quality.curve_shapes import falls_logarithmically, shows_primary_creep, shows_tertiary_creep
 from creepkit.quality.repeats import agreement_by_chance, copied_tests, repeated_rows
 from creepkit.quality.rig import temperature_step
 from creepkit.quality.smooth_curve import smooth_curve
@@ -51,14 +53,8 @@ def planted(curve, frames, size, correlation, rng):
 
 def share(curves, draws, correlation, sizes=SIZES):
     rng = np.random.default_rng(0)
-    found = [
-        shows_tertiary_creep(planted(curve, frames, size, correlation, rng))
-        for curve in curves.values()
-        for frames in FRAMES
-        for size in sizes
-        for _ in range(draws)
-    ]
-    return float(np.mean(found))
+    plans = product(curves.values(), FRAMES, sizes, range(draws))
+    return float(np.mean([shows_tertiary_creep(planted(*plan, correlation, rng)) for *plan, _ in plans]))
 
 
 @pytest.mark.parametrize(("correlation", "allowed"), [(0.0, 0.01), (0.5, 0.03), (0.9, 0.08)])
@@ -91,13 +87,17 @@ def test_primary_creep_is_seen_where_the_rate_falls_and_not_in_noise():
     primary = ("cube root", "primary and secondary", "primary and tertiary")
     curves = {**CONCAVE, **TERTIARY}
     for name, curve in curves.items():
-        found = [
-            shows_primary_creep(planted(curve, frames, 0.01, correlation, rng))
-            for frames in (25, 50, 200)
-            for correlation in (0.0, 0.5)
-            for _ in range(5)
-        ]
+        plans = product((25, 50, 200), (0.01,), (0.0, 0.5), range(5))
+        found = [shows_primary_creep(planted(curve, *plan, rng)) for *plan, _ in plans]
         assert np.mean(found) >= 0.9 if name in primary else np.mean(found) <= 0.1, name
+
+
+def test_logarithmic_creep_and_a_short_transient_are_told_from_other_curves():
+    rng, short = np.random.default_rng(2), {"short": lambda x: 0.07 * (1.0 - np.exp(-25.0 * x)) + 0.93 * x}
+    for name, curve in {**CONCAVE, **short, "logarithmic": lambda x: np.log1p(20.0 * x)}.items():
+        tests = [planted(curve, 50, 0.003, 0.0, rng) for _ in range(8)]
+        assert np.mean(list(map(falls_logarithmically, tests))) == (name == "logarithmic")
+        assert np.mean(list(map(shows_primary_creep, tests))) == (name != "straight")
 
 
 def test_primary_creep_that_is_short_in_time_is_seen():

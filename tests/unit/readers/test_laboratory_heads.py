@@ -468,7 +468,7 @@ def test_the_spans_of_a_beam_are_read_by_their_usual_names_and_never_silently_by
         (test,) = ck.read_histories(path)
         return test
 
-    for outer, inner in (("Outer span", "Inner span"), ("Support span", "Loading span"), ("Stützweite", "Lastabstand")):
+    for outer, inner in (("Piece span", "Inner span"), ("Support span", "Loading span"), ("Stützweite", "Lastabstand")):
         assert read(f"{outer},60", f"{inner},25").geometry == {"width": 4, "height": 3, "span": 60, "inner_span": 25}
     assert read("Outer span,60").labels["assumed"].endswith("lengths by default: inner_span 20 mm")
     with pytest.raises(HistoryError, match=r"'Major span' is a label, and no span .* span_mm = 60 \(or span_mm = 25\)"):

