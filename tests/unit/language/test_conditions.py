@@ -1,0 +1,54 @@
+"""Conditions: numbers that tests state beside load and temperature, in laws, fits, forecasts and exports."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import creepkit as ck
+from creepkit.language import CreepLaw, Param, conditions, parameters, stress
+from creepkit.language.law_codec import law_from_json, law_to_json
+
+A, n, p = parameters("A n p")
+d, dose = *conditions("grain_size", unit="mm"), *conditions("dose", unit="dpa")
+TABLE = {A: Param("rate", (1e-25, 1e-8), "1/s", "log"), n: Param("exponent", (1, 10)), p: Param("of grains", (0, 4))}
+LAW = CreepLaw("grains", {"power": A * stress**n * (d / 0.05) ** -p}, TABLE)
+PLANTED = {"A": 1e-16, "n": 4.2, "p": 2.0}
+
+
+def bar(size: str, load: float, rng: np.random.Generator) -> ck.History:
+    """Under a constant load, integrated by scipy; its rate scatters by 5 %."""
+    rate = 1e-16 * (float(size) / 50) ** -2 * np.exp(0.05 * rng.normal())
+    times = np.linspace(0, 0.02 / (rate * load**4.2), 41)[1:]
+    run = solve_ivp(lambda _, e: rate * (load * np.exp(e)) ** 4.2, (0, times[-1]), [0.0], t_eval=times, rtol=1e-9)
+    readings, labels = {"strain": run.y[0] + 2e-5 * rng.normal(size=40)}, {"grain": "x", "grain size (um)": size}
+    return ck.History(f"{size} {load}", times, readings, ck.constant_stress(load), 1000.0, labels=labels)
+
+
+def test_a_planted_grain_size_exponent_is_found_and_its_forecast_asks_for_the_size(tmp_path):
+    rng = np.random.default_rng(1)
+    fit = ck.identify(LAW, [bar(size, load, rng) for size in ("20", "50", "120") for load in (60.0, 80.0, 110.0)])
+    exponent = fit.estimates[2]
+    assert exponent.low < 2.0 < exponent.high < exponent.low + 0.4
+    fit.save(tmp_path / "fit.json")
+    plan = ck.History("plan", [1e5, 1e6], {}, ck.constant_stress(70.0), 1000.0)
+    with pytest.raises(ck.errors.HistoryError, match="states no grain_size.*label grain_size: 1 mm"):
+        ck.forecast(fit, plan)
+    (test,) = ck.forecast(ck.load(tmp_path / "fit.json"), plan.replace(labels={"grain_size": "0,2 mm"})).tests
+    assert "grain_size 0.2 (the tests cover 0.02 to 0.12" in test.extrapolation
+
+
+def test_two_conditions_survive_files_and_are_arguments_or_numbers_of_exports():
+    law = CreepLaw("irradiated", {"power": A * stress**n * d**-p * (1 + dose)}, TABLE, "With dose", references="here")
+    assert law_from_json(json.loads(json.dumps(law_to_json(law)))) == law == pickle.loads(pickle.dumps(law))
+    exact, ends = 1e-16 * 80**4.2 * 0.03**-2 * 1.5, {"grain_size": 0.03, "dose": 0.5}
+    modules = [ck.export(law, "python", PLANTED), ck.export(law, "numpy", PLANTED | ends)]
+    for text, more in zip(modules, (ends, {}), strict=True):
+        exec(text, names := {})
+        assert names["rate"](80.0, **more) == pytest.approx(exact, rel=1e-12)
+    assert "@ExternalStateVariable real grain_size;" in ck.export(law, "mfront", PLANTED)
+    with pytest.raises(ck.errors.ExportError, match="no place for conditions.*give dose, grain_size"):
+        ck.export(law, "abaqus", PLANTED)
+    assert ck.check_law(law).passed
