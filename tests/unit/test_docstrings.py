@@ -14,7 +14,7 @@ import creepkit
 
 ROOT = Path(creepkit.__file__).parent
 EXEMPT = ("example_data/",)
-"""Rebuilt by a later issue, or data."""
+"""Data."""
 GENERATED = tuple(f"kernels/{kind}_functions.py" for kind in ("llvm", "numpy", "scalar", "torch"))
 """Functions that generated code calls, element by element."""
 

@@ -11,17 +11,22 @@ from creepkit.arrays import ArrayLike
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError
 from creepkit.language import symbols
-from creepkit.records import History, LawWithValues, Loading, Predictor, Program, Status, call_of_plugin
+from creepkit.records import (
+    ROOM_TEMPERATURE,
+    History,
+    LawWithValues,
+    Loading,
+    Predictor,
+    Program,
+    Status,
+    call_of_plugin,
+)
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictor
 from creepkit.specimens.run import Run, run_from_outputs, unusual_values, with_explanation
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw, Elastic
-
-
-ROOM_TEMPERATURE = 293.15
-"""K; stands where a law does not ask for a temperature."""
 
 
 @checked

@@ -16,7 +16,7 @@ from creepkit.fem import simulation
 from creepkit.integration import core_structures
 from creepkit.integration.core_structures import IntegrationSettings, SettingsStructure
 from creepkit.integration.time_discretisation import SDIRK4, SMALLEST_EXPONENT
-from creepkit.records import Status
+from creepkit.records import ROOM_TEMPERATURE, Status
 from creepkit.specimens.bulge.reduced_order_model import SEARCH_GROWTH, SEARCH_MODES, SEARCH_TOLERANCE
 from creepkit.specimens.finite_element_tests import EQUILIBRIUM_SHARE
 
@@ -59,6 +59,7 @@ def _constants() -> dict[str, Any]:
     tolerance = {"tolerance": SEARCH_TOLERANCE, "newton": EQUILIBRIUM_SHARE * SEARCH_TOLERANCE, "growth": SEARCH_GROWTH}
     numbers = np.concatenate([SDIRK4.a, SDIRK4.c, SDIRK4.error, SDIRK4.dense], axis=None).tolist()
     return {
+        "room_temperature": ROOM_TEMPERATURE,
         "bar": {
             "settings": {name: getattr(settings, name) for name, *_ in SettingsStructure._fields_},
             "tableau": {"sizes": [*SDIRK4.dense.shape, SDIRK4.error_order], "numbers": numbers},

@@ -8,7 +8,7 @@ import typer
 
 from creepkit.cli.shared import Json
 from creepkit.errors import PluginError
-from creepkit.registry import default_registry, kinds
+from creepkit.registry import Registered, default_registry, kinds
 from creepkit.reports import catalogue
 from creepkit.reports.terminal import print_json
 
@@ -33,15 +33,18 @@ def command(
         else:
             catalogue.print_plugins(plugins, conflicts)
         return
-    found = registry.all(chosen)
-    single = None
-    if name is not None:  # which says what is wrong with it
-        single = found[(registry.law(name) if chosen is kinds.LAWS else registry.specimen(name)).name]
-    if as_json:
-        written = {kinds.LAWS: catalogue.law_to_json, kinds.SPECIMENS: catalogue.specimen_to_json}
-        document: Any = written.get(chosen, catalogue.registered_to_json)
-        print_json([*map(document, found.values())] if single is None else document(single))
-    elif single is not None:
-        (catalogue.print_law if chosen is kinds.LAWS else catalogue.print_specimen)(single)
+    if name is None:
+        found = registry.all(chosen)
+    elif chosen is kinds.LAWS:  # of several, such as a sum, the first that has brought one
+        law = registry.law(name)
+        found = {name: Registered(law, registry.plugins_of(law)[0])}
     else:
-        catalogue.print_registered(chosen, found, registry.conflicts() if chosen is kinds.LAWS else ())
+        found = {name: registry.all(chosen)[registry.specimen(name).name]}
+    if as_json:
+        written: Any = {kinds.LAWS: catalogue.law_to_json, kinds.SPECIMENS: catalogue.specimen_to_json}
+        documents = [*map(written.get(chosen, catalogue.registered_to_json), found.values())]
+        print_json(documents if name is None else documents[0])
+    elif name is None:
+        catalogue.print_registered(chosen, found, registry.conflicts(chosen))
+    else:
+        (catalogue.print_law if chosen is kinds.LAWS else catalogue.print_specimen)(found[name])

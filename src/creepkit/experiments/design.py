@@ -297,6 +297,8 @@ def notes_of(laws: Sequence[Identification], rigs: Sequence[Rig]) -> tuple[str, 
             "the rates of test pieces in one run are taken to scatter like those of tests one by one: where the oven "
             "scatters, several of them tell less"
         )
+    if any(error.included for fit in laws for error in fit.unmodelled):
+        notes.append("the usual errors of tests are in intervals and not in this expectation: it promises too much")
     if any(fit.settings.weights != "likelihood" for fit in laws):
         notes.append(
             'values were found with other weights than weights="likelihood", by which expectations are worked out: '

@@ -139,8 +139,8 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
 
     @property
     def headline(self) -> str:
-        """How well the law describes the tests, then whether it could be the true one, in one sentence."""
-        from creepkit.inverse.description import headline
+        """Whether to use the law, for what and within how much, then whether it could be the true one: one sentence."""
+        from creepkit.reports.description import headline
 
         return headline(self)
 

@@ -273,7 +273,8 @@ def apparent_exponent(stresses: Floats, rates: Floats, temperatures: Floats) -> 
 def apparent_energy(stresses: Floats, rates: Floats, temperatures: Floats) -> tuple[float, float]:
     """-R d ln rate / d(1/T), J/mol, by regression beside one stress exponent, and half of its 95 % interval.
 
-    As apparent_exponent; NaN where the temperatures do not differ, or not apart from the stresses.
+    stresses, rates, temperatures : (tests,) MPa, 1/s and K. NaN where the temperatures do not differ, or not apart from
+    the stresses.
     """
     per_energy, beside = -1.0 / (GAS_CONSTANT * temperatures), np.column_stack([np.ones(rates.size), np.log(stresses)])
     return _slope(per_energy, beside, rates, (ISOTHERMAL_RANGE * per_energy / temperatures) ** 2)

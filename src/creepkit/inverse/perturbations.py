@@ -188,8 +188,8 @@ def uncertain_lengths(problem: LeastSquaresProblem) -> list[tuple[tuple[str, ...
         known = [dimension_named(p, names[-1]) if p.follows(names[-1]) else None for p in predictors]
         tolerances = np.array([0.0 if length is None else length.tolerance for length in known])
         if shared.isdisjoint(names) and tolerances.all():
-            nominal = [prior_mean(Nuisance(names[-1]), h, problem.predictor) for h in problem.histories]
-            lengths.append((names, np.array(nominal), nominal * tolerances))
+            nominal = np.array([prior_mean(Nuisance(names[-1]), h, problem.predictor) for h in problem.histories])
+            lengths.append((names, nominal, nominal * tolerances))
     return lengths
 
 

@@ -84,5 +84,6 @@ from .specimen_record import Dimension as Dimension
 from .specimen_record import Load as Load
 from .specimen_record import Output as Output
 from .typical_tests import typical_history as typical_history
+from .units import ROOM_TEMPERATURE as ROOM_TEMPERATURE
 from .units import SECONDS_PER_HOUR as SECONDS_PER_HOUR
 from .units import ZERO_CELSIUS as ZERO_CELSIUS

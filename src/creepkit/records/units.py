@@ -14,6 +14,10 @@ ZERO_CELSIUS = 273.15
 """K."""
 
 
+ROOM_TEMPERATURE = ZERO_CELSIUS + 20.0
+"""K; stands where a law does not ask for a temperature."""
+
+
 SECONDS_PER_HOUR = 3600.0
 """s."""
 

@@ -91,10 +91,11 @@ class Registry:
         self._load(self._sources)
         return self._loaded()
 
-    def conflicts(self) -> tuple[str, ...]:
-        """One sentence for each name that two plugins offer."""
-        plugins = self.plugins()
-        return tuple(conflict for kind in kinds.KINDS for conflict in _merged(kind, plugins)[1].values())
+    def conflicts(self, *of: PluginKind[Any]) -> tuple[str, ...]:
+        """One sentence for each name of these kinds, or of any, that two plugins offer."""
+        for kind in of or kinds.KINDS:
+            self._load(self._offering(kind))
+        return tuple(text for kind in of or kinds.KINDS for text in _merged(kind, self._loaded())[1].values())
 
     def replaced(self, plugin: Plugin) -> tuple[str, ...]:
         """One sentence for each name that a plugin file offers in the place of an installed plugin."""
@@ -171,10 +172,14 @@ class Registry:
 
         'creepkit-damage 0.1.0' of 'kachanov-rabotnov*arrhenius'; empty when no plugin has them.
         """
-        parts = set(re.split(r"[^a-z0-9-]+", law.name))
+        return ", ".join(sorted({one.origin for one in self.plugins_of(law)}))
+
+    def plugins_of(self, law: CreepLaw) -> tuple[Provenance, ...]:
+        """Where the laws come from that a law's name says it was made of."""
+        parts = {law.name, *re.split(r"[^a-z0-9-]+", law.name)}
         self._load(self._offering(kinds.LAWS, parts))
         known, _ = _merged(kinds.LAWS, self._loaded())
-        return ", ".join(sorted({one.provenance.origin for name, one in known.items() if name in parts}))
+        return tuple(dict.fromkeys(one.provenance for name, one in known.items() if name in parts))
 
     def broken_hint(self) -> str:
         """How many plugins could not be loaded, as the end of a sentence; "" where all were."""

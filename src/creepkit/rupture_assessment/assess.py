@@ -282,7 +282,12 @@ def _notes(tests: RuptureTests, settings: RuptureSettings) -> list[str]:
     elif tests.groups and tests.censored.any():
         notes.append("effects are integrated out by adaptive Gauss-Hermite quadrature")
     few = [group for group, values in tests.groups.items() if len(set(values)) < 5]
-    notes += [f"the scatter between {len(set(tests.groups[g]))} values of {g} is poorly known" for g in few]
+    notes += [
+        f"{len(set(tests.groups[g]))} values of {g} hardly tell the scatter between them, on which bounds of a new one "
+        "and of a test rest: give tests of five or more, or count all as one (--no-random-effects; random_effects = "
+        "false in a study)"
+        for g in few
+    ]
     return notes
 
 

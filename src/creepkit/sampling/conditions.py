@@ -19,7 +19,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import DatasetError, nearest, quoted
 from creepkit.language import Elastic
 from creepkit.records import (
-    ZERO_CELSIUS,
+    ROOM_TEMPERATURE,
     Dimension,
     History,
     Load,
@@ -272,10 +272,6 @@ class TimeGrid:
 
     def __hash__(self) -> int:
         return hash((self.values.tobytes(), self.relative))
-
-
-ROOM_TEMPERATURE = ZERO_CELSIUS + 20.0
-"""K; the temperature of tests of laws that do not depend on it."""
 
 
 def planned_test(specimen: Predictor, conditions: Mapping[str, float], grid: TimeGrid, name: str = "sample") -> History:

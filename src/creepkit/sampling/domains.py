@@ -26,7 +26,7 @@ from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.language import CreepLaw, temperature
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import POINT_VARIABLES
-from creepkit.records import Specimen, Status
+from creepkit.records import ROOM_TEMPERATURE, Specimen, Status
 from creepkit.records.presentable import Presentable
 from creepkit.sampling.coefficients import (
     draw_stress_scales,
@@ -39,7 +39,6 @@ from creepkit.sampling.conditions import (
     END,
     PAPER_END,
     PAPER_INTERVAL,
-    ROOM_TEMPERATURE,
     ConditionRanges,
     TimeGrid,
     condition_range,

@@ -22,10 +22,9 @@ from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen
 from creepkit.errors import DatasetError, nearest
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, time
-from creepkit.records import History, Specimen
+from creepkit.records import ROOM_TEMPERATURE, History, Specimen
 from creepkit.sampling.conditions import (
     END,
-    ROOM_TEMPERATURE,
     TEMPERATURE,
     SpecimenConditions,
     TimeGrid,

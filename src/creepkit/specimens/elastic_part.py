@@ -13,9 +13,10 @@ from creepkit.records.specimen_lookup import outputs_of
 
 
 def with_elastic_part(plan: History, outputs: Mapping[str, Floats], say: Callable[[str], None]) -> dict[str, Floats]:
-    """Outputs (frames,) of a test that were read without their elastic part, with it; `say` is told what was added.
+    """Outputs (frames,) that were read without their elastic part, with it; `say` is told what was added.
 
-    A specimen predicts both together, under the load and with the elastic data of `plan`. What does not grow is kept.
+    outputs : {name: (frames,)}. A specimen predicts both together, under the load and with the elastic data of `plan`.
+    What does not grow is kept.
     """
     specimen = specimen_of(plan)
     growing = [one for one in outputs_of(specimen) if one.grows and one in outputs]

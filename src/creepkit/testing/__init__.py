@@ -17,6 +17,7 @@ from creepkit.testing.kits import (
     check_predictor,
     check_reader,
     check_specimen,
+    check_temperature_form,
 )
 from creepkit.testing.parity import DERIVATIVE_TOLERANCE, VALUE_TOLERANCE
 from creepkit.testing.reports import ConformanceCheck, ConformanceReport
@@ -37,5 +38,6 @@ __all__ = [
     "check_predictor",
     "check_reader",
     "check_specimen",
+    "check_temperature_form",
     "draw_samples",
 ]

@@ -6,6 +6,7 @@ import itertools
 import math
 import re
 import warnings
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -259,11 +260,10 @@ A, n, C = parameters("A n C")
 
 def module(law, folder, values=None, notes=(), exporter=None, **more):
     """The exported module, loaded; of one number at a time unless another exporter is given."""
-    source = LawWithValues(law, values or law.center(), notes, **more)
-    path = folder / "exported_law.py"
-    path.write_text((exporter or PythonExporter()).text(source), encoding="utf-8")
-    spec = importlib.util.spec_from_file_location("exported_law", path)
-    loaded = importlib.util.module_from_spec(spec)
+    text = (exporter or PythonExporter()).text(LawWithValues(law, values or law.center(), notes, **more))
+    (path := folder / "exported_law.py").write_text(text, encoding="utf-8")
+    Path(importlib.util.cache_from_source(str(path))).unlink(missing_ok=True)  # of a text as long, a second ago
+    loaded = importlib.util.module_from_spec(spec := importlib.util.spec_from_file_location("exported_law", path))
     spec.loader.exec_module(loaded)
     return loaded
 

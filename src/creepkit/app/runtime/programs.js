@@ -2,8 +2,6 @@
 "use strict";
 
 (function (creepkit) {
-  const ROOM_TEMPERATURE = 293.15; // K, where a law does not ask for a temperature
-
   /** A program: a number that is held, or pairs [time in s, value] joined by straight lines, two at one time a jump. */
   function program(given, what) {
     const pairs = typeof given === "number" ? [[0, given]] : given;
@@ -52,7 +50,7 @@
     if (given !== undefined && given !== null) return program(given, "the temperature");
     const needed = law.law.variables.includes("temperature");
     if (needed) throw new RangeError("the law depends on temperature: give one, in K");
-    return program(ROOM_TEMPERATURE, "the temperature");
+    return program(creepkit.constants.room_temperature, "the temperature");
   }
 
   /** Young's modulus at a temperature: a number, or pairs [K, MPa] joined by straight lines, the last ones going on. */

@@ -171,7 +171,7 @@ class Posterior:
         return (self.quadratic or self.problem).candidate_residuals(u) - self.errors, self.rate_effect
 
     def residuals_and_jacobian(self, u: Floats) -> tuple[Floats, Floats, Floats]:
-        """The same, and derivatives (candidates, tests, observations, parameters) of the residuals to u."""
+        """The same, and derivatives (candidates, tests, observations, parameters) to u (candidates, parameters)."""
         residuals, jacobian = (self.quadratic or self.problem).candidate_jacobian(u)
         effect = self.rate_effect
         if self._rates_are_coefficients:
