@@ -11,16 +11,8 @@ from creepkit.arrays import ArrayLike
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError
 from creepkit.language import symbols
-from creepkit.records import (
-    ROOM_TEMPERATURE,
-    History,
-    LawWithValues,
-    Loading,
-    Predictor,
-    Program,
-    Status,
-    call_of_plugin,
-)
+from creepkit.records import History, LawWithValues, Loading, Predictor, Program, Status, call_of_plugin
+from creepkit.records.units import ROOM_TEMPERATURE
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictor
 from creepkit.specimens.run import Run, run_from_outputs, unusual_values, with_explanation
@@ -55,9 +47,8 @@ def simulate(
         raise SolveError(f"law '{law.name}' depends on temperature: give temperature= in K")
     valued = LawWithValues(law, values)
     law, values = valued.law, valued.values
-    if law.conditions:
-        names = ", ".join(f"'{one.name}'" for one in law.conditions)
-        raise SolveError(f"law '{law.name}' depends on {names}: give values for it as well, in the law's units")
+    if lacking := ", ".join(f"{one.name} in {one.unit}" for one in law.conditions):
+        raise SolveError(f"law '{law.name}' needs a value for {lacking} as well")
     planned_test = History(
         name=name,
         times=np.atleast_1d(np.asarray(times, float)),

@@ -156,7 +156,6 @@ class CExporter:
     """A C file: NAME_rate, NAME_log_rate with slopes and, for laws with internal variables, NAME_state_rates."""
 
     serves = ("c++", "cpp")
-    takes_conditions = True
     name = "c"
     title = "C99 file with the rate and its derivatives"
     suffix = ".c"
@@ -213,7 +212,6 @@ class _CFile:
             "Declarations for the code that calls this file (exported by creepkit; link with -lm):",
             *(f"  {declaration};" for _, declaration, *_ in functions),
             f"Slopes are derivatives to {', '.join(map(str, self.arguments))}, in this order.",
-            *(f"{c} in {s.unit}" for c, s in zip(self.code.conditions, self.law.conditions, strict=True)),
         ]
         return c_block_comment([*comment_lines(header_lines, " *", _LINE_LENGTH), *comment_lines(declared, " *")])
 

@@ -229,6 +229,7 @@ class CodeInput:
     alternative: ClassVar[str]
     marker: ClassVar[str]
     first_lines: ClassVar[tuple[str, ...]] = ()
+    takes_conditions = False
 
     def text(self, source: LawWithValues) -> str:
         """Return heading and input; ExportError, with what to do, where the law is none of the code's."""

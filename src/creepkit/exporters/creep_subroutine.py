@@ -244,6 +244,7 @@ class CreepSubroutine:
     name: ClassVar[str]
     title: ClassVar[str]
     suffix: ClassVar[str] = ".f"
+    takes_conditions = False
     solver: ClassVar[str]
     """The code in words."""
     state_template: ClassVar[str] = ""

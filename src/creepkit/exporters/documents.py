@@ -31,7 +31,7 @@ from creepkit.exporters.unit_conversion import ConvertedValues, convert_values
 from creepkit.hookspecs import hookimpl
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import ArrheniusExponent, LatexLawPrinter, ReadableSums, latex_equations
-from creepkit.language.symbols import GAS_CONSTANT, mean_stress, principal_stress, strain, stress, temperature, time
+from creepkit.language.symbols import mean_stress, principal_stress, strain, stress, temperature, time
 from creepkit.records import Exporter, LawWithValues
 
 _LATEX_ESCAPES = {
@@ -53,7 +53,6 @@ class LatexExporter:
 
     serves = ("tex",)
     name = "latex"
-    takes_conditions = True
     title = "LaTeX equation and table of values"
     suffix = ".tex"
 
@@ -62,13 +61,10 @@ class LatexExporter:
         law, converted_values, printer = source.law, convert_values(source), LatexLawPrinter(source.law)
         comments_text = (source.title, *source.notes, *(f"Source: {reference}" for reference in law.references))
         lines = comment_lines(comments_text, "%")
-        lines += [f"% R = {GAS_CONSTANT} J/(mol K)"] if law.uses(temperature) else []
         lines += equations_in_latex(law, printer)
         lines += [rf"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
         lines += _value_table(source, converted_values, printer)
-        lines += (
-            [] if source.units.is_native else [f"In this table, {latex_escaped(converted_values.reference_sentence)}."]
-        )
+        lines += [latex_escaped(sentence) for sentence in remarks(source, converted_values)]
         return "\n".join(lines) + "\n"
 
 
@@ -130,7 +126,6 @@ class MarkdownExporter:
 
     serves = ("md",)
     name = "markdown"
-    takes_conditions = True
     title = "Markdown with the equation, a table of values, notes and references"
     suffix = ".md"
 
@@ -187,7 +182,6 @@ class MathmlExporter:
     """A page with the law's equations as presentation MathML."""
 
     name = "mathml"
-    takes_conditions = True
     title = "MathML in a page of XHTML, with a table of values, notes and references"
     suffix = ".xhtml"
 

@@ -17,7 +17,7 @@ import sympy
 
 from creepkit.exporters.c import STABLE_FUNCTIONS, c_assignments, c_expression, stable_functions_in
 from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode
-from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.exporters.law_description import comment_lines, heading, printable_text, refuse_conditions
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS
 from creepkit.language.symbols import POINT_VARIABLES
@@ -90,6 +90,7 @@ class JavaScriptExporter:
 
     serves = ("js",)
     name = "javascript"
+    takes_conditions = False
     title = "JavaScript module with the rate, its terms and its derivatives"
     suffix = ".mjs"
 
@@ -103,6 +104,7 @@ def law_expression(source: LawWithValues) -> str:
 
     Everything stays in it, what is switched off too. Nothing in it ends a script element.
     """
+    refuse_conditions(source, "a page")
     body = _JavaScriptLaw(source, keeps_inactive=True).text()
     return f'(() => {{\n"use strict";\n{body}\nreturn Object.freeze({{ {", ".join(EXPORTED_NAMES)} }});\n}})()'
 

@@ -206,9 +206,8 @@ class LawCode:
             if self._symbols[s] not in self.parameters
         }
         full = CodeFunction((), tuple(definitions.items()), tuple(e.xreplace(self._symbols) for e in outputs))
-        return replace(
-            full, inputs=tuple(s for s in (*self.point, *self.states, *self.conditions) if s in full.symbols)
-        )
+        variables = (*self.point, *self.states, *self.conditions)
+        return replace(full, inputs=tuple(s for s in variables if s in full.symbols))
 
     def logarithms_used(self, function: CodeFunction) -> dict[sympy.Symbol, sympy.Symbol]:
         """The logarithms of parameters that a function reads: {ln_A: A}."""
@@ -216,8 +215,5 @@ class LawCode:
 
     def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that the target could not keep."""
-        original_names = {
-            *self.law.names,
-            *(s.name for s in (*POINT_VARIABLES, *self.law.states, *self.law.conditions)),
-        }
-        return self.identifiers.renaming_notes(original_names)
+        variables = (*POINT_VARIABLES, *self.law.states, *self.law.conditions)
+        return self.identifiers.renaming_notes({*self.law.names, *(s.name for s in variables)})

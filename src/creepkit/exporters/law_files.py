@@ -45,7 +45,6 @@ class JsonExporter:
     """The law, its values and notes as JSON; `read_valued_law` reads it."""
 
     name = "json"
-    takes_conditions = True
     title = "JSON that creepkit reads back"
     suffix = ".json"
 

@@ -247,7 +247,6 @@ class MfrontExporter:
 
     serves = ("umat", "vumat", "usermat", "usercreep")
     name = "mfront"
-    takes_conditions = True
     title = "MFront behaviour (Implicit DSL) with its exact Jacobian"
     suffix = ".mfront"
 

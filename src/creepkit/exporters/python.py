@@ -84,9 +84,7 @@ class _ModuleFunctions:
 
     def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that had to change."""
-        return self._identifiers.renaming_notes(
-            [s.name for s in (*self.law.states, *self.law.conditions, *self.law.params)]
-        )
+        return self._identifiers.renaming_notes([s.name for s in self.names])
 
     def text(self) -> str:
         """The functions, and where internal variables start and end."""
@@ -229,7 +227,6 @@ class PythonExporter:
 
     serves = ("py",)
     name = "python"
-    takes_conditions = True
     title = "Python module that needs nothing but the standard library"
     suffix = ".py"
 
@@ -267,7 +264,6 @@ class NumpyExporter:
     """A Python module of arrays with `rate` (and `state_rates`), the values as defaults."""
 
     name = "numpy"
-    takes_conditions = True
     title = "Python module for arrays that needs nothing but NumPy"
     suffix = ".py"
 

@@ -97,7 +97,7 @@ class TestForecast:
         names = extrapolated_names(self.extrapolation)
         if time is not None:  # how long the test goes on, and the strain that it ends at, are not of this time
             own = "time" if f"{time.event} after" in self.extrapolation else "strain" if time.output else "rupture"
-            names = [name for name in names if name in ("stress", "temperature")]
+            names = [name for name in names if name not in ("time", "strain")]
             names += [own] if f"{time.event} " in self.extrapolation else []
         return f"extrapolated beyond the tests in {' and '.join(names)}" if names else ""
 
@@ -313,9 +313,7 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked
 
 def extrapolated_names(text: str) -> list[str]:
     """Which quantities a sentence on an extrapolation begins its parts with."""
-    known = [name for name in ("stress", "temperature", "time", "strain") if re.search(rf"(^|, ){name} [0-9]", text)]
-    others = re.findall(r"(?:^|, |: )(\w+) [-0-9.e]+ \(the tests cover", text)  # conditions of the law
-    return [*known, *(name.replace("_", " ") for name in others if name not in known)]
+    return [name.replace("_", " ") for name in re.findall(r"(?:^|[,:] )(\w+) -?\d[^,(]*\(the tests", text)]
 
 
 def _extrapolated_times(fit: Identification, asked: Sequence[TimeForecast]) -> list[str]:

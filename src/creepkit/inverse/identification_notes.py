@@ -53,8 +53,8 @@ def fitted_ranges(problem: LeastSquaresProblem) -> dict[str, tuple[float, float]
         "strain": [0.0, *(reference_end_strain(h, problem.predictor) for h in tests)],
         "time": [v for h in tests for v in _time_range(h)],
     }
-    stated = condition_values(problem.law, tests).T
-    values_by_name |= {one.name: values.tolist() for one, values in zip(problem.law.conditions, stated, strict=True)}
+    conditions = zip(problem.law.conditions, condition_values(problem.law, tests).T, strict=True)
+    values_by_name |= {one.name: values.tolist() for one, values in conditions}
     return {name: (float(min(values)), float(max(values))) for name, values in values_by_name.items()}
 
 

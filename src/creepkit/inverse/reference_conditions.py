@@ -228,15 +228,12 @@ class ReferencePoint:
         times = [_duration(h) for h in histories]
         strains = [reference_end_strain(h, predictor) for h in histories]
         temperatures = [float(np.mean(h.temperature_program().values)) for h in histories]
-        central_values = [float(np.exp(np.mean(np.log(v)))) for v in (mean_stresses, strains, times)]
-        stress, strain, time = central_values
+        stress, strain, time = (float(np.exp(np.mean(np.log(v)))) for v in (mean_stresses, strains, times))
         conditions = () if law is None else tuple(reference_conditions(law, histories).items())
         return cls(stress, 0.5 * strain, 0.5 * time, float(np.median(temperatures)), conditions)
 
     def law_there(self, law: CreepLaw) -> CreepLaw:
         """The law at these conditions, or at others near by where a parameter would not matter at them."""
-        if not law.conditions:
-            return law
         there = law.at(None, **dict(self.conditions))
         moved = {name: 1.1 * value + 0.1 * (value == 0.0) for name, value in self.conditions}
         return there if there.names == law.names else law.at(None, **moved)

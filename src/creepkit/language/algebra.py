@@ -265,8 +265,7 @@ def fix(law: Law, values: Mapping[str, float]) -> Law:
             low, high = param.bounds
             off = "" if param.off is None else f" or {param.off:g} (off)"
             raise LawError(f"law '{law.name}': cannot fix {name} = {value:g}; allowed are {low:g} to {high:g}{off}")
-        number = sympy.Integer(int(value)) if value.is_integer() else sympy.Float(value)
-        replacements[symbol] = number
+        replacements[symbol] = sympy.Integer(int(value)) if value.is_integer() else sympy.Float(value)
     description = ", ".join(f"{name}={float(value):g}" for name, value in values.items())
     return _substituted(law, replacements, f"{law.name}({description})", f"{law.title} with {description}")
 
@@ -310,14 +309,13 @@ def with_temperature(law: Law, forms: Mapping[str, TemperatureForm]) -> Law:
                 ordered |= extra
         params = ordered
     description = ", ".join(f"{name}:{form.name}" for name, form in forms.items())
-    substitutions = dict(replacements)
     return replace(
         law,
         name=f"{law.name}[{description}]",
         title=f"{law.title} with {', '.join(forms)} dependent on temperature",
-        terms={label: term.xreplace(substitutions) for label, term in law.terms.items()},
-        states={s: replace(z, rate=z.rate.xreplace(substitutions)) for s, z in law.states.items()},
-        constraints=(*(c.xreplace(substitutions) for c in law.constraints), *sign_constraints),
+        terms={label: term.xreplace(replacements) for label, term in law.terms.items()},
+        states={s: replace(z, rate=z.rate.xreplace(replacements)) for s, z in law.states.items()},
+        constraints=(*(c.xreplace(replacements) for c in law.constraints), *sign_constraints),
         params=params,
         references=tuple(dict.fromkeys((*law.references, *(form.reference for form in forms.values())))),
         examples=(),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import sympy
@@ -69,16 +69,8 @@ class StateDocument:
 
 
 @dataclass(frozen=True)
-class ConditionDocument:
-    """One condition that tests state."""
-
-    name: str
-    unit: str
-
-
-@dataclass(frozen=True)
 class LawDocument:
-    """A whole law; constraints are trees."""
+    """A whole law; constraints are trees, conditions {name: unit}."""
 
     name: str
     title: str
@@ -88,7 +80,7 @@ class LawDocument:
     states: tuple[StateDocument, ...]
     constraints: tuple[Any, ...]
     references: tuple[str, ...]
-    conditions: tuple[ConditionDocument, ...] = ()
+    conditions: dict[str, str] = field(default_factory=dict)
 
 
 _CODEC = RecordCodec(ranges={ParamDocument: {"limits": numbers(infinite=True)}})
@@ -111,7 +103,7 @@ def law_to_json(law: CreepLaw) -> dict[str, Any]:
         ),
         constraints=tuple(expression_to_tree(relation) for relation in law.constraints),
         references=tuple(law.references),
-        conditions=tuple(ConditionDocument(symbol.name, symbol.unit) for symbol in law.conditions),
+        conditions={symbol.name: symbol.unit for symbol in law.conditions},
     )
     return {**LAW.heading, **_CODEC.to_json(record)}
 
@@ -140,8 +132,8 @@ def law_from_json(data: Any, source: str = "law file") -> CreepLaw:
 
 def _law_of(record: LawDocument) -> CreepLaw:
     names = [param.name for param in record.params] + [state.name for state in record.states]
-    stated = {one.name: ConditionSymbol(one.name, one.unit) for one in record.conditions}
-    _check_unique([*names, *(one.name for one in record.conditions)], "parameter, state or condition")
+    stated = {name: ConditionSymbol(name, unit) for name, unit in record.conditions.items()}
+    _check_unique([*names, *stated], "parameter, state or condition")
     _check_unique([term.name for term in record.terms], "term")
     symbols = {symbol.name: symbol for symbol in (*POINT_VARIABLES, *(Symbol(name) for name in names))} | stated
     return CreepLaw(

@@ -78,9 +78,7 @@ def _check_names(law: LawRecord, origin: str) -> None:
         if name in reserved:
             raise LawError(f"{origin}: '{name}' is a word of the language and cannot name a parameter or state")
         if names.count(name) > 1:
-            raise LawError(
-                f"{origin}: the name '{name}' is used twice; give each parameter, state and condition its own"
-            )
+            raise LawError(f"{origin}: the name '{name}' is used twice; give each symbol of the law its own")
         if not name.isidentifier():
             raise LawError(f"{origin}: '{name}' is not a plain name; use letters, digits and underscores")
 
@@ -257,8 +255,7 @@ class LawRecord:
     @property
     def rate(self) -> sympy.Expr:
         """The rate of equivalent creep strain, 1/s: the sum of the terms, unevaluated."""
-        values = list(self.terms.values())
-        return values[0] if len(values) == 1 else sympy.Add(*values)
+        return sympy.Add(*self.terms.values())
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -49,7 +49,7 @@ class Symbol(sympy.Symbol):  # type: ignore[misc]  # sympy has no types
 class ConditionSymbol(Symbol):
     """A number that each test states and a law may use: grain size, content of an element, dose.
 
-    unit : that of its number in the law, "1" for none. Printed and ordered as any other symbol of its name.
+    unit : that of its number in the law, "1" for none.
     """
 
     __slots__ = ("unit",)
@@ -66,16 +66,6 @@ class ConditionSymbol(Symbol):
 
     def _hashable_content(self) -> tuple[Any, ...]:
         return (*super()._hashable_content(), self.unit)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, ConditionSymbol) and (self.name, self.unit) == (other.name, other.unit)
-
-    __hash__ = Symbol.__hash__
-
-    @classmethod
-    def class_key(cls) -> Any:
-        """Where sympy orders it: as a symbol."""
-        return Symbol.class_key()
 
 
 stress = Symbol("stress")

@@ -1,6 +1,6 @@
 """Conditions that tests state beside load and temperature, for laws that use them: grain size, composition, dose.
 
-A test states them as labels, however its table or file writes them: {"grain size (um)": "50"}, {"dose": "2 dpa"}.
+A test states them as labels, however its table or file writes them: {"grain size (um)": "50"}, {"dose": "2 ± 0.1 dpa"}.
 """
 
 from __future__ import annotations
@@ -16,20 +16,17 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.records.history import History
 from creepkit.records.prediction import Prediction
-from creepkit.records.units import UNITS
+from creepkit.records.units import UNITS, UnitConversion, spellings
 
 if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
     from creepkit.language.symbols import ConditionSymbol
 
-_HEAD = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)|/\s*(?P<c>\S+)|,\s*(?P<d>\S+))?\s*$")
-"""Names with their units: grain size (um), grain size [um], dose / dpa, d, um."""
+_NUMBER = r"(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?"
 
 
-_VALUE = re.compile(
-    r"^\s*(?P<number>[-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*(?:(?:±|\+/?-)\s*(?P<sd>[\d.,]+))?\s*(?P<unit>.*?)\s*$"
-)
-"""Numbers as labels hold them: 50, 0,05 mm, 12.5 ± 0.3 wt%."""
+_VALUE = re.compile(rf"\s*([-+]?{_NUMBER})\s*(?:(?:±|\+/?-)\s*({_NUMBER}))?\s*(.*?)\s*")
+"""A number, its standard deviation and its unit, as labels hold them: 50, 0,05 mm, 12.5 ± 0.3 wt%."""
 
 
 def stated_condition(history: History, condition: ConditionSymbol) -> tuple[float, float]:
@@ -37,27 +34,37 @@ def stated_condition(history: History, condition: ConditionSymbol) -> tuple[floa
 
     HistoryError, which says what to write, where it states nothing, no number, or a unit of another kind.
     """
-    plain = _plain(condition.name)
+    name, unit = condition.name.replace("_", " "), condition.unit
+    head_of_it = re.compile(r"[\W_]*".join(name.split()) + r"\s*(?:[\[(,/_]\s*(.*?)\s*[\])]?)?\s*", re.IGNORECASE)
     for head, text in history.labels.items():
-        name, unit = _name_and_unit(head, plain)
-        if _plain(name) != plain:
+        if (named := head_of_it.fullmatch(head.strip())) is None:
             continue
-        value = _VALUE.match(text)
-        numbers = value and [_number(value[part] or "0") for part in ("number", "sd")]
-        if value is None or numbers is None or None in numbers:
-            raise HistoryError(f"{history.origin}: {head} is {quoted(text)}; a number is needed for {condition.name}")
-        factor = _factor(value["unit"] or unit or "", condition.unit)
-        if factor is None:
+        value = _VALUE.fullmatch(text)
+        conversion = _conversion(value[3] or named[1] or "", unit) if value else None
+        if value is None or conversion is None:
             raise HistoryError(
-                f"{history.origin}: {head} = {quoted(text)} for {condition.name} in {condition.unit}; write its unit, "
-                f"such as '{condition.name} ({condition.unit})'"
+                f"{history.origin}: {head} is {quoted(text)}; write a number and a unit that becomes {unit}, such as "
+                f"'{name} ({unit})' above numbers"
             )
-        return factor * numbers[0], factor * numbers[1]  # type: ignore[operator]
-    stated = tuple(head for head in history.labels)
+        number, sd = (float((part or "0").replace(",", ".")) for part in value.groups()[:2])
+        return conversion.factor * number + conversion.offset, conversion.factor * sd
     raise HistoryError(
-        f"{history.origin}: states no {condition.name}, which the law needs; add a column "
-        f"'{condition.name.replace('_', ' ')} ({condition.unit})' or a line 'label {condition.name}: 1 "
-        f"{condition.unit}'" + (f"; {nearest(condition.name, stated)}" if stated else "")
+        f"{history.origin}: states no {name}, which the law needs; add a column '{name} ({unit})' or a line "
+        f"'label {name}: 1 {unit}'; {nearest(name, tuple(history.labels))}"
+    )
+
+
+def _conversion(stated: str, wanted: str) -> UnitConversion | None:
+    """How a number in one unit becomes one in another; None where they are of different kinds."""
+    if stated == wanted or (not stated and wanted == "1"):
+        return UnitConversion(1.0)
+    spelled = spellings(*UNITS)
+    one, other = (UNITS.get(spelled.get(text, spelled.get(text.casefold(), ""))) for text in (stated, wanted))
+    if one is None or other is None or one.quantity != other.quantity:
+        return None
+    per_unit = 1.0 / other.conversion.factor
+    return UnitConversion(
+        one.conversion.factor * per_unit, (one.conversion.offset - other.conversion.offset) * per_unit
     )
 
 
@@ -69,7 +76,7 @@ def condition_values(law: CreepLaw, histories: Sequence[History]) -> Floats:
 
 def reference_conditions(law: CreepLaw, histories: Sequence[History]) -> Mapping[str, float]:
     """{condition: the median of the tests}, in the units of the law."""
-    medians = np.median(condition_values(law, histories), axis=0) if law.conditions else []
+    medians = np.median(condition_values(law, histories), axis=0)
     return {one.name: float(value) for one, value in zip(law.conditions, medians, strict=True)}
 
 
@@ -93,41 +100,8 @@ def with_values_of_tests(law: CreepLaw, theta: Floats, histories: Sequence[Histo
 
 def of_parameters(prediction: Prediction, count: int) -> Prediction:
     """A prediction with derivatives to the first parameters alone."""
-    cut = {} if prediction.jacobian is None else {"jacobian": prediction.jacobian[..., :count]}
-    times = prediction.times_to_strain
+    times, jacobian = prediction.times_to_strain, prediction.jacobian
     if times is not None and times.time_jacobian is not None and times.rupture_jacobian is not None:
-        jacobians = {"time_jacobian": times.time_jacobian, "rupture_jacobian": times.rupture_jacobian}
-        cut["times_to_strain"] = replace(times, **{name: each[..., :count] for name, each in jacobians.items()})  # type: ignore[assignment]
-    return replace(prediction, **cut) if cut else prediction  # type: ignore[arg-type]
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[\W_]+", "", name).casefold()
-
-
-def _name_and_unit(head: str, plain: str) -> tuple[str, str]:
-    """A head as its name and its unit, "" where it has none: 'grain size (um)', 'grain_size_um'."""
-    match = _HEAD.match(head)
-    name, unit = (match["name"], match["a"] or match["b"] or match["c"] or match["d"] or "") if match else (head, "")
-    stem, _, suffix = name.rpartition("_")
-    return (stem, suffix) if not unit and stem and _plain(stem) == plain else (name, unit)
-
-
-def _number(text: str) -> float | None:
-    """A number with a decimal point or comma."""
-    try:
-        return float(text.replace(",", "."))
-    except ValueError:
-        return None
-
-
-def _factor(stated: str, wanted: str) -> float | None:
-    """By which a number in one unit becomes one in another; None where they are of different kinds."""
-    if stated == wanted or (not stated and wanted == "1"):
-        return 1.0
-    spelled = {text: symbol for symbol, unit in UNITS.items() for text in (symbol, *unit.spellings)}
-    units = [UNITS.get(spelled.get(text, spelled.get(text.casefold(), text))) for text in (stated, wanted)]
-    first, second = units
-    if first is None or second is None or first.quantity != second.quantity:
-        return None
-    return first.conversion.factor / second.conversion.factor
+        first = (times.time_jacobian[..., :count], times.rupture_jacobian[..., :count])
+        times = replace(times, time_jacobian=first[0], rupture_jacobian=first[1])
+    return replace(prediction, jacobian=None if jacobian is None else jacobian[..., :count], times_to_strain=times)

@@ -33,8 +33,8 @@ class Reader(Protocol):
 class Exporter(Protocol):
     """Writes a law with its values as text: to read, or for another program.
 
-    Optional attributes: `serves`, other words that users ask for it by, such as ("umat",); `takes_conditions`, whether
-    a law may use conditions, which the text then asks for.
+    Optional attributes: `serves`, other words that users ask for it by, such as ("umat",); `takes_conditions`, False
+    where a law that uses conditions of the material cannot be written.
     """
 
     @property

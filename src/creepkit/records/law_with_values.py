@@ -79,10 +79,9 @@ class LawWithValues:
 
     def __post_init__(self) -> None:
         stated = {one.name: self.values[one.name] for one in self.law.conditions if one.name in self.values}
-        law, values = self.law, {name: value for name, value in self.values.items() if name not in stated}
-        if stated:
-            law = law.at(None, **stated)
-            values = {name: value for name, value in values.items() if name in law.names or name not in self.law.names}
+        law = self.law.at(None, **stated)
+        gone = {*stated, *self.law.names} - {*law.names}
+        values = {name: value for name, value in self.values.items() if name not in gone}
         object.__setattr__(self, "law", law)
         object.__setattr__(self, "values", MappingProxyType(law.values(values)))
         object.__setattr__(self, "notes", tuple(self.notes))

@@ -34,7 +34,7 @@ def test_a_planted_grain_size_exponent_is_found_and_its_forecast_asks_for_the_si
     assert exponent.low < 2.0 < exponent.high < exponent.low + 0.4
     fit.save(tmp_path / "fit.json")
     plan = ck.History("plan", [1e5, 1e6], {}, ck.constant_stress(70.0), 1000.0)
-    with pytest.raises(ck.errors.HistoryError, match="states no grain_size.*label grain_size: 1 mm"):
+    with pytest.raises(ck.errors.HistoryError, match="states no grain size.*label grain size: 1 mm"):
         ck.forecast(fit, plan)
     (test,) = ck.forecast(ck.load(tmp_path / "fit.json"), plan.replace(labels={"grain_size": "0,2 mm"})).tests
     assert "grain_size 0.2 (the tests cover 0.02 to 0.12" in test.extrapolation

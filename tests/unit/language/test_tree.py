@@ -215,7 +215,7 @@ BAD_FILES = {
         _changed("params", 1, "scale", to="cubic"),
         "params.1.scale is 'cubic'; allowed is 'linear' or 'log'",
     ),
-    "same name": (_changed("params", 1, "name", to="A"), "parameter or state name 'A' is used twice"),
+    "same name": (_changed("params", 1, "name", to="A"), "state or condition name 'A' is used twice"),
     "no term": (_changed("terms", to=[]), "has no terms"),
     "undeclared": (_changed("terms", 0, "expression", to=["mul", "A", "q"]), "'creep': the expression mentions 'q'"),
     "bad state": (_changed("states", 0, "rate", to=["boom"]), "rate of state 'omega': "),

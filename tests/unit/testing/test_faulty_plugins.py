@@ -260,7 +260,7 @@ def test_the_exclusive_or_is_no_power() -> None:
 
 def test_unknown_symbols_and_arguments_are_told_where_they_belong() -> None:
     (s_inf,) = parameters("s_inf")
-    with pytest.raises(LawError, match="unknown symbol s_inf in a rate.*add it to params=, or to states="):
+    with pytest.raises(LawError, match="unknown symbol s_inf in a rate.*add it to params= or states=, or make it with conditions"):
         authored_law(A * stress**n * s_inf)
     with pytest.raises(ArgumentError, match=r"Param\(\) takes no argument 'bound'; did you mean 'bounds'"):
         ck.Param("stress exponent", bound=(1, 8))
