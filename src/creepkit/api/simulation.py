@@ -42,11 +42,10 @@ def simulate(
     A test that bursts, meets its limit load or loses convergence is a result too: the history ends there, and says so
     in `status`, `end_time` and `reason`. A specimen may return more, such as the stresses of a BulgeRun.
     """
-    law, using = resolve_law(law), resolve_predictor(using)
+    valued = LawWithValues(resolve_law(law), values)
+    law, values, using = valued.law, valued.values, resolve_predictor(using)
     if temperature is None and law.uses(symbols.temperature):
         raise SolveError(f"law '{law.name}' depends on temperature: give temperature= in K")
-    valued = LawWithValues(law, values)
-    law, values = valued.law, valued.values
     if lacking := ", ".join(f"{one.name} in {one.unit}" for one in law.conditions):
         raise SolveError(f"law '{law.name}' needs a value for {lacking} as well")
     planned_test = History(

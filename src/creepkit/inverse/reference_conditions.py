@@ -56,10 +56,8 @@ def detect_creep(history: History, output: str) -> CreepDetection:
     values, holds = history.outputs[output], list(_load_holds(history, usable_frames(history, output)))
     if not holds:
         return CreepDetection(float("nan"), float("nan"), noise)
-    thirds = [np.array_split(frames, 3) for frames in holds]
-    increase = sum(
-        float(values[last_third].mean() - values[first_third].mean()) for first_third, _, last_third in thirds
-    )
+    thirds = [np.array_split(values[frames], 3) for frames in holds]
+    increase = sum(float(last.mean() - first.mean()) for first, _, last in thirds)
     variance = sum(1.0 / first.size + 1.0 / last.size for first, _, last in thirds)
     return CreepDetection(increase, noise * float(np.sqrt(variance)), noise)
 
@@ -222,13 +220,11 @@ class ReferencePoint:
 
         predictor : where it states reference stresses, they are taken. law : whose conditions the tests state.
         """
-        mean_stresses = [
-            float(np.exp(np.mean(np.log(np.maximum(reference_stresses(h, predictor), 1e-6))))) for h in histories
-        ]
+        log_stresses = [np.mean(np.log(np.maximum(reference_stresses(h, predictor), 1e-6))) for h in histories]
         times = [_duration(h) for h in histories]
         strains = [reference_end_strain(h, predictor) for h in histories]
         temperatures = [float(np.mean(h.temperature_program().values)) for h in histories]
-        stress, strain, time = (float(np.exp(np.mean(np.log(v)))) for v in (mean_stresses, strains, times))
+        stress, strain, time = (float(np.exp(np.mean(v))) for v in (log_stresses, np.log(strains), np.log(times)))
         conditions = () if law is None else tuple(reference_conditions(law, histories).items())
         return cls(stress, 0.5 * strain, 0.5 * time, float(np.median(temperatures)), conditions)
 

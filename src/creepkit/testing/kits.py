@@ -100,8 +100,7 @@ def check_law(
         checked_law = law.at(None, **{condition.name: CHECKED_CONDITION for condition in law.conditions})
     except CreepkitError as error:
         return ConformanceReport(law, (ConformanceCheck("lowering", False, str(error)),))
-    found = run(law_checks, checked_law, draw_samples(checked_law, samples, seed))
-    return ConformanceReport(law, tuple(found))
+    return ConformanceReport(law, tuple(run(law_checks, checked_law, draw_samples(checked_law, samples, seed))))
 
 
 @checked
