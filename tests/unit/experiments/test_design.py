@@ -75,11 +75,11 @@ def test_the_grid_finds_the_end_that_a_rate_asks_for(line):
     found = design(line, rig=replace(RIG, setup_hours=1e4), goal=rate_at(40.0))
     assert found.best.first_level == pytest.approx(40.0)
     c = np.array([1.0, np.log(40.0)])
-    best = found.best
-    frames = best.histories[0].times.size
+    best, frames = found.best, found.best.histories[0].times.size
     after = regression([*MADE, 40.0], [10, 10, 10, frames])
     assert best.expectation.sd == pytest.approx(np.sqrt(c @ after @ c), rel=5e-3)
-    assert best.expectation.current_sd == pytest.approx(np.sqrt(c @ regression(MADE, 10) @ c), rel=5e-3)
+    _, low, high = line.rate(40.0, warn=False)  # three tests from 48 to 52 MPa hardly show what the law misses there
+    assert best.expectation.current_sd == pytest.approx(np.log(high / low) / (2 * 1.959964), rel=0.02)
     assert "brings the standard deviation of the rate at 40 MPa from" in found.sentence
 
 
@@ -90,7 +90,7 @@ def test_expected_precision_is_met_when_the_test_is_made():
     found = design(fit, goal=rate_at(30.0))
     made = carried_out(BAR, STRAIN_HARDENING, SPL, found.best.histories[:1], seed=0)
     after = identify(STRAIN_HARDENING, [*tests, *made], BAR, settings=LIKELY)
-    _, low, high = after.by_tests_alone.interval_of(rate_at(30.0).function(after.coordinates))
+    _, low, high = after.interval_of(rate_at(30.0).function(after.coordinates))
     assert (high - low) / (2 * 1.959964) == pytest.approx(found.best.expectation.sd, rel=0.15)
 
 
