@@ -21,7 +21,7 @@ BUDGET = {
     "core": 70,
     "dataset": 730,
     "discovery": 1385,
-    "experiments": 1330,
+    "experiments": 1360,
     "exporters": 2680,
     "extraction": 1300,
     "fem": 1450,
