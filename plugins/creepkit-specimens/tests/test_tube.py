@@ -143,7 +143,7 @@ def test_a_plate_states_the_stresses_that_creep_follows_while_it_bulges(n: float
     assert seen.min() == pytest.approx(low, rel=0.1)
     assert 1.4 * cap < high < 0.32 * 2500.0 * p
     fit = ck.identify("norton", [run], starts=1)
-    assert fit.ranges["stress"] == pytest.approx((low, high), rel=0.02)
+    assert fit.ranges["stress"] == pytest.approx((low, high), rel=0.08)
     assert low < fit.tested_point.stress < high
 
 

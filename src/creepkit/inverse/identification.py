@@ -28,7 +28,7 @@ from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.predictor_documents import PredictorDocument, missing_predictor
 from creepkit.inverse.problem import NOTEWORTHY_FACTOR, LeastSquaresProblem
-from creepkit.inverse.reference_conditions import ReferencePoint
+from creepkit.inverse.reference_conditions import ReferencePoint, simulated_stresses
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import LawAtTests, constant_stress_tests
 from creepkit.inverse.uncertainty.laplace_approximation import (
@@ -164,6 +164,11 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
         from creepkit.reports.identification import identification_comments
 
         return identification_comments(self, ranking)
+
+    @cached_property
+    def simulated_stresses(self) -> tuple[Floats, ...]:
+        """Of each test the stresses (stresses,) MPa that it goes through by the law."""
+        return tuple(simulated_stresses(self.law, self.values, h, self.predictor) for h in self.histories)
 
     @property
     def tested_point(self) -> ReferencePoint:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -109,16 +108,9 @@ def simulated_stresses(
     A plate that bulges sees a third of the stress that it begins with: the reference stresses alone do not say which
     stresses tests told of.
     """
-    return _simulated_stresses(law, tuple(values.items()), history, predictor)
-
-
-@lru_cache(maxsize=1024)
-def _simulated_stresses(
-    law: CreepLaw, values: tuple[tuple[str, float], ...], history: History, predictor: Predictor | None
-) -> Floats:
     own = None if predictor is None else predictor.for_history(history)
     with suppress(CreepkitError):  # a law that ends a test before its first frame says nothing of it
-        stresses = None if own is None else own.simulated_stress(law, dict(values), history)
+        stresses = None if own is None else own.simulated_stress(law, values, history)
         if stresses is not None:
             return _positive(np.atleast_1d(np.asarray(stresses, float)))
     return _positive(reference_stresses(history, predictor))

@@ -12,7 +12,7 @@ from creepkit.errors import CreepkitError
 from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.identified_values import MinimumRate, minimum_rates_of
 from creepkit.inverse.minimum_rates import apparent_energy, apparent_exponent
-from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, simulated_stresses
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
@@ -66,7 +66,7 @@ def has_rates(fit: Identification) -> bool:
 
 
 def _tested_stresses(fit: Identification) -> list[float]:
-    return [float(v) for h in fit.histories for v in simulated_stresses(fit.law, fit.values, h, fit.predictor)]
+    return [float(v) for stresses in fit.simulated_stresses for v in stresses]
 
 
 def draw_rates(axes: Axes, fit: Identification) -> None:
@@ -108,7 +108,7 @@ def own_rates(fit: Identification, test: int) -> list[tuple[float, float, float]
     """
     history, found = fit.histories[test], fit.tests[test]
     factor = 1.0 / found.minimum_rate.ratio if not found.outputs and found.minimum_rate else found.rate_factor
-    stresses = np.unique(simulated_stresses(fit.law, fit.values, history, fit.predictor))
+    stresses = np.unique(fit.simulated_stresses[test])
     if factor == 1.0 or not np.isfinite(factor):
         return []
     return [

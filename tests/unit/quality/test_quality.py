@@ -130,6 +130,19 @@ def test_unloading_at_the_end(frames):
     assert "the load was taken off" in found.reason
 
 
+@pytest.mark.parametrize("rows", [1, 3])
+def test_rows_read_after_fracture_are_left_out(rows):
+    """Strain that goes to infinity as -ln(1 - t/t_r) is creep to 1 - 1e-4 of the life; what steps up is not."""
+    life = np.append(np.linspace(0.01, 0.99, 60), 1.0 - np.geomspace(5e-3, 1e-4, rows))
+    strain = -0.01 * np.log1p(-life) + 1e-6 * np.random.default_rng(2).normal(size=life.size)
+    test = bar(np.random.default_rng(2), times=1e6 * life).replace(outputs={"strain": strain})
+    assert not list(check_data_quality([test]))
+    broken = np.where(np.arange(life.size) >= 60, 3.0 * strain[59], strain)
+    (marked,) = exclude_suspect_frames([test.replace(outputs={"strain": broken})])
+    assert marked.labels["suspect"].startswith("fracture, frame")
+    assert np.flatnonzero(~marked.used).tolist() == list(range(60, 60 + rows))
+
+
 def test_an_amplitude_that_falls_under_a_held_pressure():
     rng = np.random.default_rng(5)
     shape = np.where(TIMES < 9000, TIMES / 9000, 2 - TIMES / 9000)
