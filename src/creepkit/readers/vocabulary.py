@@ -7,25 +7,21 @@ Names as laboratories write them, `Time (h)`, `Strain [%]`, `T_F`, are brought i
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher, get_close_matches
 from functools import cached_property, lru_cache
 
 from creepkit.records import TENSOR_COMPONENTS, dimensions_of, known_specimens, loads_of, outputs_of
 from creepkit.records.quantities import (
-    ANGLE,
     AREA,
     FLAG,
-    FORCE,
     LENGTH,
     MODULUS,
-    MOMENT,
     POISSON,
     RATE,
     SIGNED_STRESS,
     STRAIN,
-    STRESS,
     TEMPERATURE,
     TIME,
     QuantityKind,
@@ -46,25 +42,18 @@ def split_unit(name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str] 
     return None if found is None else (found, name[len(found) + 1 :])
 
 
-_READ = dict.fromkeys(
-    suffix
-    for kind in (TIME, STRAIN, TEMPERATURE, STRESS, MODULUS, LENGTH, FORCE, MOMENT, ANGLE, AREA)
-    for suffix in kind.units
-    if suffix in UNITS
-)
-"""Units that some column or condition may be in."""
-
-
-UNIT_SPELLINGS: Mapping[str, str] = {spelling.lower(): symbol for spelling, symbol in spellings(*_READ).items()}
+UNIT_SPELLINGS: Mapping[str, str] = {spelling.lower(): symbol for spelling, symbol in spellings(*UNITS).items()}
 """{spelling in small letters: creepkit's suffix}. Capitals do not matter but where they tell units apart."""
 
 
 NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "time": (
-        *("elapsed time", "time elapsed", "test time", "creep time", "time under load", "zeit", "prüfzeit", "laufzeit"),
-        *("belastungszeit", "beanspruchungsdauer", "versuchszeit", "temps", "durée", "temps écoulé", "x_value"),
-        *("timestamp", "time stamp", "datetime", "date time", "date/time", "time of day", "uhrzeit", "時間"),
+        *("timestamp", "time stamp", "datetime", "date time", "date/time", "date and time", "clock", "zeit", "elapsed"),
+        *("elapsed time", "unix", "unix time", "epoch", "epoch time", "uhrzeit", "zeitstempel", "test time", "時間"),
+        *("time of day", "time elapsed", "creep time", "time under load", "prüfzeit", "laufzeit", "belastungszeit"),
+        *("beanspruchungsdauer", "versuchszeit", "temps", "durée", "temps écoulé", "x_value"),
     ),
+    "date": ("date", "datum", "day", "jour", "heure"),
     "temperature": (
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
@@ -138,14 +127,23 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "width": ("specimen width", "breite", "probenbreite", "largeur"),
     "thickness": (
-        *("specimen thickness", "wall thickness", "wall", "dicke", "probendicke", "wandstärke", "wanddicke"),
+        *(
+            "specimen thickness",
+            "wall thickness",
+            "wall",
+            "dicke",
+            "blechdicke",
+            "probendicke",
+            "wandstärke",
+            "wanddicke",
+        ),
         *("épaisseur", "épaisseur de paroi"),
     ),
     "area": (
         *("cross section", "cross-section", "cross-sectional area", "cross section area", "initial area"),
         *("querschnitt", "querschnittsfläche", "anfangsquerschnitt", "section", "section initiale"),
     ),
-    "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung"),
+    "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung", "composition"),
     "name": ("test name", "test id", "test", "試験片番号"),
 }
 """{quantity or text key: its names in small letters}."""
@@ -180,7 +178,7 @@ STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
 """{name of a column in small letters: key and text of the condition that it states}."""
 
 
-_IN_BRACKETS = re.compile(r"([^()\[\]]*)[(\[]([^()\[\]]*)[)\]]\s*([^()\[\]]*)")
+_IN_BRACKETS = re.compile(r"([^()\[\]]*)[(\[]((?:[^()\[\]]|\(\w*\))*)[)\]]\s*([^()\[\]]*)")
 
 
 _PARTS_OF_UNIT = 8
@@ -207,22 +205,23 @@ def unit_suffix(text: str) -> str | None:
     return UNIT_SPELLINGS.get(plain)
 
 
-def split_written_name(text: str) -> tuple[str, str]:
+def split_written_name(text: str, is_unit: Callable[[str], object] = unit_suffix) -> tuple[str, str]:
     """Name and unit as written, ("Time", "h") of `Time (h)`, `Time [h]`, `Time / h`, `Time, h`, `Time_h`, `Time in h`.
 
-    The unit is "" where there is none; what stands in brackets at the end is one even where it is not known.
+    The unit is "" where there is none; what stands in brackets at the end is one even where it is not known. is_unit :
+    whether a text is a unit elsewhere.
     """
     text = " ".join(text.split())
     if match := _IN_BRACKETS.fullmatch(text):
         name, unit, rest = (part.strip() for part in match.groups())
-        if not rest or unit_suffix(unit):
+        if not rest or is_unit(unit):
             return f"{name} {rest}".strip(), unit
     for separator in (",", " in ", "_", " ", "/"):
         parts = text.split(separator)
         for k in range(max(1, len(parts) - _PARTS_OF_UNIT), len(parts)):
             name, unit = separator.join(parts[:k]), separator.join(parts[k:])
             # A blank before 1 sets a number apart, as of a sensor, and no unit.
-            if name and unit_suffix(unit) and not (separator in " _" and unit.casefold() in ("1", "-", "std")):
+            if name and is_unit(unit) and not (separator in " _" and unit.casefold() in ("1", "-", "std")):
                 return name.strip(" ,_/"), unit.strip()
     return text, ""
 
