@@ -58,7 +58,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
         *("probentemperatur", "ofen", "ofentemperatur", "température", "température d'essai", "four", "temp ctrl"),
-        *("試験温度", "温度"),
+        *("試験温度", "温度", "temp d'essai"),
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
@@ -94,7 +94,16 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "thermal_expansion": ("coefficient of thermal expansion", "cte", "wärmeausdehnungskoeffizient"),
     "poisson": ("poisson's ratio", "poissons ratio", "poisson ratio"),
-    "rupture": ("rupture time", "time to rupture", "rupture life", "bruchzeit", "standzeit", "temps à rupture"),
+    "rupture": (
+        *("rupture time", "time to rupture", "rupture life", "creep life", "t rupture", "ttr", "ttf", "bruchzeit"),
+        *("standzeit", "temps à rupture", "durée de vie"),
+    ),
+    "end_time": (
+        *("end time", "duration", "test duration", "time on test", "hours on test", "prüfdauer", "versuchsdauer"),
+        *("durée d'essai", "temps d'essai", "durée de l'essai"),
+    ),
+    "minimum_rate": ("minimum rate", "minimum creep rate", "mcr", "minimale kriechrate"),
+    "minimum_rate_sd": ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd"),
     "strain_sd": ("standard deviation of strain", "strain standard deviation"),
     "diameter": (
         *("specimen diameter", "sample diameter", "initial diameter", "gauge diameter", "durchmesser"),
@@ -143,10 +152,19 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("cross section", "cross-section", "cross-sectional area", "cross section area", "initial area"),
         *("querschnitt", "querschnittsfläche", "anfangsquerschnitt", "section", "section initiale"),
     ),
-    "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung", "composition"),
+    "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung", "composition", "nuance", "steel", "grade"),
     "name": ("test name", "test id", "test", "試験片番号"),
+    "label heat": ("heat", "cast", "batch", "charge", "schmelze", "heat number", "heat no", "heat id", "coulée"),
+    "label laboratory": ("laboratory", "lab", "labor", "laboratoire"),
+    "label operator": ("prüfer", "tester"),
+    "label elongation_pct": ("rupture elongation", "elongation at rupture", "bruchdehnung", "allongement à rupture"),
+    "label reduction_of_area_pct": (
+        *("reduction of area", "area reduction", "reduction in area", "brucheinschnürung", "einschnürung", "striction"),
+        *("striction à rupture",),
+    ),
 }
-"""{quantity or text key: its names in small letters}."""
+"""{quantity, key of a text or of a label: its names in small letters}; a forecast tells the scatter between heats and
+laboratories apart."""
 
 
 NAME_SYNONYMS: Mapping[str, str] = {name: meaning for meaning, names in NAMES_OF.items() for name in names}
@@ -345,14 +363,6 @@ TEXT_KEYS = (
 """Words that stand once for a whole test, beside steps and programs; the last line says how its table is written."""
 
 
-LABEL_KEYS: Mapping[str, str] = {
-    **dict.fromkeys(("heat", "cast", "batch", "charge", "schmelze"), "heat"),
-    **dict.fromkeys(("laboratory", "lab", "labor"), "laboratory"),
-    **dict.fromkeys(("prüfer", "tester"), "operator"),
-}
-"""{key: label} of what tests share with others: a forecast tells the scatter between heats and laboratories apart."""
-
-
 CLOSE_SPELLING = 0.8
 """Similarity above which an unknown name is a misspelt one."""
 
@@ -496,14 +506,16 @@ class Terms:
 
     def condition(self, name: str) -> str:
         """A name of a condition in creepkit's form, where it is understood."""
-        words = words_of(name)
+        written, unit = split_written_name(name)
+        label = NAME_SYNONYMS.get(words_of(written), "")
         if name in self.vocabulary.synonyms or name in self.vocabulary.labels:
             return name
         if name.startswith(("label ", "geometry ")):
             return name
         if names_tests(name):
             return "name"
-        return f"label {LABEL_KEYS[words]}" if words in LABEL_KEYS else self.conditions.standard(name)
+        is_label = label.startswith("label ") and unit_suffix(unit) == ("pct" if unit else None)
+        return label if is_label else self.conditions.standard(name)
 
     def is_condition(self, name: str) -> bool:
         """Whether a name is that of a condition."""
@@ -523,7 +535,8 @@ class Terms:
     def misspelt(self, name: str) -> str:
         """The key of which an unknown name is a misspelling; "" for none."""
         plain, keys = plain_name(name), self._keys_by_name
-        if misspelt := [known for known in keys if is_misspelling(plain, known)]:
+        written = {plain, name.casefold()}  # with what stands before a unit that was left out
+        if misspelt := [known for known in keys if any(is_misspelling(one, known) for one in written)]:
             return keys[get_close_matches(plain, misspelt, 1, cutoff=0.0)[0]]
         words = {plain, plain.rpartition("_")[0]}
         names = (name for name in self.condition_kinds for word in words if is_misspelling(word, name.casefold()))
@@ -544,7 +557,7 @@ class Terms:
         for quantity, kind in self.condition_kinds.items():
             yield from (f"{quantity}_{unit}" if unit else quantity for unit in kind.units)
         yield from sorted(self.text_keys)
-        yield from LABEL_KEYS
+        yield from (name for key in ("heat", "laboratory", "operator") for name in NAMES_OF[f"label {key}"])
         for dimension in self.dimensions:
             yield from (f"{dimension}_{unit}" for unit in LENGTH.units)
 
