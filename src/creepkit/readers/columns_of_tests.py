@@ -168,6 +168,12 @@ def _quantity_by_words(name: str, unit: str) -> str:
     return "rupture" if is_rupture else ""
 
 
+def is_any_rate(written: str) -> bool:
+    """Whether a column holds rates of creep or of something else, in a unit of theirs."""
+    name, unit = split_written_name(written)
+    return bool(RATES.search(plain_words(name))) and unit_suffix(unit) in RATE.units
+
+
 def _strain_reached(written: str) -> float | None:
     """The strain, as a fraction, to which a column states times; None of any other column."""
     text = " ".join(written.split())
@@ -317,6 +323,7 @@ def is_test_table(names: Sequence[str], rows: Sequence[TableRow] = ()) -> bool:
     found = {one.quantity for one in columns}
     is_named = any(_differ(rows, k) for k, one in enumerate(columns) if one.quantity in ("name", "specimen"))
     measured = not {"minimum_rate", "rupture"}.isdisjoint(found) or any(one.strain is not None for one in columns)
+    measured |= any(map(is_any_rate, names)) and "end_time" not in found
     measured |= "end_time" in found and (is_named or any(kind_of_column(name) in FIRM for name in names))
     is_framed = "end_time" in found and has_frames(names)
     return measured and not {"stress", "temperature"}.isdisjoint(found) and (is_named or not is_framed)

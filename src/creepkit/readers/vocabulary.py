@@ -57,7 +57,16 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "temperature": (
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
-        *("probentemperatur", "ofen", "ofentemperatur", "température", "température d'essai", "four", "temp ctrl"),
+        *(
+            "probentemperatur",
+            "ofen",
+            "ofentemperatur",
+            "temperatur ofen",
+            "température",
+            "température d'essai",
+            "four",
+            "temp ctrl",
+        ),
         *("試験温度", "温度", "temp d'essai"),
     ),
     "stress": (
@@ -123,6 +132,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("midspan deflection", "deflection at midspan", "centre deflection", "center deflection", "durchbiegung"),
         *("central deflection", "mid span deflection", "durchbiegung mitte", "mittendurchbiegung", "flèche"),
         *("flèche au centre", "load point deflection", "load point displacement", "deflection at load points"),
+        *("apex height", "apex deflection", "dome height", "bulge height", "pole height", "kuppelhöhe", "wölbhöhe"),
     ),
     "notch_diameter": ("minimum diameter", "root diameter", "notch root diameter", "kerbdurchmesser"),
     "span": (
