@@ -15,6 +15,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import LawError, nearest
 from creepkit.kernels.kernel_functions import law_comments
 from creepkit.kernels.symbolic_kernel import SymbolicKernel, symbolic_kernel
+from creepkit.language.algebra import with_conditions_as_parameters
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
 
@@ -35,7 +36,12 @@ def lower(law: CreepLaw, target: Literal["compiled"]) -> CompiledLaw: ...
 
 @checked
 def lower(law: CreepLaw, target: KernelTarget = "numpy") -> ArrayKernel | CompiledLaw:
-    """Return the law as a numeric kernel for "numpy", "torch" or "compiled" (C functions, for solvers)."""
+    """Return the law as a numeric kernel for "numpy", "torch" or "compiled" (C functions, for solvers).
+
+    Conditions of tests that it uses are parameters of the kernel, behind its own.
+    """
+    if law.conditions:
+        law = with_conditions_as_parameters(law)
     if target == "compiled":
         from creepkit.kernels.compilation import compile_law
 

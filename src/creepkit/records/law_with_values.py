@@ -61,7 +61,8 @@ class Units:
 class LawWithValues:
     """A law with its values, and what belongs to them.
 
-    values : {parameter: number in its unit}, completed and checked.
+    values : {parameter: number in its unit}, completed and checked. Conditions that have a value, in the law's unit,
+        become numbers of the law.
     notes : lines that become comments: intervals, range of validity, provenance.
     units : of the text wanted. elastic : E in MPa, and nu, for targets that state them.
     name : what the target is to call the law; by default the law's own name, made an identifier.
@@ -77,7 +78,12 @@ class LawWithValues:
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", MappingProxyType(self.law.values(self.values)))
+        stated = {one.name: self.values[one.name] for one in self.law.conditions if one.name in self.values}
+        law = self.law.at(None, **stated)
+        gone = {*stated, *self.law.names} - {*law.names}
+        values = {name: value for name, value in self.values.items() if name not in gone}
+        object.__setattr__(self, "law", law)
+        object.__setattr__(self, "values", MappingProxyType(law.values(values)))
         object.__setattr__(self, "notes", tuple(self.notes))
         object.__setattr__(self, "ranges", MappingProxyType(dict(self.ranges)))
 
@@ -91,10 +97,10 @@ class LawWithValues:
         return replace(self, **changes)
 
     @checked
-    def at(self, temperature: float) -> LawWithValues:
-        """The same with a number, in K, in the place of the temperature."""
-        law = self.law.at(temperature)
-        elastic = None if self.elastic is None else self.elastic.at(temperature)
+    def at(self, temperature: float | None = None, /, **conditions: float) -> LawWithValues:
+        """The same with numbers in the place of the temperature, K, and of conditions, in the law's units."""
+        law = self.law.at(temperature, **conditions)
+        elastic = self.elastic if self.elastic is None or temperature is None else self.elastic.at(temperature)
         return replace(self, law=law, values={name: self.values[name] for name in law.names}, elastic=elastic)
 
     def without_inactive_terms(self) -> LawWithValues:

@@ -198,7 +198,7 @@ def test_a_constraint_follows_its_parameter_into_temperature():
         (lambda: NORTON.fix(**{"n": "five"}), "parameter 'n': 'five' is not a number"),
         (lambda: NORTON.fix(**{"k": 1}), "has no parameter 'k'"),
         *((lambda T=T: NORTON.times(arrhenius()).at(T), "temperature") for T in (0, -5, 2e4)),
-        (lambda: NORTON.with_temperature(A=linear()), "has a log scale: use exponential"),
+        (lambda: NORTON.with_temperature(A=linear()), "has a log scale: use activated"),
         (lambda: NORTON.with_temperature(A=inverse_temperature()), "has a log scale: use activated"),
         (lambda: NORTON.with_temperature(n="linear"), "n needs a form such as linear"),
         (lambda: NORTON.with_temperature(n=linear()).with_temperature(n=linear()), "depends on temperature twice"),

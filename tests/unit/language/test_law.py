@@ -75,7 +75,6 @@ BAD_LAWS = {
 
 BAD_PARAMS = {
     "reversed bounds": ({"bounds": (8, 1)}, r"bounds are reversed or empty, \(8, 1\)"),
-    "empty bounds": ({"bounds": (1, 1)}, "reversed or empty"),
     "infinite bounds": ({"bounds": (0, float("inf"))}, "must be finite"),
     "log of zero": ({"bounds": (0, 1), "scale": "log", "unit": "1/s"}, "a log scale needs bounds above zero"),
     "missing unit": ({"scale": "log"}, 'missing unit; write unit="1/s"'),
