@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -127,12 +126,6 @@ class InstrumentRecord(Presentable, Plotted):
             raise HistoryError(f"{self.origin}: channel '{channel}' holds no reading after time zero")
         return recorded_program(times[later], values[later], tolerance)
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.instrument_records import draw_record, record_figure
+    drawn_by = "instrument_records.record_figure", "instrument_records.draw_record"
 
-        return record_figure, draw_record
-
-    def __str__(self) -> str:
-        from creepkit.reports.instrument_records import record_text
-
-        return record_text(self)
+    shown_by = "instrument_records.record_text"

@@ -296,10 +296,7 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
         beyond = extrapolation(self.tests, hours, temperature, stress)
         return LifeEstimate(stress, temperature, hours, mean, heat, test, beyond)
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.rupture import draw_isotherms, rupture_figure
-
-        return rupture_figure, draw_isotherms
+    drawn_by = "rupture.rupture_figure", "rupture.draw_isotherms"
 
     def save(self, path: str | Path) -> Path:
         """Write the assessment as JSON; by their suffixes the time to rupture in C or Fortran, or a table with bounds.
@@ -308,10 +305,7 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
         """
         return write_assessment(self, path)
 
-    def __str__(self) -> str:
-        from creepkit.reports.rupture import rupture_text
-
-        return rupture_text(self)
+    shown_by = "rupture.rupture_text"
 
 
 ISOTHERMAL_TOLERANCE = 5.0

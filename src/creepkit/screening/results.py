@@ -12,7 +12,6 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -171,15 +170,9 @@ class ScreeningResult(Presentable, Plotted):
         """Write one row an alloy: class, law, weight, values with intervals, rate, misfits, notes."""
         return write_csv(self, Path(path))
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.screening import draw_rates_of_alloys, screening_figure
+    drawn_by = "screening.screening_figure", "screening.draw_rates_of_alloys"
 
-        return screening_figure, draw_rates_of_alloys
-
-    def __str__(self) -> str:
-        from creepkit.reports.screening import screening_text
-
-        return screening_text(self)
+    shown_by = "screening.screening_text"
 
 
 ALLOY_RESULT = DocumentFormat(
