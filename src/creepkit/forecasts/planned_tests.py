@@ -72,14 +72,15 @@ COMPONENTS = "components"
 """The load of specimens under stresses and strains of several components."""
 
 
-def specimen_taking(loads: Collection[str], usual: str = "uniaxial") -> str:
-    """The specimen of a test under loads of these names, where none is named: a bar if it takes one, else the first.
+def specimen_taking(loads: Collection[str]) -> str:
+    """The first specimen of a test under loads of these names, where none is named; of none that of a stress.
 
     Those of components, as stress_11, are of a material point.
     """
     names = {COMPONENTS if name in COMPONENT_LOADING_KINDS else name for name in loads}
-    taking = [name for name, one in known_specimens().items() if names & {load.name for load in loads_of(one)}]
-    return usual if usual in taking or not taking else taking[0]
+    taking = {name: {load.name for load in loads_of(one)} for name, one in known_specimens().items()}
+    of_stress = next(name for name, own in taking.items() if "stress" in own)
+    return next((name for name, own in taking.items() if names & own), of_stress)
 
 
 def stated_temperature(levels: Sequence[tuple[float, float]]) -> float | Program | None:

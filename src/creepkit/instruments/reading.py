@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import HistoryError, nearest, quoted
+from creepkit.errors import HistoryError, nearest, quoted, refuse_unknown
 from creepkit.files.reading import how_to_raise, raised
 from creepkit.files.time_stamps import DAY, ClockColumn, ResolvedTimes, is_clock_time, resolve
 from creepkit.instruments.column_heads import (
@@ -100,8 +100,7 @@ def _record(
 def _format_of(head: TableHead, formats: Sequence[InstrumentFormat], name: str | None) -> InstrumentFormat:
     if name is not None:
         known = {one.name: one for one in formats}
-        if name not in known:
-            raise HistoryError(f"no instrument format is called '{name}'; {nearest(name, known)}")
+        refuse_unknown(name, known, HistoryError, f"no instrument format is called '{name}'")
         if not known[name].accepts(head.names):
             raise HistoryError(
                 f"{head.place}: the format '{name}' wants columns named {', '.join(known[name].required)}"
@@ -201,8 +200,7 @@ class _Columns:
         times = _time_columns(place, heads, plain, stated)
         units = dict(options.units)
         for name, unit in units.items():
-            if name not in names:
-                raise HistoryError(f"{place}: units of '{name}', which is no channel; {nearest(name, names)}")
+            refuse_unknown(name, names, HistoryError, f"{place}: units of '{name}', which is no channel")
             if channel_unit(unit) is None:
                 raise HistoryError(f"the unit '{unit}' of '{name}' is not known; {', '.join(KNOWN_UNITS)}")
         channels: list[_Column] = []

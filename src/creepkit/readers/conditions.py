@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from creepkit.errors import CreepkitError, HistoryError, nearest
+from creepkit.errors import CreepkitError, HistoryError, refuse_unknown
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
@@ -378,8 +378,7 @@ def read_noise_correlation(conditions: StatedConditions, outputs: Collection[str
             )
         first, second, number = words
         for name in (first, second):
-            if name not in known:
-                raise HistoryError(f"{location}: {KEY} names '{name}', which is no column; {nearest(name, known)}")
+            refuse_unknown(name, known, HistoryError, f"{location}: {KEY} names '{name}', which is no column")
         pair = first, second
         if first == second or pair in correlations or pair[::-1] in correlations:
             problem = "correlates with itself" if first == second else f"and {second} are given twice"

@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError, refuse_unknown
 from creepkit.records.loading import Program
 from creepkit.records.presentable import Plotted, Presentable
 from creepkit.records.recorded_programs import recorded_program
@@ -101,8 +101,7 @@ class InstrumentRecord(Presentable, Plotted):
 
     def channel(self, name: str) -> Channel:
         """The channel of a name; HistoryError with the nearest one where there is none."""
-        if name not in self.channels:
-            raise HistoryError(f"{self.origin}: there is no channel '{name}'; {nearest(name, self.channels)}")
+        refuse_unknown(name, self.channels, HistoryError, f"{self.origin}: there is no channel '{name}'")
         return self.channels[name]
 
     def readings(self, name: str) -> tuple[Floats, Floats]:

@@ -63,7 +63,8 @@ class Plotted:
         """
         from creepkit.reports.figures import plotted
 
-        return plotted(self, *map(function_of_reports, self.drawn_by), path, ax)
+        figure, panel = map(function_of_reports, self.drawn_by)
+        return plotted(self, figure, panel, path, ax)
 
 
 class Tabulated:

@@ -14,7 +14,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError, nearest, quoted
+from creepkit.errors import FitError, nearest, quoted, refuse_unknown
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
@@ -79,8 +79,7 @@ class RuptureSettings(Options, title="settings of an assessment"):
         if not self.degrees:
             raise FitError("degrees are (); give whole numbers from 1 to 5, such as (1, 2, 3)")
         for method, constants in self.fixed.items():
-            if method not in METHODS:
-                raise FitError(f"fixed= names a method '{method}'; {nearest(method, METHODS)}")
+            refuse_unknown(method, METHODS, FitError, f"fixed= names a method '{method}'")
             for name, value in constants.items():
                 if name not in METHODS[method].fixable:
                     allowed = ", ".join(METHODS[method].fixable) or "none"

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from creepkit.errors import FitError, nearest
+from creepkit.errors import FitError, refuse_unknown
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError, ValueCodec
@@ -137,8 +137,7 @@ class ScreeningResult(Presentable, Plotted):
 
     def __getitem__(self, alloy: str) -> AlloyResult:
         known = {result.alloy: result for result in self.results}
-        if alloy not in known:
-            raise FitError(f"the plate has no alloy '{alloy}'; {nearest(alloy, known)}")
+        refuse_unknown(alloy, known, FitError, f"the plate has no alloy '{alloy}'")
         return known[alloy]
 
     def class_of(self, alloy: str) -> str:

@@ -271,7 +271,7 @@ def no_identification(monkeypatch):
 
 
 def test_forms_and_parameters_of_a_temperature_study(no_identification, tmp_path):
-    table = {"--form n=lin": "no temperature form 'lin': did you mean 'linear'", "--form m=linear": "'m'"}
+    table = {"--form n=lin": "no temperature form 'lin'; did you mean 'linear'", "--form m=linear": "'m'"}
     line = f"discover {' '.join(BARS)} --law norton --to {tmp_path / 'd'}"
     assert answers((f"{line} {words}", said) for words, said in table.items()) == []
 
