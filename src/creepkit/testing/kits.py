@@ -18,7 +18,7 @@ from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, LawError, PluginError
 from creepkit.files.time_stamps import DATE_ORDERS
-from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
+from creepkit.instruments.column_heads import TIME_UNITS, channel_unit, time_factor
 from creepkit.kernels.lowering import lower
 from creepkit.language.law import CreepLaw
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
@@ -43,7 +43,7 @@ def check_declaration(declared: InstrumentFormat) -> str:
     unknown = [unit for unit in declared.units.values() if channel_unit(unit) is None]
     assert not unknown, f"'{unknown[0]}' is no unit of a channel; write one such as barg, psia, C"
     unit, order = declared.time_unit, declared.date_order
-    assert unit in ("", *TIME_UNITS), f"'{unit}' is no unit of times; write one of {', '.join(TIME_UNITS)}"
+    assert not unit or time_factor(unit), f"'{unit}' is no unit of times; write one of {', '.join(TIME_UNITS)}"
     assert order in ("", *DATE_ORDERS), f"'{order}' is no order of dates; write one of {', '.join(DATE_ORDERS)}"
     return "units of channels and times, and the order of dates, are known"
 

@@ -209,7 +209,7 @@ SENSELESS = [
     ),
     (
         f"{NORTON} --stress 80 --temperature-c 1800:500",
-        "--temperature-c: nothing is said of the time before; give the first one from 0 s on",
+        "nothing is said of the temperature before; give its first level from 0 s on",
     ),
     (f"{NORTON} --specimen point --stress 21=80", "no component '21' to load; allowed are 11, 22, 33, 12, 23, 13"),
     (DIMPLE, "specimen 'bulge' needs a pressure: give --pressure, such as 9"),
