@@ -40,8 +40,7 @@ def lower(law: CreepLaw, target: KernelTarget = "numpy") -> ArrayKernel | Compil
 
     Conditions of tests that it uses are parameters of the kernel, behind its own.
     """
-    if law.conditions:
-        law = with_conditions_as_parameters(law)
+    law = with_conditions_as_parameters(law)
     if target == "compiled":
         from creepkit.kernels.compilation import compile_law
 

@@ -345,6 +345,8 @@ CONDITION_BOUNDS = (-1e30, 1e30)
 @lru_cache(maxsize=128)
 def with_conditions_as_parameters(law: Law) -> Law:
     """The law with its conditions as further parameters, behind its own: what kernels and simulations see of it."""
+    if not law.conditions:
+        return law
     plain = {symbol: Symbol(symbol.name) for symbol in law.conditions}
     stated = {plain[s]: Param(f"condition {s.name}", CONDITION_BOUNDS, s.unit) for s in law.conditions}
     return replace(
