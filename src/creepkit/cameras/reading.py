@@ -18,7 +18,7 @@ from creepkit.cameras.recognition import Recognised, recognise
 from creepkit.cameras.sequences import in_order, missing_numbers, skeleton
 from creepkit.cameras.text_files import FRAME_FILE, HEAD_BYTES, FrameText, frame_ranges, table_in_range
 from creepkit.cameras.time_files import read_frame_times
-from creepkit.errors import HistoryError, quoted, refuse_unknown
+from creepkit.errors import SAID, HistoryError, quoted, refuse_unknown, restated
 from creepkit.files.reading import read_bytes
 from creepkit.records import CameraFrame, Frames
 from creepkit.records.camera_format import CameraFormat
@@ -120,10 +120,8 @@ def _frames_in_folder(folder: Path, formats: Sequence[CameraFormat], chosen: boo
     These are frames that cannot be read: they must be missed where they stand, not left out in silence.
     """
     patterns = [pattern.lower() for one in formats for pattern in one.patterns]
-    try:
+    with restated(OSError, HistoryError, f"{folder}: the folder cannot be read ({SAID}); name another one"):
         entries = sorted(folder.iterdir())
-    except OSError as error:
-        raise HistoryError(f"{folder}: the folder cannot be read ({error.strerror}); name another one") from None
     files = [
         file
         for file in entries

@@ -12,7 +12,7 @@ from glob import glob
 from pathlib import Path
 from typing import Any, cast
 
-from creepkit.errors import HistoryError, quoted, refuse_unknown
+from creepkit.errors import SAID, HistoryError, quoted, refuse_unknown, restated
 from creepkit.files.delimited_text import refuse_unprintable
 from creepkit.files.reading import read_bytes
 from creepkit.hookspecs import hookimpl
@@ -166,10 +166,8 @@ def readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
     if not path.is_dir():
         what = "is no regular file but a device, a pipe or the like" if path.exists() else "no such file or folder"
         raise HistoryError(f"{path}: {what}; name a file or a folder")
-    try:
+    with restated(OSError, HistoryError, f"{path}: the folder cannot be read ({SAID}); name another one"):
         entries = sorted(path.iterdir())
-    except OSError as error:
-        raise HistoryError(f"{path}: the folder cannot be read ({error.strerror}); name another one") from None
     visible = [file for file in entries if file.is_file() and file.name[0] != "."]
     visible = [file for file in visible if file.name != ANSWERS_FILE]
     files = [file for file in visible if any(accepts_path(reader, file) for reader in answered_readers(file, readers))]
