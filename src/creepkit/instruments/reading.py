@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest, quoted, refuse_unknown
 from creepkit.files.reading import how_to_raise, raised
-from creepkit.files.time_stamps import DAY, ClockColumn, ResolvedTimes, is_clock_time, resolve
+from creepkit.files.time_stamps import DAY, ClockColumn, ResolvedTimes, check_increasing, is_clock_time, resolve
 from creepkit.instruments.column_heads import (
     KNOWN_UNITS,
     MINUTES_AND_SECONDS,
@@ -292,12 +292,7 @@ class _Times:
                 f"{place}: the unit of '{columns.head.names[column]}' is not stated; "
                 "write it into its name, such as time_s, or state time_unit='s', 'ms', 'min' or 'h'"
             )
-        falls = np.diff(numbers) < 0
-        if falls.any():
-            row = int(np.argmax(falls)) + 1
-            raise HistoryError(
-                f"{path}:{lines[row]}: time falls from {numbers[row - 1]:g} to {numbers[row]:g}; it must never decrease"
-            )
+        check_increasing(numbers * factor, str(path), lines)
         start = float(numbers[0] * factor)
         if start <= UNIX_SCALES[-1][0]:
             return ResolvedTimes(numbers * factor, None)
