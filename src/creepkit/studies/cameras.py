@@ -268,8 +268,8 @@ class StudyCamera:
         end = max(2.0 * levels[-1][0], 1e9)
         with self.file.at(*self.key("load", key)):
             loading = stepped_load(name, loads[name], levels, control=None, ramp=self.part.ramp_s, end=end)
-        levels = self.part.temperature_C or []
-        return loading, arguments.temperature_of(self.file, self.key("temperature_C"), levels)
+        stated = self.part.temperature_C or []
+        return loading, arguments.temperature_of(self.file, self.key("temperature_C"), stated)
 
     @cached_property
     def lengths(self) -> dict[str, float]:
