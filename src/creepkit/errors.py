@@ -7,7 +7,7 @@ import importlib
 import os
 import re
 import traceback
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import pluggy
 
@@ -150,3 +150,9 @@ def nearest(word: str, known: Iterable[str]) -> str:
     if close:
         return f"did you mean '{close[0]}'? (known: {', '.join(known)})"
     return f"known: {', '.join(known) or 'none'}"
+
+
+def refuse_unknown(name: object, known: Collection[str], error: type[CreepkitError], sentence: str) -> None:
+    """Raise the error, with what is near, for a name that is not among those known."""
+    if name not in known:
+        raise error(f"{sentence}; {nearest(str(name), known)}")

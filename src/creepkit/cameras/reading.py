@@ -18,7 +18,7 @@ from creepkit.cameras.recognition import Recognised, recognise
 from creepkit.cameras.sequences import in_order, missing_numbers, skeleton
 from creepkit.cameras.text_files import FRAME_FILE, HEAD_BYTES, FrameText, frame_ranges, table_in_range
 from creepkit.cameras.time_files import read_frame_times
-from creepkit.errors import HistoryError, nearest, quoted
+from creepkit.errors import HistoryError, quoted, refuse_unknown
 from creepkit.files.reading import read_bytes
 from creepkit.records import CameraFrame, Frames
 from creepkit.records.camera_format import CameraFormat
@@ -87,8 +87,7 @@ def _candidates(format: FormatLike, formats: Sequence[CameraFormat]) -> tuple[Ca
     if isinstance(format, Mapping):
         return (CameraFormat("columns", "columns named by the user", format),)
     known = {one.name: one for one in formats}
-    if format not in known:
-        raise HistoryError(f"no camera format is called '{format}'; {nearest(str(format), known)}")
+    refuse_unknown(format, known, HistoryError, f"no camera format is called '{format}'")
     return (known[format],)
 
 

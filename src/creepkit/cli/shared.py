@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
     from creepkit.records import History, LawWithValues
 
-PAPER_SPECIMEN, DEFAULT_SPECIMEN = "bulge", "uniaxial"
+PAPER_SPECIMEN = "bulge"
 """What a data set is made of and a camera watches, and what a test is of whose load it takes, where nothing is said."""
 
 

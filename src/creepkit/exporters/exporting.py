@@ -10,7 +10,6 @@ from typing import Any, Protocol, runtime_checkable
 from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.errors import ExportError
-from creepkit.exporters.law_description import refuse_conditions
 from creepkit.files.writing import write_text
 from creepkit.language import CreepLaw, Elastic, elastic_of
 from creepkit.options import CELSIUS, GIGAPASCAL, Options, option
@@ -95,8 +94,6 @@ def law_with_values(
 
 def exported_text(exporter: Exporter, source: LawWithValues) -> str:
     """The text of an exporter; ExportError where text() raises another error or returns no text."""
-    if not getattr(exporter, "takes_conditions", True):
-        refuse_conditions(source, f"target '{exporter.name}'")
     what = f"exporter '{exporter.name}': text()"
     text = call_of_plugin(lambda: exporter.text(source), exporter, what, ExportError)
     if not isinstance(text, str):

@@ -90,7 +90,6 @@ class JavaScriptExporter:
 
     serves = ("js",)
     name = "javascript"
-    takes_conditions = False
     title = "JavaScript module with the rate, its terms and its derivatives"
     suffix = ".mjs"
 
@@ -104,7 +103,7 @@ def law_expression(source: LawWithValues) -> str:
 
     Everything stays in it, what is switched off too. Nothing in it ends a script element.
     """
-    refuse_conditions(source, "a page")
+    refuse_conditions(source.law, "a page")
     body = _JavaScriptLaw(source, keeps_inactive=True).text()
     return f'(() => {{\n"use strict";\n{body}\nreturn Object.freeze({{ {", ".join(EXPORTED_NAMES)} }});\n}})()'
 
@@ -143,7 +142,8 @@ class _JavaScriptLaw:
             *heading(self.source, mentions_floors=mentions_floors),
             *self.code.renaming_notes(),
             "Points and parameters are objects by the names of the law: rate({stress: 100}, {}). In `kernel` they are",
-            "arrays, in MPa and s: stress, strain, time, temperature, largest principal and mean stress, then states.",
+            "arrays, in MPa and s: stress, strain, time, temperature, largest principal and mean stress, states and",
+            "conditions.",
             "A result beyond 1.8e308 is Infinity.",
         ]
         return comment_lines(map(_comment_safe, lines), "//", _LINE_LENGTH)
@@ -168,6 +168,7 @@ class _JavaScriptLaw:
                 {"name": s.name, "initial": z.initial, "limit": z.limit, "unit": z.unit, "meaning": z.meaning}
                 for s, z in law.states.items()
             ],
+            "conditions": [{"name": one.name, "unit": one.unit} for one in law.conditions],
         }
 
     # ---- functions -------------------------------------------------------------------------------------------------
@@ -175,7 +176,7 @@ class _JavaScriptLaw:
     def _kernel(self) -> list[str]:
         """The function that makes the law's functions for given values of the parameters."""
         code = self.code
-        places = {symbol: f"point[{k}]" for k, symbol in enumerate((*code.point, *code.states))}
+        places = {symbol: f"point[{k}]" for k, symbol in enumerate((*code.point, *code.states, *code.conditions))}
         closures = {name: _closure(name, code.function(entry), places) for name, entry in _ENTRIES.items()}
         labels = [f"// {_comment_safe(printable_text(label))}" for label in self.law.terms]
         return [

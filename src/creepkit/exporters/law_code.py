@@ -135,12 +135,11 @@ class LawCode:
             raise ExportError(f"cannot be written as a program: {error}") from None
         self._symbols: dict[sympy.Symbol, sympy.Symbol] = {}
         inputs, size = self._lowered.rate.inputs, len(POINT_VARIABLES) + len(self.law.states)
-        requested = [(target_names or {}).get(s.name, s.name) for s in (*POINT_VARIABLES, *self.law.states)]
+        names = target_names or {}
+        requested = [names.get(s.name, s.name) for s in (*POINT_VARIABLES, *self.law.states)]
         symbols = [self._new_symbol(symbol, name) for symbol, name in zip(inputs, requested, strict=False)]
         self.point, self.states = tuple(symbols[: len(POINT_VARIABLES)]), tuple(symbols[len(POINT_VARIABLES) :])
-        self.conditions = tuple(
-            self._new_symbol(s, (target_names or {}).get(s.name, s.name)) for s in self.law.conditions
-        )
+        self.conditions = tuple(self._new_symbol(s, names.get(s.name, s.name)) for s in self.law.conditions)
         self.parameters: dict[sympy.Symbol, float] = {}
         self.logarithms: dict[sympy.Symbol, sympy.Symbol] = {}
         for theta, (name, param) in zip(inputs[size:], self.law.table.items(), strict=True):

@@ -42,11 +42,11 @@ def heading(source: LawWithValues, *, units: str = "", mentions_floors: bool = F
     yield from (f"Source: {reference}" for reference in law.references)
 
 
-def refuse_conditions(source: LawWithValues, target: str) -> None:
+def refuse_conditions(law: CreepLaw, target: str) -> None:
     """ExportError, with what to do, where a law still has conditions of the material and a target no place for them."""
-    if names := [one.name for one in source.law.conditions]:
+    if names := [one.name for one in law.conditions]:
         raise ExportError(
-            f"{target} has no place for conditions of law '{source.law.name}'; give {', '.join(names)} a value as "
+            f"{target} has no place for conditions of law '{law.name}'; give {', '.join(names)} a value as "
             f"well, in the law's unit: in a command --set {names[0]}=0.05"
         )
 

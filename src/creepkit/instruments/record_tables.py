@@ -25,7 +25,7 @@ from creepkit.files.delimited_text import (
 from creepkit.files.labview import is_labview, table_of_labview
 from creepkit.files.reading import FileKind, open_binary
 from creepkit.files.time_stamps import ClockColumn, is_clock_time
-from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
+from creepkit.instruments.column_heads import channel_unit, time_factor
 
 RECORD_FILE = FileKind(
     "a record of an instrument", HistoryError, "export the record as a table of text", maximum_bytes=8_000_000_000
@@ -194,7 +194,7 @@ def _check_decimal_signs(cells: Sequence[str], dialect: Dialect, location: str) 
 
 def _is_units(cells: Sequence[str]) -> bool:
     texts = [cell.strip("()[] ") for cell in cells if cell.strip("()[] ")]
-    known = sum(channel_unit(text) is not None or text in TIME_UNITS for text in texts)
+    known = sum(bool(channel_unit(text) or time_factor(text)) for text in texts)
     return bool(texts) and known >= 0.5 * len(cells)
 
 

@@ -12,7 +12,7 @@ from glob import glob
 from pathlib import Path
 from typing import Any, cast
 
-from creepkit.errors import HistoryError, nearest, quoted
+from creepkit.errors import HistoryError, quoted, refuse_unknown
 from creepkit.files.delimited_text import refuse_unprintable
 from creepkit.files.reading import read_bytes
 from creepkit.hookspecs import hookimpl
@@ -136,8 +136,7 @@ def _with_vocabulary(reader: Reader, changed: Callable[[HeaderVocabulary], Heade
 
 def _reader_named(name: str, readers: Sequence[Reader]) -> Reader:
     known = {reader.name: reader for reader in readers}
-    if name not in known:
-        raise HistoryError(f"no reader is called '{name}'; {nearest(name, known)}")
+    refuse_unknown(name, known, HistoryError, f"no reader is called '{name}'")
     return known[name]
 
 

@@ -33,8 +33,7 @@ class Reader(Protocol):
 class Exporter(Protocol):
     """Writes a law with its values as text: to read, or for another program.
 
-    Optional attributes: `serves`, other words that users ask for it by, such as ("umat",); `takes_conditions`, False
-    where a law that uses conditions of the material cannot be written.
+    Optional attribute: `serves`, other words that users ask for it by, such as ("umat",).
     """
 
     @property

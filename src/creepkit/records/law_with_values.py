@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import ExportError, LawError, nearest
+from creepkit.errors import ExportError, LawError, refuse_unknown
 from creepkit.records.units import factors
 
 if TYPE_CHECKING:
@@ -37,8 +37,7 @@ class Units:
 
     def __post_init__(self) -> None:
         for what, unit, known in (("stress", self.stress, STRESS_UNITS), ("time", self.time, TIME_UNITS)):
-            if unit not in known:
-                raise ExportError(f"'{unit}' is not a unit of {what}: {nearest(unit, known)}")
+            refuse_unknown(unit, known, ExportError, f"'{unit}' is not a unit of {what}")
 
     @property
     def megapascals(self) -> float:

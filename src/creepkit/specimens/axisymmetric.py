@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import SolveError, nearest
+from creepkit.errors import SolveError, refuse_unknown
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.mesh import GeometryDerivative
 from creepkit.fem.section import Section
@@ -58,8 +58,7 @@ class Displacements:
 
     def _displacement(self, point: str, component: int) -> Floats:
         points = self._section.points
-        if point not in points:
-            raise SolveError(f"a section has no point '{point}' to observe; {nearest(point, tuple(points))}")
+        refuse_unknown(point, points, SolveError, f"a section has no point '{point}' to observe")
         number = 2 * points[point] + component
         if self._values is None:
             self.asked.append(number)

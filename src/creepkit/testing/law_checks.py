@@ -24,6 +24,7 @@ from creepkit.kernels.log_form import log_form
 from creepkit.kernels.lowering import lower
 from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.kernels.rate_jumps import find_rate_jump
+from creepkit.language.algebra import with_conditions_as_parameters
 from creepkit.language.elastic import Elastic
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, strain, stress, temperature, time
@@ -141,6 +142,7 @@ def check_temperature(law: CreepLaw, samples: LawSamples) -> str | None:
 def check_example(law: CreepLaw, _: LawSamples, number: int) -> str:
     """An example of the author has the rate that he states."""
     variables, given = (*POINT_VARIABLES, *law.states), dict(law.examples[number - 1])
+    law = with_conditions_as_parameters(law)
     stated = float(given.pop("rate"))
     missing = [key for key in law.names if key not in given]
     missing += [s.name for s in variables if law.uses(s) and s.name not in given]

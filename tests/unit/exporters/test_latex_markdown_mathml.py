@@ -6,8 +6,6 @@ import re
 import xml.etree.ElementTree as ET
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from creepkit import available
 from creepkit.errors import CreepkitError, ExportError
@@ -176,9 +174,6 @@ def _json(**changes):
         ("{", "mine.json, line 1: not JSON"),
         (_json(version=1), "in version 1 of the format; this one reads version 3: export the law again"),
         (_json(ranges={"temperature": [1100, 900]}), "ranges.temperature is 1100 to 900; the lower number comes first"),
-        (_json(script="import os"), "unknown key 'script'; known: gas_constant, law"),
-        (_json(values={"A": 1e-16}), "needs a value for n"),
-        (_json(values={"A": 1e-16, "n": float("inf")}), "Infinity is no number of JSON"),
         (_json(gas_constant=8.31), "'gas_constant' is 8.31; creepkit reads 8.314462618 alone"),
         (_json(units={"stress": "Pa", "time": "s", "temperature": "K", "energy": "J/mol"}), "'units' is .*'Pa'"),
     ],
@@ -187,13 +182,6 @@ def test_a_bad_document_is_one_sentence(text, message):
     with pytest.raises(CreepkitError, match=message) as error:
         read_valued_law(text, "mine.json")
     assert "\n" not in str(error.value)
-
-
-@given(st.text() | st.recursive(st.none() | st.integers() | st.floats() | st.text(), st.lists).map(json.dumps))
-@settings(max_examples=100, deadline=None)
-def test_any_text_is_a_document_or_an_error(text):
-    with pytest.raises(CreepkitError):
-        read_valued_law(text)
 
 
 # ---- LaTeX ---------------------------------------------------------------------------------------------------------
