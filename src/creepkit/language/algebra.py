@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import sympy
 
-from creepkit.errors import LawError, nearest
+from creepkit.errors import LawError, refuse_unknown
 from creepkit.language.law_record import LawRecord
 from creepkit.language.symbols import POINT_VARIABLES, Param, State, Symbol, strain, stress, temperature, time
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
@@ -193,8 +193,7 @@ def _chosen(law: LawRecord, kind: str, names: Iterable[str] | None, known: tuple
         return known
     chosen = (names,) if isinstance(names, str) else tuple(names)
     for name in chosen:
-        if name not in known:
-            raise LawError(f"law '{law.name}' has no {kind} '{name}': {nearest(name, known)}")
+        refuse_unknown(name, known, LawError, f"law '{law.name}' has no {kind} '{name}'")
     return chosen
 
 
@@ -332,8 +331,7 @@ def at(law: Law, T: float | None, conditions: Mapping[str, float]) -> Law:
         numbers[temperature] = sympy.Float(kelvin)
     known = {symbol.name: symbol for symbol in law.conditions}
     for name, value in conditions.items():
-        if name not in known:
-            raise LawError(f"law '{law.name}' has no condition '{name}': {nearest(name, tuple(known))}")
+        refuse_unknown(name, known, LawError, f"law '{law.name}' has no condition '{name}'")
         numbers[known[name]] = sympy.Float(law.number(value, f"condition '{name}'"))
     texts = [f"{float(v):g} K" if s == temperature else f"{s} = {float(v):g} {s.unit}" for s, v in numbers.items()]
     name = f"{law.name}@{','.join(text.replace(' ', '') for text in texts)}"
@@ -347,6 +345,8 @@ CONDITION_BOUNDS = (-1e30, 1e30)
 @lru_cache(maxsize=128)
 def with_conditions_as_parameters(law: Law) -> Law:
     """The law with its conditions as further parameters, behind its own: what kernels and simulations see of it."""
+    if not law.conditions:
+        return law
     plain = {symbol: Symbol(symbol.name) for symbol in law.conditions}
     stated = {plain[s]: Param(f"condition {s.name}", CONDITION_BOUNDS, s.unit) for s in law.conditions}
     return replace(
@@ -487,5 +487,4 @@ def _renamed(expression: sympy.Basic, replacements: Mapping[sympy.Symbol, sympy.
 
 def _check_labels(law: LawRecord, labels: Sequence[str]) -> None:
     for label in labels:
-        if label not in law.terms:
-            raise LawError(f"law '{law.name}' has no term '{label}': {nearest(label, law.terms)}")
+        refuse_unknown(label, law.terms, LawError, f"law '{law.name}' has no term '{label}'")

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import ExportError, LawError, nearest
+from creepkit.errors import SAID, ExportError, LawError, refuse_unknown, restated
 from creepkit.records.units import factors
 
 if TYPE_CHECKING:
@@ -37,8 +37,7 @@ class Units:
 
     def __post_init__(self) -> None:
         for what, unit, known in (("stress", self.stress, STRESS_UNITS), ("time", self.time, TIME_UNITS)):
-            if unit not in known:
-                raise ExportError(f"'{unit}' is not a unit of {what}: {nearest(unit, known)}")
+            refuse_unknown(unit, known, ExportError, f"'{unit}' is not a unit of {what}")
 
     @property
     def megapascals(self) -> float:
@@ -116,10 +115,8 @@ class LawWithValues:
         }
         if not inactive:
             return self
-        try:
+        with restated(LawError, ExportError, f"nothing to export: {SAID}"):
             law = self.law.fix(**inactive)
-        except LawError as error:
-            raise ExportError(f"nothing to export: {error}") from None
         description = ", ".join(f"{name} = {value:g}" for name, value in inactive.items())
         values = {name: self.values[name] for name in law.names}
         law = replace(law, name=self.law.name, title=self.law.title)

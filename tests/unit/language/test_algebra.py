@@ -326,7 +326,7 @@ def test_two_states_have_two_energies_unless_they_share_a_coefficient():
     ("chosen", "message"),
     [
         ({"states": ["x"]}, "has no state 'x'"),
-        ({"terms": "crep"}, "has no term 'crep': did you mean 'creep'"),
+        ({"terms": "crep"}, "has no term 'crep'; did you mean 'creep'"),
         ({"terms": (), "states": ()}, "multiply no term and no state"),
         ({"states": ["H"]}, "state 'H' is a multiple of the creep rate"),
     ],
