@@ -105,8 +105,8 @@ def _draw_reference_rates(axes: Axes, fit: Identification) -> None:
 
 def _stresses_at(fit: Identification, T: float) -> tuple[float, float]:
     """MPa, the lowest and the highest of the tests at a temperature, K."""
-    here = [h for h in fit.histories if np.abs(np.subtract(held_temperatures(h), T)).min() < ISOTHERMAL_RANGE]
-    stresses = [float(v) for h in here for v in reference_stresses(h, fit.predictor) if v > 0]
+    here = [np.abs(np.subtract(held_temperatures(h), T)).min() < ISOTHERMAL_RANGE for h in fit.histories]
+    stresses = [float(v) for seen, is_here in zip(fit.simulated_stresses, here, strict=True) if is_here for v in seen]
     return min(stresses, default=0.0), max(stresses, default=0.0)
 
 
