@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1340,
     "instruments": 1225,
     "integration": 785,
-    "inverse": 10615,
+    "inverse": 10525,
     "jobs": 250,
     "kernels": 1705,
     "language": 1500,
