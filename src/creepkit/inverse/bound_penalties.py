@@ -31,7 +31,7 @@ class BoundPenalties:
         """points : the six variables of a law, (points,) each, at which its constraints must hold."""
         self.coordinates, self.penalised = coordinates, list(coordinates.penalised)
         self.low, self.high = coordinates.law.internal_bounds[:, self.penalised]
-        self._constraints = _constraint_margins(coordinates.law, points)
+        self._constraints = _constraint_margins(coordinates.law_there, points)
 
     def limits(self, u: Floats) -> Floats:
         """(..., limits) WEIGHT times how far u (..., parameters) is beyond each, below zero within."""

@@ -164,7 +164,7 @@ class LeastSquaresProblem:
         check_histories(law, histories, predictor)
         check_minimum_rates(law, histories, predictor)
         tests = [thinned_history(h, settings.frames) for h in histories]
-        coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor))
+        coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor, law))
         check_nuisance_law(settings.nuisances, law)
         nuisances = NuisanceParameters.from_histories(settings.nuisances, tests, predictor)
         rupture_times, accelerating = compares_rupture_times(law, settings), not nuisances.nuisances

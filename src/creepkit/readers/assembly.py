@@ -293,8 +293,9 @@ def _time_and_end(
     if said == {STOPPED}:
         conditions.record_assumption(f"stopped before rupture by its label '{quoted(label)}'")
         return time, STOPPED, True
-    if not said and time is None and frames is not None:
-        time = _time_in_remark(conditions, [label for label, end in remarks.items() if end == RUPTURED], frames)
+    if time is None and frames is not None:
+        broke = [label for label, end in (firm | remarks).items() if end == RUPTURED]
+        time = _time_in_remark(conditions, broke, frames)
         said = {RUPTURED} if time is not None else said
     return time, "".join(said), False
 

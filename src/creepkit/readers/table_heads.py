@@ -424,7 +424,7 @@ def conditions_of_head(cell: str, known: Terms) -> list[tuple[str, str]]:
 
 def _quantity_of(unit: str, known: Terms) -> str:
     suffix, kinds = unit_suffix(unit), known.condition_kinds
-    loads = known.own_loads or ("stress",)
+    loads = known.own_loads or (("pressure",) if suffix == "bar" else ("stress",))
     names = (name for name in ("temperature", *loads) if name in kinds and suffix and suffix in kinds[name].units)
     return next(names, "")
 
@@ -437,12 +437,19 @@ def conditions_in_text(text: str, place: str, known: Terms) -> list[SourceText]:
     found: dict[str, list[str]] = {}
     if _OF_THE_MATERIAL.search(text):
         return []
-    for match in _ASSIGNED.finditer(text):
+
+    def take(match: re.Match[str]) -> str:
         name, suffix = known.condition(match[1].split(",")[-1].strip()), unit_suffix(match[3])
         kind = known.conditions.kinds.get(name)
-        if kind is not None and suffix in kind.units:
+        if kind is None:
+            return (
+                match[0] if match[0].count(":") else " ; "
+            )  # "L1-1: 40 bar" names a test, "R = 40 MPa" another stress
+        if suffix in kind.units:
             found.setdefault(name, []).append(f"{match[2]} {match[3]}")
-    rest = _ASSIGNED.sub(" ; ", text)
+        return " ; "
+
+    rest = _ASSIGNED.sub(take, text)
     for match in _VALUE.finditer(rest):
         quantity = _quantity_of(match[2], known)
         is_range = _RANGE.search(rest[: match.start()]) is not None

@@ -21,7 +21,7 @@ TRUTHS = {
     "explains": "the tests do not contradict it",
     "explained": "but {cause}",
     "two exponents": "but by it minimum rates contradict rupture times",
-    "shape": "but not for the shape of the curves",
+    "shape": "but curves differ in shape",
     "noise": "the tests differ from it by more than their noise",
 }
 """{kind: whether the law could be the true one}, at the end of a headline."""

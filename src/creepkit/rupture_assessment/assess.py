@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError, nearest
+from creepkit.errors import FitError, refuse_unknown
 from creepkit.inverse.information_criteria import bic_penalty, criterion_weights
 from creepkit.records import History
 from creepkit.records.units import celsius_text
@@ -134,8 +134,7 @@ def _known_names(methods: Sequence[str] | str | None) -> list[str] | None:
     known = [name for name in METHODS if name != MINIMUM_RATE.name]
     asked = list(dict.fromkeys([methods] if isinstance(methods, str) else methods))
     for name in asked:
-        if name not in known:
-            raise FitError(f"there is no method '{name}' of rupture times; {nearest(str(name), known)}")
+        refuse_unknown(name, known, FitError, f"there is no method '{name}' of rupture times")
     return asked
 
 

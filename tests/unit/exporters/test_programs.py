@@ -26,10 +26,10 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import LawWithValues, Units
-from creepkit.registry import default_registry
 from helpers.export_cases import LAWS, TOLERANCE, disagreements, renamed
 from helpers.exported_programs import LANGUAGES, program_text, rates
 from helpers.literature_laws import EQUATIONS
+from helpers.registered_laws import registered_laws
 
 PROGRAMS = ("c", "javascript", "python", "numpy", "abaqus", "calculix", "mfront")
 GROUPS = (
@@ -226,9 +226,8 @@ def test_the_unit_of_a_rate_coefficient(law, name, unit):
 
 def test_converted_values_give_the_same_rates():
     """At 300 MPa, above the threshold of laws that have one, and at 40 MPa."""
-    laws = {**{name: one.value for name, one in default_registry().laws().items()}, **EQUATIONS}
     bad, converted = [], 0
-    for name, law in laws.items():
+    for name, law in (registered_laws() | EQUATIONS).items():
         source = LawWithValues(law, law.center(), units=UNITS)
         try:
             values = convert_values(source).values

@@ -145,10 +145,7 @@ class PosteriorSamples(RateStatements, Presentable, Tabulated):
 
         return to_arviz(self)
 
-    def __str__(self) -> str:
-        from creepkit.reports.inference import posterior_text
-
-        return posterior_text(self)
+    shown_by = "inference.posterior_text"
 
 
 @checked
