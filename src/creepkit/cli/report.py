@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import is_file_name, is_law_name, law_source, read_results
 from creepkit.errors import FitError, ReportError
@@ -47,8 +48,6 @@ def command(
     browser while sliders move, and measured tests are laid over; of tests alone the three laws that suit them are
     fitted first.
     """
-    import creepkit as ck
-
     histories = list(ck.read_histories(tests)) if tests else []
     if app:
         source = _page_source(results, histories)
@@ -75,8 +74,6 @@ def _page_source(names: list[str], histories: list[History]) -> PageSource:
 
     histories : given by --tests; measured files in the place of results are added to them.
     """
-    import creepkit as ck
-
     named = [name for name in names if name.endswith(".json") or is_law_name(name)]
     if named and len(names) > 1:
         raise FitError(f"{len(names)} laws or results are named; name one, and tests by --tests")
@@ -89,7 +86,6 @@ def _page_source(names: list[str], histories: list[History]) -> PageSource:
 
 def fitted_laws(names: list[str], histories: list[History]) -> PageSource:
     """Laws by name, or those that suit tests, fitted to these."""
-    import creepkit as ck
     from creepkit.inverse.candidate_laws import LawChanges
     from creepkit.inverse.candidates import candidates
 
@@ -116,7 +112,6 @@ def _named_source(name: str) -> PageSource:
 
 def _read(path: Path, histories: list[History]) -> Identification | ModelAverage | RuptureAssessment:
     """What a file holds, with the tests that it was made from where they are given."""
-    import creepkit as ck
     from creepkit.files.json_documents import read_json
     from creepkit.files.reading import FileKind
     from creepkit.rupture_assessment.assessment import ASSESSMENT

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import creepkit as ck
 from creepkit.errors import LawError
 from creepkit.limits import SEED, Limits
 from creepkit.options import Option
@@ -38,8 +39,6 @@ Only = Annotated[
 
 def is_law_name(word: str) -> bool:
     """Whether a word names a registered law, or a sum of them as norton+strain-hardening, whatever files there are."""
-    import creepkit as ck
-
     try:
         ck.law(word)
     except LawError:
@@ -67,8 +66,6 @@ def read_law_file(path: str | Path) -> Identification | LawWithValues:
 
 def law_source(text: str) -> CreepLaw | Identification | LawWithValues:
     """A law by name, or else what a file holds: an identification, or a law with values."""
-    import creepkit as ck
-
     if is_file_name(text):
         return read_law_file(text)
     try:

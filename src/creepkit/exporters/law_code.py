@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import sympy
 
-from creepkit.errors import ExportError, LawError
+from creepkit.errors import SAID, ExportError, LawError, restated
 from creepkit.kernels.log_form import leading_exponents
 from creepkit.kernels.symbolic_kernel import KernelFunction, SymbolicKernel, symbolic_kernel
 from creepkit.language.symbols import POINT_VARIABLES
@@ -129,10 +129,8 @@ class LawCode:
         """
         self.source = source if keeps_inactive else source.without_inactive_terms()
         self.law, self.identifiers = self.source.law, identifiers
-        try:
+        with restated(LawError, ExportError, f"cannot be written as a program: {SAID}"):
             self._lowered: SymbolicKernel = _kernel_entries(self.law)
-        except LawError as error:
-            raise ExportError(f"cannot be written as a program: {error}") from None
         self._symbols: dict[sympy.Symbol, sympy.Symbol] = {}
         inputs, size = self._lowered.rate.inputs, len(POINT_VARIABLES) + len(self.law.states)
         names = target_names or {}

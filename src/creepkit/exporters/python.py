@@ -16,7 +16,7 @@ from typing import Any
 
 import sympy
 
-from creepkit.errors import ExportError, LawError
+from creepkit.errors import SAID, ExportError, LawError, restated
 from creepkit.exporters.law_code import Identifiers, factor_text
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
 from creepkit.exporters.unit_conversion import STRESSES
@@ -54,10 +54,8 @@ class PythonDialect:
 def module_text(source: LawWithValues, dialect: PythonDialect) -> str:
     """Return the module of a law; ExportError when it holds what no kernel can evaluate."""
     source = source.without_inactive_terms()
-    try:
+    with restated(LawError, ExportError, f"cannot be written as Python: {SAID}"):
         functions = _ModuleFunctions(source, dialect)
-    except LawError as error:
-        raise ExportError(f"cannot be written as Python: {error}") from None
     body = functions.text()
     floors = any(f"{floor!r})" in body for floor in (FLOOR, TIME_FLOOR))
     lines = [*heading(source, mentions_floors=floors), *functions.renaming_notes(), dialect.overflow_sentence]

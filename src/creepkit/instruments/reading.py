@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest, quoted, refuse_unknown
 from creepkit.files.reading import how_to_raise, raised
-from creepkit.files.time_stamps import DAY, ClockColumn, ResolvedTimes, is_clock_time, resolve
+from creepkit.files.time_stamps import DAY, ClockColumn, ResolvedTimes, check_increasing, is_clock_time, resolve
 from creepkit.instruments.column_heads import (
     KNOWN_UNITS,
     MINUTES_AND_SECONDS,
@@ -31,7 +31,7 @@ from creepkit.instruments.record_tables import MISSING, RowReader, Rows, TableHe
 from creepkit.limits import HOTTEST
 from creepkit.readers.vocabulary import NAMES_OF, words_of
 from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
-from creepkit.records.plugin_calls import call_on_file
+from creepkit.records.plugin_calls import call_on_file, named_one, only_one
 
 UNIX_SCALES = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
 """Numbers above the first are unix times in units of the second, s; below 1e8 they are none."""
@@ -99,22 +99,16 @@ def _record(
 
 def _format_of(head: TableHead, formats: Sequence[InstrumentFormat], name: str | None) -> InstrumentFormat:
     if name is not None:
-        known = {one.name: one for one in formats}
-        refuse_unknown(name, known, HistoryError, f"no instrument format is called '{name}'")
-        if not known[name].accepts(head.names):
-            raise HistoryError(
-                f"{head.place}: the format '{name}' wants columns named {', '.join(known[name].required)}"
-            )
-        return known[name]
+        named = named_one("instrument format", name, formats)
+        if not named.accepts(head.names):
+            raise HistoryError(f"{head.place}: the format '{name}' wants columns named {', '.join(named.required)}")
+        return named
     accepting = [one for one in formats if one.required and one.accepts(head.names)]
-    if len(accepting) > 1:
-        names = " and ".join(one.name for one in accepting)
-        raise HistoryError(f"{head.path}: the formats {names} both accept it; say which, format='...'")
-    general = [one for one in formats if not one.required]
-    if not (accepting or general):
+    accepting = accepting or [one for one in formats if not one.required][:1]
+    if not accepting:
         known_names = ", ".join(one.name for one in formats)
         raise HistoryError(f"{head.path}: no instrument format accepts it; known are {known_names}")
-    return (accepting or general)[0]
+    return only_one("instrument format", head.path, accepting, "format")
 
 
 @dataclass(frozen=True)
@@ -292,12 +286,7 @@ class _Times:
                 f"{place}: the unit of '{columns.head.names[column]}' is not stated; "
                 "write it into its name, such as time_s, or state time_unit='s', 'ms', 'min' or 'h'"
             )
-        falls = np.diff(numbers) < 0
-        if falls.any():
-            row = int(np.argmax(falls)) + 1
-            raise HistoryError(
-                f"{path}:{lines[row]}: time falls from {numbers[row - 1]:g} to {numbers[row]:g}; it must never decrease"
-            )
+        check_increasing(numbers * factor, str(path), lines)
         start = float(numbers[0] * factor)
         if start <= UNIX_SCALES[-1][0]:
             return ResolvedTimes(numbers * factor, None)

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import sympy
 
-from creepkit.errors import LawError, quoted
+from creepkit.errors import SAID, LawError, quoted, restated
 from creepkit.files.json_documents import DocumentFormat, check_heading
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
@@ -114,14 +114,10 @@ def law_to_json(law: CreepLaw) -> dict[str, Any]:
 def law_from_json(data: Any, source: str = "law file") -> CreepLaw:
     """Return the law that `law_to_json` wrote; LawError, naming `source`, when the data are anything else."""
     content = check_heading(data, source, LAW)
-    try:
+    with restated(RecordError, LawError, f"{source}: {SAID}; this is not a law that creepkit wrote"):
         record = _CODEC.from_json(LawDocument, content)
-    except RecordError as error:
-        raise LawError(f"{source}: {error}; this is not a law that creepkit wrote") from None
-    try:
+    with restated(LawError, LawError, f"{source}: {SAID}"):
         law = _law_of(record)
-    except LawError as error:
-        raise LawError(f"{source}: {error}") from None
     if law.fingerprint != record.fingerprint:
         raise LawError(
             f"{source}: the equations of law '{law.name}' have fingerprint {law.fingerprint} but the file says "
@@ -160,10 +156,8 @@ def _without_name(entry: ParamDocument | StateDocument) -> dict[str, Any]:
 
 
 def _with_location(location: str, read: Callable[[Any, Mapping[str, sympy.Symbol]], _T], tree: Any, symbols: Any) -> _T:
-    try:
+    with restated(LawError, LawError, f"{location}: {SAID}"):
         return read(tree, symbols)
-    except LawError as error:
-        raise LawError(f"{location}: {error}") from None
 
 
 def _check_unique(names: Sequence[str], kind: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import HistoryError, refuse_unknown
+from creepkit.errors import HistoryError, refuse_unknown, restated
 from creepkit.records.history import Histories, History
 
 LabelValues = str | float | Sequence[str | float]
@@ -63,10 +63,8 @@ def _matches(label: str, labels: Mapping[str, str | float], value: str | float) 
     found = labels[label]
     if isinstance(found, str):
         return fnmatchcase(found, str(value))
-    try:
+    with restated(ValueError, HistoryError, f"{label}={value} is not a number; write one, as in {label}={found:g}"):
         number = float(value)
-    except ValueError:
-        raise HistoryError(f"{label}={value} is not a number; write one, as in {label}={found:g}") from None
     tolerance = LABEL_TEMPERATURE if label == "temperature" else LABEL_LOAD * abs(found)
     return math.isclose(found, number, rel_tol=0.0, abs_tol=tolerance)
 

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import ExportError, LawError, refuse_unknown
+from creepkit.errors import SAID, ExportError, LawError, refuse_unknown, restated
 from creepkit.records.units import factors
 
 if TYPE_CHECKING:
@@ -115,10 +115,8 @@ class LawWithValues:
         }
         if not inactive:
             return self
-        try:
+        with restated(LawError, ExportError, f"nothing to export: {SAID}"):
             law = self.law.fix(**inactive)
-        except LawError as error:
-            raise ExportError(f"nothing to export: {error}") from None
         description = ", ".join(f"{name} = {value:g}" for name, value in inactive.items())
         values = {name: self.values[name] for name in law.names}
         law = replace(law, name=self.law.name, title=self.law.title)

@@ -14,7 +14,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError, nearest, quoted, refuse_unknown
+from creepkit.errors import SAID, FitError, nearest, quoted, refuse_unknown, restated
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
@@ -379,10 +379,8 @@ def load_rupture_assessment(path: str | Path) -> RuptureAssessment:
     """
     data = read_json(Path(path), ASSESSMENT.kind)
     content = check_heading(data, str(path), ASSESSMENT)
-    try:
+    with restated(RecordError, FitError, f"{path}: {SAID}; it is not a rupture assessment of this version"):
         assessment = CODEC.from_json(RuptureAssessment, content)
-    except RecordError as error:
-        raise FitError(f"{path}: {error}; it is not a rupture assessment of this version") from None
     problem = _problem(assessment)
     if problem:
         raise FitError(f"{path}: {problem}; the file is damaged")

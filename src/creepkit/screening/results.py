@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from creepkit.errors import FitError, refuse_unknown
+from creepkit.errors import SAID, FitError, refuse_unknown, restated
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError, ValueCodec
@@ -197,10 +197,8 @@ def write_result(result: AlloyResult, path: Path) -> Path:
 def read_result(path: Path) -> AlloyResult:
     """Read the result of an alloy; FitError, in one sentence, for any other file."""
     content = check_heading(read_json(path, ALLOY_RESULT.kind), str(path), ALLOY_RESULT)
-    try:
+    with restated(RecordError, FitError, f"{path}: {SAID}; {ALLOY_RESULT.remedy}"):
         return CODEC.from_json(AlloyResult, content)
-    except RecordError as error:
-        raise FitError(f"{path}: {error}; {ALLOY_RESULT.remedy}") from None
 
 
 COMPARISON_STRESS = 100.0

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import creepkit as ck
 from creepkit.errors import FitError, SurrogateError, nearest, quoted
 from creepkit.experiments.design_task import GoalOptions
 from creepkit.experiments.rig import Rig, changed_rigs
@@ -97,8 +98,6 @@ def laws_of(file: StudyFile) -> list[CreepLaw]:
 
     Those of a factor of temperature, such as Q, are known too; `law_changes` bounds and fixes them.
     """
-    import creepkit as ck
-
     part = file.model.identification
     assert part is not None
     laws = []
@@ -142,7 +141,6 @@ def check_parameters(file: StudyFile, table: KeyPath, names: Mapping[str, Any], 
 
 def predictor_of(file: StudyFile) -> Predictor | None:
     """What predicts the tests: the specimen of the study, or a surrogate; None for the specimens that tests name."""
-    import creepkit as ck
     from creepkit.surrogates.surrogate import reduced_order_models
 
     part = file.model.identification
@@ -169,8 +167,6 @@ def predictor_path(file: StudyFile) -> Path | None:
 
 def specimen_of_study(file: StudyFile) -> Specimen:
     """The specimen of the table [specimen], with its lengths."""
-    import creepkit as ck
-
     part = file.model.specimen
     assert part is not None
     with file.at("specimen", "name"):
@@ -183,8 +179,6 @@ def specimen_of_study(file: StudyFile) -> Specimen:
 
 def settings_of(file: StudyFile) -> IdentificationSettings:
     """Settings of every identification: the defaults with what the study changes."""
-    import creepkit as ck
-
     model, base = file.model, ck.IdentificationSettings()
     changes: dict[str, Any] = {"seed": model.study.seed, "suspect_frames": model.data.suspect_frames}
     if model.selection is not None:
@@ -276,8 +270,6 @@ def _unit_of_kind(kind: str) -> str:
 
 def targets_of(file: StudyFile, number: int) -> dict[str, list[float]]:
     """{output: its values in creepkit's unit} of a forecast, of keys such as amplitude_mm."""
-    import creepkit as ck
-
     kinds = {str(o): o.kind for one in ck.available("specimens").values() for o in outputs_of(one)}
     given = file.model.forecast[number].targets
     return dict(values_of(file, ("forecast", number, "targets", key), kinds, values) for key, values in given.items())
@@ -325,7 +317,6 @@ def rigs_of_study(file: StudyFile, rigs: Sequence[Rig]) -> list[Rig]:
 
 def check_temperature(file: StudyFile) -> None:
     """StudyError for forms of temperature and parameters that there are not."""
-    import creepkit as ck
     from creepkit.discovery.forms import check_form_names
 
     part = file.model.temperature
@@ -366,8 +357,6 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
 
     StudyError where a test cannot be made of what is said.
     """
-    import creepkit as ck
-
     part, place = file.model.forecast[number], ("forecast", number)
     assert part.end_h is not None
     kinds = {load.name: load.kind for one in known_specimens().values() for load in loads_of(one)}
