@@ -131,10 +131,9 @@ def test_the_stated_scales_are_those_of_a_thin_plate() -> None:
     assert plate.reference_stress(plan) == pytest.approx([0.32 * 400.0 * 0.5] * 2, rel=1e-3)
 
 
-@pytest.mark.parametrize("n", [2.0, 7.0])
-def test_a_plate_states_the_stresses_that_creep_follows_while_it_bulges(n: float) -> None:
+def test_a_plate_states_the_stresses_that_creep_follows_while_it_bulges() -> None:
     """At last those of a spherical cap, P R/(2 h) of the wall that its area thins, and no longer those of bending."""
-    values, p = {"A": 5e-6 / 60.0**n, "n": n}, 0.3
+    values, p = {"A": 5e-6 / 60.0**5, "n": 5.0}, 0.3
     run = plate_of(PlateBulge(10.0, 0.2), values, p, [100.0, 1e3, 3e3, 1e4], 1e5)
     w = run.outputs["deflection"][-1]
     cap = p * (100.0 + w**2) / (4.0 * w) / (0.2 * 100.0 / (100.0 + w**2))
