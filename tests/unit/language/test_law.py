@@ -85,7 +85,6 @@ BAD_PARAMS = {
 
 BAD_STATES = {
     "no initial value": ({"initial": float("nan")}, "initial = nan must be a finite number"),
-    "infinite limit": ({"limit": float("inf")}, "limit = inf must be a finite number"),
     "already broken": ({"initial": 0.5, "limit": 0.5}, "it starts at its limit, 0.5, so the material would never last"),
 }
 BAD_ELASTIC = {
@@ -96,7 +95,6 @@ BAD_ELASTIC = {
 BAD_VALUES = {
     "one missing": ({"A": 1e-12}, "needs a value for n"),
     "one too many": ({"A": 1e-12, "n": 5, "q": 1}, "has no parameter 'q'"),
-    "in words": ({"A": 1e-12, "n": "five"}, "parameter 'n': 'five' is not a number"),
     "infinite": ({"A": 1e-12, "n": float("inf")}, "inf is not a finite number"),
     "negative": ({"A": -1e-12, "n": 5}, "is negative; it must be positive"),
 }
