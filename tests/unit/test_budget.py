@@ -19,7 +19,7 @@ BUDGET = {
     "cameras": 830,
     "cli": 2175,
     "core": 70,
-    "dataset": 725,
+    "dataset": 715,
     "discovery": 1375,
     "experiments": 1360,
     "exporters": 2670,
