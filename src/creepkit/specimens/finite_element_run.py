@@ -23,6 +23,7 @@ from creepkit.kernels.interface import (
     STRESS,
     TEMPERATURE,
     TIME,
+    CompiledLaw,
     call_entry,
 )
 from creepkit.records import Program, Status
@@ -30,7 +31,6 @@ from creepkit.specimens.finite_element_tests import FiniteElementTest, Reduction
 from creepkit.specimens.run import Run, run_from_outputs
 
 if TYPE_CHECKING:
-    from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import CreepLaw
 
 

@@ -19,7 +19,7 @@ from creepkit import integration, kernels
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.integration.tensor_point import von_mises
+from creepkit.integration.tensor_point import ProportionalLoading, von_mises
 from creepkit.integration.time_discretisation import SDIRK2_TEXT
 from creepkit.language.elastic import STATE_MODULUS
 from creepkit.records import (
@@ -39,7 +39,6 @@ from creepkit.specimens.run import Run, run_from_outputs
 
 if TYPE_CHECKING:
     from creepkit.integration.tensor_integration import PointTrajectory
-    from creepkit.integration.tensor_point import ProportionalLoading
     from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import CreepLaw
 
