@@ -44,7 +44,7 @@ BUDGET = {
     "sampling": 990,
     "screening": 570,
     "specimens": 3210,
-    "studies": 2975,
+    "studies": 2980,
     "surrogates": 1370,
     "testing": 1814,
 }
