@@ -14,14 +14,14 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 260,
+    "api": 290,
     "app": 600,
     "cameras": 835,
-    "cli": 2200,
+    "cli": 2190,
     "core": 70,
     "dataset": 730,
     "discovery": 1385,
-    "experiments": 1350,
+    "experiments": 1335,
     "exporters": 2665,
     "extraction": 1300,
     "fem": 1450,
@@ -40,7 +40,7 @@ BUDGET = {
     "records": 2260,
     "registry": 640,
     "reports": 5525,
-    "rupture_assessment": 1845,
+    "rupture_assessment": 1840,
     "sampling": 1000,
     "screening": 600,
     "specimens": 3200,

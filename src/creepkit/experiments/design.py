@@ -27,7 +27,6 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.selection.ranking import Ranking
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
 from creepkit.records import History
@@ -57,7 +56,7 @@ GREEDY_POOL, MOST_RUNS, LEAST_GAIN = 30, 6, 0.02
 
 @checked
 def design(
-    source: Ranking | ModelAverage | Identification | Sequence[Identification],
+    source: Ranking | Identification | Sequence[Identification],
     *,
     rig: Rig | Sequence[Rig] | None = None,
     goal: Goal | None = None,

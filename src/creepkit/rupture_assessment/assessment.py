@@ -15,7 +15,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, nearest, quoted
-from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
+from creepkit.files.json_documents import DocumentFormat, check_heading, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import write_text
@@ -378,21 +378,16 @@ def write_assessment(assessment: RuptureAssessment, path: str | Path) -> Path:
     return write_json({**ASSESSMENT.heading, **CODEC.to_json(assessment)}, Path(path), ASSESSMENT.kind)
 
 
-@checked
-def load_rupture_assessment(path: str | Path) -> RuptureAssessment:
-    """Return the rupture assessment saved in a JSON file: its fits predict, plot and state strengths as before.
-
-    FitError, in one sentence, says what is wrong with other files.
-    """
-    data = read_json(Path(path), ASSESSMENT.kind)
-    content = check_heading(data, str(path), ASSESSMENT)
+def assessment_from_json(data: Any, source: str) -> RuptureAssessment:
+    """The rupture assessment of a document: its fits predict, plot and state strengths as before."""
+    content = check_heading(data, source, ASSESSMENT)
     try:
         assessment = CODEC.from_json(RuptureAssessment, content)
     except RecordError as error:
-        raise FitError(f"{path}: {error}; it is not a rupture assessment of this version") from None
+        raise FitError(f"{source}: {error}; it is not a rupture assessment of this version") from None
     problem = _problem(assessment)
     if problem:
-        raise FitError(f"{path}: {problem}; the file is damaged")
+        raise FitError(f"{source}: {problem}; the file is damaged")
     return assessment
 
 
