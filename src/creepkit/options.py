@@ -95,6 +95,8 @@ class Option:
 
 def option(default: Any, help: str, limits: Limits | None = None, **further: Any) -> Any:
     """A field of a record with this default; further : as Option has it. A default that is called makes one."""
+    if limits is not None and isinstance(default, float):
+        limits = replace(limits, whole=False)  # Limits(0, 1) of a share allows 0.5
     declared = Option(help=help, limits=limits, **further)
     metadata: dict[str, Any] = {"option": declared}
     if limits is not None:
