@@ -34,6 +34,8 @@ TRY_IT = (
 )
 STRESSES = (100.0, 200.0, 300.0, 400.0)
 TEMPERATURE = 1100.0
+CONDITION = 0.05
+"""Of the material, in the unit of the law, for curves."""
 LARGEST_STRAIN = 0.05
 LARGEST_STRAIN_TO_RUPTURE = 0.3
 
@@ -43,7 +45,7 @@ def write_pages(app: Sphinx) -> None:
     PAGES.mkdir(parents=True, exist_ok=True)
     registered = default_registry().laws()
     for name, entry in registered.items():
-        caption = _draw_creep_curve(entry.value, PAGES / f"{name}.png")
+        caption = _draw_creep_curve(_with_numbers(entry.value), PAGES / f"{name}.png")
         page = _page(entry.value, entry.provenance.origin, caption)
         (PAGES / f"{name}.md").write_text(page, encoding="utf-8")
     rows = [f"| [{law.title}]({name}.md) | `{name}` | {origin} |" for name, law, origin in _sorted(registered)]
@@ -83,10 +85,14 @@ def _page(law: ck.CreepLaw, origin: str, caption: str) -> str:
     parts += [
         "## Try it",
         TRY_IT,
-        f"```{{raw}} html\n{page_fragment(page_contents(law), scripts=False)}\n{SCRIPT}\n```",
+        f"```{{raw}} html\n{page_fragment(page_contents(_with_numbers(law)), scripts=False)}\n{SCRIPT}\n```",
     ]
     parts += ["## References", "\n".join(f"- {reference}" for reference in law.references) or "None."]
     return "\n\n".join(parts) + "\n"
+
+
+def _with_numbers(law: ck.CreepLaw) -> ck.CreepLaw:
+    return law.at(None, **{one.name: CONDITION for one in law.conditions})
 
 
 def _equations(law: ck.CreepLaw) -> list[str]:
@@ -114,7 +120,10 @@ def _words(law: ck.CreepLaw) -> str:
     """A sentence on the symbols of the material point that the law uses."""
     used = symbols_used(law) | {ck.strain}
     meanings = [f"{_math(symbol)} is {MEANINGS[symbol.name]}" for symbol in POINT_VARIABLES if symbol in used]
-    return "Here " + ", ".join(meanings) + "."
+    stated = [
+        f"{_math(one)} is {CONDITION:g} {one.unit} in the curves, and what each test states" for one in law.conditions
+    ]
+    return "Here " + ", ".join([*meanings, *stated]) + "."
 
 
 def _parameters(law: ck.CreepLaw) -> str:

@@ -51,6 +51,7 @@ from .language.law import CreepLaw as CreepLaw
 from .language.symbols import GAS_CONSTANT as GAS_CONSTANT
 from .language.symbols import Param as Param
 from .language.symbols import State as State
+from .language.symbols import conditions as conditions
 from .language.symbols import mean_stress as mean_stress
 from .language.symbols import parameters as parameters
 from .language.symbols import principal_stress as principal_stress

@@ -7,7 +7,8 @@ import importlib
 import os
 import re
 import traceback
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 
 import pluggy
 
@@ -150,3 +151,24 @@ def nearest(word: str, known: Iterable[str]) -> str:
     if close:
         return f"did you mean '{close[0]}'? (known: {', '.join(known)})"
     return f"known: {', '.join(known) or 'none'}"
+
+
+def refuse_unknown(name: object, known: Collection[str], error: type[CreepkitError], sentence: str) -> None:
+    """Raise the error, with what is near, for a name that is not among those known."""
+    if name not in known:
+        raise error(f"{sentence}; {nearest(str(name), known)}")
+
+
+SAID = "\0said\0"
+"""Stands in a sentence of restated() for what the error says that was caught."""
+
+
+@contextmanager
+def restated(
+    kinds: type[BaseException] | tuple[type[BaseException], ...], error: type[Exception], sentence: str
+) -> Iterator[None]:
+    """Raise errors of some kinds as another one, in the words of whoever knows what they are about."""
+    try:
+        yield
+    except kinds as found:
+        raise error(sentence.replace(SAID, getattr(found, "strerror", None) or str(found))) from None

@@ -28,7 +28,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from creepkit.checked_arguments import Kind, kind_of
-from creepkit.errors import ArgumentError, nearest
+from creepkit.errors import ArgumentError, refuse_unknown
 from creepkit.limits import FINITE, Limits
 
 if TYPE_CHECKING:
@@ -124,8 +124,7 @@ class Options:
         """The record with fields changed by name; None leaves a field as it is, but where None is a value of it."""
         known = {one.name: one for one in options_of(type(self))}
         for name in changes:
-            if name not in known:
-                raise ArgumentError(f"{self.title} have no '{name}'; {nearest(name, known)}")
+            refuse_unknown(name, known, ArgumentError, f"{self.title} have no '{name}'")
         given = {name: value for name, value in changes.items() if value is not None or known[name].is_optional}
         return replace(self, **given) if given else self
 

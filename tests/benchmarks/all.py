@@ -78,7 +78,6 @@ BENCHMARKS = {
     "causes": Benchmark(5, (("--campaigns", "20"),)),
     "forecast_beyond": Benchmark(4, (("--campaigns", "20"),), short=("--campaigns", "1", "--truths", "sinh")),
     "usual_errors": Benchmark(8, (("--campaigns", "20"),)),
-    "weights": Benchmark(8),
     "noise_correlation": Benchmark(4),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "rate_tables": Benchmark(20, needs=DATA),

@@ -21,7 +21,7 @@ from pathlib import Path
 from scipy.stats import binomtest
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "measured"
-PACKAGES = ("creepkit", "numpy", "llvmlite", "torch")
+PACKAGES = ("numpy", "llvmlite", "torch")
 
 
 class Page:

@@ -3,11 +3,9 @@
     python tests/benchmarks/page_latency.py [--moves N] [--write]
 
 Headless Chromium moves the slider of the stress exponent by the pointer, a step every 16 ms. A latency begins at the
-input event and ends at the second frame after the curves were drawn, when they are on the screen; a browser at 60
-frames a second needs one to two frames, 17 to 33 ms, for that whatever a page does, and the first row is of a page
-that shows a single text. Pages are single files; dimples are simulated by the core in WebAssembly. The limit is 50 ms
-for the 95th percentile. Browser and this program share the cores of the machine; on one that does other work start it
-as `chrt -f 10 python tests/benchmarks/page_latency.py`, which is how the table below was made.
+input event and ends when the curves are on the screen, at the second frame after they were drawn: 17 to 33 ms at 60
+frames a second whatever a page does, as the first row shows. Dimples are simulated by the core in WebAssembly. The
+limit is 50 ms for the 95th percentile. Started as `chrt -f 10 python tests/benchmarks/page_latency.py`.
 """
 
 from __future__ import annotations

@@ -5,9 +5,8 @@
 
 Half of the laws are sums of one to three products of factors (powers, sinh, exp, log, thresholds, damage, oscillation);
 the others are random trees of operations. Laws have none to two internal variables; parameters are drawn in and beyond
-their bounds. Tests are of every registered specimen, with one to six points of load and of temperature, jumps, values
-that no test has, and sometimes other dimensions of the piece, impossible ones among them. A third of the predictions is
-differentiated. A process runs the cases of one law; "lost" counts laws whose process ended before its cases.
+their bounds. Tests are of every registered specimen, with jumps and values that no test has, and sometimes impossible
+dimensions. A third of the predictions is differentiated. "lost" counts laws whose process ended before its cases.
 
 An answer is a prediction whose status agrees with its values. "refused" counts sentences of creepkit, "laws refused"
 laws that it did not take. Faults: "untrue", a complete row with a value that is not finite, an end beyond the test or a

@@ -55,10 +55,11 @@ def _c(command: Sequence[str], opening: str = "{}") -> Callable[..., Any]:
         library = shared_library([compiler, *command[1:], *STRICT, file, "-lm"], folder / "law.so")[0]
         prefix = re.search(r"^double (\w+)_rate\(", text, re.MULTILINE)[1]
         used = [s.name for s in POINT_VARIABLES if s == stress or law.uses(s)] + [s.name for s in law.states]
+        conditions = [one.name for one in law.conditions]
         rate, count = getattr(library, f"{prefix}_rate"), len(law.states)
         rate.restype, found = ctypes.c_double, []
         for point in points:
-            given = [ctypes.c_double(point.get(name, 0.0)) for name in used]
+            given = [ctypes.c_double(point.get(name, 0.0)) for name in (*used, *conditions)]
             grown, slopes = (ctypes.c_double * count)(), (ctypes.c_double * (count * len(used)))()
             if count:
                 getattr(library, f"{prefix}_state_rates")(*given, grown, slopes)
@@ -74,8 +75,9 @@ def _fortran(folder: Path, source: LawWithValues, points: Points) -> list[list[f
     library = compile_fortran(compiler_or_skip("gfortran"), text, folder, "law")[0]
     law, found = getattr(library, re.search(r"call (\w+_law)\(", text)[1] + "_"), []
     for point in points:
-        given = [point.get(name, 0.0) for name in (*(s.name for s in POINT_VARIABLES), *states)]
-        out = np.zeros((1 + len(states)) * (1 + len(given)))
+        names = (*(s.name for s in POINT_VARIABLES), *states, *(one.name for one in source.law.conditions))
+        given = [point.get(name, 0.0) for name in names]
+        out = np.zeros((1 + len(states)) * (1 + len(POINT_VARIABLES) + len(states)))
         law(pointer(np.array(given)), pointer(out))
         found.append([math.exp(out[0]), *out[1 : 1 + len(states)]])
     return found

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from creepkit.records import dimensions_of, outputs_of
+from creepkit.records.presentable import function_of_reports
 from creepkit.registry import default_registry
 from helpers import source_tree
 
@@ -20,6 +21,13 @@ MOST_PARAMETERS = 8
 def test_no_module_imports_itself_by_way_of_others() -> None:
     """Imports within functions and for type checking count as well, less those that pyproject.toml names."""
     assert source_tree.import_cycles() == []
+
+
+def test_what_shows_and_draws_records_is_there() -> None:
+    texts = "".join(path.read_text(encoding="utf-8") for path in source_tree.modules().values())
+    names = re.findall(r"\"([\w.]+)\"", " ".join(re.findall(r"\n    (?:shown|drawn)_by = (.*)", texts)))
+    assert len(names) > 45
+    assert all(callable(function_of_reports(name)) for name in names)
 
 
 def test_a_public_class_name_has_one_meaning() -> None:

@@ -42,7 +42,7 @@ def test_it_opens_from_a_file_and_is_whole(browser, address, scripts) -> None:
     assert [url for url in asked if not url.startswith("data:")] == [address]
     assert said == []
     assert page.get_by_role("heading", level=1).inner_text().startswith("Creep of")
-    assert page.locator("figure.drawing svg").count() == 4
+    assert page.locator("figure.drawing svg").count() == 5
     for section in page.locator("summary").all():
         section.click()
     for figure in page.locator("figure.drawing").get_by_role("img").all():
@@ -62,7 +62,7 @@ def test_the_answer_is_one_screen(browser, tmp_path) -> None:
     path.write_text(report_html(contents()), encoding="utf-8")
     page, _, _ = opened(browser, path.as_uri(), viewport={"width": 1400, "height": 900})
     assert len(page.locator(".lead").first.inner_text().split()) <= 25
-    for part in (".lead", ".answer .seen", ".answer .card"):
+    for part in (".lead", ".answer .seen svg", ".answer .card dl"):
         box = page.locator(part).first.bounding_box()
         assert box["y"] + box["height"] <= 900
     assert page.locator(".cautions li").count() <= 3

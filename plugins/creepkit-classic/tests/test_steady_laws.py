@@ -32,7 +32,10 @@ def slope(name: str, values: dict[str, float], which: str, point: dict[str, floa
     return float((logs[0] - logs[1]) / np.log((1 + 1e-4) / (1 - 1e-4)))
 
 
-DIFFUSION = {"nabarro-herring": (nabarro_herring.TYPICAL, 2), "coble": (coble.TYPICAL, 3)}
+DIFFUSION = {
+    "nabarro-herring": (nabarro_herring.TYPICAL | {"grain_size": 0.05}, 2),
+    "coble": (coble.TYPICAL | {"grain_size": 0.01}, 3),
+}
 
 
 def test_diffusion_creep_is_newtonian_and_of_its_power_of_grain_size() -> None:
@@ -40,7 +43,7 @@ def test_diffusion_creep_is_newtonian_and_of_its_power_of_grain_size() -> None:
     point = {"stress": 5.0, "temperature": NICKEL}
     for name, (values, power) in DIFFUSION.items():
         assert slope(name, values, "stress", point) == pytest.approx(1.0, abs=1e-9)
-        assert slope(name, values, "d", point) == pytest.approx(-power, abs=1e-7)
+        assert slope(name, values, "grain_size", point) == pytest.approx(-power, abs=1e-7)
         by_heat = (slope(name, values, "temperature", point) + 1) * GAS_CONSTANT * NICKEL
         assert by_heat == pytest.approx(values["Q"], rel=1e-6)
 
@@ -53,8 +56,8 @@ def test_boundaries_rule_below_a_grain_size_and_the_lattice_above() -> None:
     point = {"stress": 5.0, "temperature": NICKEL}
 
     for size, ratio in ((equal, 1.0), (equal / 10, 10.0), (10 * equal, 0.1)):
-        along = rate("coble", boundary | {"d": size}, **point)
-        through = rate("nabarro-herring", lattice | {"d": size}, **point)
+        along = rate("coble", boundary | {"grain_size": size}, **point)
+        through = rate("nabarro-herring", lattice | {"grain_size": size}, **point)
         assert along / through == pytest.approx(ratio, rel=1e-12)
 
 

@@ -11,7 +11,8 @@ from creepkit.arrays import ArrayLike
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError
 from creepkit.language import symbols
-from creepkit.records import ROOM_TEMPERATURE, History, Loading, Predictor, Program, Status, call_of_plugin
+from creepkit.records import History, LawWithValues, Loading, Predictor, Program, Status, call_of_plugin
+from creepkit.records.units import ROOM_TEMPERATURE
 from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictor
 from creepkit.specimens.run import Run, run_from_outputs, unusual_values, with_explanation
@@ -34,16 +35,19 @@ def simulate(
 ) -> Run:
     """Return the history that a law with these values predicts: what a perfect test would have measured.
 
-    using : a specimen, a surrogate or a closed form; values : {parameter: value} in the law's units.
+    using : a specimen, a surrogate or a closed form; values : {parameter or condition: value} in the law's units.
     loading : holds its last value beyond its last breakpoint. times : (frames,) s; temperature : K.
     elastic : E in MPa; a bulge test needs it, and a uniaxial strain then includes the elastic part.
 
     A test that bursts, meets its limit load or loses convergence is a result too: the history ends there, and says so
     in `status`, `end_time` and `reason`. A specimen may return more, such as the stresses of a BulgeRun.
     """
-    law, using = resolve_law(law), resolve_predictor(using)
+    valued = LawWithValues(resolve_law(law), values)
+    law, values, using = valued.law, valued.values, resolve_predictor(using)
     if temperature is None and law.uses(symbols.temperature):
         raise SolveError(f"law '{law.name}' depends on temperature: give temperature= in K")
+    if lacking := ", ".join(f"{one.name} in {one.unit}" for one in law.conditions):
+        raise SolveError(f"law '{law.name}' needs a value for {lacking} as well")
     planned_test = History(
         name=name,
         times=np.atleast_1d(np.asarray(times, float)),
@@ -55,7 +59,6 @@ def simulate(
         includes_elastic=elastic is not None and loading.quantity == "stress",
         source=f"simulation of law '{law.name}'",
     )
-    values = law.values(values)
     explanation = unusual_values(law, values, elastic)
     try:
         return with_explanation(_simulated(law, using, values, planned_test), explanation)

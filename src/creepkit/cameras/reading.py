@@ -18,11 +18,11 @@ from creepkit.cameras.recognition import Recognised, recognise
 from creepkit.cameras.sequences import in_order, missing_numbers, skeleton
 from creepkit.cameras.text_files import FRAME_FILE, HEAD_BYTES, FrameText, frame_ranges, table_in_range
 from creepkit.cameras.time_files import read_frame_times
-from creepkit.errors import HistoryError, nearest, quoted
+from creepkit.errors import SAID, HistoryError, quoted, restated
 from creepkit.files.reading import read_bytes
 from creepkit.records import CameraFrame, Frames
 from creepkit.records.camera_format import CameraFormat
-from creepkit.records.plugin_calls import call_on_file
+from creepkit.records.plugin_calls import call_on_file, named_one
 
 MOST_LOOKED_AT = 10
 """Files of one name, but for its numbers, whose heads decide whether they are frames."""
@@ -86,10 +86,7 @@ def _candidates(format: FormatLike, formats: Sequence[CameraFormat]) -> tuple[Ca
         return (format,)
     if isinstance(format, Mapping):
         return (CameraFormat("columns", "columns named by the user", format),)
-    known = {one.name: one for one in formats}
-    if format not in known:
-        raise HistoryError(f"no camera format is called '{format}'; {nearest(str(format), known)}")
-    return (known[format],)
+    return (named_one("camera format", format, formats),)
 
 
 # ---- which files ---------------------------------------------------------------------------------------------------
@@ -121,10 +118,8 @@ def _frames_in_folder(folder: Path, formats: Sequence[CameraFormat], chosen: boo
     These are frames that cannot be read: they must be missed where they stand, not left out in silence.
     """
     patterns = [pattern.lower() for one in formats for pattern in one.patterns]
-    try:
+    with restated(OSError, HistoryError, f"{folder}: the folder cannot be read ({SAID}); name another one"):
         entries = sorted(folder.iterdir())
-    except OSError as error:
-        raise HistoryError(f"{folder}: the folder cannot be read ({error.strerror}); name another one") from None
     files = [
         file
         for file in entries

@@ -12,6 +12,7 @@ from creepkit.cameras.text_files import FRAME_FILE, FrameText, TextHead, candida
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.reading import read_bytes
 from creepkit.records.camera_format import CameraFormat
+from creepkit.records.plugin_calls import only_one
 
 FEWEST_NAMES = 4
 """Columns of a format that a file must have, of which it lacks others, for that to be said of it."""
@@ -75,20 +76,14 @@ def recognise(path: Path, formats: Sequence[CameraFormat], chosen: bool) -> Reco
         for head in heads:
             accepting = [one for one in formats if fits(one, head.names, any_case=any_case)]
             if accepting:
-                return Recognised(_only(head.location(path), accepting), path, head, chosen)
+                one = only_one("camera format", head.location(path), accepting, "format")
+                return Recognised(one, path, head, chosen)
     raise _unknown(path, heads, formats, chosen)
 
 
 def is_for_matlab(format: CameraFormat) -> bool:
     """Whether a format is one of files of MATLAB alone."""
     return all(pattern.endswith(".mat") for pattern in format.patterns)
-
-
-def _only(place: str, accepting: Sequence[CameraFormat]) -> CameraFormat:
-    if len(accepting) > 1:
-        names = " and ".join(f"'{one.name}'" for one in accepting)
-        raise HistoryError(f"{place}: the camera formats {names} both fit it; say which one with format=")
-    return accepting[0]
 
 
 def _unknown(path: Path, heads: Sequence[TextHead], formats: Sequence[CameraFormat], chosen: bool) -> HistoryError:

@@ -10,10 +10,8 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_number, parse_numbers
 from creepkit.readers.text_files import read_text_table
+from creepkit.readers.vocabulary import NAMES_OF
 from creepkit.records.camera_format import TIME_UNITS, TIMES_ALLOWED, ColumnName
-
-TIME_NAMES = ("time", "t", "timestamp", "time stamp", "unix", "unix time", "zeit")
-
 
 FIRST_UNIX_MILLISECONDS = 1e11
 """Numbers from here on, without a unit, are milliseconds since 1970; in seconds they would be of the year 5138."""
@@ -34,7 +32,9 @@ def read_frame_times(path: str | Path) -> Floats:
     found = [ColumnName("time", "")] * len(head)
     if not all(is_number(cell, dialect) for cell in head):
         found, body = [ColumnName.of(cell) for cell in head], rows[1:]
-    of_time = [k for k, one in enumerate(found) if one.name.casefold() in TIME_NAMES or len(found) == 1]
+    of_time = [
+        k for k, one in enumerate(found) if one.name.casefold() in ("time", "t", *NAMES_OF["time"]) or len(found) == 1
+    ]
     if len(of_time) != 1:
         names = ", ".join(f"'{quoted(cell)}'" for cell in head[:6])
         raise HistoryError(f"{place}: which of {names} is the time of a frame is not clear; call one column time")

@@ -88,6 +88,7 @@ def _run(data: Path, folder: Path) -> StudyResult:
     """Carry out the study of example data, and print what it found; FitError where a stage fails."""
     import creepkit as ck
     from creepkit.errors import FitError
+    from creepkit.reports.answer import answer_text
 
     tell(HEADINGS[data])
     study = ck.Study.load(data / "study.toml")
@@ -96,7 +97,7 @@ def _run(data: Path, folder: Path) -> StudyResult:
     for failure in result.failures:
         raise FitError(f"{failure.stage}: {failure.sentence}")
     ranking = result.rankings[""]
-    tell(str(ranking))
+    tell(answer_text(ranking.best, ranking, "report.html"))
     if data == MEASURED:
         _print_rupture_times(ranking.best)
     else:

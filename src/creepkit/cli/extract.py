@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import PAPER_SPECIMEN
 from creepkit.errors import HistoryError
@@ -33,7 +34,6 @@ def command(
     plot: Annotated[Path | None, typer.Option(help="Contact sheet, .png, .svg or .pdf."), OutputPath("picture")] = None,
 ) -> None:
     """What was imposed is in an instrument's record, or constant; without it, histories cannot be written."""
-    import creepkit as ck
     from creepkit.api.extraction import extract_as_described, operator_of
     from creepkit.files.writing import check_folder_target, check_target, made_from
 
@@ -87,7 +87,6 @@ def _histories(
     numbered: bool,
 ) -> dict[str, History]:
     """Histories under what an instrument recorded, after the clocks were aligned, or under constants."""
-    import creepkit as ck
     from creepkit.api.extraction import ImposedChannels, history_of, imposed_on
 
     if recorded is None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.identified_folder import check_identified_folder, write_ranking
 from creepkit.cli.shared import Files, Json, Only, Reader, Workers, is_file_name, selected
@@ -80,7 +81,6 @@ def command(
     for something else; one is identified as by identify(). JSON and plots of each, LaTeX and Python of the best,
     go to a folder.
     """
-    import creepkit as ck
     from creepkit.reports.ranking import print_ranking, ranking_to_json
     from creepkit.screening.screen import CANDIDATE_LAWS
 
@@ -147,7 +147,6 @@ def _screen(
     as_json: bool,
 ) -> None:
     """Identify every alloy by itself, and write the plate."""
-    import creepkit as ck
     from creepkit.reports.screening import print_screening
 
     with ProgressBar() as progress:
@@ -164,7 +163,6 @@ def _screen(
 
 def _confirm(fits: list[Identification], histories: list[History], using: Predictor | None, as_json: bool) -> None:
     """Simulate identified laws for each test; using : what they were identified through."""
-    import creepkit as ck
     from creepkit.reports.inference import confirmation_to_json
 
     for fit in fits:

@@ -12,19 +12,16 @@ from dataclasses import make_dataclass
 from typing import TYPE_CHECKING
 
 from creepkit.cli.command_options import Levels
-from creepkit.cli.shared import DEFAULT_SPECIMEN
 from creepkit.errors import SolveError
-from creepkit.forecasts.planned_tests import COMPONENTS, DescribedTest, PlannedTestOptions
-from creepkit.options import Options, option
-from creepkit.records import (
-    ZERO_CELSIUS,
-    Program,
-    check_geometry,
-    dimension_named,
-    dimensions_of,
-    known_specimens,
-    loads_of,
+from creepkit.forecasts.planned_tests import (
+    COMPONENTS,
+    DescribedTest,
+    PlannedTestOptions,
+    specimen_taking,
+    stated_temperature,
 )
+from creepkit.options import Options, option
+from creepkit.records import check_geometry, dimension_named, dimensions_of, known_specimens, loads_of
 
 if TYPE_CHECKING:
     from typing import Any
@@ -72,7 +69,8 @@ def described_test(given: Mapping[str, Any], *others: Mapping[str, Levels] | Non
     options, stated = PlannedTestOptions().changed(given), dict[str, Levels]()
     for name, levels in (item for part in others if part for item in part.items()):
         stated[name] = (*stated.get(name, ()), *levels)
-    specimen = ck.specimen(options.specimen or _specimen_for(stated))
+    loaded = (f"{name}_{one[0]}".rstrip("_") for name, levels in stated.items() for one in levels)
+    specimen = ck.specimen(options.specimen or specimen_taking([*loaded]))
     own = {load.name: load for load in loads_of(specimen)}
     loads: dict[str, list[tuple[float, float]]] = {}
     lengths: dict[str, float] = {}
@@ -101,20 +99,7 @@ def described_test(given: Mapping[str, Any], *others: Mapping[str, Levels] | Non
         way = "--stress 11=100, or --strain 12=0.001" if COMPONENTS in own else " or ".join(ways)
         raise SolveError(f"specimen '{specimen.name}' needs a {named}: give {way}")
     check_geometry(specimen, lengths, "a length")
-    temperature: float | Program | None = None
-    if options.temperature:
-        if options.temperature[0][0] != 0.0:
-            raise SolveError("--temperature-c: nothing is said of the time before; give the first one from 0 s on")
-        steps = [(start, celsius + ZERO_CELSIUS) for start, celsius in options.temperature]
-        temperature = steps[0][1] if len(steps) == 1 else Program.steps(steps)
-    return DescribedTest(specimen, options, loads, lengths, temperature)
-
-
-def _specimen_for(stated: Mapping[str, Levels]) -> str:
-    """The specimen that takes the loads, where none is named: a bar if it does, else the first that does."""
-    names = {COMPONENTS} if any(component for one in stated.values() for component, _, _ in one) else set(stated)
-    taking = [name for name, one in known_specimens().items() if names & {load.name for load in loads_of(one)}]
-    return DEFAULT_SPECIMEN if DEFAULT_SPECIMEN in taking or not taking else taking[0]
+    return DescribedTest(specimen, options, loads, lengths, stated_temperature(options.temperature))
 
 
 def _usual_level(specimen: Specimen, load: str) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import Json
 from creepkit.errors import HistoryError
@@ -49,7 +50,6 @@ def command(
 
     A record of an instrument is shown with its channels, units, gaps and clock.
     """
-    import creepkit as ck
     from creepkit.quality import ACTIVATION_ENERGY, remark_flags
     from creepkit.readers.questions import merged
     from creepkit.records import Histories
@@ -97,7 +97,6 @@ def command(
 
 
 def _describe_data_set(file: Path, as_json: bool) -> None:
-    import creepkit as ck
     from creepkit.dataset.dataset import summary
 
     data = ck.read_dataset(file)
@@ -111,7 +110,6 @@ def _readable_tests(
     files: list[Path], reader: str | None, ignored: list[str]
 ) -> tuple[list[History], list[CreepkitError]]:
     """All tests; where some file cannot be read those of the others, and the errors of these."""
-    import creepkit as ck
     from creepkit.registry.reading import read_those_that_can_be
 
     try:
@@ -125,7 +123,6 @@ def _readable_tests(
 
 def _write(histories: list[History], folder: Path) -> list[Path]:
     """Write each history; what cannot stand in the name of a file becomes a line."""
-    import creepkit as ck
     from creepkit.files.writing import check_folder_target, file_stem, made_from
     from creepkit.readers.history_csv import history_text
     from creepkit.reports.figures import make_folder
@@ -158,7 +155,6 @@ def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
 
     Where a reader takes a table with clock times for tests, it is none.
     """
-    import creepkit as ck
     from creepkit.instruments.record_tables import find_head
     from creepkit.registry import default_registry, kinds
 

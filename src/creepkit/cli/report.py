@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import is_law_name, law_source
 from creepkit.errors import FitError, ReportError
@@ -44,8 +45,6 @@ def command(
     browser while sliders move, and measured tests are laid over; of tests alone the three laws that suit them are
     fitted first.
     """
-    import creepkit as ck
-
     histories = list(ck.read_histories(tests)) if tests else []
     if app:
         source = _page_source(results, histories)
@@ -76,8 +75,6 @@ def _page_source(names: list[str], histories: list[History]) -> PageSource:
 
     histories : given by --tests; measured files in the place of results are added to them.
     """
-    import creepkit as ck
-
     named = [name for name in names if name.endswith(".json") or is_law_name(name)]
     if named and len(names) > 1:
         raise FitError(f"{len(names)} laws or results are named; name one, and tests by --tests")
@@ -90,7 +87,6 @@ def _page_source(names: list[str], histories: list[History]) -> PageSource:
 
 def fitted_laws(names: list[str], histories: list[History]) -> PageSource:
     """Laws by name, or those that suit tests, fitted to these."""
-    import creepkit as ck
     from creepkit.inverse.candidate_laws import LawChanges
     from creepkit.inverse.candidates import candidates
 

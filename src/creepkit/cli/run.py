@@ -71,6 +71,8 @@ def command(
 
 def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
+    from creepkit.reports.answer import answer_text, asked_figures, strength_figures
+
     tell(result.title)
     told = [(one.name, one.state, one.sentence) for one in result.stages if one.state != "made" or one.sentence]
     if told:
@@ -80,15 +82,14 @@ def print_result(result: StudyResult) -> None:
         frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""
         tell(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
     if result.forecasts or result.rupture:
-        from creepkit.reports.answer import asked_figures, strength_figures
-
         of = {name: f"{group}: " if len(result.rankings) > 1 else "" for name, group in result.forecast_groups.items()}
         lines = [f"{of[name]}{one.line}" for name, found in result.forecasts.items() for one in asked_figures(found)]
         lines += [one.line for assessment in result.rupture.values() for one in strength_figures(assessment)]
         for line in lines[:MOST_FIGURES]:
             tell(line)
     for group, ranking in result.rankings.items():
-        tell(f"{group}: {ranking.best.headline}" if len(result.rankings) > 1 else str(ranking))
+        alone = len(result.rankings) == 1
+        tell(answer_text(ranking.best, ranking, result.report) if alone else f"{group}: {ranking.best.headline}")
     if result.report is not None:
         tell(f"report: {result.report}")
 

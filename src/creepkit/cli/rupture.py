@@ -9,7 +9,7 @@ import typer
 
 from creepkit.cli.command_options import OutputPath, parsed_number
 from creepkit.cli.shared import Files, Json, Only, selected, show
-from creepkit.errors import FitError
+from creepkit.errors import FitError, restated
 from creepkit.options import Option
 from creepkit.records import ZERO_CELSIUS
 from creepkit.rupture_assessment.assessment import RuptureQuestion, RuptureSettings
@@ -42,10 +42,8 @@ def command(
     import creepkit as ck
     from creepkit.reports.rupture import rupture_to_json
 
-    try:
+    with restated(ValueError, FitError, f"--tensile {' '.join(tensile or ())}: write C=MPA, such as 850=420"):
         strengths = {parsed_number(celsius) + ZERO_CELSIUS: value for celsius, value in (tensile or {}).items()}
-    except ValueError:
-        raise FitError(f"--tensile {' '.join(tensile or ())}: write C=MPA, such as 850=420") from None
     assessment = ck.rupture(
         selected(ck.read_histories(tables), only),
         tensile_strength=strengths or None,

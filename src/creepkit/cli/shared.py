@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import creepkit as ck
 from creepkit.errors import FitError, LawError
 from creepkit.limits import SEED, Limits
 from creepkit.options import Option
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
     from creepkit.records import History, LawWithValues
 
-PAPER_SPECIMEN, DEFAULT_SPECIMEN = "bulge", "uniaxial"
+PAPER_SPECIMEN = "bulge"
 """What a data set is made of and a camera watches, and what a test is of whose load it takes, where nothing is said."""
 
 
@@ -39,8 +40,6 @@ Only = Annotated[
 
 def is_law_name(word: str) -> bool:
     """Whether a word names a registered law, or a sum of them as norton+strain-hardening, whatever files there are."""
-    import creepkit as ck
-
     try:
         ck.law(word)
     except LawError:
@@ -55,7 +54,6 @@ def is_file_name(word: str) -> bool:
 
 def law_source(text: str) -> CreepLaw | Identification | Ranking | LawWithValues:
     """A law by name, or else what a file holds: an identification, a ranking, or a law with values."""
-    import creepkit as ck
     from creepkit.records import LawWithValues
 
     if is_file_name(text):

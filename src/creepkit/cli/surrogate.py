@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import PAPER_SPECIMEN, Json, Seed
 from creepkit.errors import DatasetError, SolveError
@@ -51,7 +52,6 @@ def generate(
 
     Interrupted, it goes on where it was when it is started again in the same way.
     """
-    import creepkit as ck
     from creepkit.dataset.generation import resolve_design
     from creepkit.reports.dataset import print_acceptance, print_dataset
 
@@ -94,7 +94,6 @@ def train(
     Interrupted at any moment, the same command goes on where it was. Curves of the training, and predicted against
     true outputs are drawn.
     """
-    import creepkit as ck
     from creepkit.dataset.storage import read_dataset
     from creepkit.reports.surrogate import write_surrogate_figures
 
@@ -160,7 +159,6 @@ def reduce(
     Searches begin in it. It is kept in the cache folder, so that the first identification of such a test piece finds
     it there; some seconds.
     """
-    import creepkit as ck
     from creepkit.records import outputs_of
 
     predictor = _trainable_model(ck.specimen(specimen), geometry or {})

@@ -146,10 +146,7 @@ class Dataset(Presentable):
         end = conditions["end_time"] if "end_time" in conditions else self.grid.end  # noqa: SIM401
         return self.grid.times(end)
 
-    def __str__(self) -> str:
-        from creepkit.reports.dataset import dataset_text
-
-        return dataset_text(self)
+    shown_by = "dataset.dataset_text"
 
 
 def concatenate(parts: Sequence[Dataset]) -> Dataset:

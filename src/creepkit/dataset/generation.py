@@ -30,7 +30,7 @@ from creepkit.dataset import storage
 from creepkit.dataset.dataset import Dataset, concatenate, first_difference
 from creepkit.dataset.simulation import empty_dataset, simulate_rows
 from creepkit.dataset.storage import LAYOUT_VERSION
-from creepkit.errors import DatasetError
+from creepkit.errors import SAID, DatasetError, restated
 from creepkit.files.hdf5_files import open_hdf5, write_hdf5
 from creepkit.files.json_documents import as_read_back, canonical_json, json_text, read_json
 from creepkit.files.locking import locked
@@ -159,12 +159,10 @@ class GenerationJob:
     def open_folder(self) -> None:
         """Make the folder, or check that the one that is there belongs to this job."""
         path = self.folder / GENERATION_NAME
-        try:
+        with restated(OSError, DatasetError, f"{self.folder}: no shards can be written there ({SAID})"):
             self.folder.mkdir(parents=True, exist_ok=True)
             if not path.exists():
                 write_text(json_text(self.document), path, DatasetError, internal=True)
-        except OSError as error:
-            raise DatasetError(f"{self.folder}: no shards can be written there ({error.strerror})") from None
         existing = read_json(path, GENERATION_FILE)
         if existing != self.document:
             difference = first_difference(existing, self.document, "")

@@ -68,10 +68,7 @@ class ModulusEstimates(Presentable):
     elastic: Elastic | None
     fit: Identification
 
-    def __str__(self) -> str:
-        from creepkit.reports.temperature_law import modulus_estimates_text
-
-        return modulus_estimates_text(self)
+    shown_by = "temperature_law.modulus_estimates_text"
 
 
 @checked
@@ -254,10 +251,7 @@ class TemperatureStudy(Presentable):
     temperature_law: TemperatureLaw | None
     notes: tuple[str, ...]
 
-    def __str__(self) -> str:
-        from creepkit.reports.temperature_law import temperature_study_text
-
-        return temperature_study_text(self)
+    shown_by = "temperature_law.temperature_study_text"
 
 
 @takes_options(DiscoveryOptions)

@@ -23,7 +23,7 @@ import sympy
 
 from creepkit import registry
 from creepkit.arrays import Floats
-from creepkit.errors import FitError, LawError, nearest
+from creepkit.errors import FitError, LawError, refuse_unknown
 from creepkit.language import CreepLaw, Param, TemperatureFactor, TemperatureForm, temperature
 from creepkit.language.symbols import Symbol
 from creepkit.language.temperature_forms import LOG_PARAMETER_RANGE, TEMPERATURE_SPAN
@@ -370,5 +370,4 @@ def check_form_names(names: Iterable[str]) -> None:
     """FitError for a name of no temperature form that is registered."""
     known = [CONSTANT, *registry.default_registry().all(registry.kinds.TEMPERATURE_FORMS)]
     for name in names:
-        if name not in known:
-            raise FitError(f"there is no temperature form '{name}': {nearest(name, known)}")
+        refuse_unknown(name, known, FitError, f"there is no temperature form '{name}'")

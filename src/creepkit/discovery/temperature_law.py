@@ -191,15 +191,9 @@ class TemperatureLaw(Presentable, Plotted):
         """Write the result as JSON (to a temporary name, then renamed)."""
         return write_json(temperature_law_to_json(self), Path(path), TEMPERATURE_LAW.kind)
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.temperature_law import draw_parameter, temperature_law_figure
+    drawn_by = "temperature_law.temperature_law_figure", "temperature_law.draw_parameter"
 
-        return temperature_law_figure, draw_parameter
-
-    def __str__(self) -> str:
-        from creepkit.reports.temperature_law import temperature_law_text
-
-        return temperature_law_text(self)
+    shown_by = "temperature_law.temperature_law_text"
 
 
 def temperature_law_from_combinations(

@@ -1,7 +1,8 @@
 """design: the next tests, by what they are expected to tell for each hour of machine time.
 
 Candidates are what a rig can make. Each is predicted with every law that remains, with exact sensitivities, and what it
-tells follows from Gaussian algebra about the estimates; the best ones are evaluated again at draws of the posteriors.
+tells follows from Gaussian algebra about the estimates, with the errors that tests usually have; to tell laws apart the
+best ones are evaluated again at draws of the posteriors.
 Goals are the parameters (D-optimal), a quantity such as the rate at the stress of service (c-optimal), and the law.
 """
 
@@ -25,7 +26,7 @@ from creepkit.experiments.planned_outcomes import KnownLaw, PlannedOutcomes
 from creepkit.experiments.rig import CandidateTest, Rig, candidates_given, grid_of_rig, rigs_for
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
-from creepkit.inverse.noise_model import MINIMUM_TESTS
+from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
@@ -106,8 +107,8 @@ class _Search:
         self.task, self.rigs = task, {rig.specimen: rig for rig in rigs}
         self.progress: Progress = progress or (lambda *_: None)
         with single_threaded_blas():
-            noise_model = task.laws[0].noise_model
-            known = [KnownLaw.from_identification(fit, noise_model) for fit in task.laws]
+            noise_model, of_ranking = _noise_model(task), task.goal == "law"
+            known = [KnownLaw.from_identification(fit, noise_model, of_ranking=of_ranking) for fit in task.laws]
             known += [KnownLaw.from_altered(task.laws[k], altered, noise_model) for k, altered in task.altered]
         self.outcomes = PlannedOutcomes(known, progress, len(task.laws))
         self.criterion: PrecisionCriterion | LawCriterion
@@ -115,7 +116,7 @@ class _Search:
             self.criterion = _law_criterion(task, self.outcomes, seed)
         else:
             quantity = task.goal if isinstance(task.goal, DerivedQuantity) else None
-            self.criterion = PrecisionCriterion(self.outcomes, task.weights, quantity, seed)
+            self.criterion = PrecisionCriterion(self.outcomes, task.weights, quantity)
         self.tests: list[PlannedTest] = []
         self.left_out: dict[str, str] = {}
 
@@ -123,8 +124,8 @@ class _Search:
         """The design; refuse : whether it is an error that no test can be made, as where a user names them."""
         with single_threaded_blas():
             self._evaluate_all(planned, refuse)
-            if self.criterion.differs_at_draws:
-                self._evaluate_best()
+            if isinstance(self.criterion, LawCriterion):
+                self._evaluate_best(self.criterion)
             plan, expected = self._plan()
         if not plan and self.tests:
             plan, expected = (self.tests[0],), self.tests[0].expectation
@@ -175,14 +176,19 @@ class _Search:
                 return f"it would grow by {growth:.2g} noises of a frame only"
         return ""
 
-    def _evaluate_best(self) -> None:
+    def _evaluate_best(self, criterion: LawCriterion) -> None:
         """The best candidates at draws of the posteriors."""
         promising = self._promising()
         for done, test in enumerate(promising):
-            if self._ruptures(test):
+            probability = criterion.probability_of_rupture(test.histories)
+            if probability > LARGEST_RUPTURE_PROBABILITY:
+                self.left_out[test.description] = f"it would rupture with a probability of {probability:.2f}"
                 self.tests.remove(test)
             else:
-                self._evaluate_at_draws(test)
+                expectation = criterion.expectation(test.histories, at_draws=True)
+                position = next(k for k, t in enumerate(self.tests) if t.histories is test.histories)
+                self.tests[position] = replace(test, expectation=expectation, at_draws=True)
+                self.tests.sort(key=self._order)
             self.progress("best tests at draws of the posteriors", done + 1, len(promising))
 
     def _promising(self) -> list[PlannedTest]:
@@ -193,20 +199,6 @@ class _Search:
             if places[place] <= MOST_ALIKE and len(chosen) < EVALUATED_AT_DRAWS:
                 chosen.append(test)
         return chosen
-
-    def _ruptures(self, candidate: CandidateTest) -> bool:
-        if not isinstance(self.criterion, LawCriterion):
-            return False
-        probability = self.criterion.probability_of_rupture(candidate.histories)
-        if probability > LARGEST_RUPTURE_PROBABILITY:
-            self.left_out[candidate.description] = f"it would rupture with a probability of {probability:.2f}"
-        return probability > LARGEST_RUPTURE_PROBABILITY
-
-    def _evaluate_at_draws(self, test: PlannedTest) -> None:
-        expectation = self.criterion.expectation(test.histories, at_draws=True)
-        position = next(k for k, t in enumerate(self.tests) if t.histories is test.histories)
-        self.tests[position] = replace(test, expectation=expectation, at_draws=True)
-        self.tests.sort(key=self._order)
 
     def _order(self, test: PlannedTest) -> tuple[float, ...]:
         """Least for the best: the cheapest that decides between laws, else the likeliest to; for values by the hour.
@@ -251,9 +243,11 @@ class _Search:
         return tuple(chosen)
 
     def _together(self, plan: Sequence[PlannedTest]) -> Expectation:
-        if len(plan) == 1 and (plan[0].at_draws or not self.criterion.differs_at_draws):
+        if len(plan) == 1 and (plan[0].at_draws or not isinstance(self.criterion, LawCriterion)):
             return plan[0].expectation
-        return self.criterion.expectation(_histories(plan), at_draws=True)
+        if isinstance(self.criterion, LawCriterion):
+            return self.criterion.expectation(_histories(plan), at_draws=True)
+        return self.criterion.expectation(_histories(plan))
 
     def _merit(self, plan: Sequence[PlannedTest], expectation: Expectation) -> tuple[float, float]:
         """Largest for the best: of plans that decide the one of fewest hours."""
@@ -265,6 +259,15 @@ class _Search:
 
 def _histories(plan: Sequence[PlannedTest]) -> list[History]:
     return [history for test in plan for history in test.histories]
+
+
+def _noise_model(task: DesignTask) -> NoiseModel:
+    """That of the best law: of values with the scatter of rates as their intervals have it, its expected square."""
+    fit = task.laws[0]
+    noise_model, scatter = fit.noise_model, fit.rate_scatter
+    if task.goal == "law" or len(fit.histories) == 1 or scatter is None or scatter.known is not None:
+        return noise_model
+    return replace(noise_model, rate=max(noise_model.rate, scatter.posterior.mean_square("test") ** 0.5))
 
 
 def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> LawCriterion:
@@ -286,10 +289,10 @@ def notes_of(laws: Sequence[Identification], rigs: Sequence[Rig]) -> tuple[str, 
         names = ", ".join(fit.law.name for fit in laws if not fit.law.uses(temperature))
         notes.append(f"the temperatures of the rig were not varied: {names} says nothing of temperature")
     scatters = any(n.kind == "rate" and n.sd is None for n in laws[0].settings.nuisances)
-    if scatters and len(laws[0].histories) < MINIMUM_TESTS and laws[0].noise_model.rate == 0.0:
+    if scatters and len(laws[0].histories) == 1:
         notes.append(
-            f"fewer than {MINIMUM_TESTS} tests do not show by how much the rate scatters from test to test; it is "
-            'taken as none: give Nuisance("rate", sd=...) where it is known'
+            "one test does not show by how much the rate scatters from test to test; it is taken as none: give "
+            'Nuisance("rate", sd=...) where it is known'
         )
     if laws[0].noise_model.rate > 0 and any(rig.tests_per_run > 1 for rig in rigs):
         notes.append(

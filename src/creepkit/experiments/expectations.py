@@ -5,8 +5,9 @@ For the values of a law, with S the covariance of its parameters u before and S'
     information = (ln det S - ln det S') / 2        (D-optimal: all parameters)
     information = ln sd - ln sd',  sd^2 = c'S c      (c-optimal: one quantity, c its derivative to u)
 
-Both are the mean over draws of the posterior, for the derivatives of the test are those at the true values; of several
-laws they are averaged with their weights.
+Both are to first order about the estimates; of several laws they are averaged with their weights. The errors that
+tests usually have are in S and in S' as they are in intervals (see planned_outcomes), and of a rate beyond the tests
+what the law misses there (uncertainty.law_misfit), less of it after a test nearer to it that agrees with the law.
 
 Let law a be true with its weight, at a draw of its posterior, and y be the whitened outcome of a planned test with its
 noise. To first order law b, refitted to the tests that were made and to this one, leaves
@@ -28,21 +29,20 @@ they alter. The mean of chi-square over laws, with weights, is the T-criterion (
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.experiments.planned_outcomes import Expansion, PlannedOutcomes
+from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
+from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.selection.challenges import NOT_EXCLUDED
-from creepkit.inverse.uncertainty.quantities import DerivedQuantity, gradient
+from creepkit.inverse.uncertainty.quantities import DerivedQuantity, gradient, log_rate
 from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.language import CreepLaw
 from creepkit.records import History
-
-DRAWS = 8
-"""Of the posterior, at which the derivatives of the best candidates are taken."""
 
 
 @dataclass(frozen=True)
@@ -80,86 +80,91 @@ class Expectation:
 
 @dataclass(eq=False)
 class PrecisionCriterion:
-    """The precision of the parameters (quantity None) or of one quantity, averaged over laws with weights (laws,).
-
-    About the estimates, or at draws of the posterior where they are asked for and differ.
-    """
+    """The precision of the parameters (quantity None) or of one quantity, averaged over laws with weights (laws,)."""
 
     outcomes: PlannedOutcomes
     weights: Floats
     quantity: DerivedQuantity | None = None
-    seed: int = 0
-    _deviations: dict[int, Floats] = field(default_factory=dict)
-    _information: dict[int, Floats] = field(default_factory=dict)
+    _misfits: dict[tuple[int, bytes], float] = field(default_factory=dict)
 
-    def expectation(self, histories: Sequence[History], *, at_draws: bool = False) -> Expectation:
+    def expectation(self, histories: Sequence[History]) -> Expectation:
         """The expected precision after these tests."""
         gains, sds, current, parameters = [], [], [], [dict[str, float](), dict[str, float]()]
         for position, law in enumerate(self.outcomes.laws):
-            before, after, points = self._covariances(position, histories, at_draws)
-            size = law.size
+            covariances = self._covariances(position, histories)
             if self.quantity is None:
-                logs = [np.linalg.slogdet(S[:, :size, :size])[1] for S in (before, after)]
-                gains.append(0.5 * float(np.mean(logs[0] - logs[1])))
+                logs = [float(np.linalg.slogdet(S)[1]) for S in covariances]
+                gains.append(0.5 * (logs[0] - logs[1]))
             else:
                 function = self.quantity.function(law.fit.coordinates)
-                rows = np.stack([gradient(function, u, np.sqrt(np.diag(law.fit.covariance))) for u in points])
-                both = [np.sqrt(np.einsum("cp,cpq,cq->c", rows, S[:, :size, :size], rows)) for S in (before, after)]
-                mean_logs = [float(np.mean(np.log(each))) for each in both]
-                gains.append(mean_logs[0] - mean_logs[1])
-                current.append(float(np.exp(mean_logs[0])))
-                sds.append(float(np.exp(mean_logs[1])))
+                c = gradient(function, law.fit.u, np.sqrt(np.diag(law.fit.covariance)))
+                before, after = (
+                    float(np.hypot(np.sqrt(c @ S @ c), self._misfit_sd(position, tests)))
+                    for tests, S in zip(([], histories), covariances, strict=True)
+                )
+                gains.append(float(np.log(before / after)))
+                current.append(before)
+                sds.append(after)
             if position == 0:
-                parameters = [self._parameter_sd(position, S, points) for S in (before, after)]
+                parameters = [_parameter_sd(law.fit, S) for S in covariances]
         sd, current_sd = (float(np.sqrt(self.weights @ np.square(v))) if v else float("nan") for v in (sds, current))
         return Expectation(
             float(self.weights @ gains), sd, current_sd, parameter_sd=parameters[1], current_parameter_sd=parameters[0]
         )
 
-    @property
-    def differs_at_draws(self) -> bool:
-        """Whether anything is worked out at draws: not where rates scatter, or where values have a sandwich covariance.
+    def _misfit_sd(self, position: int, planned: Sequence[History]) -> float:
+        """Standard deviation of what the law misses of the rate that is asked for; 0 of other quantities."""
+        fit, quantity = self.outcomes.laws[position].fit, self.quantity
+        assert fit.predictor is not None
+        if quantity is None or quantity.unit != "1/s" or not quantity.point:
+            return 0.0
+        conditions = np.array([reference_condition(history, fit.predictor) for history in planned]).reshape(-1, 2).T
+        key = position, conditions.round(6).tobytes()
+        if key not in self._misfits:
+            T = quantity.point["temperature"]
+            place = float(quantity.point["stress"] or 0.0), fit.reference.temperature if T is None else T
+            misfit = _after(fit, conditions).misfit_at(*place)
+            self._misfits[key] = 0.0 if misfit is None else misfit.sd
+        return self._misfits[key]
 
-        The effect of a factor on the rate of a test is that at the estimates. At a draw it would not quite be the
-        derivative to the law's own coefficient, and tests would seem to tell the two apart.
-        """
-        fits = [law.fit for law in self.outcomes.laws]
-        return all(fit.noise_model.rate == 0 and fit.settings.weights == "likelihood" for fit in fits)
-
-    def _parameter_sd(self, position: int, after: Floats, points: Floats) -> dict[str, float]:
+    def _covariances(self, position: int, histories: Sequence[History]) -> list[Floats]:
+        """Covariances (parameters, parameters) of u before and after the tests."""
         law = self.outcomes.laws[position]
-        to_theta = law.fit.coordinates.jacobian(points)
-        variances = np.einsum("cpq,cqr,cpr->cp", to_theta, after[:, : law.size, : law.size], to_theta)
-        sd = np.exp(0.5 * np.log(np.maximum(variances, 1e-300)).mean(axis=0))
-        return dict(zip(_scaled_names(law.fit.law), sd.tolist(), strict=True))
+        _, K = self.outcomes.of(histories, position)
+        A, T, size = law.information, law.sandwich, law.size
+        return [(T @ scaled_inverse(each) @ T.T)[:size, :size] for each in (A, A + K.T @ K)]
 
-    def _covariances(
-        self, position: int, histories: Sequence[History], at_draws: bool
-    ) -> tuple[Floats, Floats, Floats]:
-        """Covariances (draws, q, q) of q before and after the tests, and u (draws, parameters) at the draws."""
-        law = self.outcomes.laws[position]
-        if not (at_draws and self.differs_at_draws):
-            _, K = self.outcomes.of(histories, position)
-            information = law.information
-            T = law.sandwich
-            before, after = (T @ scaled_inverse(A) @ T.T for A in (information, information + K.T @ K))
-            return before[None], after[None], law.fit.u[None]
-        deviations = self._drawn(position)
-        information = self._information[position]
-        added = np.zeros_like(information)
-        for history in histories:
-            _, K, ruptures = self.outcomes.drawn(history, position, deviations)
-            added += np.where(ruptures[:, None, None], 0.0, np.einsum("cnp,cnq->cpq", K, K))
-        before = np.stack([scaled_inverse(A) for A in information])
-        after = np.stack([scaled_inverse(A) for A in information + added])
-        return before, after, law.fit.u + deviations[:, : law.size]
 
-    def _drawn(self, position: int) -> Floats:
-        if position not in self._deviations:
-            law = self.outcomes.laws[position]
-            self._deviations[position] = law.draws(DRAWS, self.seed)
-            self._information[position] = law.expansion(self._deviations[position]).information
-        return self._deviations[position]
+def _after(fit: Identification, conditions: Floats) -> Identification:
+    """An identification with planned tests at which the law holds, as what it misses elsewhere depends on them.
+
+    conditions : (2, planned tests) MPa and K.
+    """
+    scatter, ranges, count = fit.rate_scatter, dict(fit.ranges), conditions.shape[1]
+    if scatter is None or scatter.stresses.size != len(scatter.tests):
+        return fit
+    for name, values in zip(("stress", "temperature"), conditions, strict=True):
+        ranges[name] = min([ranges[name][0], *values]), max([ranges[name][1], *values])
+    rows = np.zeros((count, scatter.design.shape[1]))
+    rows[:, : fit.u.size] = gradient(log_rate(fit.coordinates, *conditions), fit.u, np.ones(fit.u.size))
+    extended = replace(
+        scatter,
+        tests=(*scatter.tests, *map(str, range(count))),
+        members={level: (*names, *names[-1:] * count) for level, names in scatter.members.items()},
+        log_factor=np.append(scatter.log_factor, np.zeros(count)),
+        variance=np.append(scatter.variance, np.full(count, scatter.variance.min())),
+        weight=np.append(scatter.weight, np.ones(count)),
+        design=np.concatenate([scatter.design, rows]),
+        stresses=np.append(scatter.stresses, conditions[0]),
+        temperatures=np.append(scatter.temperatures, conditions[1]),
+    )
+    return replace(fit, rate_scatter=extended, ranges=ranges)
+
+
+def _parameter_sd(fit: Identification, covariance: Floats) -> dict[str, float]:
+    to_theta = fit.coordinates.jacobian(fit.u)
+    sd = np.sqrt(np.einsum("pq,qr,pr->p", to_theta, covariance, to_theta))
+    return dict(zip(_scaled_names(fit.law), sd.tolist(), strict=True))
 
 
 def _scaled_names(law: CreepLaw) -> list[str]:
@@ -193,8 +198,6 @@ class LawCriterion:
     seed: int = 0
     _deviations: dict[int, Floats] = field(default_factory=dict)
     _expansions: dict[int, Expansion] = field(default_factory=dict)
-
-    differs_at_draws = True
 
     @property
     def names(self) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -93,15 +92,9 @@ class Design(Presentable, Plotted):
 
         return design_to_json(self)
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.design import design_figure, draw_design
+    drawn_by = "design.design_figure", "design.draw_design"
 
-        return design_figure, draw_design
-
-    def __str__(self) -> str:
-        from creepkit.reports.design import design_text
-
-        return design_text(self)
+    shown_by = "design.design_text"
 
 
 def machine_time_text(hours: float) -> str:

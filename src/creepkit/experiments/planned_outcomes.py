@@ -1,14 +1,16 @@
 """What the tests that were made know of identified laws, and what these expect of planned tests.
 
-The unknowns q = (u, s) of a law are its conditioned coordinates u and the nuisance parameters s that tests share, such
-as the modulus of an alloy. The tests that were made know them with the information
+The unknowns q = (u, s, c) of a law are its conditioned coordinates u, the nuisance parameters s that tests share, such
+as the modulus of an alloy, and the errors c, in their standard deviations, that an instrument has in all tests alike:
+those usual errors that intervals include (inverse.errors_of_tests). The tests that were made know them with the
+information
 
     A = J'C^-1 J + P,
 
-their own nuisance parameters integrated out. The outcome of a planned test is y = m + K (q - q_0) + e, all over the
-Cholesky factor of its covariance: white noise, drift and discrepancy of the noise model, and as random effects its own
-offset, its own rate and its own nuisance parameters, with their priors. Afterwards the information is A + K'K.
-Everything is predicted by the reduced-order model where there is one.
+their own nuisance parameters and errors integrated out. The outcome of a planned test is y = m + K (q - q_0) + e, all
+over the Cholesky factor of its covariance: white noise, drift and discrepancy of the noise model, and as random effects
+its own offset, its own rate, its own nuisance parameters with their priors, and its own usual errors. Afterwards the
+information is A + K'K. Everything is predicted by the reduced-order model where there is one.
 
 A ranking compares laws under one covariance, that of the law which explains the tests best. What is expected if a law
 is true is therefore whitened by what that law predicts: noise depends on it where outputs are compared by logarithms.
@@ -16,22 +18,26 @@ is true is therefore whitened by what that law predicts: noise depends on it whe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import norm, qmc
 
 from creepkit.arrays import Bools, Floats
+from creepkit.inverse.errors_of_tests import LIFE, RATE, errors_of_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector
-from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.residuals import candidate_residuals, residuals_of_prediction
+from creepkit.inverse.perturbations import with_derivatives_to_lengths
+from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
+from creepkit.inverse.reference_conditions import reference_condition
+from creepkit.inverse.residuals import candidate_residuals
 from creepkit.inverse.selection.challenges import AlteredLaw
-from creepkit.inverse.variance_components import scaled_inverse
+from creepkit.inverse.variance_components import LinearisedProblem, scaled_inverse
 from creepkit.records import History, Predictor, Status, dimension_named
 
 
@@ -47,6 +53,7 @@ class KnownLaw:
 
     measured : the problem of these tests, through the predictor of planned tests. x : (unknowns,) its values.
     shared : positions among x of the nuisance parameters that tests share. information : (q, q) A.
+    of_ranking : whether the usual errors of tests are those of a ranking of laws. errors : of these tests.
     chi_square : of the tests that were made, under the covariance of the noise model. sandwich : (q, q) T, with
     which T A^-1 T' has the covariance of the fit: other than 1 where values were not found by likelihood.
     held : (q, q) information of what is held beside the tests, such as the share of a second law.
@@ -57,6 +64,8 @@ class KnownLaw:
     noise_model: NoiseModel
     x: Floats
     shared: tuple[int, ...]
+    of_ranking: bool
+    errors: UsualErrors
     information: Floats
     chi_square: float
     sandwich: Floats
@@ -78,28 +87,39 @@ class KnownLaw:
             problem=None,
             linearised=None,
         )
-        return cls.from_identification(fit, noise_model, altered.constraints.T @ altered.constraints)
+        return cls.from_identification(fit, noise_model, altered.constraints.T @ altered.constraints, of_ranking=True)
 
     @classmethod
-    def from_identification(cls, fit: Identification, noise_model: NoiseModel, held: Floats | float = 0.0) -> KnownLaw:
-        """The information of the tests that were made, under a noise model, and of what is held of the unknowns."""
+    def from_identification(
+        cls, fit: Identification, noise_model: NoiseModel, held: Floats | float = 0.0, *, of_ranking: bool = False
+    ) -> KnownLaw:
+        """The information of the tests that were made, under a noise model, and of what is held of the unknowns.
+
+        of_ranking : whether the usual errors are those of a ranking of laws, and not those of intervals.
+        """
         predictor, count = predictor_of(fit), fit.u.size
         problem = LeastSquaresProblem.from_histories(fit.law, fit.histories, predictor, fit.settings, fit.reference)
+        problem = with_derivatives_to_lengths(problem)
         nuisances = problem.nuisance_parameters
         if fit.nuisances:
             sd = np.array([n.prior_sd for n in fit.nuisances], float)
             problem = problem.with_nuisances(replace(nuisances, sd=sd))
-        residuals = fit.residuals_of(problem)
+        linear = problem.linearised(fit.x, fit.residuals_of(problem))
+        errors = UsualErrors.of(problem, linear, noise_model, len(fit.histories) + 1, of_ranking=of_ranking)
+        residuals = linear.residuals.with_effects(errors.own)
         factor = CovarianceFactor.of_residuals(residuals, noise_model)
-        information = _information(problem, residuals, factor, count) + held
+        unknowns = _with_columns(residuals.jacobian, errors.common.values())
+        weighted, further = factor.inverse_times(unknowns), len(errors.common)
+        of_x = np.pad(np.broadcast_to(held, (fit.x.size, fit.x.size)), (0, further))
+        information = np.einsum("tep,teq->pq", unknowns, weighted) + of_x
+        information += np.diag(np.concatenate([linear.precision, np.ones(further)]))
         shared = tuple(count + k for k, n in enumerate(nuisances.nuisances) if n.scope != "test")
-        kept = [*range(count), *shared]
+        kept = [*range(count), *shared, *range(fit.x.size, fit.x.size + further)]
         marginal = scaled_inverse(scaled_inverse(information)[np.ix_(kept, kept)])
-        is_altered = bool(np.any(held))
-        sandwich = np.eye(len(marginal)) if is_altered else _sandwich(fit.by_tests_alone.covariance, marginal)
+        sandwich = np.eye(len(marginal)) if np.any(held) else _sandwich(fit.covariance, marginal)
         chi_square = float((factor.whiten(residuals.values) ** 2).sum())
-        of_kept = np.broadcast_to(held, information.shape)[np.ix_(kept, kept)]
-        return cls(fit, problem, noise_model, fit.x, shared, marginal, chi_square, sandwich, of_kept)
+        known = (marginal, chi_square, sandwich, of_x[np.ix_(kept, kept)])
+        return cls(fit, problem, noise_model, fit.x, shared, of_ranking, errors, *known)
 
     @property
     def size(self) -> int:
@@ -109,7 +129,7 @@ class KnownLaw:
     def draws(self, count: int, seed: int) -> Floats:
         """(draws, q) deviations from the estimates, of the posterior: its samples where there are some, else normal.
 
-        Values beyond a bound are put on it; s is drawn given u.
+        Of what a ranking compares, q = (u, s). Values beyond a bound are put on it; s is drawn given u.
         """
         p, A = self.size, self.information
         unit = norm.ppf(np.clip(qmc.Sobol(A.shape[0], seed=seed).random(count), 1e-6, 1 - 1e-6))
@@ -138,9 +158,8 @@ class KnownLaw:
         of_own = residuals.jacobian[..., own]
         sd = np.minimum(nuisances.sd, (nuisances.high - nuisances.low) / np.sqrt(12.0))
         effects = compact_effects(of_own * sd[[k - p for k in own]]) if own else None
-        factor = CovarianceFactor.of_residuals(
-            replace(residuals, random_effect_sensitivities=effects), self.noise_model
-        )
+        with_own = replace(residuals, random_effect_sensitivities=effects).with_effects(self.errors.own)
+        factor = CovarianceFactor.of_residuals(with_own, self.noise_model)
         shift = of_own @ (e - nuisances.mean)[[k - p for k in own]]
         of_s = residuals.jacobian[..., list(self.shared)]
         points = np.concatenate([np.zeros((1, deviations.shape[1])), deviations])
@@ -171,11 +190,31 @@ class Expansion:
     information: Floats
 
 
-def _information(problem: LeastSquaresProblem, residuals: Residuals, factor: CovarianceFactor, count: int) -> Floats:
-    assert residuals.jacobian is not None
-    precision = np.concatenate([12.0 / problem.bounds.width[:count] ** 2, problem.nuisance_parameters.precision])
-    weighted = factor.inverse_times(residuals.jacobian)
-    return np.asarray(np.einsum("tep,teq->pq", residuals.jacobian, weighted) + np.diag(precision))
+class UsualErrors(NamedTuple):
+    """What errors that tests usually have change of residuals, one standard deviation each.
+
+    own : (tests, observations) each, of those that each test has by itself. common : {kind: (tests, observations)} of
+    those that all tests have alike.
+    """
+
+    own: list[Floats]
+    common: dict[str, Floats]
+
+    @classmethod
+    def of(
+        cls, problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel, among: int, *,
+        of_ranking: bool,
+    ) -> UsualErrors:  # fmt: skip
+        """Those that intervals include, of some tests among others; of a ranking of laws lengths of each test alone."""
+        errors = [e for e in errors_of_tests(problem, linear.x, linear, noise_model, among) if e.included]
+        own = [e.residual_change for e in errors if not e.common and not (of_ranking and e.kind in (RATE, LIFE))]
+        return cls(own, {e.kind: e.residual_change for e in errors if e.common and not of_ranking})
+
+
+def _with_columns(jacobian: Floats | None, columns: Iterable[Floats]) -> Floats:
+    """Derivatives (tests, observations, unknowns) and further columns (tests, observations)."""
+    assert jacobian is not None
+    return np.concatenate([jacobian, *(column[..., None] for column in columns)], axis=-1)
 
 
 def _sandwich(covariance: Floats, information: Floats) -> Floats:
@@ -255,16 +294,15 @@ class PlannedOutcome:
 class _Chunk:
     """What one law predicts of some planned tests.
 
-    residuals : with zero in the place of what is measured. leading : (tests,) arrays of the leading output, in its
-    unit. ruptures : (tests,). own_effects : (tests, observations, effects) -, of one standard deviation of the nuisance
-    parameters that each test has for itself, or None. kept : columns of the derivatives that are of q.
+    residuals : with zero in the place of what is measured, and as random effects the nuisance parameters and errors
+    that each test has for itself. leading : (tests,) arrays of the leading output, in its unit. ruptures : (tests,).
+    jacobian : (tests, observations, q) derivatives to q.
     """
 
     residuals: Residuals
     leading: list[Floats]
     ruptures: Bools
-    own_effects: Floats | None
-    kept: tuple[int, ...]
+    jacobian: Floats
 
 
 @dataclass(eq=False)
@@ -324,8 +362,11 @@ class PlannedOutcomes:
     def _outcomes(self, chunk: Sequence[History]) -> list[list[list[PlannedOutcome]]]:
         """For each law, under the covariance of each law, the outcomes of each test of a chunk."""
         observations = self._observations(chunk)
-        predicted = [_predicted(law, chunk, observations) for law in self.laws]
-        factors = [self._covariance(one, observations) for one in predicted[: self.candidates]]
+        known = self.laws[0].noise_model  # the same for all; the derivatives are those of each law
+        outputs = {name: known[name] for name in observations.outputs}
+        noise_model = NoiseModel(outputs, known.rate, known.discrepancy, known.discrepancy_length)
+        predicted = [_predicted(law, chunk, observations, noise_model) for law in self.laws]
+        factors = [CovarianceFactor.of_residuals(one.residuals, noise_model) for one in predicted[: self.candidates]]
         if len(chunk) == 1:
             self._covariances[test_key(chunk[0])] = factors
         return [[self._whitened(one, factor, observations) for factor in factors] for one in predicted]
@@ -334,10 +375,9 @@ class PlannedOutcomes:
         self, predicted: _Chunk, factor: CovarianceFactor, observations: ObservationVector
     ) -> list[PlannedOutcome]:
         """The outcomes of one law for each test of a chunk."""
-        residuals = predicted.residuals
-        assert residuals.jacobian is not None
-        transformed = np.where(observations.present, residuals.values + observations.transformed_values, 0.0)
-        mean, jacobian = factor.whiten(transformed), factor.whiten(residuals.jacobian[..., predicted.kept])
+        values = predicted.residuals.values + observations.transformed_values
+        mean = factor.whiten(np.where(observations.present, values, 0.0))
+        jacobian = factor.whiten(predicted.jacobian)
         outcomes = []
         for k, leading in enumerate(predicted.leading):
             mask = observations.present[k]
@@ -362,19 +402,6 @@ class PlannedOutcomes:
             planned.append(history.replace(outputs=zero, standard_deviation=sd, rupture_time=None, unruptured=False))
         observations = ObservationVector.from_histories(planned, predictor).with_noise_of(base)
         return replace(observations, relative_noise=np.ones_like(observations.relative_noise))
-
-    def _covariance(self, predicted: _Chunk, observations: ObservationVector) -> CovarianceFactor:
-        """Noise, offset and rate of each planned test, and its own nuisance parameters, as a law predicts it."""
-        known = self.laws[0].noise_model  # the same for all; the derivatives are those of each law
-        outputs = {name: known[name] for name in observations.outputs}
-        noise_model = NoiseModel(outputs, known.rate, known.discrepancy, known.discrepancy_length)
-        residuals = replace(
-            predicted.residuals,
-            present=observations.present,
-            discrepancy_unit=np.where(observations.present, observations.discrepancy_unit, 0.0),
-            random_effect_sensitivities=predicted.own_effects,
-        )
-        return CovarianceFactor.of_residuals(residuals, noise_model)
 
     def _evaluated_at(self, history: History, law: int, deviations: Floats) -> tuple[list[Floats], list[Floats], Bools]:
         """Predictions at draws whitened by the covariance of each law, their derivatives, and which draws rupture."""
@@ -425,35 +452,48 @@ def test_key(history: History) -> tuple[object, ...]:
     )
 
 
-def _predicted(law: KnownLaw, planned: Sequence[History], observations: ObservationVector) -> _Chunk:
+def _predicted(
+    law: KnownLaw, planned: Sequence[History], observations: ObservationVector, noise_model: NoiseModel
+) -> _Chunk:
     """What a law predicts of planned tests at its estimates, with derivatives."""
-    nuisances, problem, coordinates = nuisances_of_planned(law, planned), law.measured, law.fit.coordinates
-    e, u, size = values_of_nuisances(nuisances, law), law.fit.u, law.size
-    prediction = problem.predictor.predict(
-        law.fit.law, coordinates.theta(u)[None], planned, nuisances=nuisances.predictor_values(e), sensitivities=True
+    made, nuisances, size = law.measured, nuisances_of_planned(law, planned), law.size
+    conditions = np.array([reference_condition(history, made.predictor) for history in planned]).T
+    problem = replace(
+        made.with_nuisances(nuisances),
+        histories=tuple(planned),
+        observations=observations,
+        conditions=conditions,
+        evaluations=EvaluationCache(),
     )
-    coefficients = coordinates.coefficients if coordinates.every_rate_has_coefficient else None
-    residuals = residuals_of_prediction(observations, prediction, nuisances, coefficients)
+    problem, x = with_derivatives_to_lengths(problem), np.append(law.fit.u, values_of_nuisances(nuisances, law))
+    residuals, prediction = problem.residuals(x), problem.prediction(x)
     assert residuals.jacobian is not None
-    internal, of_nuisances = np.split(residuals.jacobian, [size], axis=-1)
-    jacobian = np.concatenate([internal @ coordinates.jacobian(u), of_nuisances], axis=-1)
-    owners = [(n.key, owner) for n, owner in zip(nuisances.nuisances, nuisances.owners, strict=True)]
-    made = problem.nuisance_parameters
-    made_owners = [(n.key, owner) for n, owner in zip(made.nuisances, made.owners, strict=True)]
+    linear, among = problem.linearised(x, residuals), len(law.fit.histories) + 1
+    errors = UsualErrors.of(problem, linear, noise_model, among, of_ranking=law.of_ranking)
+    owners = list(zip((n.key for n in nuisances.nuisances), nuisances.owners, strict=True))
+    of_made = made.nuisance_parameters
+    made_owners = list(zip((n.key for n in of_made.nuisances), of_made.owners, strict=True))
     kept = (*range(size), *(size + owners.index(made_owners[k - size]) for k in law.shared))
+    of_common = [errors.common.get(kind, np.zeros_like(residuals.values)) for kind in law.errors.common]
     names = {h.name for h in planned}
     own = [k for k, n in enumerate(nuisances.nuisances) if n.scope == "test" and nuisances.owners[k] in names]
     sd = np.minimum(nuisances.sd, (nuisances.high - nuisances.low) / np.sqrt(12.0))
-    effects = compact_effects(jacobian[..., [size + k for k in own]] * sd[own]) if own else None
+    effects = compact_effects(residuals.jacobian[..., [size + k for k in own]] * sd[own]) if own else None
+    present = observations.present
+    of_own = replace(
+        residuals,
+        present=present,
+        discrepancy_unit=np.where(present, observations.discrepancy_unit, 0.0),
+        random_effect_sensitivities=effects,
+    ).with_effects(errors.own)
     leading = []
     for k, history in enumerate(planned):
-        outputs = problem.predictor.for_history(history).outputs_of_test(history) or prediction.outputs
+        outputs = made.predictor.for_history(history).outputs_of_test(history) or prediction.outputs
         values = prediction.of(k)[:, prediction.outputs.index(outputs[0])]  # the first grows with creep
         leading.append(values[np.isfinite(values)])
     return _Chunk(
-        residuals=replace(residuals, jacobian=jacobian),
+        residuals=of_own,
         leading=leading,
         ruptures=np.isin(prediction.status[0], ENDED),
-        own_effects=effects,
-        kept=kept,
+        jacobian=_with_columns(residuals.jacobian[..., kept], of_common),
     )

@@ -271,10 +271,10 @@ class _CFile:
         self, comment: str, kind: str, name: str, outputs: Sequence[str], function: CodeFunction, results: Sequence[str]
     ) -> list[str]:
         """Comment, declaration and body; stress and time come in the law's own units from the first statements on."""
-        inputs = [f"double {s}" for s in self.arguments]
+        inputs = [f"double {s}" for s in (*self.arguments, *self.code.conditions)]
         scales = [(s, self.unit_factors[k]) for k, s in zip(self.input_indices, self.arguments, strict=True)]
         body = [
-            *(f"(void){s};" for s in self.arguments if s not in function.inputs),
+            *(f"(void){s};" for s in (*self.arguments, *self.code.conditions) if s not in function.inputs),
             *(f"{s} *= {scale!r};" for s, scale in scales if scale != 1 and s in function.inputs),
             *(f"const double {ln} = log({plain});" for ln, plain in self.code.logarithms_used(function).items()),
             *c_assignments(function.assignments),

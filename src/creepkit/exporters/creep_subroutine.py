@@ -22,7 +22,7 @@ from sympy.logic.boolalg import BooleanFunction
 
 from creepkit.errors import ExportError
 from creepkit.exporters.law_code import Identifiers, LawCode, called_names
-from creepkit.exporters.law_description import comment_lines, comment_safe, heading
+from creepkit.exporters.law_description import comment_lines, comment_safe, heading, refuse_conditions
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.language.law import CreepLaw
@@ -55,10 +55,9 @@ class FortranPrinter(KernelPrinter):
     choice = "merge({branch}, {otherwise}, {condition})"
 
     def _print_BooleanTrue(self, e: Any) -> str:
-        return ".true."
+        return f".{e}.".lower()
 
-    def _print_BooleanFalse(self, e: Any) -> str:
-        return ".false."
+    _print_BooleanFalse = _print_BooleanTrue
 
 
 _PRINTER = FortranPrinter({"standard": "python3"})
@@ -197,15 +196,15 @@ The formulas are those of kernels.scalar_functions. Fortran has neither log1p no
 def law_subroutine(code: LawCode, name: str) -> list[str]:
     """Return `subroutine NAME(x, out)` as lines of fixed-form Fortran.
 
-    Its x is stress MPa, strain, time s, temperature K, largest principal and mean stress MPa, then internal variables;
-    out is row by row (value, derivatives to x) of ln rate and of each state's rate, in the order of creepkit's kernels.
+    Its x is stress MPa, strain, time s, temperature K, largest principal and mean stress MPa, then internal variables,
+    then conditions; out is row by row (value, derivatives to all of them but conditions) of ln rate and of each state's
+    rate, in the order of creepkit's kernels.
     """
     function = code.function("update")
-    width = len(POINT_VARIABLES) + len(code.states)
     logs = code.logarithms_used(function)
     definitions = [*(f"{ln} = log({plain})" for ln, plain in logs.items()), *fortran_assignments(function.assignments)]
     results = [f"out({k + 1}) = {fortran_expression(e)}" for k, e in enumerate(function.outputs)]
-    input_positions = {s: k + 1 for k, s in enumerate((*code.point, *code.states))}
+    input_positions = {s: k + 1 for k, s in enumerate((*code.point, *code.states, *code.conditions))}
     input_lines = [f"{s} = x({input_positions[s]})" for s in function.inputs]
     parameters_used = [s for s in code.parameters if s in function.symbols or s in logs.values()]
     logical_names = [str(s) for s, e in function.assignments if isinstance(e, (Relational, BooleanFunction))]
@@ -218,7 +217,7 @@ def law_subroutine(code: LawCode, name: str) -> list[str]:
         [
             f"subroutine {name}(x, out)",
             "  implicit none",
-            f"  double precision, intent(in) :: x({width})",
+            f"  double precision, intent(in) :: x({len(input_positions)})",
             f"  double precision, intent(out) :: out({len(function.outputs)})",
             *(f"  double precision, parameter :: {s} = {fortran_number(code.parameters[s])}" for s in parameters_used),
             *(f"  {line}" for line in double_declarations(variables)),
@@ -290,7 +289,7 @@ class CreepSubroutine:
         raise NotImplementedError
 
     def _template_values(self, code: LawCode, stem: str) -> dict[str, str]:
-        law, units = code.law, code.source.units
+        law, units, fields = code.law, code.source.units, len(code.conditions)
         states = list(law.states.values())
         starts = [0.0, *(s.initial for s in states)]
         ends = [1e308, *(1e308 if s.limit is None else s.limit for s in states)]
@@ -298,7 +297,13 @@ class CreepSubroutine:
             "id": stem,
             "ny": str(1 + len(states)),
             "ns": str(len(states)),
-            "nx": str(len(POINT_VARIABLES) + len(states)),
+            "nx": str(nx := len(POINT_VARIABLES) + len(states)),
+            "mx": str(nx + fields),
+            "nt": str(2 + fields),
+            "np": str(7 + fields),
+            "fields": "".join(f"      temps({k + 2}) = predef({k}) - 0.5d0*dpred({k})\n" for k in range(1, fields + 1)),
+            "carried": "        point(8:) = temps(3:)\n" if fields else "",
+            "placed": f"        x({nx + 1}:) = point(8:)\n" if fields else "",
             "beta": fortran_number(code.leading_time_exponent()),
             "shift_origin": "" if law.uses(time) else "        if (.not. strain > 0.0d0) origin = max(start, 0.0d0)\n",
             "mpa": fortran_number(units.megapascals),
@@ -323,6 +328,9 @@ class AbaqusCreepSubroutine(CreepSubroutine):
         """Lines for the head of the file."""
         yield "Abaqus/Standard: *CREEP, LAW=USER in the material, *VISCO, CETOL=... as the step."
         yield from _time_notes(code)
+        if code.conditions:
+            fields = ", ".join(f"{k} {one.name} in {one.unit}" for k, one in enumerate(code.law.conditions, 1))
+            yield f"Predefined fields (*INITIAL CONDITIONS, TYPE=FIELD, VARIABLE=number): {fields}."
         if code.states:
             state_list = ", ".join(f"{k} {s.name}" for k, s in enumerate(code.law.states, 1))
             yield f"*DEPVAR needs {len(code.states)}: {state_list} (less its initial value, so nil is a fresh start)."
@@ -365,6 +373,7 @@ class CalculixCreepSubroutine(CreepSubroutine):
 
     def _check_inputs(self, law: CreepLaw) -> None:
         super()._check_inputs(law)
+        refuse_conditions(law, "CREEP of CalculiX, which is given no fields,")
         if law.uses(mean_stress):
             raise ExportError(
                 f"law '{law.name}' needs the mean stress, which CalculiX does not pass to CREEP; export it as 'mfront'"

@@ -31,7 +31,7 @@ from creepkit.exporters.unit_conversion import ConvertedValues, convert_values
 from creepkit.hookspecs import hookimpl
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import ArrheniusExponent, LatexLawPrinter, ReadableSums, latex_equations
-from creepkit.language.symbols import GAS_CONSTANT, mean_stress, principal_stress, strain, stress, temperature, time
+from creepkit.language.symbols import mean_stress, principal_stress, strain, stress, temperature, time
 from creepkit.records import Exporter, LawWithValues
 
 _LATEX_ESCAPES = {
@@ -61,13 +61,10 @@ class LatexExporter:
         law, converted_values, printer = source.law, convert_values(source), LatexLawPrinter(source.law)
         comments_text = (source.title, *source.notes, *(f"Source: {reference}" for reference in law.references))
         lines = comment_lines(comments_text, "%")
-        lines += [f"% R = {GAS_CONSTANT} J/(mol K)"] if law.uses(temperature) else []
         lines += equations_in_latex(law, printer)
         lines += [rf"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
         lines += _value_table(source, converted_values, printer)
-        lines += (
-            [] if source.units.is_native else [f"In this table, {latex_escaped(converted_values.reference_sentence)}."]
-        )
+        lines += [latex_escaped(sentence) for sentence in remarks(source, converted_values)]
         return "\n".join(lines) + "\n"
 
 

@@ -17,7 +17,7 @@ import sympy
 
 from creepkit.exporters.c import STABLE_FUNCTIONS, c_assignments, c_expression, stable_functions_in
 from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode
-from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.exporters.law_description import comment_lines, heading, printable_text, refuse_conditions
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS
 from creepkit.language.symbols import POINT_VARIABLES
@@ -103,6 +103,7 @@ def law_expression(source: LawWithValues) -> str:
 
     Everything stays in it, what is switched off too. Nothing in it ends a script element.
     """
+    refuse_conditions(source.law, "a page")
     body = _JavaScriptLaw(source, keeps_inactive=True).text()
     return f'(() => {{\n"use strict";\n{body}\nreturn Object.freeze({{ {", ".join(EXPORTED_NAMES)} }});\n}})()'
 
@@ -141,7 +142,8 @@ class _JavaScriptLaw:
             *heading(self.source, mentions_floors=mentions_floors),
             *self.code.renaming_notes(),
             "Points and parameters are objects by the names of the law: rate({stress: 100}, {}). In `kernel` they are",
-            "arrays, in MPa and s: stress, strain, time, temperature, largest principal and mean stress, then states.",
+            "arrays, in MPa and s: stress, strain, time, temperature, largest principal and mean stress, states and",
+            "conditions.",
             "A result beyond 1.8e308 is Infinity.",
         ]
         return comment_lines(map(_comment_safe, lines), "//", _LINE_LENGTH)
@@ -166,6 +168,7 @@ class _JavaScriptLaw:
                 {"name": s.name, "initial": z.initial, "limit": z.limit, "unit": z.unit, "meaning": z.meaning}
                 for s, z in law.states.items()
             ],
+            "conditions": [{"name": one.name, "unit": one.unit} for one in law.conditions],
         }
 
     # ---- functions -------------------------------------------------------------------------------------------------
@@ -173,7 +176,7 @@ class _JavaScriptLaw:
     def _kernel(self) -> list[str]:
         """The function that makes the law's functions for given values of the parameters."""
         code = self.code
-        places = {symbol: f"point[{k}]" for k, symbol in enumerate((*code.point, *code.states))}
+        places = {symbol: f"point[{k}]" for k, symbol in enumerate((*code.point, *code.states, *code.conditions))}
         closures = {name: _closure(name, code.function(entry), places) for name, entry in _ENTRIES.items()}
         labels = [f"// {_comment_safe(printable_text(label))}" for label in self.law.terms]
         return [

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import sympy
 
-from creepkit.errors import ExportError, LawError
+from creepkit.errors import SAID, ExportError, LawError, restated
 from creepkit.kernels.log_form import leading_exponents
 from creepkit.kernels.symbolic_kernel import KernelFunction, SymbolicKernel, symbolic_kernel
 from creepkit.language.symbols import POINT_VARIABLES
@@ -110,7 +110,8 @@ class CodeFunction:
 class LawCode:
     """A law with its values, reduced of what is off, as functions in names of a target's language.
 
-    source : what is exported, reduced. point, states : symbols of the six variables of the point and of the states.
+    source : what is exported, reduced. point, states, conditions : symbols of the six variables of the point, of the
+        states, and of what tests state besides.
     parameters : {symbol: the author's value}; logarithms : {symbol: the parameter it is the logarithm of}.
     """
 
@@ -128,15 +129,15 @@ class LawCode:
         """
         self.source = source if keeps_inactive else source.without_inactive_terms()
         self.law, self.identifiers = self.source.law, identifiers
-        try:
+        with restated(LawError, ExportError, f"cannot be written as a program: {SAID}"):
             self._lowered: SymbolicKernel = _kernel_entries(self.law)
-        except LawError as error:
-            raise ExportError(f"cannot be written as a program: {error}") from None
         self._symbols: dict[sympy.Symbol, sympy.Symbol] = {}
         inputs, size = self._lowered.rate.inputs, len(POINT_VARIABLES) + len(self.law.states)
-        requested = [(target_names or {}).get(s.name, s.name) for s in (*POINT_VARIABLES, *self.law.states)]
+        names = target_names or {}
+        requested = [names.get(s.name, s.name) for s in (*POINT_VARIABLES, *self.law.states)]
         symbols = [self._new_symbol(symbol, name) for symbol, name in zip(inputs, requested, strict=False)]
         self.point, self.states = tuple(symbols[: len(POINT_VARIABLES)]), tuple(symbols[len(POINT_VARIABLES) :])
+        self.conditions = tuple(self._new_symbol(s, names.get(s.name, s.name)) for s in self.law.conditions)
         self.parameters: dict[sympy.Symbol, float] = {}
         self.logarithms: dict[sympy.Symbol, sympy.Symbol] = {}
         for theta, (name, param) in zip(inputs[size:], self.law.table.items(), strict=True):
@@ -202,7 +203,8 @@ class LawCode:
             if self._symbols[s] not in self.parameters
         }
         full = CodeFunction((), tuple(definitions.items()), tuple(e.xreplace(self._symbols) for e in outputs))
-        return replace(full, inputs=tuple(s for s in (*self.point, *self.states) if s in full.symbols))
+        variables = (*self.point, *self.states, *self.conditions)
+        return replace(full, inputs=tuple(s for s in variables if s in full.symbols))
 
     def logarithms_used(self, function: CodeFunction) -> dict[sympy.Symbol, sympy.Symbol]:
         """The logarithms of parameters that a function reads: {ln_A: A}."""
@@ -210,5 +212,5 @@ class LawCode:
 
     def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that the target could not keep."""
-        original_names = {*self.law.names, *(s.name for s in (*POINT_VARIABLES, *self.law.states))}
-        return self.identifiers.renaming_notes(original_names)
+        variables = (*POINT_VARIABLES, *self.law.states, *self.law.conditions)
+        return self.identifiers.renaming_notes({*self.law.names, *(s.name for s in variables)})

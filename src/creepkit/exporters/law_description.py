@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import sympy
 
+from creepkit.errors import ExportError
 from creepkit.exporters.unit_conversion import ConvertedValues, coefficient_unit, reference_sentence
 from creepkit.kernels.log_form import FLOOR, TIME_FLOOR
 from creepkit.language.law import CreepLaw
-from creepkit.language.printing import expression_text
+from creepkit.language.printing import rate_lines
 from creepkit.language.symbols import GAS_CONSTANT, temperature
 from creepkit.records import LawWithValues, Units
 
@@ -26,7 +27,7 @@ def heading(source: LawWithValues, *, units: str = "", mentions_floors: bool = F
     law = source.law
     yield f"{law.name}: {law.title}" if law.title else law.name
     yield ""
-    yield from equation_lines(law)
+    yield from rate_lines(law)
     yield ""
     yield units or units_sentence(source)
     yield "Parameters, for stress as a ratio to 1 MPa and time to 1 s:"
@@ -41,6 +42,15 @@ def heading(source: LawWithValues, *, units: str = "", mentions_floors: bool = F
     yield from (f"Source: {reference}" for reference in law.references)
 
 
+def refuse_conditions(law: CreepLaw, target: str) -> None:
+    """ExportError, with what to do, where a law still has conditions of the material and a target no place for them."""
+    if names := [one.name for one in law.conditions]:
+        raise ExportError(
+            f"{target} has no place for conditions of law '{law.name}'; give {', '.join(names)} a value as "
+            f"well, in the law's unit: in a command --set {names[0]}=0.05"
+        )
+
+
 def units_sentence(source: LawWithValues) -> str:
     """The units of a text that converts stress and time on entry, and rates on exit."""
     sentence = f"Stress in {source.units.stress}, time in {source.units.time}, rates in 1/{source.units.time}"
@@ -50,16 +60,6 @@ def units_sentence(source: LawWithValues) -> str:
     return f"{sentence}. {conversion}{reference_sentence(Units())}."
 
 
-def equation_lines(law: CreepLaw) -> Iterator[str]:
-    """The rate, a term a line under its name, and the rates of internal variables."""
-    prefixes = ["rate =", *["     +"] * (len(law.terms) - 1)]
-    for prefix, (label, term) in zip(prefixes, law.terms.items(), strict=True):
-        yield f"{prefix} {expression_text(term)}    [{label}]"
-    for symbol, state in law.states.items():
-        failure = "" if state.limit is None else f" to failure at {state.limit:g}"
-        yield f"d{symbol}/dt = {expression_text(state.rate)}, from {state.initial:g}{failure}    [{state.meaning}]"
-
-
 def parameter_lines(law: CreepLaw, values: Mapping[str, float]) -> Iterator[str]:
     """One line a parameter: name, value, unit, meaning."""
     for name, param in law.table.items():
@@ -67,6 +67,7 @@ def parameter_lines(law: CreepLaw, values: Mapping[str, float]) -> Iterator[str]
         absolute = coefficient_unit(law, name)
         absolute = f" ({absolute} for stress in MPa and time in s)" if absolute else ""
         yield f"  {name} = {values[name]!r}{unit}, {param.meaning}{absolute}"
+    yield from (f"  {one.name} in {one.unit}, a condition of the material" for one in law.conditions)
 
 
 def comment_lines(lines: Iterable[str], marker: str, width: int = 0) -> list[str]:
@@ -124,6 +125,7 @@ def remarks(source: LawWithValues, converted_values: ConvertedValues) -> Iterato
     yield f"Here {converted_values.reference_sentence}."
     if source.law.uses(temperature):
         yield f"Temperature in K, R = {GAS_CONSTANT} J/(mol K)."
+    yield from (f"{one.name} in {one.unit}." for one in source.law.conditions)
     for symbol, state in source.law.states.items():
         if state.limit is not None:
             yield f"The material has failed when {symbol} reaches {state.limit:g}."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from creepkit.errors import ExportError, LawError, quoted
+from creepkit.errors import SAID, ExportError, LawError, quoted, restated
 from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, json_text, parse_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
@@ -74,17 +74,13 @@ def valued_law_from_json(data: Any, source: str) -> LawWithValues:
                 f"{source}: '{key}' is {data[key]!r}; creepkit reads {expected!r} alone, convert the values"
             )
     law = law_from_json(content.pop("law"), source)
-    try:
+    with restated(RecordError, ExportError, f"{source}: {SAID}; {VALUED_LAW.kind.advice}"):
         values = RecordCodec().from_json(_Values, content)
-    except RecordError as error:
-        raise ExportError(f"{source}: {error}; {VALUED_LAW.kind.advice}") from None
     for name, (low, high) in values.ranges.items():
         if low > high:
             raise ExportError(f"{source}: ranges.{quoted(name)} is {low:g} to {high:g}; the lower number comes first")
-    try:
+    with restated(LawError, ExportError, f"{source}: {SAID}"):
         return LawWithValues(law, values.values, values.notes, ranges=values.ranges)
-    except LawError as error:
-        raise ExportError(f"{source}: {error}") from error
 
 
 @hookimpl

@@ -71,13 +71,15 @@ class IntegratorBlock:
         self.behaviour = identifiers.unique(source.name or source.law.name)
         self.elapsed = identifiers.unique("elapsed")
         self.states = identifiers.unique_names(s.name for s in reduced.law.states)
-        target_names = {s.name: f"{s.name}_now" for s in (*POINT_VARIABLES, *reduced.law.states)}
+        self.conditions = identifiers.unique_names(s.name for s in reduced.law.conditions)
+        variable = (*POINT_VARIABLES, *reduced.law.states, *reduced.law.conditions)
+        target_names = {s.name: f"{s.name}_now" for s in variable}
         self.code = LawCode(reduced, identifiers, target_names)
         self.source, self.law, self._units = self.code.source, self.code.law, source.units
 
     def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that MFront cannot keep."""
-        pairs = zip(self.law.states, self.states, strict=True)
+        pairs = zip((*self.law.states, *self.law.conditions), (*self.states, *self.conditions), strict=True)
         notes = [f"'{old}' is called {new} here" for old, new in pairs if old.name != new]
         variables = {*self.law.names, *(s.name for s in POINT_VARIABLES)}
         return [*notes, *(line for line in self.code.identifiers.renaming_notes(variables) if line not in notes)]
@@ -123,6 +125,7 @@ class IntegratorBlock:
         for symbol, name, state in zip(self.code.states, self.states, self.law.states.values(), strict=True):
             values[symbol] = f"{f'{state.initial!r} + ' if state.initial else ''}{name} + theta * d{name}"
         power = f"const real time_power = {c_expression(self.time_power)};"
+        values |= {s: f"{n} + theta * d{n}" for s, n in zip(self.code.conditions, self.conditions, strict=True)}
         lines = [f"const real {s} = {text};" for s, text in values.items() if s in self._update_function.inputs]
         return [power, *lines] if self.time_power != 0 and self.law.uses(time) else lines
 
@@ -334,6 +337,8 @@ def _state_variables(behaviour: IntegratorBlock) -> Iterator[str]:
                 yield f"@PhysicalBounds {symbol} in ]*:{span!r}]; // where the material has failed"
             else:
                 yield f"// the material has failed where {symbol} reaches {span!r}"
+    for name, condition in zip(behaviour.conditions, behaviour.law.conditions, strict=True):
+        yield f"@ExternalStateVariable real {name}; // {comment_safe(condition.unit)}"
     if behaviour.law.uses(time):
         yield f"@AuxiliaryStateVariable real {behaviour.elapsed};"
         yield f'{behaviour.elapsed}.setEntryName("TimeUnderLoad");'

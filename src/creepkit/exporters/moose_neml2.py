@@ -67,12 +67,9 @@ class MooseBlock(CodeInput):
         """Comments and the block."""
         for form in forms:
             if form.stress_function != "power" or form.strain_exponent:
-                is_power = form.stress_function == "power"
-                part = (
-                    f"power {form.strain_exponent:g} of creep strain"
-                    if is_power
-                    else f"{form.stress_function} of stress"
-                )
+                part = f"{form.stress_function} of stress"
+                if form.stress_function == "power":
+                    part = f"power {form.strain_exponent:g} of creep strain"
                 reason = f"MOOSE has no creep model for its {part} (its m_exponent is one of time)"
                 raise self.refusal(source, f", term '{form.label}': {reason}")
         names = Identifiers(_MOOSE_RESERVED)

@@ -16,7 +16,7 @@ from typing import Any
 
 import sympy
 
-from creepkit.errors import ExportError, LawError
+from creepkit.errors import SAID, ExportError, LawError, restated
 from creepkit.exporters.law_code import Identifiers, factor_text
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
 from creepkit.exporters.unit_conversion import STRESSES
@@ -54,10 +54,8 @@ class PythonDialect:
 def module_text(source: LawWithValues, dialect: PythonDialect) -> str:
     """Return the module of a law; ExportError when it holds what no kernel can evaluate."""
     source = source.without_inactive_terms()
-    try:
+    with restated(LawError, ExportError, f"cannot be written as Python: {SAID}"):
         functions = _ModuleFunctions(source, dialect)
-    except LawError as error:
-        raise ExportError(f"cannot be written as Python: {error}") from None
     body = functions.text()
     floors = any(f"{floor!r})" in body for floor in (FLOOR, TIME_FLOOR))
     lines = [*heading(source, mentions_floors=floors), *functions.renaming_notes(), dialect.overflow_sentence]
@@ -75,7 +73,7 @@ class _ModuleFunctions:
         self.source, self.law, self.dialect = source, source.law, dialect
         form = log_form(self.law)
         self._identifiers = Identifiers((*keyword.kwlist, *TARGET_FUNCTIONS, *dialect.helpers, *_MODULE_NAMES))
-        symbols = (*POINT_VARIABLES, *self.law.states, *self.law.params)
+        symbols = (*POINT_VARIABLES, *self.law.states, *self.law.conditions, *self.law.params)
         self.names = {s: self._symbol(s.name) for s in symbols}
         self.logs = {self._symbol(theta.name): self.names[s] for s, theta in form.logs.items()}
         renamed = self.names | dict(zip(form.logs.values(), self.logs, strict=True))
@@ -84,7 +82,7 @@ class _ModuleFunctions:
 
     def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that had to change."""
-        return self._identifiers.renaming_notes([s.name for s in (*self.law.states, *self.law.params)])
+        return self._identifiers.renaming_notes([s.name for s in self.names])
 
     def text(self) -> str:
         """The functions, and where internal variables start and end."""
@@ -129,7 +127,7 @@ class _ModuleFunctions:
 
     def _signature_lines(self) -> list[str]:
         """Variables of the point by keyword, needed where the law uses them; then parameters with their values."""
-        required = [s for s in POINT_VARIABLES[1:] if self.law.uses(s)] + list(self.law.states)
+        required = [s for s in POINT_VARIABLES[1:] if self.law.uses(s)] + [*self.law.states, *self.law.conditions]
         optional = [s for s in POINT_VARIABLES[1:4] if not self.law.uses(s)]
         return [
             "    stress,",
@@ -145,6 +143,7 @@ class _ModuleFunctions:
         for symbol, state in self.law.states.items():  # nothing in a meaning ends the docstring, or escapes in it
             meaning = printable_text(state.meaning).replace("\\", "/").replace('"', "'")
             lines.append(f"    {self.names[symbol]} : {meaning}")
+        lines += [f"    {self.names[one]} : condition of the material, {one.unit}" for one in self.law.conditions]
         unused = [s.name for s in POINT_VARIABLES[:4] if not self.law.uses(s)]
         return [*lines, f"    {', '.join(unused)} : not used by this law"] if unused else lines
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.errors import FitError, HistoryError
+from creepkit.errors import SAID, FitError, HistoryError, restated
 from creepkit.extraction.domes import Centers, find_domes, place_centers
 from creepkit.extraction.extraction import Extraction, FieldMap, PlateMotion
 from creepkit.extraction.frame_checks import FrameFlags, frames_at_rest, motion_reasons, residual_reasons
@@ -185,10 +185,8 @@ def _extract_one(frames: Frames, specimen: Specimen, request: ExtractionRequest,
         raise HistoryError(f"{piece.name}: {loaded.size} good frames under load; extraction needs at least 2")
     center, center_sd = np.zeros(2), np.zeros(2)
     if request.centers is None:
-        try:
+        with restated(FitError, HistoryError, f"{piece.name}: {SAID}"):
             center, covariance = specimen.surface_center(replace(points, heights=heights[loaded]))
-        except FitError as error:
-            raise HistoryError(f"{piece.name}: {error}") from None
         center_sd = np.sqrt(np.diag(covariance))
     centred = replace(points, places=points.places - center)
     seen = specimen.observe_surface(centred, request.operator or region.operator)

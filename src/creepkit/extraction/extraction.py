@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -97,10 +97,7 @@ class Extraction(Presentable, Plotted):
         object.__setattr__(self, "used", frozen(self.used, dtype=bool))
         object.__setattr__(self, "clamped", frozen(self.clamped, dtype=bool))
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.extraction import draw_extraction, extraction_figure
-
-        return extraction_figure, draw_extraction
+    drawn_by = "extraction.extraction_figure", "extraction.draw_extraction"
 
     def history_under(
         self, loading: Loading | float, temperature: float | Program, *, time_zero: float | None = None
@@ -166,10 +163,7 @@ class Extraction(Presentable, Plotted):
         """The same extraction with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
-    def __str__(self) -> str:
-        from creepkit.reports.extraction import extraction_text
-
-        return extraction_text(self)
+    shown_by = "extraction.extraction_text"
 
 
 def _label(extraction: Extraction) -> str:

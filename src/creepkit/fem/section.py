@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen
 from creepkit.checked_arguments import checked
-from creepkit.errors import SolveError, nearest
+from creepkit.errors import SolveError, nearest, refuse_unknown
 from creepkit.fem.finite_element_model import AxialConstraints, FiniteElementModel, RigidContact, finite_element_model
 from creepkit.fem.mesh import SIDE_SLOPES, SIDE_VALUES, SIDE_WEIGHTS, Mesh, check_elements, outline, strip_mesh
 
@@ -259,8 +259,7 @@ class Section:
 
 def _side(section: Section, name: str) -> Ints:
     """The element sides (edges, 3) of a name; SolveError for an unknown one."""
-    if name not in section.sides:
-        raise SolveError(f"a section has no side '{name}'; {nearest(name, tuple(section.sides))}")
+    refuse_unknown(name, section.sides, SolveError, f"a section has no side '{name}'")
     return np.asarray(section.sides[name])
 
 

@@ -126,10 +126,10 @@ def resolve(column: ClockColumn, path: str, lines: Ints, date_order: str, time_z
         notes += [problem] if problem else []
     else:
         notes.append("its time zone is not stated; time_zone='Europe/Berlin', or '+01:00', states it")
-        _check_increasing(local, path, lines, "; where clocks were put back for winter, state time_zone")
+        check_increasing(local, path, lines, "; where clocks were put back for winter, state time_zone")
         return ResolvedTimes(local - local[0], None, tuple(notes))
     universal = local + shift
-    _check_increasing(universal, path, lines, "")
+    check_increasing(universal, path, lines, "")
     return ResolvedTimes(universal - universal[0], base + float(universal[0]), tuple(notes))
 
 
@@ -140,7 +140,8 @@ def _check_uniform(marks: Bools, path: str, lines: Ints, what: str, advice: str)
         raise HistoryError(f"{path}:{lines[row]}: this time {found} {what}, unlike those before; write {advice}")
 
 
-def _check_increasing(times: Floats, path: str, lines: Ints, advice: str) -> None:
+def check_increasing(times: Floats, path: str, lines: Ints, advice: str = "") -> None:
+    """HistoryError where a time, s, is before the one of the line above it."""
     falls = np.diff(times) < 0
     if falls.any():
         row = int(np.argmax(falls)) + 1
@@ -149,13 +150,18 @@ def _check_increasing(times: Floats, path: str, lines: Ints, advice: str) -> Non
         )
 
 
+def through_midnight(seconds: Floats) -> tuple[Floats, Floats]:
+    """Times of the day, s, that go on where they begin anew, and the day of each from 0 on."""
+    later = np.concatenate([[0.0], np.cumsum(np.diff(seconds) < -0.5 * DAY)])
+    return seconds + DAY * later, later
+
+
 def _times_of_day(seconds: Floats, path: str, lines: Ints, time_zone: str) -> ResolvedTimes:
     """Times without a date: one that falls by more than half a day belongs to the next day."""
     if time_zone:
         raise HistoryError(f"{path}: its times of day have no date, so that a time_zone says nothing; leave it away")
-    later = np.concatenate([[0.0], np.cumsum(np.diff(seconds) < -0.5 * DAY)])
-    times = seconds + DAY * later
-    _check_increasing(times, path, lines, " (a time of day may begin anew at midnight only)")
+    times, later = through_midnight(seconds)
+    check_increasing(times, path, lines, " (a time of day may begin anew at midnight only)")
     notes = ["its times of day have no date"]
     if later[-1]:
         notes.append(f"its times of day cross midnight {int(later[-1])} time{'s' if later[-1] > 1 else ''}")

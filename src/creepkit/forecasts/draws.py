@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import FitError, nearest
+from creepkit.errors import FitError, refuse_unknown
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import owner_of, prior_mean
 from creepkit.inverse.reference_conditions import reference_condition
@@ -237,8 +237,7 @@ def check_tolerances(tolerances: Mapping[str, float], histories: Sequence[Histor
     for kind, sd in tolerances.items():
         lengths = {name for h in histories for d in dimensions_of(predictor.for_history(h)) for name in d.names}
         known = sorted({*TOLERANCE_KINDS, *lengths, *all_dimensions()})
-        if kind not in known:
-            raise FitError(f"a tolerance of '{kind}' is not known; {nearest(kind, known)}")
+        refuse_unknown(kind, known, FitError, f"a tolerance of '{kind}' is not known")
         if not (np.isfinite(sd) and sd >= 0):
             raise FitError(f"the tolerance of '{kind}' is {sd}; give a standard deviation of zero or more, in its unit")
         if sd > LARGEST_TOLERANCES.get(kind, np.inf):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -68,15 +68,9 @@ class Forecast(Presentable, Plotted, Tabulated):
             raise FitError(f"there is no forecast of a test '{test}'; there are those of {', '.join(known)}")
         return known[test]
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.forecast import draw_forecast, forecast_figure
+    drawn_by = "forecast.forecast_figure", "forecast.draw_forecast"
 
-        return forecast_figure, draw_forecast
-
-    def __str__(self) -> str:
-        from creepkit.reports.forecast import forecast_text
-
-        return forecast_text(self)
+    shown_by = "forecast.forecast_text"
 
 
 @checked

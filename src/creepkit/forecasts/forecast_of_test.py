@@ -33,6 +33,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import is_open
 from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
 from creepkit.records import ZERO_CELSIUS, History, Predictor, is_length_nuisance, output_unit
+from creepkit.records.conditions import stated_condition
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class TestForecast:
         names = extrapolated_names(self.extrapolation)
         if time is not None:  # how long the test goes on, and the strain that it ends at, are not of this time
             own = "time" if f"{time.event} after" in self.extrapolation else "strain" if time.output else "rupture"
-            names = [name for name in names if name in ("stress", "temperature")]
+            names = [name for name in names if name not in ("time", "strain")]
             names += [own] if f"{time.event} " in self.extrapolation else []
         return f"extrapolated beyond the tests in {' and '.join(names)}" if names else ""
 
@@ -290,6 +291,7 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked
     fit, temperatures = best.draws.fit, history.temperature_program().at(history.times)
     stresses = reference_stresses(history, predictor)
     point = {"stress": stresses[stresses > 0], "temperature": temperatures, "time": history.times[-1:]}
+    point |= {one.name: np.array(stated_condition(history, one)[:1]) for one in fit.law.conditions}
     if "stress" in best.central.outputs:
         point["stress"] = best.central.of("stress", history.times)[0]
     if "strain" in best.central.outputs:
@@ -311,7 +313,7 @@ def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked
 
 def extrapolated_names(text: str) -> list[str]:
     """Which quantities a sentence on an extrapolation begins its parts with."""
-    return [name for name in ("stress", "temperature", "time", "strain") if re.search(rf"(^|, ){name} [0-9]", text)]
+    return [name.replace("_", " ") for name in re.findall(r"(?:^|[,:] )(\w+) -?\d[^,(]*\(the tests", text)]
 
 
 def _extrapolated_times(fit: Identification, asked: Sequence[TimeForecast]) -> list[str]:

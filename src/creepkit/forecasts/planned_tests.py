@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -14,8 +14,11 @@ from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError
 from creepkit.language import Elastic, elastic_of
+from creepkit.limits import HOTTEST
 from creepkit.options import GIGAPASCAL, HOURS, Options, option
+from creepkit.readers.vocabulary import COMPONENT_LOADING_KINDS
 from creepkit.records import (
+    ZERO_CELSIUS,
     History,
     Loading,
     PointLoading,
@@ -24,6 +27,7 @@ from creepkit.records import (
     StrainSteps,
     StressSteps,
     TwoLevels,
+    known_specimens,
     loading_of,
     loads_of,
 )
@@ -66,6 +70,27 @@ PLANNED_FRAMES = 100
 
 COMPONENTS = "components"
 """The load of specimens under stresses and strains of several components."""
+
+
+def specimen_taking(loads: Collection[str]) -> str:
+    """The first specimen of a test under loads of these names, where none is named; of none that of a stress.
+
+    Those of components, as stress_11, are of a material point.
+    """
+    names = {COMPONENTS if name in COMPONENT_LOADING_KINDS else name for name in loads}
+    taking = {name: {load.name for load in loads_of(one)} for name, one in known_specimens().items()}
+    of_stress = next(name for name, own in taking.items() if "stress" in own)
+    return next((name for name, own in taking.items() if names & own), of_stress)
+
+
+def stated_temperature(levels: Sequence[tuple[float, float]]) -> float | Program | None:
+    """K, of (start in s, °C) of levels; None of none. SolveError for what no test can have."""
+    if any(not -ZERO_CELSIUS < level < HOTTEST for _, level in levels):
+        raise SolveError(f"{min(level for _, level in levels):g} °C is no temperature of a test")
+    if levels and levels[0][0] != 0.0:
+        raise SolveError("nothing is said of the temperature before; give its first level from 0 s on")
+    kelvin = [(start, level + ZERO_CELSIUS) for start, level in levels]
+    return Program.steps(kelvin) if len(kelvin) > 1 else kelvin[0][1] if kelvin else None
 
 
 def stepped_load(
@@ -129,6 +154,8 @@ class DescribedTest:
         if len(self.loads) > 1:
             raise SolveError(f"a test of specimen '{label}' has one load, found {named}; leave all but one out")
         ((name, steps),) = self.loads.items()
+        if name not in own:
+            raise SolveError(f"specimen '{label}' takes no {name} but {' or '.join(own) or 'none'}")
         end = float(options.end or 0.0)
         return stepped_load(name, own[name], steps, control=options.control, ramp=options.ramp, end=end)
 

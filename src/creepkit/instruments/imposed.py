@@ -72,10 +72,7 @@ class Imposed(Presentable):
         errors = response * (self.load.at(times[:, None] + shifts) - loads[:, None]) + rate[:, None] * shifts
         return np.asarray(np.sqrt(errors**2 @ probability))
 
-    def __str__(self) -> str:
-        from creepkit.reports.instrument_records import imposed_text
-
-        return imposed_text(self)
+    shown_by = "instrument_records.imposed_text"
 
 
 @checked

@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import HistoryError, nearest, quoted
+from creepkit.errors import HistoryError, nearest, quoted, refuse_unknown
 from creepkit.files.reading import how_to_raise, raised
-from creepkit.files.time_stamps import DAY, ClockColumn, ResolvedTimes, is_clock_time, resolve
+from creepkit.files.time_stamps import DAY, ClockColumn, ResolvedTimes, check_increasing, is_clock_time, resolve
 from creepkit.instruments.column_heads import (
     KNOWN_UNITS,
     MINUTES_AND_SECONDS,
-    TIME_UNITS,
     ChannelUnit,
     channel_unit,
     near_unit,
@@ -25,18 +24,15 @@ from creepkit.instruments.column_heads import (
     reference_in_name,
     split_head,
     stated_unit,
+    time_factor,
 )
 from creepkit.instruments.reading_options import RecordOptions
 from creepkit.instruments.record_tables import MISSING, RowReader, Rows, TableHead, find_head, means
 from creepkit.limits import HOTTEST
+from creepkit.readers.vocabulary import NAMES_OF, words_of
 from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
-from creepkit.records.plugin_calls import call_on_file
+from creepkit.records.plugin_calls import call_on_file, named_one, only_one
 
-TIME_NAMES = (
-    *("time", "timestamp", "time stamp", "datetime", "date time", "date/time", "date and time", "t", "clock", "zeit"),
-    *("elapsed", "elapsed time", "unix", "unix time", "epoch", "epoch time", "uhrzeit", "zeitstempel", "test time"),
-)
-DATE_NAMES = ("date", "datum", "day")
 UNIX_SCALES = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
 """Numbers above the first are unix times in units of the second, s; below 1e8 they are none."""
 
@@ -103,23 +99,16 @@ def _record(
 
 def _format_of(head: TableHead, formats: Sequence[InstrumentFormat], name: str | None) -> InstrumentFormat:
     if name is not None:
-        known = {one.name: one for one in formats}
-        if name not in known:
-            raise HistoryError(f"no instrument format is called '{name}'; {nearest(name, known)}")
-        if not known[name].accepts(head.names):
-            raise HistoryError(
-                f"{head.place}: the format '{name}' wants columns named {', '.join(known[name].required)}"
-            )
-        return known[name]
+        named = named_one("instrument format", name, formats)
+        if not named.accepts(head.names):
+            raise HistoryError(f"{head.place}: the format '{name}' wants columns named {', '.join(named.required)}")
+        return named
     accepting = [one for one in formats if one.required and one.accepts(head.names)]
-    if len(accepting) > 1:
-        names = " and ".join(one.name for one in accepting)
-        raise HistoryError(f"{head.path}: the formats {names} both accept it; say which, format='...'")
-    general = [one for one in formats if not one.required]
-    if not (accepting or general):
+    accepting = accepting or [one for one in formats if not one.required][:1]
+    if not accepting:
         known_names = ", ".join(one.name for one in formats)
         raise HistoryError(f"{head.path}: no instrument format accepts it; known are {known_names}")
-    return (accepting or general)[0]
+    return only_one("instrument format", head.path, accepting, "format")
 
 
 @dataclass(frozen=True)
@@ -205,8 +194,7 @@ class _Columns:
         times = _time_columns(place, heads, plain, stated)
         units = dict(options.units)
         for name, unit in units.items():
-            if name not in names:
-                raise HistoryError(f"{place}: units of '{name}', which is no channel; {nearest(name, names)}")
+            refuse_unknown(name, names, HistoryError, f"{place}: units of '{name}', which is no channel")
             if channel_unit(unit) is None:
                 raise HistoryError(f"the unit '{unit}' of '{name}' is not known; {', '.join(KNOWN_UNITS)}")
         channels: list[_Column] = []
@@ -229,7 +217,7 @@ class _Columns:
             head,
             tuple(channels),
             times,
-            unit if unit in TIME_UNITS else options.time_unit or format.time_unit,
+            unit if time_factor(unit) else options.time_unit or format.time_unit,
             options.date_order or format.date_order,
             options.time_zone or format.time_zone,
         )
@@ -252,8 +240,9 @@ def _time_columns(
 
     names : of columns that may be one of them, "" for the others. stated : of date and time, where they are known.
     """
-    plain = [name if name == "T" else name.lower().replace("_", " ").strip() for name in names]
-    usual = [next((plain.index(one) for one in known if one in plain), None) for known in (DATE_NAMES, TIME_NAMES)]
+    plain = [name if name == "T" else words_of(name) for name in names]
+    called = (NAMES_OF["date"], ("time", "t", *NAMES_OF["time"]))
+    usual = [next((plain.index(one) for one in known if one in plain), None) for known in called]
     both = [by_name if position is None else position for position, by_name in zip(stated, usual, strict=True)]
     found = tuple(dict.fromkeys(k for k in both if k is not None))
     if not found:
@@ -291,18 +280,13 @@ class _Times:
             return resolve(self.clock, str(path), lines, columns.date_order, columns.time_zone)
         numbers = np.concatenate(self.numbers)
         unix = next((scale for limit, scale in UNIX_SCALES if numbers[0] > limit), None)
-        factor = TIME_UNITS.get(columns.time_unit, unix)
+        factor = time_factor(columns.time_unit) or unix
         if factor is None:
             raise HistoryError(
                 f"{place}: the unit of '{columns.head.names[column]}' is not stated; "
                 "write it into its name, such as time_s, or state time_unit='s', 'ms', 'min' or 'h'"
             )
-        falls = np.diff(numbers) < 0
-        if falls.any():
-            row = int(np.argmax(falls)) + 1
-            raise HistoryError(
-                f"{path}:{lines[row]}: time falls from {numbers[row - 1]:g} to {numbers[row]:g}; it must never decrease"
-            )
+        check_increasing(numbers * factor, str(path), lines)
         start = float(numbers[0] * factor)
         if start <= UNIX_SCALES[-1][0]:
             return ResolvedTimes(numbers * factor, None)
@@ -317,7 +301,7 @@ class _Times:
     def _check_clock_unit(self, column: int) -> None:
         """HistoryError where the head gives a unit to cells that are times of a clock, hours and minutes."""
         head, units = self.columns.head.names[column], self.columns.head.units[column]
-        stated = [text for text in (split_head(head)[1], units) if text in TIME_UNITS]
+        stated = [text for text in (split_head(head)[1], units) if time_factor(text)]
         stated += MINUTES_AND_SECONDS.findall(f"{head[:200]} {units[:40]}")
         if stated:
             raise HistoryError(

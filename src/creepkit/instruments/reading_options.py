@@ -8,7 +8,7 @@ from typing import Literal
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest
-from creepkit.instruments.column_heads import TIME_UNITS
+from creepkit.instruments.column_heads import time_factor
 from creepkit.limits import Limits
 from creepkit.options import Options, option
 
@@ -39,5 +39,7 @@ class RecordOptions(Options, title="options of a record"):
     missing: tuple[str, ...] = option((), "Texts that mean a lost reading.", flag="record-missing")
 
     def __post_init__(self) -> None:
-        if self.time_unit and self.time_unit not in TIME_UNITS:
-            raise HistoryError(f"time_unit is '{self.time_unit}'; {nearest(self.time_unit, TIME_UNITS)}")
+        if self.time_unit and not time_factor(self.time_unit):
+            raise HistoryError(
+                f"time_unit is '{self.time_unit}'; {nearest(self.time_unit, ('s', 'ms', 'min', 'h', 'd'))}"
+            )

@@ -14,7 +14,6 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import (
-    ERROR_VALUES,
     Dialect,
     detect_dialect,
     is_number,
@@ -25,7 +24,8 @@ from creepkit.files.delimited_text import (
 from creepkit.files.labview import is_labview, table_of_labview
 from creepkit.files.reading import FileKind, open_binary
 from creepkit.files.time_stamps import ClockColumn, is_clock_time
-from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
+from creepkit.instruments.column_heads import channel_unit, time_factor
+from creepkit.readers.table import is_comment
 
 RECORD_FILE = FileKind(
     "a record of an instrument", HistoryError, "export the record as a table of text", maximum_bytes=8_000_000_000
@@ -63,12 +63,6 @@ def _western(error: UnicodeError) -> tuple[str, int]:
 
 
 codecs.register_error("creepkit.western", _western)
-
-
-def is_remark(line: str) -> bool:
-    """Whether a line is a remark, and no row that begins with #N/A."""
-    text = line.lstrip()
-    return text.startswith("#") and not text.startswith(ERROR_VALUES)
 
 
 def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
@@ -133,14 +127,14 @@ def find_head(path: Path) -> TableHead:
     sample = [(number, line) for number, line in islice(numbered_lines(path), _HEAD_LINES) if line.strip()]
     if not sample:
         raise HistoryError(f"{path}: the file is empty; a record needs a line of names and rows of readings")
-    plain = [line for _, line in sample if not is_remark(line)]
+    plain = [line for _, line in sample if not is_comment(line)]
     dialect = detect_dialect(plain[len(plain) // 2 :] or plain, str(path))
 
     def cells_of(number: int, line: str) -> list[str]:
-        text = line.lstrip().removeprefix("#") if is_remark(line) else line
+        text = line.lstrip().removeprefix("#") if is_comment(line) else line
         return split_line(text.strip("\n"), dialect, f"{path}:{number}")
 
-    rows = (k for k, (n, line) in enumerate(sample) if not is_remark(line) and _is_row(cells_of(n, line), dialect))
+    rows = (k for k, (n, line) in enumerate(sample) if not is_comment(line) and _is_row(cells_of(n, line), dialect))
     at = next(rows, None)
     if at is None:
         for number, line in sample:
@@ -194,7 +188,7 @@ def _check_decimal_signs(cells: Sequence[str], dialect: Dialect, location: str) 
 
 def _is_units(cells: Sequence[str]) -> bool:
     texts = [cell.strip("()[] ") for cell in cells if cell.strip("()[] ")]
-    known = sum(channel_unit(text) is not None or text in TIME_UNITS for text in texts)
+    known = sum(bool(channel_unit(text) or time_factor(text)) for text in texts)
     return bool(texts) and known >= 0.5 * len(cells)
 
 
@@ -245,7 +239,7 @@ class RowReader:
         lines, cells, size = list[int](), list[Sequence[str]](), 0
         for number, line in numbered_lines(self.head.path):
             self.has_end = line.endswith("\n")
-            if number < self.head.first_row or not line.strip() or is_remark(line):
+            if number < self.head.first_row or not line.strip() or is_comment(line):
                 continue
             if self.cut:
                 raise HistoryError(self._wrong_count(*self._shorter))

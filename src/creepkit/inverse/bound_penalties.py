@@ -35,7 +35,7 @@ class BoundPenalties:
         """points : the six variables of a law, (points,) each, at which its constraints must hold."""
         self.coordinates, self.nuisance_parameters, law = coordinates, nuisance_parameters, coordinates.law
         self.low, self.high = law.internal_bounds[:, list(coordinates.penalised)]
-        self._constraints = _constraint_margins(law, points)
+        self._constraints = _constraint_margins(coordinates.law_there, points)
 
     def residuals(self, x: Floats) -> Floats:
         """(..., penalties) - residuals at x (..., unknowns)."""

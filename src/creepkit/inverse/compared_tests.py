@@ -54,7 +54,8 @@ LEAST_INCREASE = 1e-6
 @lru_cache(maxsize=256)
 def has_tertiary_creep(law: CreepLaw) -> bool:
     """Whether the rate of some term can rise along a test at constant stress, by strain, time or internal variables."""
-    return any(_is_somewhere(rise, law) for rise in _rises(law, strain, time))
+    plain = law.at(None, **{condition.name: 1.0 for condition in law.conditions})
+    return any(_is_somewhere(rise, plain) for rise in _rises(plain, strain, time))
 
 
 def _rises(law: CreepLaw, *variables: sympy.Symbol) -> Iterator[sympy.Expr]:

@@ -110,8 +110,8 @@ class CompositePredictor(Predictor):
 
         return self._of_groups(histories, of_group)
 
-    def predict_to_rupture(
-        self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
+    def _predict_to_rupture(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool
     ) -> Prediction:
         """As each predicts its tests to their rupture; theta : (candidates[, tests], parameters) internal values."""
 

@@ -143,10 +143,7 @@ class Confirmation(Presentable):
         _, test, output = max(measured, key=lambda s: -np.inf if np.isnan(s[0]) else s[0])
         return test, output
 
-    def __str__(self) -> str:
-        from creepkit.reports.inference import confirmation_text
-
-        return confirmation_text(self)
+    shown_by = "inference.confirmation_text"
 
 
 @checked

@@ -133,8 +133,8 @@ class Coordinates:
     """The map between internal parameters theta and conditioned coordinates u, both (..., parameters)."""
 
     def __init__(self, law: CreepLaw, reference: ReferencePoint) -> None:
-        self.law, self.reference = law, reference
-        self.names = law.names
+        self.law, self.reference, self.names = law, reference, law.names
+        self.law_there = law = reference.law_there(law)
         self._last: dict[str, tuple[object, Floats]] = {}
         self._rate_kernels: list[tuple[int, list[int], ArrayKernel]] = []
         for label in law.terms:
@@ -186,7 +186,7 @@ class Coordinates:
     def _theta(self, u: Floats) -> Floats:
         theta = np.array(u, float)
         for local in self.exponents:
-            a, b, _, _ = local.evaluate(self._point(self.law), theta)
+            a, b, _, _ = local.evaluate(self._point(self.law_there), theta)
             theta[..., local.position] = (theta[..., local.position] - a) / b
         internal = theta.copy()
         for k, positions, kernel in self._rate_kernels:
@@ -203,7 +203,7 @@ class Coordinates:
         """(..., parameters) conditioned coordinates of internal parameters theta (..., parameters)."""
         u = np.array(theta, float)
         for local in self.exponents:
-            a, b, _, _ = local.evaluate(self._point(self.law), u)
+            a, b, _, _ = local.evaluate(self._point(self.law_there), u)
             u[..., local.position] = a + b * u[..., local.position]
         for k, positions, kernel in self._rate_kernels:
             u[..., k] = self._log_rate(kernel, theta[..., positions])
@@ -241,7 +241,7 @@ class Coordinates:
         """Derivatives of the parameters that local exponents stand for, (..., parameters, parameters)."""
         matrix = np.zeros((*theta.shape, theta.shape[-1])) + np.eye(theta.shape[-1])
         for local in self.exponents:
-            _, b, da, db = local.evaluate(self._point(self.law), theta)
+            _, b, da, db = local.evaluate(self._point(self.law_there), theta)
             matrix[..., local.position, local.position] = 1.0 / b
             for k, position in enumerate(local.others):
                 matrix[..., local.position, position] = -(da[..., k] + db[..., k] * theta[..., local.position]) / b

@@ -95,10 +95,7 @@ class CrossValidation(Presentable):
                     predicted.append(fold.prediction.of(k)[used, column])
         return relative_squared_error(measured, predicted)
 
-    def __str__(self) -> str:
-        from creepkit.reports.inference import cross_validation_text
-
-        return cross_validation_text(self)
+    shown_by = "inference.cross_validation_text"
 
 
 @checked

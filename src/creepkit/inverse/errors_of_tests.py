@@ -48,13 +48,13 @@ to rupture."""
 
 
 def errors_of_tests(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel, among: int = 1
 ) -> tuple[Perturbation, ...]:
     """Errors at x (unknowns,), of which those count that the settings include; none where they include none.
 
-    Those of lengths and instruments, then RATE and LIFE.
+    Those of lengths and instruments, then RATE and LIFE. among : how many tests there are, with others than these.
     """
-    included, tests = problem.settings.included_errors, len(problem.histories)
+    included, tests = problem.settings.included_errors, max(among, len(problem.histories))
     if not included:
         return ()
     kinds = {n.kind for n in problem.settings.nuisances}
@@ -66,7 +66,7 @@ def errors_of_tests(
         changes[RATE] = rates[:, None] * linear.residuals.log_rate_sensitivity
     made = [Perturbation(kind, 1.0, "", residual_change=s, tests=tests, included=True) for kind, s in changes.items()]
     own = [one for one in made if one.residual_change.any()]
-    return (*of_lengths_and_instruments(problem, x, linear), *own)
+    return (*of_lengths_and_instruments(problem, x, linear, among), *own)
 
 
 def effect_of_lives(problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel) -> Floats:

@@ -46,7 +46,7 @@ def extrapolation_text(
             continue
         (low, high), values = ranges[name], np.asarray(given, float)
         tolerance = (tolerances or {}).get(name, RANGE_TOLERANCE)
-        if values.size and (values.min() < low * (1 - tolerance) or values.max() > high * (1 + tolerance)):
+        if values.size and (values.min() < low - tolerance * abs(low) or values.max() > high + tolerance * abs(high)):
             if name == "time":
                 low, high, values = low / HOUR, high / HOUR, values / HOUR
             least, largest, unit = float(values.min()), float(values.max()), UNITS.get(name, "")

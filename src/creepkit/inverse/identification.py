@@ -139,8 +139,8 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
 
     @property
     def headline(self) -> str:
-        """How well the law describes the tests, then whether it could be the true one, in one sentence."""
-        from creepkit.inverse.description import headline
+        """Whether to use the law, for what and within how much, then whether it could be the true one: one sentence."""
+        from creepkit.reports.description import headline
 
         return headline(self)
 
@@ -464,15 +464,9 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
 
         return write_identification(self, Path(path))
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.identification_plot import draw_identification, identification_figure
+    drawn_by = "identification_plot.identification_figure", "identification_plot.draw_identification"
 
-        return identification_figure, draw_identification
-
-    def __str__(self) -> str:
-        from creepkit.reports.answer import answer_text
-
-        return answer_text(self)
+    shown_by = "answer.answer_text"
 
     def details(self) -> str:
         """Everything that there is to say, as text."""

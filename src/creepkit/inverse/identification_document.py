@@ -62,7 +62,7 @@ CODEC = RecordCodec(
     },
     ranges={
         Identification: {"rms": NOT_NEGATIVE_OR_NAN, "effective_frames": POSITIVE, "freedom": POSITIVE},
-        ReferencePoint: {"*": POSITIVE},
+        ReferencePoint: {"*": POSITIVE, "conditions": ANY_SIZE},
         NoiseModel: {"*": SIZE, "discrepancy_length": POSITIVE},
         OutputNoise: {"*": SIZE, "correlation_length": POSITIVE},
         RateScatter: {

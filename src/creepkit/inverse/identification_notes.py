@@ -30,6 +30,7 @@ from creepkit.inverse.reference_conditions import reference_end_strain, referenc
 from creepkit.inverse.uncertainty.rate_scatter import unstated_member_notes
 from creepkit.language import temperature
 from creepkit.records import History, Prediction, Predictor, Status
+from creepkit.records.conditions import condition_values
 from creepkit.records.units import celsius_text
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ LARGE_STRAIN, LARGE_RUPTURE_STRAIN = 0.5, 2.0
 
 
 def fitted_ranges(problem: LeastSquaresProblem) -> dict[str, tuple[float, float]]:
-    """{"stress", "temperature", "strain", "time": (low, high)} of the fitted frames; MPa, K, s."""
+    """{"stress", "temperature", "strain", "time": (low, high)} of the fitted frames, MPa, K, s; and of conditions."""
     tests = problem.histories
     values_by_name = {
         "stress": [v for h in tests for v in reference_stresses(h, problem.predictor)],
@@ -52,6 +53,8 @@ def fitted_ranges(problem: LeastSquaresProblem) -> dict[str, tuple[float, float]
         "strain": [0.0, *(reference_end_strain(h, problem.predictor) for h in tests)],
         "time": [v for h in tests for v in _time_range(h)],
     }
+    conditions = zip(problem.law.conditions, condition_values(problem.law, tests).T, strict=True)
+    values_by_name |= {one.name: values.tolist() for one, values in conditions}
     return {name: (float(min(values)), float(max(values))) for name, values in values_by_name.items()}
 
 

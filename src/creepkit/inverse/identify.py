@@ -228,10 +228,8 @@ def _estimated(
         while widenings and (wider := _wider_law(end.best)) is not None:
             end, widenings = within(wider, stage, end.best), widenings - 1
         if end is not usual and (kept := _law_of_determined(usual, end)).params != end.problem.law.params:
-            if kept.params == usual.problem.law.params:
-                end, widenings = usual, 0  # nor do the tests determine more through the last predictor
-            else:
-                end = within(kept, stage, usual.best)
+            is_wider = kept.params != usual.problem.law.params  # if not, nor is more told through the last predictor
+            end, widenings = (within(kept, stage, usual.best), widenings) if is_wider else (usual, 0)
         problem, starts, noise = replace(end.problem, settings=end.best.problem.settings), [end.best.x], end.best.noise
     _check_bounds(end.best)
     return end.best, outcome, end.numerical_error

@@ -105,7 +105,8 @@ class Judge:
         independent, reduced = self._independent_noise, replace(linear, residuals=residuals)
         solution = _within_bounds(reduced, CovarianceFactor.of_residuals(residuals, independent))
         noise = NoiseModel({name: OutputNoise(one.noise) for name, one in independent.outputs.items()})
-        of_frames = CovarianceFactor.of_residuals(replace(residuals, random_effect_sensitivities=None), noise).blocks
+        plain = replace(residuals, random_effect_sensitivities=None, rate_errors=None)
+        of_frames = CovarianceFactor.of_residuals(plain, noise).blocks
         white = np.einsum("tef,tf->te", of_frames, solution.weighted_residuals)
         return JudgedResiduals(
             linear.residuals,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import FitError, nearest
+from creepkit.errors import FitError, nearest, refuse_unknown
 from creepkit.inverse.noise_model import Residuals
 from creepkit.language import CreepLaw, temperature
 from creepkit.records import (
@@ -222,8 +222,7 @@ def check_nuisance_tests(nuisances: Sequence[Nuisance], names: Sequence[str]) ->
     """FitError for a nuisance of a test that is not among those of these names."""
     for nuisance in nuisances:
         for test in nuisance.tests:
-            if test not in names:
-                raise FitError(f"nuisance '{nuisance.key}': there is no test '{test}'; {nearest(test, names)}")
+            refuse_unknown(test, names, FitError, f"nuisance '{nuisance.key}': there is no test '{test}'")
 
 
 def check_nuisance_law(nuisances: Sequence[Nuisance], law: CreepLaw) -> None:

@@ -127,17 +127,17 @@ def _all(
 
 
 def of_lengths_and_instruments(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, among: int = 1
 ) -> tuple[Perturbation, ...]:
     """Lengths that are off in each test by itself, errors common to all tests, and lengths that are off in all alike.
 
-    Those for which no nuisance parameter stands. x : (unknowns,).
+    Those for which no nuisance parameter stands. x : (unknowns,). among : as in errors_of_tests().
     """
     own, common = list[Perturbation](), list[Perturbation]()
     kinds, included = {n.kind for n in problem.settings.nuisances}, problem.settings.included_errors
     for names, nominal, tolerances in uncertain_lengths(problem):
         slope, sizes = _slope(problem, x, names[-1], nominal), included.get("dimensions", 1.0) * tolerances
-        form: dict[str, Any] = {"tests": len(sizes), "included": "dimensions" in included}
+        form: dict[str, Any] = {"tests": max(among, len(sizes)), "included": "dimensions" in included}
         form["residual_change"] = linear.residuals.offset_sensitivity * slope * sizes[:, None]
         found = Perturbation(names[-1], float(np.median(sizes)), "mm", **form)
         own += [found] if found.size > 0 and kinds.isdisjoint(names) else []
@@ -188,8 +188,8 @@ def uncertain_lengths(problem: LeastSquaresProblem) -> list[tuple[tuple[str, ...
         known = [dimension_named(p, names[-1]) if p.follows(names[-1]) else None for p in predictors]
         tolerances = np.array([0.0 if length is None else length.tolerance for length in known])
         if shared.isdisjoint(names) and tolerances.all():
-            nominal = [prior_mean(Nuisance(names[-1]), h, problem.predictor) for h in problem.histories]
-            lengths.append((names, np.array(nominal), nominal * tolerances))
+            nominal = np.array([prior_mean(Nuisance(names[-1]), h, problem.predictor) for h in problem.histories])
+            lengths.append((names, nominal, nominal * tolerances))
     return lengths
 
 

@@ -49,8 +49,10 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.stopped_tests import stopped_tests
 from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
+from creepkit.kernels import lower
 from creepkit.language import CreepLaw
 from creepkit.records import History, NuisanceValues, Prediction, Predictor
+from creepkit.records.conditions import stated_condition
 
 CACHED_EVALUATIONS = 4
 """Points whose residuals are cached: a search ends at one that it has evaluated, and the next begins there."""
@@ -113,6 +115,10 @@ class EvaluationCache:
         return self._residuals[key]
 
 
+STATED_STEP = 0.1
+"""Standard deviations, of central differences in conditions of the material."""
+
+
 @dataclass(frozen=True, eq=False)
 class LeastSquaresProblem:
     """A law against histories under a covariance; the unknowns are x = (u, e).
@@ -168,7 +174,7 @@ class LeastSquaresProblem:
         check_histories(law, histories, predictor)
         check_minimum_rates(law, histories, predictor)
         tests = [thinned_history(h, settings.frames) for h in histories]
-        coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor))
+        coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor, law))
         check_nuisance_law(settings.nuisances, law)
         nuisances = NuisanceParameters.from_histories(settings.nuisances, tests, predictor)
         rupture_times, accelerating = compares_rupture_times(law, settings), not nuisances.nuisances
@@ -373,7 +379,23 @@ class LeastSquaresProblem:
         assert residuals.jacobian is not None
         internal, nuisance_jacobian = np.split(residuals.jacobian, [u.size], axis=-1)
         jacobian = np.concatenate([internal @ coordinates.jacobian(u), nuisance_jacobian], axis=-1)
-        return replace(residuals, jacobian=jacobian)
+        return replace(residuals, jacobian=jacobian, rate_errors=self._stated_errors(u))
+
+    def _stated_errors(self, u: Floats) -> Floats | None:
+        """(tests,) standard deviation of ln rate by those of conditions of the material that tests state; None if none.
+
+        u : (parameters,).
+        """
+        law, (stress, kelvin), reference = self.law, self.conditions, self.coordinates.reference
+        stated = np.array([[stated_condition(h, one) for h in self.histories] for one in law.conditions], float)
+        if not stated.size or not stated[..., 1].any():
+            return None
+        point = (stress, reference.strain, reference.time, kelvin, stress, stress / 3)
+        given = (*point, *(state.initial for state in law.states.values()), *self.coordinates.theta(u))
+        steps = STATED_STEP * np.eye(len(stated))[..., None] * stated[..., 1]
+        ends = [stated[:, None, :, 0] + side * np.moveaxis(steps, 0, 1) for side in (1, -1)]
+        up, down = (lower(law, "numpy").internal_log_rate(*given, *end) for end in ends)
+        return np.asarray(np.linalg.norm(up - down, axis=0) / (2 * STATED_STEP))
 
     # ---- chi-square ------------------------------------------------------------------------------------------------
 

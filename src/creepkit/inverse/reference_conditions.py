@@ -15,6 +15,7 @@ from creepkit.inverse.compared_tests import followed_duration
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
 from creepkit.records import ZERO_CELSIUS, History, Predictor, growing_output, is_logarithmic, specimen_of
+from creepkit.records.conditions import reference_conditions
 
 HELD_LOAD = 0.02
 """Relative change of a load within which it is held."""
@@ -55,10 +56,8 @@ def detect_creep(history: History, output: str) -> CreepDetection:
     values, holds = history.outputs[output], list(_load_holds(history, usable_frames(history, output)))
     if not holds:
         return CreepDetection(float("nan"), float("nan"), noise)
-    thirds = [np.array_split(frames, 3) for frames in holds]
-    increase = sum(
-        float(values[last_third].mean() - values[first_third].mean()) for first_third, _, last_third in thirds
-    )
+    thirds = [np.array_split(values[frames], 3) for frames in holds]
+    increase = sum(float(last.mean() - first.mean()) for first, _, last in thirds)
     variance = sum(1.0 / first.size + 1.0 / last.size for first, _, last in thirds)
     return CreepDetection(increase, noise * float(np.sqrt(variance)), noise)
 
@@ -202,24 +201,35 @@ def with_arrhenius(law: CreepLaw, histories: Sequence[History]) -> CreepLaw:
 
 @dataclass(frozen=True)
 class ReferencePoint:
-    """The point at which term rates are stated: stress MPa, strain, time s, temperature K."""
+    """The point at which term rates are stated: stress MPa, strain, time s, temperature K.
+
+    conditions : (name, value) of those of the law, the medians of the tests, in its units.
+    """
 
     stress: float
     strain: float
     time: float
     temperature: float
+    conditions: tuple[tuple[str, float], ...] = ()
 
     @classmethod
-    def from_histories(cls, histories: Sequence[History], predictor: Predictor | None = None) -> ReferencePoint:
+    def from_histories(
+        cls, histories: Sequence[History], predictor: Predictor | None = None, law: CreepLaw | None = None
+    ) -> ReferencePoint:
         """The middle of what was measured: geometric means of stress and time, of half the end strain; median T.
 
-        predictor : where it states reference stresses, they are taken.
+        predictor : where it states reference stresses, they are taken. law : whose conditions the tests state.
         """
-        mean_stresses = [
-            float(np.exp(np.mean(np.log(np.maximum(reference_stresses(h, predictor), 1e-6))))) for h in histories
-        ]
+        log_stresses = [np.mean(np.log(np.maximum(reference_stresses(h, predictor), 1e-6))) for h in histories]
         times = [_duration(h) for h in histories]
         strains = [reference_end_strain(h, predictor) for h in histories]
         temperatures = [float(np.mean(h.temperature_program().values)) for h in histories]
-        central_values = [float(np.exp(np.mean(np.log(v)))) for v in (mean_stresses, strains, times)]
-        return cls(central_values[0], 0.5 * central_values[1], 0.5 * central_values[2], float(np.median(temperatures)))
+        stress, strain, time = (float(np.exp(np.mean(v))) for v in (log_stresses, np.log(strains), np.log(times)))
+        conditions = () if law is None else tuple(reference_conditions(law, histories).items())
+        return cls(stress, 0.5 * strain, 0.5 * time, float(np.median(temperatures)), conditions)
+
+    def law_there(self, law: CreepLaw) -> CreepLaw:
+        """The law at these conditions, or at others near by where a parameter would not matter at them."""
+        there = law.at(None, **dict(self.conditions))
+        moved = {name: 1.1 * value + 0.1 * (value == 0.0) for name, value in self.conditions}
+        return there if there.names == law.names else law.at(None, **moved)

@@ -14,7 +14,7 @@ from typing import Any, Literal, Self, get_args
 import numpy as np
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError, nearest, quoted
+from creepkit.errors import FitError, quoted, refuse_unknown
 from creepkit.limits import SEED, SOBOL_POINTS, STARTS, Limits
 from creepkit.options import Options, option
 from creepkit.records import Nuisance, Predictor, dimension_named
@@ -169,8 +169,7 @@ def default_nuisances(*further: Nuisance, without: Sequence[str] = ()) -> tuple[
     usual = IdentificationSettings().nuisances
     known = [n.kind for n in usual]
     for kind in without:
-        if kind not in known:
-            raise FitError(f"'{kind}' is no default nuisance that could be left out; {nearest(kind, known)}")
+        refuse_unknown(kind, known, FitError, f"'{kind}' is no default nuisance that could be left out")
     replaced = {*without, *(n.kind for n in further)}
     return (*(n for n in usual if n.kind not in replaced), *further)
 
@@ -196,8 +195,7 @@ def _check_usual_errors(errors: UsualErrors) -> None:
             raise FitError(f'usual_errors is "{errors}"; allowed are usual, none and such as {{"temperature": 3}}')
         return
     for name, size in errors.items():
-        if name not in USUAL_ERRORS:
-            raise FitError(f"usual_errors names '{name}', which is none of them; {nearest(name, USUAL_ERRORS)}")
+        refuse_unknown(name, USUAL_ERRORS, FitError, f"usual_errors names '{name}', which is none of them")
         if not 0.0 <= size <= LARGEST_USUAL_ERRORS[name]:
             raise FitError(
                 f"usual_errors: {name} is {size!r}; give a standard deviation from 0 to {LARGEST_USUAL_ERRORS[name]:g}"

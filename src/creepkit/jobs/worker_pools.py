@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 from creepkit import limits
 from creepkit.arrays import usable_cores
 from creepkit.checked_arguments import checked
-from creepkit.errors import DatasetError, quoted
+from creepkit.errors import DatasetError, quoted, restated
 from creepkit.jobs.worker_process import Job, TaskResult, run_task, send, setup_message, start_worker
 from creepkit.options import Options, option
 
@@ -173,10 +173,8 @@ class ClusterWorkers:
 @contextmanager
 def cluster_workers(job: Job, address: str, threads: int | None = None) -> Iterator[ClusterWorkers]:
     """The workers of the dask scheduler at an address; DatasetError where none answers, or dask is not installed."""
-    try:
+    with restated(ImportError, DatasetError, "--cluster needs dask; install it with: pip install 'creepkit[cluster]'"):
         from distributed import Client
-    except ImportError:
-        raise DatasetError("--cluster needs dask; install it with: pip install 'creepkit[cluster]'") from None
     try:
         client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)  # type: ignore[no-untyped-call]
     except Exception as error:  # whatever dask makes of what another kind of server says

@@ -41,7 +41,6 @@ class StableFunction(sympy.Function):  # type: ignore[misc]
 class LogFloor(StableFunction):
     """ln(max(x, floor)), with slope 1/max(x, floor) on both sides."""
 
-    nargs = 2
     partial_derivatives = (lambda x, floor: 1 / Floored(x, floor), lambda x, floor: sympy.S.Zero)
     sympy_form = staticmethod(lambda x, floor: log(x))
 
@@ -49,7 +48,6 @@ class LogFloor(StableFunction):
 class Floored(StableFunction):
     """max(x, floor), with slope 1 on both sides: the floor is not felt."""
 
-    nargs = 2
     partial_derivatives = (lambda x, floor: sympy.S.One, lambda x, floor: sympy.S.Zero)
     sympy_form = staticmethod(lambda x, floor: x)
 
@@ -57,7 +55,6 @@ class Floored(StableFunction):
 class Log1p(StableFunction):
     """ln(1 + x) for x > -1, with all digits near 0."""
 
-    nargs = 1
     partial_derivatives = (lambda x: 1 / (1 + x),)
     sympy_form = staticmethod(lambda x: log(1 + x))
 
@@ -65,7 +62,6 @@ class Log1p(StableFunction):
 class LogSinh(StableFunction):
     """ln sinh(x) for x > 0."""
 
-    nargs = 1
     partial_derivatives = (lambda x: Coth(x),)
     sympy_form = staticmethod(lambda x: log(sinh(x)))
 
@@ -73,7 +69,6 @@ class LogSinh(StableFunction):
 class LogCosh(StableFunction):
     """ln cosh(x)."""
 
-    nargs = 1
     partial_derivatives = (lambda x: Tanh(x),)
     sympy_form = staticmethod(lambda x: log(cosh(x)))
 
@@ -81,7 +76,6 @@ class LogCosh(StableFunction):
 class LogTanh(StableFunction):
     """ln tanh(x) for x > 0, with all digits where tanh(x) is nearly 1."""
 
-    nargs = 1
     partial_derivatives = (lambda x: 2 / sinh(2 * Floored(x, SMALLEST_ARGUMENT)),)
     sympy_form = staticmethod(lambda x: log(tanh(x)))
 
@@ -89,7 +83,6 @@ class LogTanh(StableFunction):
 class LogRise(StableFunction):
     """ln(1 - exp(-x)) for x > 0: the logarithm of a saturating transient, exact at both of its ends."""
 
-    nargs = 1
     partial_derivatives = (lambda x: 1 / Expm1(Floored(x, SMALLEST_ARGUMENT)),)
     sympy_form = staticmethod(lambda x: log(1 - exp(-x)))
 
@@ -97,7 +90,6 @@ class LogRise(StableFunction):
 class Tanh(StableFunction):
     """tanh(x), with a slope that keeps its digits where tanh(x) is nearly 1."""
 
-    nargs = 1
     partial_derivatives = (lambda x: cosh(x) ** -2,)
     sympy_form = staticmethod(lambda x: tanh(x))
 
@@ -105,7 +97,6 @@ class Tanh(StableFunction):
 class Coth(StableFunction):
     """coth(x) for x > 0."""
 
-    nargs = 1
     partial_derivatives = (lambda x: -(sinh(Floored(x, SMALLEST_ARGUMENT)) ** -2),)
     sympy_form = staticmethod(lambda x: cosh(x) / sinh(x))
 
@@ -113,7 +104,6 @@ class Coth(StableFunction):
 class Expm1(StableFunction):
     """exp(x) - 1."""
 
-    nargs = 1
     partial_derivatives = (lambda x: exp(x),)
     sympy_form = staticmethod(lambda x: exp(x) - 1)
 
@@ -121,7 +111,6 @@ class Expm1(StableFunction):
 class ExpDifference(StableFunction):
     """exp(a) - exp(b)."""
 
-    nargs = 2
     partial_derivatives = (lambda a, b: exp(a), lambda a, b: -exp(b))
     sympy_form = staticmethod(lambda a, b: exp(a) - exp(b))
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import sympy
 
-from creepkit.errors import LawError, quoted
+from creepkit.errors import SAID, LawError, quoted, restated
 from creepkit.kernels.extremes import Max, Min
 from creepkit.kernels.kernel_functions import (
     Coth,
@@ -129,10 +129,8 @@ def _log_form(law: CreepLaw) -> LogForm:
         _check_expression(expression, f"law '{law.name}', {place}")
     terms = []
     for label, term in law.terms.items():
-        try:
+        with restated(LawError, LawError, f"law '{law.name}', term '{label}': {SAID}"):
             terms.append(lowering.log_of(term))
-        except LawError as error:
-            raise LawError(f"law '{law.name}', term '{label}': {error}") from None
     positions = {symbol: k for k, symbol in enumerate(law.params) if symbol in logs}
     coefficients = [sorted(positions[s] for s in _vanishing_factors(t) if s in logs) for t in law.terms.values()]
     return LogForm(

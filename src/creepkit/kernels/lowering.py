@@ -12,9 +12,10 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import LawError, nearest
+from creepkit.errors import LawError, refuse_unknown
 from creepkit.kernels.kernel_functions import law_comments
 from creepkit.kernels.symbolic_kernel import SymbolicKernel, symbolic_kernel
+from creepkit.language.algebra import with_conditions_as_parameters
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
 
@@ -35,7 +36,11 @@ def lower(law: CreepLaw, target: Literal["compiled"]) -> CompiledLaw: ...
 
 @checked
 def lower(law: CreepLaw, target: KernelTarget = "numpy") -> ArrayKernel | CompiledLaw:
-    """Return the law as a numeric kernel for "numpy", "torch" or "compiled" (C functions, for solvers)."""
+    """Return the law as a numeric kernel for "numpy", "torch" or "compiled" (C functions, for solvers).
+
+    Conditions of tests that it uses are parameters of the kernel, behind its own.
+    """
+    law = with_conditions_as_parameters(law)
     if target == "compiled":
         from creepkit.kernels.compilation import compile_law
 
@@ -127,8 +132,7 @@ class ArrayKernel:
 
     def _arguments(self, values: Mapping[str, Any], point: Mapping[str, Any]) -> Sequence[Any]:
         for name in point:
-            if name not in self._variables:
-                raise LawError(f"law '{self.law.name}' has no variable '{name}': {nearest(name, self._variables)}")
+            refuse_unknown(name, self._variables, LawError, f"law '{self.law.name}' has no variable '{name}'")
         if "stress" not in point:
             raise LawError(f"law '{self.law.name}' needs a stress, in MPa")
         if self.law.uses(POINT_VARIABLES[3]) and "temperature" not in point:

@@ -8,6 +8,7 @@ from .plugin import hookimpl as hookimpl
 from .symbols import GAS_CONSTANT as GAS_CONSTANT
 from .symbols import Param as Param
 from .symbols import State as State
+from .symbols import conditions as conditions
 from .symbols import mean_stress as mean_stress
 from .symbols import parameters as parameters
 from .symbols import principal_stress as principal_stress

@@ -11,11 +11,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import TypeVar
 
 import sympy
 
-from creepkit.errors import LawError, nearest
+from creepkit.errors import LawError, refuse_unknown
 from creepkit.language.law_record import LawRecord
 from creepkit.language.symbols import POINT_VARIABLES, Param, State, Symbol, strain, stress, temperature, time
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
@@ -192,8 +193,7 @@ def _chosen(law: LawRecord, kind: str, names: Iterable[str] | None, known: tuple
         return known
     chosen = (names,) if isinstance(names, str) else tuple(names)
     for name in chosen:
-        if name not in known:
-            raise LawError(f"law '{law.name}' has no {kind} '{name}': {nearest(name, known)}")
+        refuse_unknown(name, known, LawError, f"law '{law.name}' has no {kind} '{name}'")
     return chosen
 
 
@@ -264,8 +264,7 @@ def fix(law: Law, values: Mapping[str, float]) -> Law:
             low, high = param.bounds
             off = "" if param.off is None else f" or {param.off:g} (off)"
             raise LawError(f"law '{law.name}': cannot fix {name} = {value:g}; allowed are {low:g} to {high:g}{off}")
-        number = sympy.Integer(int(value)) if value.is_integer() else sympy.Float(value)
-        replacements[symbol] = number
+        replacements[symbol] = sympy.Integer(int(value)) if value.is_integer() else sympy.Float(value)
     description = ", ".join(f"{name}={float(value):g}" for name, value in values.items())
     return _substituted(law, replacements, f"{law.name}({description})", f"{law.title} with {description}")
 
@@ -309,28 +308,54 @@ def with_temperature(law: Law, forms: Mapping[str, TemperatureForm]) -> Law:
                 ordered |= extra
         params = ordered
     description = ", ".join(f"{name}:{form.name}" for name, form in forms.items())
-    substitutions = dict(replacements)
     return replace(
         law,
         name=f"{law.name}[{description}]",
         title=f"{law.title} with {', '.join(forms)} dependent on temperature",
-        terms={label: term.xreplace(substitutions) for label, term in law.terms.items()},
-        states={s: replace(z, rate=z.rate.xreplace(substitutions)) for s, z in law.states.items()},
-        constraints=(*(c.xreplace(substitutions) for c in law.constraints), *sign_constraints),
+        terms={label: term.xreplace(replacements) for label, term in law.terms.items()},
+        states={s: replace(z, rate=z.rate.xreplace(replacements)) for s, z in law.states.items()},
+        constraints=(*(c.xreplace(replacements) for c in law.constraints), *sign_constraints),
         params=params,
         references=tuple(dict.fromkeys((*law.references, *(form.reference for form in forms.values())))),
         examples=(),
     )
 
 
-def at(law: Law, T: float) -> Law:
-    """Set the temperature to a number, K."""
-    kelvin = law.number(T, "temperature")
-    if not 0 < kelvin < 1e4:
-        raise LawError(f"law '{law.name}': {T!r} is not a temperature in K (allowed: above 0, below 10000)")
-    description = f"{kelvin:g}"
-    return _substituted(
-        law, {temperature: sympy.Float(kelvin)}, f"{law.name}@{description}K", f"{law.title} at {description} K"
+def at(law: Law, T: float | None, conditions: Mapping[str, float]) -> Law:
+    """Set the temperature, K, and conditions, in the units of the law, to numbers."""
+    numbers: dict[sympy.Symbol, sympy.Expr] = {}
+    if T is not None:
+        kelvin = law.number(T, "temperature")
+        if not 0 < kelvin < 1e4:
+            raise LawError(f"law '{law.name}': {T!r} is not a temperature in K (allowed: above 0, below 10000)")
+        numbers[temperature] = sympy.Float(kelvin)
+    known = {symbol.name: symbol for symbol in law.conditions}
+    for name, value in conditions.items():
+        refuse_unknown(name, known, LawError, f"law '{law.name}' has no condition '{name}'")
+        numbers[known[name]] = sympy.Float(law.number(value, f"condition '{name}'"))
+    texts = [f"{float(v):g} K" if s == temperature else f"{s} = {float(v):g} {s.unit}" for s, v in numbers.items()]
+    name = f"{law.name}@{','.join(text.replace(' ', '') for text in texts)}"
+    return _substituted(law, numbers, name, f"{law.title} at {', '.join(texts)}") if numbers else law
+
+
+CONDITION_BOUNDS = (-1e30, 1e30)
+"""Formal bounds of a condition as a parameter: tests state its value."""
+
+
+@lru_cache(maxsize=128)
+def with_conditions_as_parameters(law: Law) -> Law:
+    """The law with its conditions as further parameters, behind its own: what kernels and simulations see of it."""
+    if not law.conditions:
+        return law
+    plain = {symbol: Symbol(symbol.name) for symbol in law.conditions}
+    stated = {plain[s]: Param(f"condition {s.name}", CONDITION_BOUNDS, s.unit) for s in law.conditions}
+    return replace(
+        law,
+        terms={label: term.xreplace(plain) for label, term in law.terms.items()},
+        states={s: replace(z, rate=z.rate.xreplace(plain)) for s, z in law.states.items()},
+        constraints=tuple(c.xreplace(plain) for c in law.constraints),
+        params={**law.params, **stated},
+        examples=(),
     )
 
 
@@ -406,7 +431,7 @@ def _pruned(
             break
         needed = extended
     params = {s: p for s, p in law.params.items() if s in needed}
-    declared = {*params, *needed_states, *POINT_VARIABLES}
+    declared = {*params, *needed_states, *law.conditions, *POINT_VARIABLES}
     remaining_constraints = tuple(c for c in constraints if c.free_symbols <= declared)
     return replace(
         law,
@@ -462,5 +487,4 @@ def _renamed(expression: sympy.Basic, replacements: Mapping[sympy.Symbol, sympy.
 
 def _check_labels(law: LawRecord, labels: Sequence[str]) -> None:
     for label in labels:
-        if label not in law.terms:
-            raise LawError(f"law '{law.name}' has no term '{label}': {nearest(label, law.terms)}")
+        refuse_unknown(label, law.terms, LawError, f"law '{law.name}' has no term '{label}'")

@@ -19,6 +19,7 @@ from sympy.core.function import Application
 from sympy.logic.boolalg import Boolean
 
 from creepkit.errors import LawError, nearest
+from creepkit.language.symbols import ConditionSymbol
 
 _BINARY_EXPONENT_LIMIT = 2.0**30
 """Largest |log2| of a number that is computed."""
@@ -200,7 +201,7 @@ class _Writer:
 
 
 def _name_of(symbol: sympy.Symbol) -> str:
-    if symbol != sympy.Symbol(symbol.name, real=True):
+    if not isinstance(symbol, ConditionSymbol) and symbol != sympy.Symbol(symbol.name, real=True):
         raise LawError(f"the symbol '{symbol}' carries assumptions; make symbols with parameters(\"{symbol}\")")
     return str(symbol.name)
 

@@ -83,9 +83,12 @@ class CreepLaw(LawRecord):
         return algebra.with_temperature(self, forms)
 
     @checked
-    def at(self, temperature: float) -> CreepLaw:
-        """The law at one temperature, in K; parameters that no longer matter there are dropped."""
-        return algebra.at(self, temperature)
+    def at(self, temperature: float | None = None, /, **conditions: float) -> CreepLaw:
+        """The law at one temperature, K, and at conditions, in its units; parameters that no longer matter are dropped.
+
+        law.at(1073.15), law.at(grain_size=0.02)
+        """
+        return algebra.at(self, temperature, conditions)
 
     @property
     def expr(self) -> Any:

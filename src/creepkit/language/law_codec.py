@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import sympy
 
-from creepkit.errors import LawError, quoted
+from creepkit.errors import SAID, LawError, quoted, restated
 from creepkit.files.json_documents import DocumentFormat, check_heading
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.language.expression_trees import condition_from_tree, expression_from_tree, expression_to_tree
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT_VARIABLES, Param, ParameterScale, State, Symbol
+from creepkit.language.symbols import POINT_VARIABLES, ConditionSymbol, Param, ParameterScale, State, Symbol
 from creepkit.limits import numbers
 
 __all__ = ["LAW", "condition_from_tree", "expression_from_tree", "expression_to_tree", "law_from_json", "law_to_json"]
@@ -70,7 +70,7 @@ class StateDocument:
 
 @dataclass(frozen=True)
 class LawDocument:
-    """A whole law; constraints are trees."""
+    """A whole law; constraints are trees, conditions {name: unit}."""
 
     name: str
     title: str
@@ -80,6 +80,7 @@ class LawDocument:
     states: tuple[StateDocument, ...]
     constraints: tuple[Any, ...]
     references: tuple[str, ...]
+    conditions: dict[str, str] = field(default_factory=dict)
 
 
 _CODEC = RecordCodec(ranges={ParamDocument: {"limits": numbers(infinite=True)}})
@@ -102,6 +103,7 @@ def law_to_json(law: CreepLaw) -> dict[str, Any]:
         ),
         constraints=tuple(expression_to_tree(relation) for relation in law.constraints),
         references=tuple(law.references),
+        conditions={symbol.name: symbol.unit for symbol in law.conditions},
     )
     return {**LAW.heading, **_CODEC.to_json(record)}
 
@@ -112,14 +114,10 @@ def law_to_json(law: CreepLaw) -> dict[str, Any]:
 def law_from_json(data: Any, source: str = "law file") -> CreepLaw:
     """Return the law that `law_to_json` wrote; LawError, naming `source`, when the data are anything else."""
     content = check_heading(data, source, LAW)
-    try:
+    with restated(RecordError, LawError, f"{source}: {SAID}; this is not a law that creepkit wrote"):
         record = _CODEC.from_json(LawDocument, content)
-    except RecordError as error:
-        raise LawError(f"{source}: {error}; this is not a law that creepkit wrote") from None
-    try:
+    with restated(LawError, LawError, f"{source}: {SAID}"):
         law = _law_of(record)
-    except LawError as error:
-        raise LawError(f"{source}: {error}") from None
     if law.fingerprint != record.fingerprint:
         raise LawError(
             f"{source}: the equations of law '{law.name}' have fingerprint {law.fingerprint} but the file says "
@@ -130,9 +128,10 @@ def law_from_json(data: Any, source: str = "law file") -> CreepLaw:
 
 def _law_of(record: LawDocument) -> CreepLaw:
     names = [param.name for param in record.params] + [state.name for state in record.states]
-    _check_unique(names, "parameter or state")
+    stated = {name: ConditionSymbol(name, unit) for name, unit in record.conditions.items()}
+    _check_unique([*names, *stated], "parameter, state or condition")
     _check_unique([term.name for term in record.terms], "term")
-    symbols = {symbol.name: symbol for symbol in (*POINT_VARIABLES, *(Symbol(name) for name in names))}
+    symbols = {symbol.name: symbol for symbol in (*POINT_VARIABLES, *(Symbol(name) for name in names))} | stated
     return CreepLaw(
         name=record.name,
         title=record.title,
@@ -157,10 +156,8 @@ def _without_name(entry: ParamDocument | StateDocument) -> dict[str, Any]:
 
 
 def _with_location(location: str, read: Callable[[Any, Mapping[str, sympy.Symbol]], _T], tree: Any, symbols: Any) -> _T:
-    try:
+    with restated(LawError, LawError, f"{location}: {SAID}"):
         return read(tree, symbols)
-    except LawError as error:
-        raise LawError(f"{location}: {error}") from None
 
 
 def _check_unique(names: Sequence[str], kind: str) -> None:

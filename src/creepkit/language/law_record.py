@@ -22,7 +22,7 @@ from sympy.logic.boolalg import Boolean, BooleanAtom
 
 from creepkit.errors import POWER_REMEDY, LawError, nearest, quoted
 from creepkit.language.expression_trees import evaluate_multiprecision
-from creepkit.language.symbols import POINT_VARIABLES, Param, State, SymbolTuple
+from creepkit.language.symbols import POINT_VARIABLES, ConditionSymbol, Param, State, SymbolTuple
 
 if TYPE_CHECKING:
     from creepkit.arrays import ArrayLike, Bools, Floats
@@ -35,8 +35,8 @@ def validate_law(law: LawRecord) -> None:
     for symbol in (*law.params, *law.states):
         if isinstance(symbol, SymbolTuple):
             symbol.refuse()
-    _check_names(law, origin)
     _check_expressions(law, origin)
+    _check_names(law, origin)
     _check_symbols(law, origin)
     _check_constraints(law, origin)
 
@@ -73,12 +73,12 @@ def _check_names_and_titles(law: LawRecord) -> None:
 
 def _check_names(law: LawRecord, origin: str) -> None:
     reserved = {symbol.name for symbol in POINT_VARIABLES}
-    names = [symbol.name for symbol in (*law.params, *law.states)]
+    names = [symbol.name for symbol in (*law.params, *law.states, *law.conditions)]
     for name in names:
         if name in reserved:
             raise LawError(f"{origin}: '{name}' is a word of the language and cannot name a parameter or state")
         if names.count(name) > 1:
-            raise LawError(f"{origin}: the name '{name}' is used twice; give each parameter and state its own")
+            raise LawError(f"{origin}: the name '{name}' is used twice; give each symbol of the law its own")
         if not name.isidentifier():
             raise LawError(f"{origin}: '{name}' is not a plain name; use letters, digits and underscores")
 
@@ -101,19 +101,19 @@ def _check_expressions(law: LawRecord, origin: str) -> None:
 def _check_symbols(law: LawRecord, origin: str) -> None:
     """Declared must equal used, and every symbol must be plain and real."""
     used = symbols_used(law)
-    for symbol in sorted({*used, *law.params, *law.states}, key=str):
+    for symbol in sorted({*used, *law.params, *law.states} - {*law.conditions}, key=str):
         if symbol != sympy.Symbol(symbol.name, real=True):
             raise LawError(
                 f"{origin}: the symbol '{symbol}' is not a plain real one; make it with parameters(\"{symbol}\"), "
                 "or import it from creepkit.language when it is a word of the language"
             )
-    declared = {*law.params, *law.states, *POINT_VARIABLES}
+    declared = {*law.params, *law.states, *law.conditions, *POINT_VARIABLES}
     unknown = sorted(str(s) for s in used - declared)
     if unknown:
         allowed = ", ".join(sorted(str(s) for s in declared))
         raise LawError(
             f"{origin}: unknown symbol {', '.join(unknown)} in a rate; declared are {allowed}; "
-            f"add {'it' if len(unknown) == 1 else 'them'} to params=, or to states="
+            f"add {'it' if len(unknown) == 1 else 'them'} to params= or states=, or make it with conditions()"
         )
     unused = sorted(str(s) for s in set(law.params) - used)
     if unused:
@@ -121,7 +121,7 @@ def _check_symbols(law: LawRecord, origin: str) -> None:
 
 
 def _check_constraints(law: LawRecord, origin: str) -> None:
-    declared = {*law.params, *law.states, *POINT_VARIABLES}
+    declared = {*law.params, *law.states, *law.conditions, *POINT_VARIABLES}
     for relation in law.constraints:
         if not isinstance(relation, Boolean) or isinstance(relation, (sympy.Symbol, BooleanAtom)):
             raise LawError(f"{origin}: the constraint {relation} is not a relation, such as n >= 0, that can fail")
@@ -155,6 +155,7 @@ def structure_of(law: LawRecord) -> str:
         parts = [f"{label} = {sympy.srepr(expression)}" for label, expression in law.terms.items()]
         parts += [f"{s.name}' = {sympy.srepr(v.rate)} from {v.initial!r} to {v.limit!r}" for s, v in law.states.items()]
         parts += [f"{s.name}: {p.scale}" for s, p in law.params.items()]
+        parts += [f"{s.name} in {s.unit}" for s in law.conditions]
         return "\n".join(parts)
 
 
@@ -172,9 +173,9 @@ def _failures_said(law: LawRecord) -> Iterator[None]:
 
 def _signature(law: LawRecord) -> str:
     """Each rate to 10 digits at two fixed points with parameters drawn from a fixed sequence."""
-    symbols = [*POINT_VARIABLES, *law.states, *law.params]
+    symbols = [*POINT_VARIABLES, *law.states, *law.params, *law.conditions]
     state_values = [0.11 + 0.07 * (k % 7) for k in range(len(law.states))]
-    parameter_values = [1.3 + 0.31 * ((5 * k) % 11) for k in range(len(law.params))]
+    parameter_values = [1.3 + 0.31 * ((5 * k) % 11) for k in range(len(law.params) + len(law.conditions))]
     expressions = [*law.terms.values(), *(state.rate for state in law.states.values())]
     lines = []
     with mpmath.workdps(30):
@@ -254,8 +255,7 @@ class LawRecord:
     @property
     def rate(self) -> sympy.Expr:
         """The rate of equivalent creep strain, 1/s: the sum of the terms, unevaluated."""
-        values = list(self.terms.values())
-        return values[0] if len(values) == 1 else sympy.Add(*values)
+        return sympy.Add(*self.terms.values())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -266,6 +266,16 @@ class LawRecord:
     def table(self) -> dict[str, Param]:
         """{parameter name: Param}, in the author's order."""
         return {symbol.name: param for symbol, param in self.params.items()}
+
+    @property
+    def conditions(self) -> tuple[ConditionSymbol, ...]:
+        """The conditions that its rates depend on, by name: what every test must state."""
+        cached: tuple[ConditionSymbol, ...] | None = self.__dict__.get("_conditions")
+        if cached is None:
+            found = [symbol for symbol in symbols_used(self) if isinstance(symbol, ConditionSymbol)]
+            cached = tuple(sorted(found, key=lambda symbol: str(symbol.name)))
+            object.__setattr__(self, "_conditions", cached)
+        return cached
 
     @property
     def fingerprint(self) -> str:

@@ -65,6 +65,7 @@ class LatexLawPrinter(ReadableSums, LatexPrinter):  # type: ignore[misc]
 
     def __init__(self, law: LawRecord) -> None:
         names = {symbol: r"n_\infty" for symbol in law.params if symbol.name == "n_inf"}
+        names |= {one: rf"\mathrm{{{one.name.replace('_', ' ')}}}".replace(" ", r"\,") for one in law.conditions}
         super().__init__({"symbol_names": {**LATEX_SYMBOLS, **names}, "mul_symbol": None})
 
     def _print_exp(self, e: Any, exp: Any = None) -> str:
@@ -117,14 +118,19 @@ def state_equations(law: LawRecord) -> list[str]:
     ]
 
 
+def rate_lines(law: LawRecord) -> list[str]:
+    """The rate, a term a line with its name, and the equations of internal variables with their meanings."""
+    terms = enumerate(law.terms.items())
+    states = zip(state_equations(law), law.states.values(), strict=True)
+    return [
+        *(f"{'+' if k else 'rate =':>6} {expression_text(term)}    [{label}]" for k, (label, term) in terms),
+        *(f"{equation}    [{state.meaning}]" for equation, state in states),
+    ]
+
+
 def law_text(law: LawRecord) -> str:
     """Return the law as a small table for a terminal."""
-    lines = [f"{law.name}: {law.title}" if law.title else law.name]
-    prefix = "rate ="
-    for label, term in law.terms.items():
-        lines.append(f"  {prefix:6} {expression_text(term)}    [{label}]")
-        prefix = "     +"
-    lines += [f"  {equation}" for equation in state_equations(law)]
+    lines = [f"{law.name}: {law.title}" if law.title else law.name, *(f"  {line}" for line in rate_lines(law))]
     for name, param in law.table.items():
         low, high = param.bounds
         off = "" if param.off is None or low <= param.off <= high else f" or {param.off:g}"

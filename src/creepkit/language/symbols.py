@@ -46,6 +46,28 @@ class Symbol(sympy.Symbol):  # type: ignore[misc]  # sympy has no types
         return new if isinstance(old, sympy.Symbol) and old.name == self.name else None
 
 
+class ConditionSymbol(Symbol):
+    """A number that each test states and a law may use: grain size, content of an element, dose.
+
+    unit : that of its number in the law, "1" for none.
+    """
+
+    __slots__ = ("unit",)
+    unit: str
+
+    def __new__(cls, name: str, unit: str = "1", **_: bool) -> Self:
+        """The symbol of a name and a unit."""
+        symbol: Self = cls.__xnew__(cls, name, real=True)
+        symbol.unit = unit
+        return symbol
+
+    def __getnewargs_ex__(self) -> tuple[tuple[str, str], dict[str, bool]]:
+        return (self.name, self.unit), {}
+
+    def _hashable_content(self) -> tuple[Any, ...]:
+        return (*super()._hashable_content(), self.unit)
+
+
 stress = Symbol("stress")
 
 
@@ -128,6 +150,22 @@ def _symbols(names: str) -> list[sympy.Symbol]:
 def states(names: str) -> tuple[sympy.Symbol, ...]:
     """Return the symbols of internal variables, named in `names`, as a tuple: (damage,) = states("damage")."""
     return _StateTuple(_symbols(names))
+
+
+class _ConditionTuple(SymbolTuple):
+    maker = "conditions"
+
+
+@checked
+def conditions(names: str, *, unit: str = "1") -> tuple[sympy.Symbol, ...]:
+    """Return the symbols of conditions, numbers that each test states beside its load and temperature, as a tuple.
+
+    unit : of the numbers in the law; tests may state others of its kind (um where a law has mm).
+
+    >>> (d,) = conditions("grain_size", unit="mm")
+    """
+    _check_text("condition", names, unit)
+    return _ConditionTuple(ConditionSymbol(name, unit) for name in names.replace(",", " ").split())
 
 
 ParameterScale = Literal["linear", "log"]

@@ -8,7 +8,7 @@ basis functions reads x(T) = x + sum_j c_j b_j(T); every basis function is 0 at 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import sympy
@@ -71,27 +71,16 @@ def arrhenius(T_ref: float = 1073.15, Q: float | None = None) -> TemperatureFact
 @checked
 def linear(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> TemperatureForm:
     """p(T) = p + p_T (T - T_ref); the slope p_T, per K, lies by default within half the range of p in 100 K."""
-
-    def build(symbol: sympy.Symbol, param: Param) -> Built:
-        reach = _slope_bounds(symbol, param, slope, 200.0, "use exponential() or activated(), not linear()")
-        unit = "1/K" if param.unit == "1" else f"{param.unit}/K"
-        rate, extra = _coefficient(f"{symbol.name}_T", f"temperature slope of {param.meaning}", reach, unit)
-        return symbol + rate * (temperature - sympy.Float(T_ref)), extra
-
-    return TemperatureForm("linear", build, "straight line about T_ref", float(T_ref))
+    difference = temperature - sympy.Float(T_ref)
+    shape = _BasisFunction("T", difference, "temperature slope of", "1/K", 1 / (2 * TEMPERATURE_SPAN))
+    return _straight_line("linear", "straight line about T_ref", T_ref, shape, slope)
 
 
 @checked
 def inverse_temperature(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> TemperatureForm:
     """p(T) = p + p_I (1000/T - 1000/T_ref); default bounds of p_I: the range of p over 0.5."""
-
-    def build(symbol: sympy.Symbol, param: Param) -> Built:
-        reach = _slope_bounds(symbol, param, slope, 0.5, "use activated() for it, not inverse()")
-        unit = "1000 K" if param.unit == "1" else f"{param.unit} 1000 K"
-        rate, extra = _coefficient(f"{symbol.name}_I", f"slope of {param.meaning} against 1000/T", reach, unit)
-        return symbol - 1000 * rate * _reciprocal_decrease(T_ref), extra
-
-    return TemperatureForm("inverse", build, "straight line in 1/T about T_ref", float(T_ref))
+    shape = _BasisFunction("I", -1000 * _reciprocal_decrease(T_ref), "slope against 1000/T of", "1000 K", 2.0)
+    return _straight_line("inverse", "straight line in 1/T about T_ref", T_ref, shape, slope)
 
 
 @checked
@@ -123,16 +112,6 @@ def _coefficient(
     """A parameter that a form introduces, which 0 switches off."""
     symbol = Symbol(name)
     return symbol, {symbol: Param(meaning, bounds=bounds, unit=unit, off=0.0)}
-
-
-def _slope_bounds(
-    symbol: sympy.Symbol, param: Param, given: tuple[float, float] | None, span: float, remedy: str
-) -> tuple[float, float]:
-    """Bounds of a slope: by default the parameter's range over a span to either side; LawError for one of log scale."""
-    if param.scale == "log":
-        raise LawError(f"parameter '{symbol}' has a log scale: {remedy}")
-    low, high = param.bounds
-    return given or (-(high - low) / span, (high - low) / span)
 
 
 def _reciprocal_decrease(T_ref: float) -> sympy.Expr:
@@ -194,7 +173,7 @@ def boltzmann(T_ref: float = 1073.15, T0: tuple[float, float] = T0_BOUNDS) -> Te
     """p(T) = p + p_E (T_ref^2/T0) [exp(-T0 (1/T - 1/T_ref)) - 1]: a + b exp(-T0/T) with slope p_E per K at T_ref."""
 
     def shape(start: sympy.Symbol) -> sympy.Expr:
-        return sympy.Float(T_ref) ** 2 / start * (sympy.exp(-start * _reciprocal_increase(T_ref)) - 1)
+        return sympy.Float(T_ref) ** 2 / start * (sympy.exp(start * _reciprocal_decrease(T_ref)) - 1)
 
     return _form_with_T0("boltzmann", "exponential of reciprocal temperature", T_ref, T0, "E", shape)
 
@@ -203,7 +182,7 @@ def wachtman_form(T_ref: float = 1073.15, T0: tuple[float, float] = T0_BOUNDS) -
     """p(T) = a + b T exp(-T0/T), the form of Wachtman's modulus, written with its slope p_W per K at T_ref."""
 
     def shape(start: sympy.Symbol) -> sympy.Expr:
-        grown = temperature * sympy.exp(-start * _reciprocal_increase(T_ref)) - sympy.Float(T_ref)
+        grown = temperature * sympy.exp(start * _reciprocal_decrease(T_ref)) - sympy.Float(T_ref)
         return grown / (1 + start / sympy.Float(T_ref))
 
     return _form_with_T0("wachtman", "Wachtman et al. (1961), Phys. Rev. 122, 1754", T_ref, T0, "W", shape)
@@ -245,6 +224,20 @@ def _basis_form(name: str, reference: str, T_ref: float, basis: Sequence[_BasisF
     return TemperatureForm(name, lambda symbol, param: _basis_expansion(symbol, param, basis), reference, float(T_ref))
 
 
+def _straight_line(
+    name: str, reference: str, T_ref: float, shape: _BasisFunction, slope: tuple[float, float] | None
+) -> TemperatureForm:
+    """The form of one shape for parameters of linear scale alone; slope : bounds of its coefficient."""
+
+    def build(symbol: sympy.Symbol, param: Param) -> Built:
+        if param.scale == "log":
+            raise LawError(f"parameter '{symbol}' has a log scale: use activated() or exponential(), not {name}()")
+        built, coefficients = _basis_expansion(symbol, param, [shape])
+        return built, {c: replace(p, bounds=slope or p.bounds) for c, p in coefficients.items()}
+
+    return TemperatureForm(name, build, reference, float(T_ref))
+
+
 def _basis_expansion(symbol: sympy.Symbol, param: Param, basis: Sequence[_BasisFunction]) -> Built:
     """The parameter with its shapes added on its own scale, and their coefficients."""
     low, high = param.bounds
@@ -263,7 +256,7 @@ def _basis_expansion(symbol: sympy.Symbol, param: Param, basis: Sequence[_BasisF
 def _coefficient_unit(unit: str, param: Param) -> str:
     if param.scale == "log" or param.unit == "1":
         return unit
-    return param.unit if unit == "1" else f"{param.unit} {unit}"
+    return param.unit if unit == "1" else f"{param.unit} {unit}".replace(" 1/", "/")
 
 
 def _form_with_T0(
@@ -283,8 +276,3 @@ def _form_with_T0(
         return built, coefficients | {start: Param(f"T0 of {param.meaning}", bounds=T0, unit="K")}
 
     return TemperatureForm(name, build, reference, float(T_ref))
-
-
-def _reciprocal_increase(T_ref: float) -> sympy.Expr:
-    """1/T - 1/T_ref as (T_ref - T)/(T_ref T), which loses no digits near T_ref and is exactly 0 there."""
-    return (sympy.Float(T_ref) - temperature) / (sympy.Float(T_ref) * temperature)

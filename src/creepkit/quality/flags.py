@@ -93,10 +93,7 @@ class DataQuality(Presentable):
     def __len__(self) -> int:
         return len(self.flags)
 
-    def __str__(self) -> str:
-        from creepkit.reports.histories import data_quality_text
-
-        return data_quality_text(self)
+    shown_by = "histories.data_quality_text"
 
 
 def frame_ranges_text(frames: Sequence[int]) -> str:

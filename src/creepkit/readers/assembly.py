@@ -293,8 +293,9 @@ def _time_and_end(
     if said == {STOPPED}:
         conditions.record_assumption(f"stopped before rupture by its label '{quoted(label)}'")
         return time, STOPPED, True
-    if not said and time is None and frames is not None:
-        time = _time_in_remark(conditions, [label for label, end in remarks.items() if end == RUPTURED], frames)
+    if time is None and frames is not None:
+        broke = [label for label, end in (firm | remarks).items() if end == RUPTURED]
+        time = _time_in_remark(conditions, broke, frames)
         said = {RUPTURED} if time is not None else said
     return time, "".join(said), False
 
@@ -399,7 +400,7 @@ def _record_place(conditions: StatedConditions, table: CellTable, specimen: str)
 _LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?([^\d\s]*)")
 
 
-_WORDS_OF_PIECES = {"dimple", "plate", "sheet", "disc", "specimen", "sample", "piece", "initial", "nominal"}
+_WORDS_OF_PIECES = {"plate", "sheet", "disc", "specimen", "sample", "piece", "initial", "nominal"}
 """That a head says beside the name of a length, such as "specimen thickness"."""
 
 
@@ -437,6 +438,8 @@ def _specimen_and_outputs(
     _refuse_unknown_specimen(named, terms, location)
     if len(chosen) != 1:
         if len(chosen) > 1:
+            said = " ".join((*conditions.labels, *conditions.labels.values())).casefold()
+            chosen.sort(key=lambda one: one.replace("-", " ") not in said)
             what = f"the columns are those of {' and '.join(chosen)}; which specimen is it?"
             raise conditions.question(what, "specimen", *chosen, location=location, is_free=False)
         needed = f"of '{named}' ({', '.join(terms.outputs[named])})" if named in terms.outputs else _SOME_OUTPUTS

@@ -20,6 +20,7 @@ from creepkit.readers.table import CellTable, TableRow
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
     NAMES_OF,
+    SYMBOLS,
     NameTable,
     names_tests,
     plain_name,
@@ -34,58 +35,43 @@ TIME_TO_STRAIN = "time_to_strain"
 """Before the strain, as a fraction, in the quantity of a column of times to it."""
 
 
-QUANTITIES: Mapping[str, tuple[QuantityKind, tuple[str, ...]]] = {
-    "stress": (STRESS, (*NAMES_OF["stress"], "stress", "sigma", "σ", "σ0", "σo")),
-    "temperature": (TEMPERATURE, (*NAMES_OF["temperature"], "temperature", "t", "temp d essai")),
-    "minimum_rate": (RATE, ("minimum rate", "minimum creep rate", "mcr", "minimale kriechrate")),
-    "minimum_rate_sd": (RATE, ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd")),
-    "rupture": (
-        TIME,
-        (
-            *("rupture", "rupture time", "creep life", "t r", "tr", "t rupture", "life", "bruchzeit", "standzeit"),
-            *("tb", "t f", "tf", "ttr", "ttf", "t u", "tu", "zeitstand", "durée de vie"),
-        ),
-    ),
-    "end_time": (
-        TIME,
-        (
-            *(*NAMES_OF["time"], "end time", "duration", "test duration", "time", "time on test", "t", "hours on test"),
-            *("prüfdauer", "versuchsdauer", "durée d essai", "temps d essai", "durée de l essai"),
-        ),
-    ),
+QUANTITIES: Mapping[str, QuantityKind] = {
+    "stress": STRESS,
+    **{
+        name: CONDITION_KINDS[name]
+        for name in ("temperature", "minimum_rate", "minimum_rate_sd", "rupture", "end_time")
+    },
 }
-"""{quantity: its kind, and names of a column of it in small letters, beside those that its words tell."""
+"""{quantity of a column: its kind}."""
 
 
-TEXTS: Mapping[str, tuple[str, ...]] = {
+TEXTS = (
+    *("name", "alloy", "control", "specimen", "label heat", "label laboratory", "label elongation_pct"),
+    *("label reduction_of_area_pct",),
+)
+"""Keys of a history file that columns are."""
+
+
+_OWN_NAMES: Mapping[str, tuple[str, ...]] = {
+    "rupture": ("rupture", "t r", "tr", "tb", "t f", "tf", "t u", "tu", "life", "zeitstand"),
+    "end_time": ("time", *NAMES_OF["time"]),
     "name": ("name", "id", "no", "nr", "nom", "bar"),
-    "alloy": (*NAMES_OF["alloy"], "alloy", "nuance", "steel", "grade"),
-    "control": ("control",),
-    "specimen": ("specimen",),
-    "label heat": ("heat", "cast", "batch", "charge", "schmelze", "heat number", "heat no", "coulée", "heat id"),
-    "label laboratory": ("laboratory", "lab", "labor", "laboratoire"),
-    "label elongation_pct": (
-        *("elongation pct", "elongation", "rupture elongation", "elongation at rupture", "a", "el", "allongement"),
-        *("bruchdehnung", "allongement à rupture"),
-    ),
-    "label reduction_of_area_pct": (
-        *("reduction of area", "area reduction", "ra", "z", "reduction in area", "roa", "brucheinschnürung"),
-        *("einschnürung", "striction", "striction à rupture"),
-    ),
+    "label elongation_pct": ("elongation pct", "elongation", "a", "el", "allongement"),
+    "label reduction_of_area_pct": ("ra", "z", "roa"),
 }
-"""{key of a history file: the names of a column of it in small letters}."""
+"""{quantity or key: names in small letters} that mean something else, or too much, anywhere but in a table of tests."""
 
 
 NAMES = NameTable(
-    {quantity: kind for quantity, (kind, _) in QUANTITIES.items()},
-    tuple(TEXTS),
+    QUANTITIES,
+    TEXTS,
     {
         spelling: key
-        for key, names in (*TEXTS.items(), *((q, names) for q, (_, names) in QUANTITIES.items()))
-        for name in names
+        for key in (*TEXTS, *QUANTITIES)
+        for name in (*NAMES_OF.get(key, ()), *_OWN_NAMES.get(key, ()))
         for spelling in (name, plain_words(name).replace("|", " "))
     },
-    {},
+    {symbol: quantity for symbol, quantity in SYMBOLS.items() if quantity == "stress"},
 )
 
 
@@ -104,7 +90,7 @@ class TestColumn:
     @property
     def kind(self) -> QuantityKind | None:
         """The kind of its numbers; None of a text."""
-        return TIME if self.strain is not None else QUANTITIES.get(self.quantity, (None,))[0]
+        return TIME if self.strain is not None else QUANTITIES.get(self.quantity)
 
     @property
     def strain(self) -> float | None:
@@ -160,7 +146,7 @@ def column_called(written: str) -> TestColumn:
     text = whole if whole in TEXTS else quantity if unit in ("", "pct") else ""
     if quantity not in QUANTITIES and (text or not (quantity := _quantity_by_words(name, unit))):
         return TestColumn(text)
-    return TestColumn(quantity, unit or (_unit_of_time(written) if QUANTITIES[quantity][0] is TIME else ""))
+    return TestColumn(quantity, unit or (_unit_of_time(written) if QUANTITIES[quantity] is TIME else ""))
 
 
 def _meaning(name: str, is_per_cent: bool) -> str:
@@ -180,6 +166,12 @@ def _quantity_by_words(name: str, unit: str) -> str:
         return "minimum_rate"
     is_rupture = _OF_RUPTURE.search(plain) and _IS_TIME.search(plain) and not _OF_OTHERS.search(plain)
     return "rupture" if is_rupture else ""
+
+
+def is_any_rate(written: str) -> bool:
+    """Whether a column holds rates of creep or of something else, in a unit of theirs."""
+    name, unit = split_written_name(written)
+    return bool(RATES.search(plain_words(name))) and unit_suffix(unit) in RATE.units
 
 
 def _strain_reached(written: str) -> float | None:
@@ -288,7 +280,7 @@ def _may_name(row: TableRow, dialect: Dialect) -> bool:
 
 def _understood(names: Sequence[str], meant: Mapping[str, str]) -> int:
     columns = [column_called(meant.get(name, name)) for name in names]
-    is_in_unit = (one.quantity in QUANTITIES and one.unit in QUANTITIES[one.quantity][0].units for one in columns)
+    is_in_unit = (one.quantity in QUANTITIES and one.unit in QUANTITIES[one.quantity].units for one in columns)
     return sum(bool(one.quantity) for one in columns) + sum(is_in_unit)
 
 
@@ -331,6 +323,7 @@ def is_test_table(names: Sequence[str], rows: Sequence[TableRow] = ()) -> bool:
     found = {one.quantity for one in columns}
     is_named = any(_differ(rows, k) for k, one in enumerate(columns) if one.quantity in ("name", "specimen"))
     measured = not {"minimum_rate", "rupture"}.isdisjoint(found) or any(one.strain is not None for one in columns)
+    measured |= any(map(is_any_rate, names)) and "end_time" not in found
     measured |= "end_time" in found and (is_named or any(kind_of_column(name) in FIRM for name in names))
     is_framed = "end_time" in found and has_frames(names)
     return measured and not {"stress", "temperature"}.isdisjoint(found) and (is_named or not is_framed)

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from creepkit.errors import CreepkitError, HistoryError, nearest
+from creepkit.errors import CreepkitError, HistoryError, refuse_unknown
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
@@ -328,7 +328,8 @@ def _length(stem: str, entry: SourceText, terms: Terms, is_free: bool) -> tuple[
     known = terms.own_dimensions or (terms.dimensions if is_free else ())
     if has_unit and base in terms.dimensions:
         return terms.dimensions[base], LENGTH.convert(entry.number(entry.key or stem), suffix, entry.location, stem)
-    if not is_free and any(stem == one or (base == one and not has_unit) for one in known):
+    has_other = base in terms.dimensions and not has_unit and unit_suffix(suffix) is not None
+    if not is_free and (has_other or any(stem == one or (base == one and not has_unit) for one in known)):
         one, units = stem if stem in known else base, ", ".join(LENGTH.units)
         raise HistoryError(f"{entry.location}: '{stem}' needs a unit of length: write {one}_mm (or {units})")
     name = base if has_unit else stem
@@ -377,8 +378,7 @@ def read_noise_correlation(conditions: StatedConditions, outputs: Collection[str
             )
         first, second, number = words
         for name in (first, second):
-            if name not in known:
-                raise HistoryError(f"{location}: {KEY} names '{name}', which is no column; {nearest(name, known)}")
+            refuse_unknown(name, known, HistoryError, f"{location}: {KEY} names '{name}', which is no column")
         pair = first, second
         if first == second or pair in correlations or pair[::-1] in correlations:
             problem = "correlates with itself" if first == second else f"and {second} are given twice"

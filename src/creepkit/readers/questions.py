@@ -74,9 +74,10 @@ class Question(HistoryError):
 
 def merged(errors: Iterable[Exception]) -> list[Exception]:
     """Errors by themselves; those that say the same of several places, and questions of files of a folder, as one."""
-    found, questions = list[Exception](), dict[tuple[object, ...], Question]()
+    found, questions, of_place = list[Exception](), dict[tuple[object, ...], Question](), dict[object, Question]()
     for one in (one for error in errors for one in single_errors(error)):
         if isinstance(one, Question):
+            one = of_place.setdefault((one.place, one.key, repr(one.choices)), one)  # numbers in it may differ
             key = (one.path.parent, one.key, one.sentence, repr(one.choices))
             question = questions.setdefault(key, one)
             question.at |= one.at

@@ -12,7 +12,7 @@ from glob import glob
 from pathlib import Path
 from typing import Any, cast
 
-from creepkit.errors import HistoryError, nearest, quoted
+from creepkit.errors import SAID, HistoryError, quoted, restated
 from creepkit.files.delimited_text import refuse_unprintable
 from creepkit.files.reading import read_bytes
 from creepkit.hookspecs import hookimpl
@@ -26,6 +26,7 @@ from creepkit.readers.tests_in_rows import TEST_TABLE
 from creepkit.readers.text_files import TABLE_FILE
 from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, Reader, accepts_path, histories_in
+from creepkit.records.plugin_calls import named_one, only_one
 
 
 @hookimpl
@@ -53,7 +54,7 @@ def read_histories(
     their folder in front. ignore : columns that are left out wherever they stand.
     """
     if reader is not None:
-        readers = [_reader_named(reader, readers)]
+        readers = [named_one("reader", reader, readers)]
     readers = [reader_without(ignore, one) for one in readers] if ignore else readers
     read: dict[tuple[str, str], tuple[Path, History]] = {}
     errors = list[HistoryError]()
@@ -134,13 +135,6 @@ def _with_vocabulary(reader: Reader, changed: Callable[[HeaderVocabulary], Heade
     return cast(Reader, replace(cast(Any, reader), vocabulary=changed(vocabulary)))
 
 
-def _reader_named(name: str, readers: Sequence[Reader]) -> Reader:
-    known = {reader.name: reader for reader in readers}
-    if name not in known:
-        raise HistoryError(f"no reader is called '{name}'; {nearest(name, known)}")
-    return known[name]
-
-
 def _existing_paths(paths: PathsLike) -> list[Path]:
     """The paths that exist, with `~` and patterns expanded, each once."""
     path_list = [paths] if isinstance(paths, (str, Path)) else list(paths)
@@ -167,10 +161,8 @@ def readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
     if not path.is_dir():
         what = "is no regular file but a device, a pipe or the like" if path.exists() else "no such file or folder"
         raise HistoryError(f"{path}: {what}; name a file or a folder")
-    try:
+    with restated(OSError, HistoryError, f"{path}: the folder cannot be read ({SAID}); name another one"):
         entries = sorted(path.iterdir())
-    except OSError as error:
-        raise HistoryError(f"{path}: the folder cannot be read ({error.strerror}); name another one") from None
     visible = [file for file in entries if file.is_file() and file.name[0] != "."]
     visible = [file for file in visible if file.name != ANSWERS_FILE]
     files = [file for file in visible if any(accepts_path(reader, file) for reader in answered_readers(file, readers))]
@@ -188,10 +180,7 @@ def _reader_of(path: Path, readers: Sequence[Reader]) -> Reader:
     if not accepting:
         reader_list = "; ".join(f"{reader.name}: {reader.title}" for reader in readers)
         raise HistoryError(f"{path}: no reader understands it; known are {reader_list or 'none'}")
-    if len(accepting) > 1:
-        names = " and ".join(f"'{reader.name}'" for reader in accepting)
-        raise HistoryError(f"{path}: the readers {names} both accept it; say which one with reader=")
-    return accepting[0]
+    return only_one("reader", path, accepting, "reader")
 
 
 def _with_unique_names(read: Sequence[tuple[Path, History]]) -> list[History]:

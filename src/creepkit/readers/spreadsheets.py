@@ -24,7 +24,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
 from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, how_to_raise, raised, read_bytes
 from creepkit.readers.columns_of_tests import column_called, head_of_tests
-from creepkit.readers.frames import unknown_text
+from creepkit.readers.frames import UNUSED, unknown_text
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.parts_of_tests import parts_beside
 from creepkit.readers.questions import Question
@@ -332,21 +332,17 @@ class SpreadsheetReader:
             listed = ", ".join(f"'{sheet.sheet}'" for sheet in sheets) or "none that holds anything"
             raise HistoryError(f"{path}: no sheet has a column of time (sheets: {listed}); name one time_h or Time (h)")
         tests = [test for sheet in framed for test in tests_in(sheet, self.vocabulary)]
-        names = {name for test in tests for name in (test.table.sheet, test.name)}
-        stated, notes, aside = dict[str, dict[str, SourceText]](), dict[str, SourceText](), list[str]()
+        notes, aside = dict[str, SourceText](), list[str]()
         for sheet in (one for one in sheets if one not in framed):
             conditions = _conditions_by_test(sheet, self.vocabulary)
             states = any(not key.startswith("label ") for entries in conditions.values() for key in entries)
-            if not states and not conditions.keys() & names:  # remarks
+            if states or any(_agreement(key, test) for key in conditions for test in tests):
+                tests = list(_with_conditions(sheet, tests, conditions))
+            else:  # remarks
                 aside.append(f"sheet '{sheet.sheet}' not read as it has no column of time")
                 notes |= _note_of_sheet(sheet)
-            elif twice := sorted(conditions.keys() & stated.keys()):
-                what = f"test '{quoted(twice[0])}' has conditions in another sheet too"
-                raise HistoryError(f"{sheet.place}: {what}; keep one of them")
-            else:
-                stated |= conditions
         tests = [replace(one, entries={**notes, **one.entries}, table=one.table.assuming(*aside)) for one in tests]
-        return histories_of_tests(_with_conditions(path, tests, stated), path, self.vocabulary)
+        return histories_of_tests(tests, path, self.vocabulary)
 
 
 def holds_frames(sheet: CellTable, vocabulary: HeaderVocabulary) -> bool:
@@ -354,28 +350,46 @@ def holds_frames(sheet: CellTable, vocabulary: HeaderVocabulary) -> bool:
     return names_time(sheet, vocabulary) and head_of_tests(sheet, vocabulary.synonyms) is None
 
 
-def _names_sheets(name: str) -> bool:
-    """Whether a column says to which test or sheet conditions belong."""
-    return names_tests(name) or words_of(name) in ("name", "sheet", "specimen")
+def _agreement(key: str, test: TabulatedTest) -> int:
+    """How many words a row of conditions shares with the name of a test, its sheet or its alloy; 0 for another one.
+
+    A test may have more words behind, `TA1 350 °C` those of `TA1`; all words of its name count a thousand.
+    """
+    alloy = test.entries["alloy"].text if "alloy" in test.entries else ""
+    wanted, *named = (re.findall(r"\w+", one.casefold()) for one in (key, test.name, test.table.sheet, alloy))
+    is_whole, is_front = wanted == named[0], any(one[: len(wanted)] == wanted for one in named)
+    return 1000 * is_whole or len(wanted) * is_front
+
+
+def _keys_tests(row: TableRow, known: Terms) -> list[int]:
+    """The columns that say to which tests, sheets or alloys the conditions below belong, the surest first."""
+    tests = [k for k, cell in enumerate(row.cells) if names_tests(cell) or words_of(cell) in _NAMES_OF_SHEETS]
+    return tests + [k for k, cell in enumerate(row.cells) if cell and known.condition(cell) == "alloy"]
+
+
+_NAMES_OF_SHEETS = ("name", "sheet", "specimen")
 
 
 def _conditions_by_test(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[str, dict[str, SourceText]]:
-    """{test: its conditions} of a sheet with a column of tests; {} of any other sheet."""
-    named = [sum(map(bool, row.cells)) > 1 and any(map(_names_sheets, row.cells)) for row in sheet.rows[:_FILLED_ROWS]]
+    """{test, or alloy: its conditions} of a sheet with a column of them; {} of any other sheet."""
+    known = vocabulary.terms()
+    named = [sum(map(bool, row.cells)) > 1 and bool(_keys_tests(row, known)) for row in sheet.rows[:_FILLED_ROWS]]
     if True not in named[: len(sheet.rows) - 1]:
         return {}
     sheet = replace(sheet, rows=sheet.rows[named.index(True) :])  # rows above the names are titles
-    table, known = named_columns(without_ignored(sheet, 0, vocabulary.ignored)), vocabulary.terms()
-    columns = [k for k, name in enumerate(table.columns) if _names_sheets(name)]
-    tests: dict[str, dict[str, SourceText]] = {}
-    for row in table.rows if columns else ():
-        test, place = row.cells[columns[0]], table.location(row.line)
+    table = named_columns(without_ignored(sheet, 0, vocabulary.ignored))
+    (column, *_), tests = [*_keys_tests(TableRow(0, table.columns), known), -1], dict[str, dict[str, SourceText]]()
+    by_alloy = known.condition(table.columns[column]) == "alloy"
+    for row in table.rows if column >= 0 else ():
+        test, place = row.cells[column], table.location(row.line)
+        if by_alloy and (not test or test in tests):
+            return {}  # of alloys at several temperatures, and the like
         if not test or test in tests:
             raise HistoryError(f"{place}: the test is '{quoted(test)}', which is empty or named before; name each once")
         tests[test] = {
             _key_of_condition(name, known): replace(entry, key=name)
             for name, entry in table.entries(row).items()
-            if name != table.columns[columns[0]]
+            if by_alloy or name != table.columns[column]
         }
         if empty := [name for name in table.empty_columns(row) if known.is_condition(name)]:
             tests[test]["label assumed"] = SourceText(", ".join(map(unknown_text, empty)), place)
@@ -394,16 +408,21 @@ def _note_of_sheet(sheet: CellTable) -> dict[str, SourceText]:
 
 
 def _with_conditions(
-    path: Path, tests: Sequence[TabulatedTest], stated: Mapping[str, Mapping[str, SourceText]]
+    sheet: CellTable, tests: Sequence[TabulatedTest], stated: Mapping[str, Mapping[str, SourceText]]
 ) -> Iterator[TabulatedTest]:
-    """The tests with what the sheets of conditions say of them, by their name or that of their sheet."""
-    used = {test.name if test.name in stated else test.table.sheet for test in tests}
-    if unused := sorted(stated.keys() - used):
-        where = next((entry.location for entry in stated[unused[0]].values()), str(path))
-        what = f"'{quoted(unused[0])}' has conditions, but no sheet or column of that name"
-        raise HistoryError(f"{where}: {what}; correct it, or leave the sheet out: --ignore, in Python ignore=[...]")
-    for test in tests:
-        extra = stated.get(test.name, stated.get(test.table.sheet, {}))
+    """The tests with what a sheet of conditions says of them, by their name, or that of their sheet or alloy."""
+    most = [max((_agreement(key, test) for key in stated), default=0) for test in tests]
+    found = [[key for key in stated if n and _agreement(key, test) == n] for n, test in zip(most, tests, strict=True)]
+    unused = sorted(stated.keys() - {key for keys in found for key in keys})
+    twice = next((keys for keys in found if len(keys) > 1), [])
+    if unused or twice:
+        said = f"'{quoted(unused[0])}' has conditions, but no sheet or column of that name" if unused else ""
+        said = said or f"'{quoted(twice[0])}' and '{quoted(twice[1])}' may be of one test"
+        where = next((one.location for one in stated[(unused or twice)[0]].values()), sheet.place)
+        what = f"{said}; correct it, or is sheet '{sheet.sheet}' to be left out?"
+        raise Question(sheet.path, where, what, "columns", [{sheet.sheet: UNUSED}])
+    for test, keys in zip(tests, found, strict=True):
+        extra = stated[keys[0]] if keys else {}
         for key in extra.keys() & test.entries.keys():
             if not extra[key].says_the_same(test.entries[key]):
                 what = f"'{key}' is {quoted(extra[key].text, 60)}, and {test.entries[key].location} says another one"

@@ -23,7 +23,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_number
-from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve
+from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve, through_midnight
 from creepkit.readers.questions import Question
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of
 from creepkit.readers.vocabulary import (
@@ -252,8 +252,7 @@ def _times_of(
     times = np.array(seconds)
     meant = synonyms.get(name, name)
     if words_of(meant) in OF_DAY:
-        later = np.concatenate([[0.0], np.cumsum(np.diff(times) < -0.5 * DAY)])
-        times = times + DAY * later
+        times = through_midnight(times)[0]
         return times - times[0], f"time since the first row at {table.rows[0].cells[clock]}"
     if _ELAPSED_NAME.search(meant):
         return times, ""

@@ -11,11 +11,12 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import NUMBERS, is_missing, is_number
+from creepkit.files.delimited_text import NUMBERS, float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.questions import ANSWERS_FILE
 from creepkit.readers.table import CellTable, SourceText, TableRow, without_ignored
@@ -120,7 +121,9 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
     known = vocabulary.terms(table.header["specimen"].text if "specimen" in table.header else "")
     at = _row_of_names(table, known)
     line, searched = table.rows[at].line, table.rows[: at + _MOST_BELOW]
-    table = without_ignored(_with_comments(table, line, known), at, vocabulary.ignored)
+    numbered = [name for k, name in enumerate(table.rows[at].cells) if _numbers_readings(table, at, k, known)]
+    table = table.assuming(*(f"'{quoted(name, 40)}' numbers the readings" for name in numbered))
+    table = without_ignored(_with_comments(table, line, known), at, (*vocabulary.ignored, *numbered))
     at = next((k for k, row in enumerate(table.rows[: at + 1]) if row.line == line), -1)
     if at < 0:
         raise HistoryError(f"{table.location(line)}: every column is left out by ignore; keep those of the test")
@@ -146,6 +149,17 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
     below = replace(table, rows=[TableRow(line, with_units), *table.rows[body:]])
     times = [k for k, cell in enumerate(with_units) if is_time(cell, known)]
     return HeadedTable(below, known, written, head, whole, times)
+
+
+def _numbers_readings(table: CellTable, at: int, column: int, known: Terms) -> bool:
+    """Whether a column of no known name, below the row of names, holds whole numbers that rise by one, as of frames."""
+    name, rows = table.rows[at].cells[column], table.rows[at + 1 :]
+    cells = [row.cells[column] for row in rows if row.cells[column:]]
+    if not name or known.quantity(name) or known.is_condition(name) or split_written_name(name)[1]:
+        return False
+    numbers = [float_of(cell) for cell in cells if is_number(cell, table.dialect)]
+    rises = {b - a for a, b in pairwise(numbers)} == {1.0} and numbers[0] == int(numbers[0])
+    return rises and len(numbers) > 2 and 2 * len(numbers) > len(cells)
 
 
 def _with_stated(table: CellTable, stated: Mapping[str, tuple[str, str]]) -> CellTable:
@@ -388,7 +402,8 @@ _OF_THE_MATERIAL = re.compile(
 
 
 _LOWEST = 100.0
-"""Number of a temperature below which a text hardly means that of a creep test, unless it is called a temperature."""
+_AT_TEST = re.compile(r"(?:creep|kriech|fluage|test|versuch|essai)\w*\b.*(?:\bat|\bbei|à|@)\s*$", re.IGNORECASE)
+"""Number of a temperature below which a text hardly means that of a creep test, unless it says so, or calls it one."""
 
 
 TEMPERATURE_AGREEMENT, LOAD_AGREEMENT = 3.0, 0.03
@@ -409,7 +424,7 @@ def conditions_of_head(cell: str, known: Terms) -> list[tuple[str, str]]:
 
 def _quantity_of(unit: str, known: Terms) -> str:
     suffix, kinds = unit_suffix(unit), known.condition_kinds
-    loads = known.own_loads or ("stress",)
+    loads = known.own_loads or (("pressure",) if suffix == "bar" else ("stress",))
     names = (name for name in ("temperature", *loads) if name in kinds and suffix and suffix in kinds[name].units)
     return next(names, "")
 
@@ -422,17 +437,25 @@ def conditions_in_text(text: str, place: str, known: Terms) -> list[SourceText]:
     found: dict[str, list[str]] = {}
     if _OF_THE_MATERIAL.search(text):
         return []
-    for match in _ASSIGNED.finditer(text):
+
+    def take(match: re.Match[str]) -> str:
         name, suffix = known.condition(match[1].split(",")[-1].strip()), unit_suffix(match[3])
         kind = known.conditions.kinds.get(name)
-        if kind is not None and suffix in kind.units:
+        if kind is None:
+            return (
+                match[0] if match[0].count(":") else " ; "
+            )  # "L1-1: 40 bar" names a test, "R = 40 MPa" another stress
+        if suffix in kind.units:
             found.setdefault(name, []).append(f"{match[2]} {match[3]}")
-    rest = _ASSIGNED.sub(" ; ", text)
+        return " ; "
+
+    rest = _ASSIGNED.sub(take, text)
     for match in _VALUE.finditer(rest):
         quantity = _quantity_of(match[2], known)
         is_range = _RANGE.search(rest[: match.start()]) is not None
         number = float(match[1].replace(",", "."))
-        if unit_suffix(match[2]) in ("GPa", "Pa") or (quantity == "temperature" and number < _LOWEST):
+        is_at = _AT_TEST.search(rest[: match.start()]) is not None
+        if unit_suffix(match[2]) in ("GPa", "Pa") or (quantity == "temperature" and number < _LOWEST and not is_at):
             continue
         if quantity:
             found.setdefault(quantity, []).extend([f"{match[1]} {match[2]}"] * (1 + is_range))

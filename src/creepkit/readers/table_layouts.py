@@ -41,7 +41,15 @@ from creepkit.readers.table_heads import (
     is_time,
     test_and_column,
 )
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, split_written_name, unit_suffix, words_of
+from creepkit.readers.vocabulary import (
+    NAMES_OF,
+    HeaderVocabulary,
+    Terms,
+    names_tests,
+    split_written_name,
+    unit_suffix,
+    words_of,
+)
 from creepkit.records.quantities import STRAIN
 
 # ---- tests in rows ---------------------------------------------------------------------------------------------------
@@ -83,10 +91,6 @@ def without_remarks(table: CellTable, notes: dict[str, SourceText], labels: Coll
     return table.keeping([k for k in range(len(table.columns)) if k not in columns])
 
 
-_DATES = frozenset(("date", "datum", "day", "jour", "heure"))
-"""Names of columns of days, in small letters, and of the clock times beside them."""
-
-
 def without_clocks(table: CellTable, known: Terms) -> CellTable:
     """The table without dates and times of a clock, where a column of elapsed times in a unit is beside them."""
     if not table.rows:
@@ -94,7 +98,7 @@ def without_clocks(table: CellTable, known: Terms) -> CellTable:
     first = table.rows[0].cells
     times = [k for k, name in enumerate(table.columns) if known.quantity(name) == "time"]
     elapsed = [k for k in times if is_number(first[k], table.dialect)]
-    dates = [k for k, name in enumerate(table.columns) if words_of(name) in _DATES]
+    dates = [k for k, name in enumerate(table.columns) if words_of(name) in NAMES_OF["date"]]
     clocks = [k for k in {*times, *dates} if is_clock_time(first[k])]
     if not elapsed or not clocks:
         return table

@@ -20,7 +20,6 @@ from creepkit.readers.columns_of_tests import (
     NAMES,
     QUANTITIES,
     RATES,
-    TEXTS,
     TestColumn,
     TestTableHead,
     column_called,
@@ -291,8 +290,7 @@ class TestTable:
 
     def _refuse_misspelt(self, written: str) -> None:
         name, unit = split_written_name(written)
-        lists = (*(names for _, names in QUANTITIES.values()), *TEXTS.values())
-        known = [one for names in lists for one in names if len(one) > 3]
+        known = [one for one in (*QUANTITIES, *NAMES.synonyms) if len(one) > 3]
         near = get_close_matches(words_of(name), known, 1, cutoff=0.8)
         is_another = (
             near and {*near[0].split()} & {*words_of(name).split()} and self._has(column_called(near[0]).quantity)

@@ -7,25 +7,21 @@ Names as laboratories write them, `Time (h)`, `Strain [%]`, `T_F`, are brought i
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher, get_close_matches
 from functools import cached_property, lru_cache
 
 from creepkit.records import TENSOR_COMPONENTS, dimensions_of, known_specimens, loads_of, outputs_of
 from creepkit.records.quantities import (
-    ANGLE,
     AREA,
     FLAG,
-    FORCE,
     LENGTH,
     MODULUS,
-    MOMENT,
     POISSON,
     RATE,
     SIGNED_STRESS,
     STRAIN,
-    STRESS,
     TEMPERATURE,
     TIME,
     QuantityKind,
@@ -46,30 +42,32 @@ def split_unit(name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str] 
     return None if found is None else (found, name[len(found) + 1 :])
 
 
-_READ = dict.fromkeys(
-    suffix
-    for kind in (TIME, STRAIN, TEMPERATURE, STRESS, MODULUS, LENGTH, FORCE, MOMENT, ANGLE, AREA)
-    for suffix in kind.units
-    if suffix in UNITS
-)
-"""Units that some column or condition may be in."""
-
-
-UNIT_SPELLINGS: Mapping[str, str] = {spelling.lower(): symbol for spelling, symbol in spellings(*_READ).items()}
+UNIT_SPELLINGS: Mapping[str, str] = {spelling.lower(): symbol for spelling, symbol in spellings(*UNITS).items()}
 """{spelling in small letters: creepkit's suffix}. Capitals do not matter but where they tell units apart."""
 
 
 NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "time": (
-        *("elapsed time", "time elapsed", "test time", "creep time", "time under load", "zeit", "prüfzeit", "laufzeit"),
-        *("belastungszeit", "beanspruchungsdauer", "versuchszeit", "temps", "durée", "temps écoulé", "x_value"),
-        *("timestamp", "time stamp", "datetime", "date time", "date/time", "time of day", "uhrzeit", "時間"),
+        *("timestamp", "time stamp", "datetime", "date time", "date/time", "date and time", "clock", "zeit", "elapsed"),
+        *("elapsed time", "unix", "unix time", "epoch", "epoch time", "uhrzeit", "zeitstempel", "test time", "時間"),
+        *("time of day", "time elapsed", "creep time", "time under load", "prüfzeit", "laufzeit", "belastungszeit"),
+        *("beanspruchungsdauer", "versuchszeit", "temps", "durée", "temps écoulé", "x_value"),
     ),
+    "date": ("date", "datum", "day", "jour", "heure"),
     "temperature": (
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
-        *("probentemperatur", "ofen", "ofentemperatur", "température", "température d'essai", "four", "temp ctrl"),
-        *("試験温度", "温度"),
+        *(
+            "probentemperatur",
+            "ofen",
+            "ofentemperatur",
+            "temperatur ofen",
+            "température",
+            "température d'essai",
+            "four",
+            "temp ctrl",
+        ),
+        *("試験温度", "温度", "temp d'essai"),
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
@@ -105,7 +103,16 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "thermal_expansion": ("coefficient of thermal expansion", "cte", "wärmeausdehnungskoeffizient"),
     "poisson": ("poisson's ratio", "poissons ratio", "poisson ratio"),
-    "rupture": ("rupture time", "time to rupture", "rupture life", "bruchzeit", "standzeit", "temps à rupture"),
+    "rupture": (
+        *("rupture time", "time to rupture", "rupture life", "creep life", "t rupture", "ttr", "ttf", "bruchzeit"),
+        *("standzeit", "temps à rupture", "durée de vie"),
+    ),
+    "end_time": (
+        *("end time", "duration", "test duration", "time on test", "hours on test", "prüfdauer", "versuchsdauer"),
+        *("durée d'essai", "temps d'essai", "durée de l'essai"),
+    ),
+    "minimum_rate": ("minimum rate", "minimum creep rate", "mcr", "minimale kriechrate"),
+    "minimum_rate_sd": ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd"),
     "strain_sd": ("standard deviation of strain", "strain standard deviation"),
     "diameter": (
         *("specimen diameter", "sample diameter", "initial diameter", "gauge diameter", "durchmesser"),
@@ -125,6 +132,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("midspan deflection", "deflection at midspan", "centre deflection", "center deflection", "durchbiegung"),
         *("central deflection", "mid span deflection", "durchbiegung mitte", "mittendurchbiegung", "flèche"),
         *("flèche au centre", "load point deflection", "load point displacement", "deflection at load points"),
+        *("apex height", "apex deflection", "dome height", "bulge height", "pole height", "kuppelhöhe", "wölbhöhe"),
     ),
     "notch_diameter": ("minimum diameter", "root diameter", "notch root diameter", "kerbdurchmesser"),
     "span": (
@@ -138,17 +146,35 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "width": ("specimen width", "breite", "probenbreite", "largeur"),
     "thickness": (
-        *("specimen thickness", "wall thickness", "wall", "dicke", "probendicke", "wandstärke", "wanddicke"),
+        *(
+            "specimen thickness",
+            "wall thickness",
+            "wall",
+            "dicke",
+            "blechdicke",
+            "probendicke",
+            "wandstärke",
+            "wanddicke",
+        ),
         *("épaisseur", "épaisseur de paroi"),
     ),
     "area": (
         *("cross section", "cross-section", "cross-sectional area", "cross section area", "initial area"),
         *("querschnitt", "querschnittsfläche", "anfangsquerschnitt", "section", "section initiale"),
     ),
-    "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung"),
+    "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung", "composition", "nuance", "steel", "grade"),
     "name": ("test name", "test id", "test", "試験片番号"),
+    "label heat": ("heat", "cast", "batch", "charge", "schmelze", "heat number", "heat no", "heat id", "coulée"),
+    "label laboratory": ("laboratory", "lab", "labor", "laboratoire"),
+    "label operator": ("prüfer", "tester"),
+    "label elongation_pct": ("rupture elongation", "elongation at rupture", "bruchdehnung", "allongement à rupture"),
+    "label reduction_of_area_pct": (
+        *("reduction of area", "area reduction", "reduction in area", "brucheinschnürung", "einschnürung", "striction"),
+        *("striction à rupture",),
+    ),
 }
-"""{quantity or text key: its names in small letters}."""
+"""{quantity, key of a text or of a label: its names in small letters}; a forecast tells the scatter between heats and
+laboratories apart."""
 
 
 NAME_SYNONYMS: Mapping[str, str] = {name: meaning for meaning, names in NAMES_OF.items() for name in names}
@@ -180,7 +206,7 @@ STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
 """{name of a column in small letters: key and text of the condition that it states}."""
 
 
-_IN_BRACKETS = re.compile(r"([^()\[\]]*)[(\[]([^()\[\]]*)[)\]]\s*([^()\[\]]*)")
+_IN_BRACKETS = re.compile(r"([^()\[\]]*)[(\[]((?:[^()\[\]]|\(\w*\))*)[)\]]\s*([^()\[\]]*)")
 
 
 _PARTS_OF_UNIT = 8
@@ -207,22 +233,23 @@ def unit_suffix(text: str) -> str | None:
     return UNIT_SPELLINGS.get(plain)
 
 
-def split_written_name(text: str) -> tuple[str, str]:
+def split_written_name(text: str, is_unit: Callable[[str], object] = unit_suffix) -> tuple[str, str]:
     """Name and unit as written, ("Time", "h") of `Time (h)`, `Time [h]`, `Time / h`, `Time, h`, `Time_h`, `Time in h`.
 
-    The unit is "" where there is none; what stands in brackets at the end is one even where it is not known.
+    The unit is "" where there is none; what stands in brackets at the end is one even where it is not known. is_unit :
+    whether a text is a unit elsewhere.
     """
     text = " ".join(text.split())
     if match := _IN_BRACKETS.fullmatch(text):
         name, unit, rest = (part.strip() for part in match.groups())
-        if not rest or unit_suffix(unit):
+        if not rest or is_unit(unit):
             return f"{name} {rest}".strip(), unit
     for separator in (",", " in ", "_", " ", "/"):
         parts = text.split(separator)
         for k in range(max(1, len(parts) - _PARTS_OF_UNIT), len(parts)):
             name, unit = separator.join(parts[:k]), separator.join(parts[k:])
             # A blank before 1 sets a number apart, as of a sensor, and no unit.
-            if name and unit_suffix(unit) and not (separator in " _" and unit.casefold() in ("1", "-", "std")):
+            if name and is_unit(unit) and not (separator in " _" and unit.casefold() in ("1", "-", "std")):
                 return name.strip(" ,_/"), unit.strip()
     return text, ""
 
@@ -344,14 +371,6 @@ TEXT_KEYS = (
     *("decimal", "columns", "ignore", "strain_unit", "date_order", "time_zone"),
 )
 """Words that stand once for a whole test, beside steps and programs; the last line says how its table is written."""
-
-
-LABEL_KEYS: Mapping[str, str] = {
-    **dict.fromkeys(("heat", "cast", "batch", "charge", "schmelze"), "heat"),
-    **dict.fromkeys(("laboratory", "lab", "labor"), "laboratory"),
-    **dict.fromkeys(("prüfer", "tester"), "operator"),
-}
-"""{key: label} of what tests share with others: a forecast tells the scatter between heats and laboratories apart."""
 
 
 CLOSE_SPELLING = 0.8
@@ -497,14 +516,16 @@ class Terms:
 
     def condition(self, name: str) -> str:
         """A name of a condition in creepkit's form, where it is understood."""
-        words = words_of(name)
+        written, unit = split_written_name(name)
+        label = NAME_SYNONYMS.get(words_of(written), "")
         if name in self.vocabulary.synonyms or name in self.vocabulary.labels:
             return name
         if name.startswith(("label ", "geometry ")):
             return name
         if names_tests(name):
             return "name"
-        return f"label {LABEL_KEYS[words]}" if words in LABEL_KEYS else self.conditions.standard(name)
+        is_label = label.startswith("label ") and unit_suffix(unit) == ("pct" if unit else None)
+        return label if is_label else self.conditions.standard(name)
 
     def is_condition(self, name: str) -> bool:
         """Whether a name is that of a condition."""
@@ -524,7 +545,8 @@ class Terms:
     def misspelt(self, name: str) -> str:
         """The key of which an unknown name is a misspelling; "" for none."""
         plain, keys = plain_name(name), self._keys_by_name
-        if misspelt := [known for known in keys if is_misspelling(plain, known)]:
+        written = {plain, name.casefold()}  # with what stands before a unit that was left out
+        if misspelt := [known for known in keys if any(is_misspelling(one, known) for one in written)]:
             return keys[get_close_matches(plain, misspelt, 1, cutoff=0.0)[0]]
         words = {plain, plain.rpartition("_")[0]}
         names = (name for name in self.condition_kinds for word in words if is_misspelling(word, name.casefold()))
@@ -545,7 +567,7 @@ class Terms:
         for quantity, kind in self.condition_kinds.items():
             yield from (f"{quantity}_{unit}" if unit else quantity for unit in kind.units)
         yield from sorted(self.text_keys)
-        yield from LABEL_KEYS
+        yield from (name for key in ("heat", "laboratory", "operator") for name in NAMES_OF[f"label {key}"])
         for dimension in self.dimensions:
             yield from (f"{dimension}_{unit}" for unit in LENGTH.units)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Bools, Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
-from creepkit.errors import HistoryError
+from creepkit.errors import SAID, HistoryError, restated
 
 
 @dataclass(frozen=True)
@@ -146,13 +146,11 @@ class Frames(Sequence[CameraFrame]):
         moved = np.asarray(displacements, dtype=float)
         if moved.ndim != 3 or moved.shape[2] != 3:
             raise HistoryError(f"frames '{name}': displacements have the shape {moved.shape}; not (frames, points, 3)")
-        try:
+        with restated(ValueError, HistoryError, f"frames '{name}': the shapes do not belong together ({SAID})"):
             rest = np.broadcast_to(np.asarray(points, dtype=float), moved.shape)
             seen = np.isfinite(rest).all(axis=2) & np.isfinite(moved).all(axis=2)
             marks = seen if valid is None else seen & np.broadcast_to(np.asarray(valid, dtype=bool), moved.shape[:2])
             moments = np.broadcast_to(np.asarray(times, dtype=float), moved.shape[:1])
-        except ValueError as error:
-            raise HistoryError(f"frames '{name}': the shapes do not belong together ({error})") from None
 
         def frame(index: int) -> CameraFrame:
             return CameraFrame(rest[index], moved[index], marks[index], float(moments[index]), f"{name}, frame {index}")

@@ -49,7 +49,4 @@ class ClockAlignment(Presentable):
         """
         return np.asarray(record_times, dtype=float) - self.lag + self.zero
 
-    def __str__(self) -> str:
-        from creepkit.reports.instrument_records import alignment_text
-
-        return alignment_text(self)
+    shown_by = "instrument_records.alignment_text"

@@ -62,10 +62,7 @@ EVERY_FRAME: Bools = frozen([], dtype=bool)
 class Measured(NotebookCell, Plotted, Tabulated):
     """One or several tests, which notebooks show as a table and a picture of their outputs over time."""
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.histories import draw_tests, tests_figure
-
-        return tests_figure, draw_tests
+    drawn_by = "histories.tests_figure", "histories.draw_tests"
 
 
 @checked

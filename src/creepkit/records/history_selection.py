@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError, refuse_unknown, restated
 from creepkit.records.history import Histories, History
 
 LabelValues = str | float | Sequence[str | float]
@@ -35,8 +35,7 @@ def select_tests(histories: Sequence[History], **labels: LabelValues) -> Histori
     selected = list(range(len(histories)))
     for label, given in labels.items():
         values = [given] if isinstance(given, str | float | int) else list(given)
-        if label not in known:
-            raise HistoryError(f"no test has a label '{label}': {nearest(label, known)}")
+        refuse_unknown(label, known, HistoryError, f"no test has a label '{label}'")
         for value in values:
             if not any(_matches(label, test_labels, value) for test_labels in labels_by_test):
                 raise HistoryError(
@@ -64,10 +63,8 @@ def _matches(label: str, labels: Mapping[str, str | float], value: str | float) 
     found = labels[label]
     if isinstance(found, str):
         return fnmatchcase(found, str(value))
-    try:
+    with restated(ValueError, HistoryError, f"{label}={value} is not a number; write one, as in {label}={found:g}"):
         number = float(value)
-    except ValueError:
-        raise HistoryError(f"{label}={value} is not a number; write one, as in {label}={found:g}") from None
     tolerance = LABEL_TEMPERATURE if label == "temperature" else LABEL_LOAD * abs(found)
     return math.isclose(found, number, rel_tol=0.0, abs_tol=tolerance)
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import Floats, frozen, set_fields
 from creepkit.checked_arguments import checked
-from creepkit.errors import HistoryError, nearest
+from creepkit.errors import HistoryError, refuse_unknown
 from creepkit.records.loading import Program
 from creepkit.records.presentable import Plotted, Presentable
 from creepkit.records.recorded_programs import recorded_program
@@ -102,8 +101,7 @@ class InstrumentRecord(Presentable, Plotted):
 
     def channel(self, name: str) -> Channel:
         """The channel of a name; HistoryError with the nearest one where there is none."""
-        if name not in self.channels:
-            raise HistoryError(f"{self.origin}: there is no channel '{name}'; {nearest(name, self.channels)}")
+        refuse_unknown(name, self.channels, HistoryError, f"{self.origin}: there is no channel '{name}'")
         return self.channels[name]
 
     def readings(self, name: str) -> tuple[Floats, Floats]:
@@ -127,12 +125,6 @@ class InstrumentRecord(Presentable, Plotted):
             raise HistoryError(f"{self.origin}: channel '{channel}' holds no reading after time zero")
         return recorded_program(times[later], values[later], tolerance)
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.instrument_records import draw_record, record_figure
+    drawn_by = "instrument_records.record_figure", "instrument_records.draw_record"
 
-        return record_figure, draw_record
-
-    def __str__(self) -> str:
-        from creepkit.reports.instrument_records import record_text
-
-        return record_text(self)
+    shown_by = "instrument_records.record_text"

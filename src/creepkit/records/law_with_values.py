@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import ExportError, LawError, nearest
+from creepkit.errors import SAID, ExportError, LawError, refuse_unknown, restated
 from creepkit.records.units import factors
 
 if TYPE_CHECKING:
@@ -37,8 +37,7 @@ class Units:
 
     def __post_init__(self) -> None:
         for what, unit, known in (("stress", self.stress, STRESS_UNITS), ("time", self.time, TIME_UNITS)):
-            if unit not in known:
-                raise ExportError(f"'{unit}' is not a unit of {what}: {nearest(unit, known)}")
+            refuse_unknown(unit, known, ExportError, f"'{unit}' is not a unit of {what}")
 
     @property
     def megapascals(self) -> float:
@@ -61,7 +60,8 @@ class Units:
 class LawWithValues:
     """A law with its values, and what belongs to them.
 
-    values : {parameter: number in its unit}, completed and checked.
+    values : {parameter: number in its unit}, completed and checked. Conditions that have a value, in the law's unit,
+        become numbers of the law.
     notes : lines that become comments: intervals, range of validity, provenance.
     units : of the text wanted. elastic : E in MPa, and nu, for targets that state them.
     name : what the target is to call the law; by default the law's own name, made an identifier.
@@ -77,7 +77,12 @@ class LawWithValues:
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", MappingProxyType(self.law.values(self.values)))
+        stated = {one.name: self.values[one.name] for one in self.law.conditions if one.name in self.values}
+        law = self.law.at(None, **stated)
+        gone = {*stated, *self.law.names} - {*law.names}
+        values = {name: value for name, value in self.values.items() if name not in gone}
+        object.__setattr__(self, "law", law)
+        object.__setattr__(self, "values", MappingProxyType(law.values(values)))
         object.__setattr__(self, "notes", tuple(self.notes))
         object.__setattr__(self, "ranges", MappingProxyType(dict(self.ranges)))
 
@@ -91,10 +96,10 @@ class LawWithValues:
         return replace(self, **changes)
 
     @checked
-    def at(self, temperature: float) -> LawWithValues:
-        """The same with a number, in K, in the place of the temperature."""
-        law = self.law.at(temperature)
-        elastic = None if self.elastic is None else self.elastic.at(temperature)
+    def at(self, temperature: float | None = None, /, **conditions: float) -> LawWithValues:
+        """The same with numbers in the place of the temperature, K, and of conditions, in the law's units."""
+        law = self.law.at(temperature, **conditions)
+        elastic = self.elastic if self.elastic is None or temperature is None else self.elastic.at(temperature)
         return replace(self, law=law, values={name: self.values[name] for name in law.names}, elastic=elastic)
 
     def without_inactive_terms(self) -> LawWithValues:
@@ -110,10 +115,8 @@ class LawWithValues:
         }
         if not inactive:
             return self
-        try:
+        with restated(LawError, ExportError, f"nothing to export: {SAID}"):
             law = self.law.fix(**inactive)
-        except LawError as error:
-            raise ExportError(f"nothing to export: {error}") from None
         description = ", ".join(f"{name} = {value:g}" for name, value in inactive.items())
         values = {name: self.values[name] for name in law.names}
         law = replace(law, name=self.law.name, title=self.law.title)

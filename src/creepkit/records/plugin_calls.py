@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from creepkit.errors import CreepkitError, HistoryError, quoted, raised_text
+from creepkit.errors import CreepkitError, HistoryError, quoted, raised_text, refuse_unknown
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -17,6 +17,29 @@ _T = TypeVar("_T")
 
 
 OWN_PACKAGE = "creepkit"
+
+
+class _Offered(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+_Plugin = TypeVar("_Plugin", bound=_Offered)
+
+
+def named_one(kind: str, name: str, offered: Iterable[_Plugin]) -> _Plugin:
+    """The reader, or the format, of a name; HistoryError with the nearest one where there is none."""
+    known = {one.name: one for one in offered}
+    refuse_unknown(name, known, HistoryError, f"no {kind} is called '{name}'")
+    return known[name]
+
+
+def only_one(kind: str, place: object, accepting: Sequence[_Plugin], argument: str) -> _Plugin:
+    """The one reader, or format, that accepts a file; HistoryError for several, which an argument tells apart."""
+    if len(accepting) > 1:
+        names = " and ".join(f"'{one.name}'" for one in accepting)
+        raise HistoryError(f"{place}: the {kind}s {names} both accept it; say which one with {argument}=")
+    return accepting[0]
 
 
 def call_of_plugin(call: Callable[[], _T], owner: object, what: str, error: type[CreepkitError]) -> _T:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from creepkit.errors import SolveError
+from creepkit.records.conditions import of_parameters, with_values_of_tests
 from creepkit.records.nuisance_programs import with_changed_history
 from creepkit.records.plugin_calls import call_of_plugin
 from creepkit.records.prediction import (
@@ -206,9 +207,12 @@ class Predictor:
                 raise SolveError(
                     f"{self.label} does not know the nuisance '{kind_and_start(key)[0]}'; it knows {known}"
                 )
-        given = dict(nuisances or {})
+        given, count = dict(nuisances or {}), theta.shape[-1]
+        law, theta = with_values_of_tests(law, theta, histories)
         prediction = self._predict(law, theta, histories, given, sensitivities)
-        return self._with_differences(prediction, law, theta, histories, given) if sensitivities else prediction
+        if sensitivities:
+            prediction = self._with_differences(prediction, law, theta, histories, given)
+        return of_parameters(prediction, count) if theta.shape[-1] > count else prediction
 
     def predict_to_rupture(
         self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
@@ -218,6 +222,14 @@ class Predictor:
         theta : (candidates[, tests], parameters) internal values. Where specimens are not followed to rupture, no
         strain is reached, and they never break.
         """
+        law, extended = with_values_of_tests(law, theta, histories)
+        prediction = self._predict_to_rupture(law, extended, histories, sensitivities)
+        return prediction if extended is theta else of_parameters(prediction, theta.shape[-1])
+
+    def _predict_to_rupture(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool
+    ) -> Prediction:
+        """predict_to_rupture() of a law without conditions; a kind of it that follows ruptures writes this one."""
         prediction = self.predict(law, theta, histories, sensitivities=sensitivities)
         shape, count = prediction.values.shape[:3], theta.shape[-1]
         never = TimesToStrain(

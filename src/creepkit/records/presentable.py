@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from pandas import DataFrame
+
+
+def function_of_reports(name: str) -> Callable[..., Any]:
+    """A function of the layer above by its module and name, such as "forecast.forecast_text"."""
+    module, _, function = name.rpartition(".")
+    found: Callable[..., Any] = getattr(import_module(f"creepkit.reports.{module}"), function)
+    return found
 
 
 class NotebookCell:
@@ -17,15 +26,20 @@ class NotebookCell:
     __slots__ = ()
 
     def _repr_html_(self) -> str:
-        from creepkit.reports.html.notebook import notebook_html
-
-        return notebook_html(self)
+        return str(function_of_reports("html.notebook.notebook_html")(self))
 
 
 class Presentable(NotebookCell):
-    """A record that prints an answer of its own, `__str__`, in notebooks too; one of long answers has `details()`."""
+    """A record that prints an answer of its own, in notebooks too; one of long answers has `details()`.
+
+    shown_by : the function of creepkit.reports that gives the text, for those that have no `__str__` of their own.
+    """
 
     __slots__ = ()
+    shown_by: ClassVar[str] = ""
+
+    def __str__(self) -> str:
+        return str(function_of_reports(self.shown_by)(self)) if self.shown_by else repr(self)
 
     def details(self) -> str:
         """Everything that there is to say, as text."""
@@ -33,9 +47,13 @@ class Presentable(NotebookCell):
 
 
 class Plotted:
-    """A record with a picture."""
+    """A record with a picture.
+
+    drawn_by : the functions of creepkit.reports of the whole figure, and of its leading panel, of axes and the record.
+    """
 
     __slots__ = ()
+    drawn_by: ClassVar[tuple[str, str]]
 
     def plot(self, path: str | Path | None = None, *, ax: Axes | None = None) -> Figure:
         """The Figure, drawn and written to `path` where one is given; its panels are `.axes`.
@@ -45,11 +63,8 @@ class Plotted:
         """
         from creepkit.reports.figures import plotted
 
-        return plotted(self, *self._drawn_by(), path, ax)
-
-    def _drawn_by(self) -> tuple[Any, Any]:
-        """The function of the whole figure of a record, and that of its leading panel, of axes and the record."""
-        raise NotImplementedError
+        figure, panel = map(function_of_reports, self.drawn_by)
+        return plotted(self, figure, panel, path, ax)
 
 
 class Tabulated:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import SolveError, nearest
+from creepkit.errors import SolveError, refuse_unknown
 from creepkit.records.quantities import QUANTITIES, QuantityKind, unit_of
 
 NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
@@ -176,5 +176,4 @@ def _check_name(what: str, name: str) -> None:
 
 
 def _check_quantity(what: str, quantity: str) -> None:
-    if quantity not in QUANTITIES:
-        raise SolveError(f"{what}: quantity {quantity!r} is not known; {nearest(str(quantity), QUANTITIES)}")
+    refuse_unknown(quantity, QUANTITIES, SolveError, f"{what}: quantity {quantity!r} is not known")

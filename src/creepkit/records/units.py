@@ -72,11 +72,11 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
         "kPa": _unit("stress", 1e-3),
         "hPa": _unit("stress", 1e-4),
         "Pa": _unit("stress", 1e-6),
-        "bar": _unit("stress", 0.1),
+        "bar": _unit("stress", 0.1, "barg", "bar(g)", "bar g", "bar gauge"),
         "mbar": _unit("stress", 1e-4),
         "atm": _unit("stress", 0.101325),
         "Torr": _unit("stress", 0.101325 / 760.0, "mmhg"),
-        "psi": _unit("stress", PSI),
+        "psi": _unit("stress", PSI, "psig", "psi(g)", "psi g", "psi gauge"),
         "kgf/mm2": _unit(
             "stress", 9.80665, "kgf/mm²", "kgf/mm^2", "kp/mm2", "kp/mm²", "kp/mm^2", "kg/mm2", "kg/mm²", "kg/mm^2"
         ),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
-from creepkit.errors import CreepkitError, DatasetError, quoted
+from creepkit.errors import SAID, CreepkitError, DatasetError, quoted, restated
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.limits import ANY_NUMBER
 from creepkit.registry.arguments import specimen_by_name
@@ -28,11 +28,9 @@ def specimen_to_json(specimen: Specimen) -> dict[str, Any]:
         raise DatasetError(
             f"specimen '{specimen.name}' is no dataclass, so that a data set cannot say which one it was made with"
         )
-    try:
+    with restated(RecordError, DatasetError, f"{SAID}; allowed are numbers, words and records of them"):
         _refuse_arrays(record, specimen.name)
         return {"name": specimen.name, "fields": CODEC.to_json(record, specimen.name)}
-    except RecordError as error:
-        raise DatasetError(f"{error}; allowed are numbers, words and records of them") from None
 
 
 def _refuse_arrays(record: Any, place: str) -> None:

@@ -25,8 +25,11 @@ from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.blocks import Answer, Rich, as_text, ends, listed, number, plural, printable
+from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, as_text, listed, named, number, plural, printable
+from creepkit.reports.description import tested_range
+from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
+from creepkit.reports.words import CAUTIONS
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -34,7 +37,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.laplace_approximation import Estimate
-    from creepkit.language import CreepLaw
+    from creepkit.language import CreepLaw, Param
     from creepkit.quality.flags import DataQuality
     from creepkit.rupture_assessment.assessment import RuptureAssessment
 
@@ -43,16 +46,12 @@ MOST_CAUTIONS = 3
 """On the first screen and in a terminal; the others stand in the details."""
 
 
-AT_BOUND = 1e-3
-"""Of the width of a search, from whose upper end on a value is held there."""
+AT_BOUND, WIDER_RATIO = 1e-3, 1e3
+"""Of the width of a search: so near to its end a value is held there; and by what a bound of a logarithm is moved."""
 
 
 MOST_ASKED = 4
 """Numbers of forecasts on the first screen."""
-
-
-MOST_NAMED = 4
-"""Parameters, tests or laws in a sentence."""
 
 
 NOTEWORTHY_EXPONENT = 0.15
@@ -108,15 +107,16 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     slopes = ([math.nan] * 3 if not rates else exponents(rates, energy=energy) for energy in (False, True))
     (measured, half, predicted), (heat, error, _) = slopes
     of_heat = (heat, heat - error, heat + error)
-    by_rates = _with_interval("measured activation energy", _range(fit), of_heat, 1e-3, "kJ/mol")
+    by_rates = _with_interval("measured activation energy", tested_range(fit), of_heat, 1e-3, "kJ/mol")
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
         interval = (measured, measured - half, measured + half)
-        found = [KeyFigure("measured stress exponent", _range(fit), *interval, remark=by_law), by_rates]
-        return [one for one in found if math.isfinite(one.value)]
+        found = [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), by_rates]
+        return [*(one for one in found if math.isfinite(one.value)), *_lives(fit)]
     r = fit.reference
     of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
-    at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}"
+    stated = [f", {c.name.replace('_', ' ')} {dict(r.conditions)[c.name]:.3g} {c.unit}" for c in fit.law.conditions]
+    at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{''.join(stated)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
     by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
@@ -124,7 +124,19 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         by_tests = f"{by_rates.text} by measured minimum rates" if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with usual errors" if any(one.included for one in fit.unmodelled) else ""
-    return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)]
+    return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included), *_lives(fit)]
+
+
+def _lives(fit: Identification) -> list[KeyFigure]:
+    """The life of the test that broke last, by the law, with the interval of a single test; none where none broke."""
+    broken = [(one.rupture, one) for one in fit.tests if one.rupture is not None and one.rupture.used]
+    broken = [(end, one) for end, one in broken if not end.censored and math.isfinite(end.predicted)]
+    if not broken:
+        return []
+    end, test = max(broken, key=lambda pair: pair[0].measured)
+    said = f"measured {_written_out(end.measured / SECONDS_PER_HOUR, 3)} h"
+    values = (end.predicted, end.low, end.high)
+    return [_with_interval("time to rupture", test.condition, values, 1 / SECONDS_PER_HOUR, "h", said)]
 
 
 def _with_interval(
@@ -185,14 +197,9 @@ def strength_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
     return figures
 
 
-def _range(fit: Identification) -> str:
-    """Stresses and temperatures of the tests."""
-    return f"{ends(fit.ranges['stress'], 3)} MPa, {celsius_text(*fit.ranges['temperature'], digits=0)}"
-
-
 def tests_text(fit: Identification) -> str:
     """How many tests, and under which conditions."""
-    return f"{plural(len(fit.tests), 'test')}, {_range(fit)}"
+    return f"{plural(len(fit.tests), 'test')}, {tested_range(fit)}"
 
 
 # ---- cautions --------------------------------------------------------------------------------------------------------
@@ -214,28 +221,47 @@ def _of_tests(fit: Identification) -> Iterator[str]:
 
 
 def _held(fits: Sequence[Identification]) -> Iterator[str]:
-    """A law that an upper bound of the search keeps from the tests."""
+    """A law that a bound of the search keeps from the tests, and how to move it; what is physical is no such bound."""
     for one in fits:
         for name, param in one.law.table.items():
-            low, high = param.bounds
-            if param.scale != "log" and high > 0 and one.values.get(name, low) >= high - AT_BOUND * (high - low):
-                wider = f"bounds = {{ {name} = [{low:g}, {2 * high:g}] }}"
-                yield f"{one.law.name} is held at {name} = {high:g}, where its search ends; write {wider}"
-                return
+            low, high = (param.to_internal(end) for end in param.bounds)
+            value = param.to_internal(one.values[name]) if name in one.values else math.nan
+            free = [end not in (param.limits or ()) and end not in (0.0, param.off) for end in param.bounds]
+            for at_upper, distance in ((False, value - low), (True, high - value)):
+                if distance <= AT_BOUND * (high - low) and free[at_upper]:
+                    yield _bound_text(one.law.name, name, param, at_upper=at_upper)
+                    return
+
+
+def _bound_text(law: str, name: str, param: Param, *, at_upper: bool) -> str:
+    low, high = param.bounds
+    bound = high if at_upper else low
+    further = WIDER_RATIO if param.scale == "log" else 2.0
+    if at_upper:
+        high = high * further if high > 0 else high + (high - low)
+    else:
+        low = low / further if low > 0 else low - (high - low)
+    wider = f"bounds = {{ {name} = [{number(low)}, {number(high)}] }}"
+    end = "upper" if at_upper else "lower"
+    return _said("held", law=law, name=name, value=number(bound), end=end, wider=wider)
+
+
+def _said(kind: str, **values: object) -> str:
+    return CAUTIONS[kind].format(**values)
 
 
 def _contradictions(fit: Identification) -> Iterator[str]:
     """What keeps the law from describing the tests."""
     adequacy = fit.adequacy
     if not fit.converged:
-        yield "the search did not converge: these values may not be its best"
+        yield _said("not converged")
     if adequacy is None:
-        yield "whether the tests contradict the law is not known"
+        yield _said("unknown")
         return
     if adequacy.unpredicted:
-        yield f"it does not predict every reading of {_named(adequacy.unpredicted, 'test')}"
+        yield _said("unpredicted", tests=named(adequacy.unpredicted, "test"))
     if adequacy.contradicting is not None:
-        yield "minimum rates and rupture times of the tests contradict one another by this law"
+        yield _said("contradicting")
     if adequacy.is_explained and not adequacy.lies_in_tests:
         yield adequacy.explanations[0].headline
     if adequacy.mentioned is not None:
@@ -244,13 +270,19 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         worst = adequacy.largest
         factor, unit = (100.0, "%") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
         what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
-        side = "too large" if worst.deviation > 0 else "too small"
-        yield f"it is worst in '{worst.test}': {what} {amount} {side} at {time_text(worst.time)}"
+        side, at = "large" if worst.deviation > 0 else "small", time_text(worst.time)
+        yield _said("worst", test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
     if adequacy.remedies and not adequacy.explanations:
-        yield f"it would explain the tests with {adequacy.remedies[0]}, which nobody modelled"
-    yield from (f"it takes {one.description}, far from what was stated" for one in adequacy.implausible[:1])
+        yield _said("remedy", remedy=adequacy.remedies[0])
+    yield from (_said("implausible", nuisance=one.description) for one in adequacy.implausible[:1])
     if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
-        yield "the noise of the readings is not known: the law cannot be judged by it"
+        yield _said("noise unknown")
+
+
+def _test(fit: Identification, name: str) -> str:
+    """A test with its temperature and load."""
+    condition = next((one.condition for one in fit.tests if one.name == name), "")
+    return f"'{name}'" if not condition or condition in name else f"'{name}' ({condition})"
 
 
 def _choice(ranking: Ranking | None) -> Iterator[str]:
@@ -259,7 +291,7 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
         return
     unmet, others = ranking.unmet, [one.fit.law.name for one in ranking.credible[1:]]
     if others:
-        yield f"the tests cannot tell it apart from {_named(others, 'law')}"
+        yield _said("undecided", laws=named(others, "law"))
     yield from map(str, (ranking.challenges or ())[:1])
     if not (others or ranking.challenges or ranking.adequacy.rejects):
         yield from (unmet[name] for name in ("weight", "challenges") if name in unmet)
@@ -269,52 +301,24 @@ def _precision(fit: Identification) -> Iterator[str]:
     """What the tests do not determine, and what intervals leave out."""
     rejected = fit.adequacy is not None and fit.adequacy.rejects  # whose exponents are not those of the tests
     by = "by this law the tests" if rejected else "the tests"
-    for verdict, words in ((NOT_DETERMINED, "do not determine"), (POORLY_DETERMINED, "hardly determine")):
+    for verdict, kind in ((NOT_DETERMINED, "not determined"), (POORLY_DETERMINED, "hardly determined")):
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
-            yield f"{by} {words} {_named(names, 'parameter', quoted=False)}"
+            yield _said(kind, by=by, names=named(names, "parameter"))
     exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
     if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
-        yield f"without test '{far.test}' the stress exponent is {far.exponent:.3g}"
+        yield _said("one test", test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
     change = combined_change_text(fit.unmodelled)
     if change:
         kinds = " and ".join(dict.fromkeys(one.description for one in beyond_intervals(fit.unmodelled)[:2]))
-        yield f"intervals do not include {kinds}: rates move by {change}"
+        yield _said("not included", kinds=kinds, change=change)
 
 
 def _data(quality: DataQuality | None) -> Iterator[str]:
     if quality is not None and quality.flags:
         tests = list(dict.fromkeys(name for flag in quality.flags for name in flag.tests))
-        yield f"readings of {_named(tests, 'test')} are suspect; nothing was dropped"
-
-
-def _named(names: Sequence[str], noun: str, *, quoted: bool = True) -> str:
-    """Some names, and how many more there are."""
-    marks = "'" if quoted and noun == "test" else ""
-    more = [f"{plural(len(names) - MOST_NAMED, f'more {noun}')}"] if len(names) > MOST_NAMED else []
-    return listed([*(f"{marks}{name}{marks}" for name in names[:MOST_NAMED]), *more])
-
-
-# ---- next ------------------------------------------------------------------------------------------------------------
-
-
-def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
-    """What to do now, in one sentence without a full stop."""
-    adequacy, weak = fit.adequacy, [e.name for e in fit.estimates if e.verdict in (NOT_DETERMINED, POORLY_DETERMINED)]
-    if not fit.converged:
-        held = f" and bounds for {_named(weak, 'parameter', quoted=False)}" if weak else ""
-        return f"repeat the search with more starts (--starts {2 * fit.settings.starts}, or starts in a study){held}"
-    if adequacy is not None and adequacy.in_tests is not None:
-        return adequacy.in_tests.next_step
-    if adequacy is not None and (adequacy.rejects or adequacy.verdict == "cannot be judged"):
-        if ranking is None or len(ranking.laws) < 2:
-            return "compare it with other laws that suit the tests (creepkit init)"
-        return "use it within the range of the tests alone; try further laws for more"
-    undecided = ranking is not None and len(ranking.laws) > 1 and not ranking.decisive
-    if wanted := "tells the laws apart" if undecided else weak and "determines more":
-        return f"make a test that {wanted} (creepkit design says which)"
-    return "forecast (creepkit predict), or export the law to your code (creepkit export)"
+        yield _said("suspect", tests=named(tests, "test"))
 
 
 # ---- the answer ------------------------------------------------------------------------------------------------------
@@ -349,9 +353,9 @@ def answer(
     )
 
 
-def answer_text(fit: Identification, ranking: Ranking | None = None) -> str:
-    """The answer of one law, or of the best of a ranking with the weights of all."""
-    return as_text([answer(fit, ranking)])
+def answer_text(fit: Identification, ranking: Ranking | None = None, more: object = ".details()") -> str:
+    """The answer of one law, or of the best of a ranking with the weights of all; more : what shows the rest."""
+    return as_text([answer(fit, ranking, more=str(more))])
 
 
 def chosen_text(ranking: Ranking) -> str:

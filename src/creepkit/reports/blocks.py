@@ -127,6 +127,7 @@ class Answer:
 
     remarks : on the choice of the law. values : (symbol, value, ends of its interval, unit) of the parameters.
     picture : a Picture, or the Paragraph that says why there is none.
+    more : what shows the rest.
     figures : (name, where it holds, value with interval, remark).
     """
 
@@ -142,6 +143,7 @@ class Answer:
     remarks: Sequence[str] = ()
     picture: Any = None
     files: Sequence[tuple[str, str, str]] = ()
+    more: str = ".details()"
 
 
 Block: TypeAlias = Answer | Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads
@@ -190,6 +192,17 @@ def plural(count: int, noun: str) -> str:
 def listed(words: Sequence[str]) -> str:
     """Words with commas, and 'and' before the last."""
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0] if words else "none"
+
+
+MOST_NAMED = 4
+"""Parameters, tests or laws in a sentence."""
+
+
+def named(names: Sequence[str], noun: str) -> str:
+    """Some names, those of tests in quotes, and how many more there are."""
+    marks = "'" if noun == "test" else ""
+    more = [f"{plural(len(names) - MOST_NAMED, f'more {noun}')}"] if len(names) > MOST_NAMED else []
+    return listed([*(f"{marks}{name}{marks}" for name in names[:MOST_NAMED]), *more])
 
 
 def ends(values: Sequence[float] | Floats, digits: int = 4) -> str:
@@ -273,10 +286,10 @@ def _answer_lines(answer: Answer) -> list[str]:
         lines += _indented(text)
     figures = [f"{name} at {where}: {value}{remark and ', '}{remark}" for name, where, value, remark in answer.figures]
     said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
-    end = _indented(f"next: {answer.next_step}; more: .details()")
-    end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), "  more: .details()"]
-    for parts in (warned, said):
-        while len(parts) > 1 and sum(map(len, (lines, *said, *warned, end))) > MOST_LINES:
+    end = _indented(f"next: {answer.next_step}; more: {answer.more}")
+    end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
+    for parts, least in ((warned, 1), (said, 0)):
+        while len(parts) > least and sum(map(len, (lines, *said, *warned, end))) > MOST_LINES:
             parts.pop()
     return [*lines, *chain(*said, *warned), *end]
 

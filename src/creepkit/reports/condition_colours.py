@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-USED_SHARE, SAME, LABELS = 0.8, 1e-6, 5
-"""Of a colour map, whose palest colours cannot be seen on white; the relative difference of conditions that are one;
-and labels along a colour bar, its ends among them."""
+USED, SAME, LABELS = (0.15, 0.8), 1e-6, 5
+"""Of a colour map, whose palest colours cannot be seen on white, nor its darkest told apart on a dark page; the
+relative difference of conditions that are one; and labels along a colour bar, its ends among them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class ColourScale:
         transform: Callable[[Any], Any] = np.log if self.logarithmic else np.asarray
         low, high = (float(transform(end)) for end in self.ends)
         share = (float(transform(value)) - low) / (high - low) if high - low > SAME * abs(high) else 0.0
-        return colormaps[self.colour_map](USED_SHARE * share)
+        return colormaps[self.colour_map](USED[0] + (USED[1] - USED[0]) * share)
 
     @property
     def colours(self) -> list[Any]:
@@ -65,7 +65,7 @@ class ColourScale:
 
         low, high = self.ends
         norm = (LogNorm if self.logarithmic else Normalize)(low, high)
-        colours = ListedColormap(colormaps[self.colour_map](np.linspace(0.0, USED_SHARE, 256)))
+        colours = ListedColormap(colormaps[self.colour_map](np.linspace(*USED, 256)))
         bar = axes.figure.colorbar(ScalarMappable(norm, colours), ax=axes, label=self.label, pad=0.01, aspect=30)
         ticks = (np.geomspace if self.logarithmic else np.linspace)(low, high, LABELS)
         bar.set_ticks(list(ticks), labels=[f"{float(f'{v:.3g}'):g}" for v in ticks])
@@ -90,7 +90,7 @@ def mean_stresses(histories: Sequence[History], predictor: Predictor | None) -> 
 def temperature_scale(histories: Sequence[History]) -> ColourScale:
     """Colours by temperature: a test with steps has that of its mean, which is no level of the scale."""
     levels = np.array([T for h in histories for T in held_temperatures(h)]) - ZERO_CELSIUS
-    return ColourScale("temperature, °C", temperatures_celsius(histories), colour_map="inferno", levels=levels)
+    return ColourScale("temperature, °C", temperatures_celsius(histories), colour_map="plasma", levels=levels)
 
 
 def tested_temperatures(histories: Sequence[History]) -> list[float]:

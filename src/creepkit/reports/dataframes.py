@@ -7,7 +7,7 @@ from functools import singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.errors import HistoryError, ReportError
+from creepkit.errors import HistoryError, ReportError, restated
 from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
@@ -53,10 +53,8 @@ def to_arviz(samples: PosteriorSamples) -> Any:
 
     ReportError where xarray, which comes with arviz, is not installed.
     """
-    try:
+    with restated(ImportError, ReportError, "samples for arviz need it installed: pip install 'creepkit[notebook]'"):
         from xarray import Dataset
-    except ImportError:
-        raise ReportError("samples for arviz need it installed: pip install 'creepkit[notebook]'") from None
     table, draws = samples.coordinates.law.table, samples.values
     known = {name: {"long_name": p.meaning, "units": p.unit} for name, p in table.items()}
     return Dataset({name: (("chain", "draw"), draws[name][None, :], known[name]) for name in draws})

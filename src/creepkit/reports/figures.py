@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import ReportError
+from creepkit.errors import SAID, ReportError, restated
 from creepkit.files.writing import replace_on_success
 
 if TYPE_CHECKING:
@@ -77,10 +77,8 @@ def panel_grid(
 
 def make_folder(folder: Path) -> None:
     """Make a folder for figures where there is none; ReportError where it cannot be made."""
-    try:
+    with restated(OSError, ReportError, f"{folder}: no plots can be written there ({SAID}); name another folder"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ReportError(f"{folder}: no plots can be written there ({error.strerror}); name another folder") from None
 
 
 def check_picture_format(path: Path) -> None:

@@ -14,7 +14,7 @@ from creepkit.errors import CreepkitError
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
 from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, chi_square_by_test
 from creepkit.records import is_logarithmic
-from creepkit.reports.answer import titled_law
+from creepkit.reports.answer import answer_text, titled_law
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
 from creepkit.reports.compared_values import judged_readings, misfit_of
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
@@ -169,7 +169,8 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
     """Print the table of laws, the answer, and what was written."""
     table = _table(ranking)
     print_table(f"{test_count} tests", table.columns, [[*map(str, row)] for row in table.rows])
-    tell(f"{ranking}\n")
+    files = [path.name for path in written if path.suffix == ".json"]
+    tell(f"{answer_text(ranking.best, ranking, f'creepkit report {files[-1]}' if files else 'creepkit report')}\n")
     for path in written:
         tell_written(path)
 

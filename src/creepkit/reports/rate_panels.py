@@ -41,7 +41,8 @@ PERCENT_PER_HOUR = 100.0 * SECONDS_PER_HOUR
 class RateCurve(NamedTuple):
     """Rates over stress at a temperature.
 
-    stress : (stresses,) MPa. rate, low, high : (stresses,) 1/s, with the ends of 95 % intervals.
+    stress : (stresses,) MPa. rate, low, high : (stresses,) 1/s, with the ends of 95 % intervals. tested : MPa, the
+    lowest and the highest stress of tests there; beyond them the curve is dashed.
     """
 
     celsius: float
@@ -49,6 +50,7 @@ class RateCurve(NamedTuple):
     rate: Floats
     low: Floats
     high: Floats
+    tested: tuple[float, float] = (0.0, np.inf)
 
 
 class RatePoints(NamedTuple):
@@ -86,8 +88,9 @@ def _draw_reference_rates(axes: Axes, fit: Identification) -> None:
     stresses = _tested_stresses(fit)
     grid = np.geomspace(0.8 * min(stresses), 1.25 * max(stresses), 60)
     curves = [
-        RateCurve(celsius, grid, *fit.rate(grid, np.full_like(grid, celsius + ZERO_CELSIUS), warn=False))
+        RateCurve(celsius, grid, *fit.rate(grid, np.full_like(grid, T), warn=False), _stresses_at(fit, T))
         for celsius in _drawn_temperatures(tested_temperatures(fit.histories))
+        for T in [celsius + ZERO_CELSIUS]
     ]
     points = [RatePoints("law × own rate of each test", *np.array(own).T)] if own else []
     _draw(axes, fit, curves, points, "95 % band: law")
@@ -98,6 +101,13 @@ def _draw_reference_rates(axes: Axes, fit: Identification) -> None:
         f"the law's rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h{initial}",
         fontsize=9,
     )
+
+
+def _stresses_at(fit: Identification, T: float) -> tuple[float, float]:
+    """MPa, the lowest and the highest of the tests at a temperature, K."""
+    here = [h for h in fit.histories if np.abs(np.subtract(held_temperatures(h), T)).min() < ISOTHERMAL_RANGE]
+    stresses = [float(v) for h in here for v in reference_stresses(h, fit.predictor) if v > 0]
+    return min(stresses, default=0.0), max(stresses, default=0.0)
 
 
 def own_rates(fit: Identification, test: int) -> list[tuple[float, float, float]]:
@@ -148,12 +158,14 @@ def _draw(
     centre = PERCENT_PER_HOUR * np.concatenate([one.rate for one in drawn])
     centre = centre[np.isfinite(centre) & (centre > 0)]
     for curve in curves:
-        rate, low, high = (PERCENT_PER_HOUR * v for v in curve[2:])
+        rate, low, high = (PERCENT_PER_HOUR * v for v in (curve.rate, curve.low, curve.high))
+        inside = (curve.stress >= 0.99 * curve.tested[0]) & (curve.stress <= 1.01 * curve.tested[1])
         style: Any = {"color": scale(curve.celsius)}
         label = f"{curve.celsius:.0f} °C" if len(curves) <= MOST_TEMPERATURES else None
         if np.ptp(curve.stress) > 0:
             axes.fill_between(curve.stress, low, high, alpha=0.25, lw=0, **style)
-            axes.plot(curve.stress, rate, lw=1.4, label=label, **style)
+            axes.plot(curve.stress[inside], rate[inside], lw=1.4, label=label, **style)
+            axes.plot(curve.stress, rate, lw=1.0, ls="--", **style)
         else:
             error = np.maximum(np.stack([rate - low, high - rate]), 0.0)
             axes.errorbar(curve.stress, rate, yerr=error, fmt="_", label=label, **style)
@@ -161,6 +173,8 @@ def _draw(
         for celsius, stress, rate in zip(one.celsius, one.stress, PERCENT_PER_HOUR * one.rate, strict=True):
             axes.plot(stress, rate, "o", ms=4, color=scale(celsius), mec="black", mew=0.4, zorder=3)
         axes.plot([], [], "o", ms=4, color="grey", mec="black", mew=0.4, label=one.label)
+    if any(np.isfinite(curve.tested[1]) for curve in curves):
+        axes.plot([], [], "--", lw=1.0, color="grey", label="beyond the tests")
     ends = PERCENT_PER_HOUR * np.concatenate([v for curve in curves for v in (curve.low, curve.high)] or [centre])
     ends = ends[(ends > centre.min() / DRAWN_FACTOR) & (ends < centre.max() * DRAWN_FACTOR)]
     span(axes, "x", *(one.stress for one in drawn), logarithmic=True, margin=1.07)

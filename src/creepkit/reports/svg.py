@@ -132,9 +132,10 @@ def _thin(figure: Figure, artists: Sequence[Any]) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.path import Path
 
-    lines, bands, maps = (
+    every: list[list[Any]] = [
         [one for one in artists if isinstance(one, kind)] for kind in (Line2D, PolyCollection, PathCollection)
-    )
+    ]
+    lines, bands, maps = every
     with np.errstate(all="ignore"):
         for line in (one for one in lines if one.get_linestyle() in ("None", "none", " ", "")):
             points = np.column_stack([line.get_xdata(orig=False), line.get_ydata(orig=False)])

@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError, nearest
+from creepkit.errors import FitError, refuse_unknown
 from creepkit.inverse.information_criteria import bic_penalty, criterion_weights
 from creepkit.records import History
 from creepkit.records.units import celsius_text
@@ -134,8 +134,7 @@ def _known_names(methods: Sequence[str] | str | None) -> list[str] | None:
     known = [name for name in METHODS if name != MINIMUM_RATE.name]
     asked = list(dict.fromkeys([methods] if isinstance(methods, str) else methods))
     for name in asked:
-        if name not in known:
-            raise FitError(f"there is no method '{name}' of rupture times; {nearest(str(name), known)}")
+        refuse_unknown(name, known, FitError, f"there is no method '{name}' of rupture times")
     return asked
 
 
@@ -282,7 +281,12 @@ def _notes(tests: RuptureTests, settings: RuptureSettings) -> list[str]:
     elif tests.groups and tests.censored.any():
         notes.append("effects are integrated out by adaptive Gauss-Hermite quadrature")
     few = [group for group, values in tests.groups.items() if len(set(values)) < 5]
-    notes += [f"the scatter between {len(set(tests.groups[g]))} values of {g} is poorly known" for g in few]
+    notes += [
+        f"{len(set(tests.groups[g]))} values of {g} hardly tell the scatter between them, on which bounds of a new one "
+        "and of a test rest: give tests of five or more, or count all as one (--no-random-effects; random_effects = "
+        "false in a study)"
+        for g in few
+    ]
     return notes
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError, nearest, quoted
+from creepkit.errors import SAID, FitError, nearest, quoted, refuse_unknown, restated
 from creepkit.files.json_documents import DocumentFormat, check_heading, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
@@ -79,8 +79,7 @@ class RuptureSettings(Options, title="settings of an assessment"):
         if not self.degrees:
             raise FitError("degrees are (); give whole numbers from 1 to 5, such as (1, 2, 3)")
         for method, constants in self.fixed.items():
-            if method not in METHODS:
-                raise FitError(f"fixed= names a method '{method}'; {nearest(method, METHODS)}")
+            refuse_unknown(method, METHODS, FitError, f"fixed= names a method '{method}'")
             for name, value in constants.items():
                 if name not in METHODS[method].fixable:
                     allowed = ", ".join(METHODS[method].fixable) or "none"
@@ -296,10 +295,7 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
         beyond = extrapolation(self.tests, hours, temperature, stress)
         return LifeEstimate(stress, temperature, hours, mean, heat, test, beyond)
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.rupture import draw_isotherms, rupture_figure
-
-        return rupture_figure, draw_isotherms
+    drawn_by = "rupture.rupture_figure", "rupture.draw_isotherms"
 
     def save(self, path: str | Path) -> Path:
         """Write the assessment as JSON; by their suffixes the time to rupture in C or Fortran, or a table with bounds.
@@ -308,10 +304,7 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
         """
         return write_assessment(self, path)
 
-    def __str__(self) -> str:
-        from creepkit.reports.rupture import rupture_text
-
-        return rupture_text(self)
+    shown_by = "rupture.rupture_text"
 
 
 ISOTHERMAL_TOLERANCE = 5.0
@@ -381,10 +374,8 @@ def write_assessment(assessment: RuptureAssessment, path: str | Path) -> Path:
 def assessment_from_json(data: Any, source: str) -> RuptureAssessment:
     """The rupture assessment of a document: its fits predict, plot and state strengths as before."""
     content = check_heading(data, source, ASSESSMENT)
-    try:
+    with restated(RecordError, FitError, f"{source}: {SAID}; it is not a rupture assessment of this version"):
         assessment = CODEC.from_json(RuptureAssessment, content)
-    except RecordError as error:
-        raise FitError(f"{source}: {error}; it is not a rupture assessment of this version") from None
     problem = _problem(assessment)
     if problem:
         raise FitError(f"{source}: {problem}; the file is damaged")

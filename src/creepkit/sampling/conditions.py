@@ -16,7 +16,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, frozen
 from creepkit.checked_arguments import checked
-from creepkit.errors import DatasetError, nearest, quoted
+from creepkit.errors import DatasetError, nearest, quoted, refuse_unknown
 from creepkit.language import Elastic
 from creepkit.records import (
     ROOM_TEMPERATURE,
@@ -79,8 +79,7 @@ class SpecimenConditions:
     def check_names(self, names: Iterable[str]) -> None:
         """DatasetError where a name is none of a condition."""
         for name in names:
-            if name not in self.names:
-                raise DatasetError(f"a {self.kind} test has no condition '{name}': {nearest(name, self.names)}")
+            refuse_unknown(name, self.names, DatasetError, f"a {self.kind} test has no condition '{name}'")
 
 
 def record_of(specimen: Predictor) -> Any:

@@ -458,10 +458,7 @@ class Acceptance(Presentable):
         in_range = (self.log10_strains >= self.useful_strains[:, 0]) & (self.log10_strains <= self.useful_strains[:, 1])
         return np.asarray(self.kept & in_range)
 
-    def __str__(self) -> str:
-        from creepkit.reports.dataset import acceptance_text
-
-        return acceptance_text(self)
+    shown_by = "dataset.acceptance_text"
 
 
 def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0) -> Acceptance:

@@ -12,11 +12,10 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from creepkit.errors import FitError, nearest
+from creepkit.errors import SAID, FitError, refuse_unknown, restated
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError, ValueCodec
@@ -138,8 +137,7 @@ class ScreeningResult(Presentable, Plotted):
 
     def __getitem__(self, alloy: str) -> AlloyResult:
         known = {result.alloy: result for result in self.results}
-        if alloy not in known:
-            raise FitError(f"the plate has no alloy '{alloy}'; {nearest(alloy, known)}")
+        refuse_unknown(alloy, known, FitError, f"the plate has no alloy '{alloy}'")
         return known[alloy]
 
     def class_of(self, alloy: str) -> str:
@@ -171,15 +169,9 @@ class ScreeningResult(Presentable, Plotted):
         """Write one row an alloy: class, law, weight, values with intervals, rate, misfits, notes."""
         return write_csv(self, Path(path))
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.screening import draw_rates_of_alloys, screening_figure
+    drawn_by = "screening.screening_figure", "screening.draw_rates_of_alloys"
 
-        return screening_figure, draw_rates_of_alloys
-
-    def __str__(self) -> str:
-        from creepkit.reports.screening import screening_text
-
-        return screening_text(self)
+    shown_by = "screening.screening_text"
 
 
 ALLOY_RESULT = DocumentFormat(
@@ -205,10 +197,8 @@ def write_result(result: AlloyResult, path: Path) -> Path:
 def read_result(path: Path) -> AlloyResult:
     """Read the result of an alloy; FitError, in one sentence, for any other file."""
     content = check_heading(read_json(path, ALLOY_RESULT.kind), str(path), ALLOY_RESULT)
-    try:
+    with restated(RecordError, FitError, f"{path}: {SAID}; {ALLOY_RESULT.remedy}"):
         return CODEC.from_json(AlloyResult, content)
-    except RecordError as error:
-        raise FitError(f"{path}: {error}; {ALLOY_RESULT.remedy}") from None
 
 
 COMPARISON_STRESS = 100.0

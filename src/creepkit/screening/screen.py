@@ -21,7 +21,7 @@ from typing import Annotated, ClassVar, Literal
 
 from creepkit.arrays import usable_cores
 from creepkit.checked_arguments import checked
-from creepkit.errors import CreepkitError, FitError, HistoryError
+from creepkit.errors import SAID, CreepkitError, FitError, HistoryError, restated
 from creepkit.files.writing import hashed_stem
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.confirmation import Confirmation, confirm, outside_domain
@@ -283,10 +283,8 @@ def _distinct_laws(laws_or_names: Sequence[CreepLaw | str]) -> tuple[CreepLaw, .
 
 
 def _make_folder(folder: Path) -> None:
-    try:
+    with restated(OSError, FitError, f"{folder}: cannot be made ({SAID}); name another folder for the results"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FitError(f"{folder}: cannot be made ({error.strerror}); name another folder for the results") from None
 
 
 def _screen_all(job: ScreeningJob, processes: int, progress: ProgressCallback | None) -> list[AlloyResult]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import SolveError, nearest
+from creepkit.errors import SAID, SolveError, refuse_unknown, restated
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.mesh import GeometryDerivative
 from creepkit.fem.section import Section
@@ -58,8 +58,7 @@ class Displacements:
 
     def _displacement(self, point: str, component: int) -> Floats:
         points = self._section.points
-        if point not in points:
-            raise SolveError(f"a section has no point '{point}' to observe; {nearest(point, tuple(points))}")
+        refuse_unknown(point, points, SolveError, f"a section has no point '{point}' to observe")
         number = 2 * points[point] + component
         if self._values is None:
             self.asked.append(number)
@@ -162,7 +161,7 @@ class PreparedSection:
 @kept
 def prepared_section(piece: Axisymmetric, load: str) -> PreparedSection:
     """The section of a test piece; SolveError, beginning with the specimen's name, where it cannot be made."""
-    try:
+    with restated(SolveError, SolveError, f"specimen '{piece.name}' under {load}: {SAID}"):
         section = piece.section(load)
         notes = Displacements(section)
         with np.errstate(all="ignore"):
@@ -172,8 +171,6 @@ def prepared_section(piece: Axisymmetric, load: str) -> PreparedSection:
                 raise SolveError(f"observe() gave no '{name}'; it gives {', '.join(piece.outputs)}")
         order = tuple(sorted(set(notes.asked)))
         return PreparedSection(section, section.model(np.array(order, dtype=np.int64)), order)
-    except SolveError as error:
-        raise SolveError(f"specimen '{piece.name}' under {load}: {error}") from error
 
 
 def _outputs(piece: Axisymmetric, body: PreparedSection, quantities: Floats) -> Floats:

@@ -32,15 +32,9 @@ class Run(Presentable, History):
     end_time: float = 0.0
     reason: str = ""
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.histories import draw_tests, run_figure
+    drawn_by = "histories.run_figure", "histories.draw_tests"
 
-        return run_figure, draw_tests
-
-    def __str__(self) -> str:
-        from creepkit.reports.simulation import run_text
-
-        return run_text(self)
+    shown_by = "simulation.run_text"
 
 
 def run_from_outputs(

@@ -10,7 +10,7 @@ from functools import lru_cache, wraps
 from typing import Any, Self, TypeVar
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import SolveError, nearest
+from creepkit.errors import SolveError, refuse_unknown
 from creepkit.records import (
     Dimension,
     History,
@@ -98,8 +98,7 @@ class TestPiece(Specimen):
         if not known:
             raise SolveError(f"specimen '{self.name}' has no fields to replace; make its class a frozen dataclass")
         for name in changes:
-            if name not in known:
-                raise SolveError(f"specimen '{self.name}' has no field '{name}'; {nearest(name, known)}")
+            refuse_unknown(name, known, SolveError, f"specimen '{self.name}' has no field '{name}'")
         for length in (d for d in self.dimensions if d.name in changes):
             length.checked(changes[length.name], f"specimen '{self.name}'")
         changed: Self = replace(self, **changes)  # type: ignore[type-var]

@@ -82,8 +82,8 @@ class Uniaxial(Bar):
         """Derivative of the observed strain to the creep strain, (candidates, times); creep : (candidates, times)."""
         return np.exp(creep) if history.strain_measure == "engineering" else np.ones_like(creep)
 
-    def predict_to_rupture(
-        self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
+    def _predict_to_rupture(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool
     ) -> Prediction:
         """Predict as predict() does, and follow each bar to its rupture: by a state's limit, or by the strain limit.
 

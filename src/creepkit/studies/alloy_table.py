@@ -11,28 +11,28 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
-from creepkit.files.delimited_text import Dialect, is_number, parse_number
+from creepkit.files.delimited_text import is_number
+from creepkit.readers.conditions import StatedConditions
 from creepkit.readers.spreadsheets import read_sheets
-from creepkit.readers.table import CellTable
+from creepkit.readers.table import CellTable, SourceText, TableRow, check_columns
 from creepkit.readers.text_files import read_text_table
-from creepkit.readers.vocabulary import plain_name, split_written_name, unit_suffix
-from creepkit.records import Specimen, dimensions_of
-from creepkit.records.quantities import LENGTH, MODULUS
+from creepkit.readers.vocabulary import HeaderVocabulary, split_unit, split_written_name, unit_suffix, words_of
+from creepkit.records import Specimen
+from creepkit.records.quantities import LENGTH
 
 COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "camera": ("camera", "view", "field_of_view", "kamera"),
-    "dimple": ("dimple", "test_piece", "piece", "site", "position", "pos", "kalotte"),
-    "alloy": ("alloy", "material", "composition", "legierung", "werkstoff"),
-    "modulus": ("modulus", "young_s_modulus", "youngs_modulus", "elastic_modulus", "e", "e_modul"),
-    "exclude": ("exclude", "excluded", "exclusion", "leave_out", "ausschluss", "ausgeschlossen"),
+    "camera": ("camera", "view", "field of view", "kamera"),
+    "dimple": ("dimple", "test piece", "piece", "site", "position", "pos", "kalotte"),
+    "exclude": ("exclude", "excluded", "exclusion", "leave out", "ausschluss", "ausgeschlossen"),
 }
-"""{what a column holds: names of it}."""
+"""{what a column holds beside the conditions of a test: names of it}."""
 
 
 EMPTY_HEADS = (
@@ -42,12 +42,12 @@ EMPTY_HEADS = (
 """Of a table that is to be filled in."""
 
 
-TOLERANCE_WORDS = ("tolerance", "tol", "sd", "uncertainty", "toleranz", "unsicherheit")
-"""Behind the name of a length."""
+_TOLERANCE = re.compile(r"(?:(.+) )?(?:tolerance|tol|sd|uncertainty|toleranz|unsicherheit)")
+"""Behind the name of a length; alone, of the first one."""
 
 
-THICKNESS_WORDS = ("thickness", "dicke", "wall", "blechdicke", "t")
-"""Names of the first length of a test piece, which is that of its plate."""
+_SEARCHED = 60
+"""Rows among which the heads are looked for."""
 
 
 NOTHING = ("", "-", "no", "nein", "0", "false", "n", "none")
@@ -125,13 +125,12 @@ def _grid(path: Path) -> CellTable:
 def read_alloy_table(path: Path, specimen: Specimen) -> AlloyTable:
     """Read a table of alloys; HistoryError, with file and row, says what is wrong with another."""
     grid = _grid(path)
-    heads = _heads(grid, specimen)
+    at, keys = _heads(grid, specimen)
     rows: list[Dimple] = []
-    for row in grid.rows[1:]:
-        cells = [" ".join(cell.split()) for cell in row.cells]
-        if not any(cells):
+    for row in grid.rows[at + 1 :]:
+        if not any(row.cells):
             continue
-        one = _dimple(grid.location(row.line), dict(zip(heads, cells, strict=False)), grid.dialect)
+        one = _dimple(grid, row, dict(zip(keys, grid.rows[at].cells, strict=True)), specimen)
         if any((one.camera, one.name) == (other.camera, other.name) for other in rows):
             raise HistoryError(f"{one.place}: '{quoted(one.name)}' stands there twice; keep one row of each dimple")
         rows.append(one)
@@ -140,88 +139,69 @@ def read_alloy_table(path: Path, specimen: Specimen) -> AlloyTable:
     return AlloyTable(path, tuple(rows))
 
 
-@dataclass(frozen=True)
-class _Head:
-    """A column. role : of COLUMNS, "length", "tolerance" or "label". name : of the length or the label."""
-
-    role: str
-    name: str
-    unit: str
-    written: str
-
-    def value(self, cell: str, place: str, dialect: Dialect, length: float | None = None) -> float:
-        """The number of a cell, mm or MPa; length : mm, of which a tolerance may be in per cent."""
-        number, kind = parse_number(cell, dialect, place, self.written), MODULUS if self.role == "modulus" else LENGTH
-        suffix = unit_suffix(self.unit) if self.unit else "mm" if self.role == "length" else ""
-        if self.role == "tolerance" and suffix == "pct":
-            if length is None:
-                raise HistoryError(
-                    f"{place}: a tolerance in % needs the length that it is of; write that in its column"
-                )
-            number, suffix = 0.01 * number * length, "mm"
-        if not suffix:
-            units = ", ".join(kind.units)
-            raise HistoryError(f"{place}: '{quoted(self.written)}' has no unit that is known; write it as in [{units}]")
-        value = kind.convert(number, suffix, place, self.written)
-        if not value > 0.0:
-            raise HistoryError(f"{place}: '{quoted(self.written)}' is {number:g}; write a number above zero")
-        return value
+def _heads(grid: CellTable, specimen: Specimen) -> tuple[int, list[str]]:
+    """The row of the heads, and what its columns hold: roles of COLUMNS, keys of conditions, tolerances of lengths."""
+    found = [[_key(cell, specimen) for cell in row.cells] for row in grid.rows[:_SEARCHED]]
+    at = next((k for k, keys in enumerate(found) if {"dimple", "alloy"} <= {*keys}), None)
+    if at is None:
+        listed = quoted(", ".join(grid.rows[0].cells), 200) if grid.rows else "none"
+        raise HistoryError(f"{grid.location(1)}: a table of alloys has the columns dimple and alloy, found {listed}")
+    check_columns(grid.location(grid.rows[at].line), found[at])
+    return at, found[at]
 
 
-def _heads(grid: CellTable, specimen: Specimen) -> list[_Head]:
-    if not grid.rows:
-        raise HistoryError(f"{grid.place}: has no heads; write camera, dimple, alloy, ...")
-    place = grid.location(grid.rows[0].line)
-    roles = {spelling: role for role, spellings in COLUMNS.items() for spelling in spellings}
-    lengths = {plain_name(name): one.name for one in dimensions_of(specimen) for name in one.names}
-    thickness = next(iter(lengths.values()), "")
-    lengths |= dict.fromkeys(THICKNESS_WORDS, thickness)
-    heads: list[_Head] = []
-    for written in grid.rows[0].cells:
-        name, unit = split_written_name(written)
-        plain = plain_name(name)
-        first, _, last = plain.rpartition("_")
-        if plain in roles:
-            head = _Head(roles[plain], "", unit, written)
-        elif plain in lengths:
-            head = _Head("length", lengths[plain], unit, written)
-        elif last in TOLERANCE_WORDS and (not first or first in lengths):
-            head = _Head("tolerance", lengths.get(first, thickness), unit, written)
-        else:
-            head = _Head("label", " ".join(written.split()), "", written)
-        if (head.role, head.name) in [(one.role, one.name) for one in heads]:
-            raise HistoryError(f"{place}: '{quoted(written)}' stands there twice; rename one of these columns")
-        heads.append(head)
-    if not {"dimple", "alloy"} <= {one.role for one in heads}:
-        found = quoted(", ".join(one.written for one in heads), 200)
-        raise HistoryError(f"{place}: a table of alloys has the columns dimple and alloy, found {found}")
-    return heads
+def _key(written: str, specimen: Specimen) -> str:
+    """What a column of this head holds; a length without a unit is in mm, what is no condition of a dimple a label."""
+    known = HeaderVocabulary().terms(specimen.name)
+    words = words_of(split_written_name(written)[0])
+    if role := next((role for role, names in COLUMNS.items() if words in names), ""):
+        return role
+    if tolerance := _TOLERANCE.fullmatch(words):
+        name = known.condition(tolerance[1]) if tolerance[1] else next(iter(known.dimensions), "")
+        if name in known.dimensions:
+            return f"tolerance {known.dimensions[name]}"
+    key = known.condition("thickness" if words == "t" else written)
+    found = split_unit(key, known.conditions.kinds)
+    if key in known.dimensions:
+        return f"{key}_mm"
+    is_own = key == "alloy" or key.startswith("label ") or (found and found[0] in ("modulus", *known.dimensions))
+    return key if is_own else f"label {' '.join(written.split())}"
 
 
-def _dimple(place: str, cells: Mapping[_Head, str], dialect: Dialect) -> Dimple:
-    texts = {head.role: cell for head, cell in cells.items()}
-    if not texts["dimple"]:
+def _dimple(grid: CellTable, row: TableRow, heads: Mapping[str, str], specimen: Specimen) -> Dimple:
+    """The test piece of a row; heads : {key of a column: as it is written}."""
+    place, cells = grid.location(row.line), [" ".join(cell.split()) for cell in row.cells]
+    entries = {
+        key: SourceText(cell, place, grid.dialect.decimal, written)
+        for (key, written), cell in zip(heads.items(), cells, strict=False)
+        if cell or key in COLUMNS
+    }
+    camera, name, reason = (entries.pop(role).text if role in entries else "" for role in COLUMNS)
+    if not name:
         raise HistoryError(f"{place}: does not name its dimple; write it, such as D1")
-    filled: dict[str, dict[str, tuple[_Head, str]]] = {}
-    for head, cell in cells.items():
-        if cell:
-            filled.setdefault(head.role, {})[head.name] = (head, cell)
-    lengths = {name: head.value(cell, place, dialect) for name, (head, cell) in filled.get("length", {}).items()}
-    word = texts.get("exclude", "")
-    reason = "" if word.casefold() in NOTHING else word
+    of_tolerances = {key: entries.pop(key) for key in [*entries] if key.startswith("tolerance ")}
+    stated = StatedConditions(entries, HeaderVocabulary(default_texts={"specimen": specimen.name}), place)
+    modulus, lengths, tolerances = stated.take_number("modulus"), stated.geometry, dict[str, float]()
+    for key, entry in of_tolerances.items():
+        length, unit = key.removeprefix("tolerance "), unit_suffix(split_written_name(entry.key)[1]) or ""
+        if unit == "pct" and length not in lengths:
+            what = "a tolerance in % needs the length that it is of; write that in its column"
+            raise HistoryError(f"{place}: {what}")
+        factor = 0.01 * lengths[length] if unit == "pct" else LENGTH.unit(unit, place, entry.key).factor
+        tolerances[length] = factor * entry.number(entry.key)
+    for what, value in (*lengths.items(), *tolerances.items()):
+        if not value > 0.0:
+            raise HistoryError(f"{place}: {what} is {value:g} mm; write a number above zero")
     return Dimple(
         place,
-        texts.get("camera", ""),
-        texts["dimple"],
-        texts["alloy"],
+        camera,
+        name,
+        stated.take_text("alloy"),
         lengths,
-        {
-            name: head.value(cell, place, dialect, lengths.get(name))
-            for name, (head, cell) in filled.get("tolerance", {}).items()
-        },
-        next((head.value(cell, place, dialect) for head, cell in filled.get("modulus", {}).values()), None),
-        f"excluded by {place}" if reason.casefold() in PLAIN_YES else reason,
-        {name: cell for name, (_, cell) in filled.get("label", {}).items() if name},
+        tolerances,
+        None if modulus is None else modulus.value,
+        "" if reason.casefold() in NOTHING else f"excluded by {place}" if reason.casefold() in PLAIN_YES else reason,
+        stated.labels,
     )
 
 
@@ -231,8 +211,7 @@ def looks_like_alloys(path: Path, specimen: Specimen) -> bool:
         return False
     with suppress(CreepkitError, OSError):
         grid = _grid(path)
-        _heads(grid, specimen)
-        return not any(is_number(cell, grid.dialect) for cell in grid.rows[0].cells)
+        return not any(is_number(cell, grid.dialect) for cell in grid.rows[_heads(grid, specimen)[0]].cells)
     return False
 
 

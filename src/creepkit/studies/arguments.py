@@ -8,17 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import creepkit as ck
 from creepkit.errors import FitError, SurrogateError, nearest, quoted
 from creepkit.experiments.design_task import GoalOptions
 from creepkit.experiments.rig import Rig, changed_rigs
-from creepkit.forecasts.planned_tests import COMPONENTS, DescribedTest, PlannedTestOptions
+from creepkit.forecasts.planned_tests import DescribedTest, PlannedTestOptions, specimen_taking, stated_temperature
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.language import temperature
 from creepkit.options import values_of_table
-from creepkit.readers.vocabulary import split_unit
+from creepkit.readers.vocabulary import COMPONENT_LOADING_KINDS, split_unit
 from creepkit.records import (
     SECONDS_PER_HOUR,
-    TENSOR_COMPONENTS,
     ZERO_CELSIUS,
     History,
     Nuisance,
@@ -27,12 +27,13 @@ from creepkit.records import (
     Specimen,
     dimensions_of,
     is_length_nuisance,
+    known_specimens,
     loads_of,
     outputs_of,
 )
-from creepkit.records.quantities import LENGTH, QUANTITIES, QuantityKind
+from creepkit.records.quantities import LENGTH, QuantityKind
 from creepkit.studies.study_file import KeyPath, StudyFile
-from creepkit.studies.tables import ForecastTable, Step
+from creepkit.studies.tables import Step
 
 if TYPE_CHECKING:
     from creepkit.inverse.settings import IdentificationSettings
@@ -83,15 +84,10 @@ def levels_of(
     return name, [(SECONDS_PER_HOUR * one.from_h, level) for one, level in zip(steps, levels, strict=True)]
 
 
-def temperature_of(file: StudyFile, key: KeyPath, steps: Sequence[Step]) -> float | Program:
-    """K, a number or a program."""
-    levels = [(SECONDS_PER_HOUR * one.from_h, one.level + ZERO_CELSIUS) for one in steps]
-    if any(not 0.0 < level < 1e4 for _, level in levels):
-        raise file.error(key, f"{min(one.level for one in steps):g} °C is no temperature of a test")
-    if levels[0][0] != 0.0:
-        raise file.error(key, "nothing is said of the time before; give the first level from_h = 0")
+def temperature_of(file: StudyFile, key: KeyPath, steps: Sequence[Step]) -> float | Program | None:
+    """K, a number or a program; None of no steps."""
     with file.at(*key):
-        return levels[0][1] if len(levels) == 1 else Program.steps(levels)
+        return stated_temperature([(SECONDS_PER_HOUR * one.from_h, one.level) for one in steps])
 
 
 # ---- laws, predictors, settings ------------------------------------------------------------------------------------
@@ -102,8 +98,6 @@ def laws_of(file: StudyFile) -> list[CreepLaw]:
 
     Those of a factor of temperature, such as Q, are known too; `law_changes` bounds and fixes them.
     """
-    import creepkit as ck
-
     part = file.model.identification
     assert part is not None
     laws = []
@@ -147,7 +141,6 @@ def check_parameters(file: StudyFile, table: KeyPath, names: Mapping[str, Any], 
 
 def predictor_of(file: StudyFile) -> Predictor | None:
     """What predicts the tests: the specimen of the study, or a surrogate; None for the specimens that tests name."""
-    import creepkit as ck
     from creepkit.surrogates.surrogate import reduced_order_models
 
     part = file.model.identification
@@ -174,8 +167,6 @@ def predictor_path(file: StudyFile) -> Path | None:
 
 def specimen_of_study(file: StudyFile) -> Specimen:
     """The specimen of the table [specimen], with its lengths."""
-    import creepkit as ck
-
     part = file.model.specimen
     assert part is not None
     with file.at("specimen", "name"):
@@ -188,8 +179,6 @@ def specimen_of_study(file: StudyFile) -> Specimen:
 
 def settings_of(file: StudyFile) -> IdentificationSettings:
     """Settings of every identification: the defaults with what the study changes."""
-    import creepkit as ck
-
     model, base = file.model, ck.IdentificationSettings()
     changes: dict[str, Any] = {"seed": model.study.seed, "suspect_frames": model.data.suspect_frames}
     if model.selection is not None:
@@ -281,8 +270,6 @@ def _unit_of_kind(kind: str) -> str:
 
 def targets_of(file: StudyFile, number: int) -> dict[str, list[float]]:
     """{output: its values in creepkit's unit} of a forecast, of keys such as amplitude_mm."""
-    import creepkit as ck
-
     kinds = {str(o): o.kind for one in ck.available("specimens").values() for o in outputs_of(one)}
     given = file.model.forecast[number].targets
     return dict(values_of(file, ("forecast", number, "targets", key), kinds, values) for key, values in given.items())
@@ -330,7 +317,6 @@ def rigs_of_study(file: StudyFile, rigs: Sequence[Rig]) -> list[Rig]:
 
 def check_temperature(file: StudyFile) -> None:
     """StudyError for forms of temperature and parameters that there are not."""
-    import creepkit as ck
     from creepkit.discovery.forms import check_form_names
 
     part = file.model.temperature
@@ -348,13 +334,6 @@ def check_temperature(file: StudyFile) -> None:
 
 
 # ---- planned tests ---------------------------------------------------------------------------------------------------
-
-
-COMPONENT_KINDS: Mapping[str, QuantityKind] = {
-    f"{name}_{component}": QUANTITIES[quantity_name]
-    for name, quantity_name in (("stress", "signed stress"), ("strain", "strain"))
-    for component in TENSOR_COMPONENTS
-}
 
 
 def check_forecast(file: StudyFile, number: int) -> None:
@@ -380,14 +359,17 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
     """
     part, place = file.model.forecast[number], ("forecast", number)
     assert part.end_h is not None
-    specimen = _specimen_of(file, number, part)
-    own = {load.name: load.kind for load in loads_of(specimen)}
+    kinds = {load.name: load.kind for one in known_specimens().values() for load in loads_of(one)}
+    kinds = {**kinds, **COMPONENT_LOADING_KINDS}
     loads: dict[str, list[tuple[float, float]]] = {}
     for key, steps in part.load.items():
-        name, levels = levels_of(file, (*place, "load", key), COMPONENT_KINDS if COMPONENTS in own else own, steps)
+        name, levels = levels_of(file, (*place, "load", key), kinds, steps)
         if name in loads:
             raise file.error((*place, "load", key), f"{name} is given twice; keep one of them")
         loads[name] = levels
+    of_study = None if file.model.specimen is None else file.model.specimen.name
+    with file.at(*((*place, "specimen") if part.specimen else ("specimen", "name"))):
+        specimen = ck.specimen(part.specimen or of_study or specimen_taking(loads))
     if part.temperature_C is not None:
         temperature = temperature_of(file, (*place, "temperature_C"), part.temperature_C)
     if temperature is None:
@@ -400,28 +382,3 @@ def planned_test(file: StudyFile, number: int, temperature: float | Program | No
         _ = described.loading  # which may contradict itself or the specimen
     with file.at(*place):
         return described.history(temperature, part.name).replace(labels=dict(part.labels))
-
-
-def _specimen_of(file: StudyFile, number: int, part: ForecastTable) -> Specimen:
-    """The specimen of a planned test: as named, as the study says, else the first that takes its load."""
-    import creepkit as ck
-
-    place = ("forecast", number)
-    if part.specimen is not None:
-        with file.at(*place, "specimen"):
-            return ck.specimen(part.specimen)
-    if file.model.specimen is not None:
-        with file.at("specimen", "name"):
-            return ck.specimen(file.model.specimen.name)
-    key = next(iter(part.load))
-    known: dict[str, QuantityKind] = {}
-    for specimen in ck.available("specimens").values():
-        loads = {load.name: load.kind for load in loads_of(specimen)}
-        kinds = COMPONENT_KINDS if COMPONENTS in loads else loads
-        found = split_unit(key, kinds)
-        if found is not None and found[1] in kinds[found[0]].units:
-            taking: Specimen = specimen
-            return taking
-        known |= kinds
-    quantity(file, (*place, "load", key), known)
-    raise file.error((*place, "load", key), "no specimen takes such a load")

@@ -12,6 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
+import creepkit as ck
 from creepkit.api.extraction import WATCHED, ImposedChannels, extract_as_described, history_of, imposed_on, operator_of
 from creepkit.cameras.sequences import in_order
 from creepkit.errors import HistoryError, StudyError, nearest
@@ -65,8 +66,6 @@ class ImposedOnTests:
 
 def cameras_of(file: StudyFile) -> list[StudyCamera]:
     """The cameras of a study; StudyError for cameras and records that contradict themselves, or that nobody names."""
-    import creepkit as ck
-
     model = file.model
     cameras = [StudyCamera(file, k) for k in range(len(model.camera))]
     named = {"camera": [one.label for one in cameras], "record": [one.name for one in model.record]}
@@ -121,8 +120,6 @@ class StudyCamera:
 
     def check(self) -> None:
         """StudyError for what contradicts itself, or names what there is not; before anything is read."""
-        import creepkit as ck
-
         part = self.part
         given = {key for key in type(part).model_fields if getattr(part, key) not in (None, {}, [])}
         self.file.check_name(self.key("format"), "format", part.format, ck.available("cameras"))
@@ -187,8 +184,6 @@ class StudyCamera:
     @cached_property
     def specimen(self) -> Specimen:
         """What it watched: as it says, else the specimen of the study, else the one of ck.extract."""
-        import creepkit as ck
-
         of_study = self.part.specimen is None and self.file.model.specimen is not None
         key = ("specimen", "name") if of_study else self.key(*(["specimen"] if self.part.specimen else []))
         with self.file.at(*key):
@@ -273,9 +268,8 @@ class StudyCamera:
         end = max(2.0 * levels[-1][0], 1e9)
         with self.file.at(*self.key("load", key)):
             loading = stepped_load(name, loads[name], levels, control=None, ramp=self.part.ramp_s, end=end)
-        if self.part.temperature_C is None:
-            return loading, None
-        return loading, arguments.temperature_of(self.file, self.key("temperature_C"), self.part.temperature_C)
+        stated = self.part.temperature_C or []
+        return loading, arguments.temperature_of(self.file, self.key("temperature_C"), stated)
 
     @cached_property
     def lengths(self) -> dict[str, float]:
@@ -290,8 +284,6 @@ class StudyCamera:
         return [self._extraction(hashes), *([] if self.record_number is None else [self._imposed(hashes)])]
 
     def _extraction(self, hashes: Mapping[Path, list[str]]) -> Stage:
-        import creepkit as ck
-
         said, (paths, times, _) = self.said, self.files
 
         def make(results: Results, tick: Tick) -> ExtractedTests:
@@ -308,8 +300,6 @@ class StudyCamera:
         return Stage("extraction", "", settings, make, ExtractedTests, _numbers_of_frames, name=self.name)
 
     def _imposed(self, hashes: Mapping[Path, list[str]]) -> Stage:
-        import creepkit as ck
-
         part, path, index = self.part, self.files[2], self.record_number
         assert index is not None
         assert path is not None

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from creepkit.errors import StudyError, quoted
+from creepkit.errors import SAID, StudyError, quoted, restated
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
@@ -96,10 +96,8 @@ def read_lock(path: Path) -> StudyLock | None:
     if not path.exists():
         return None
     content = check_heading(read_json(path, STUDY_LOCK.kind), str(path), STUDY_LOCK)
-    try:
+    with restated(RecordError, StudyError, f"{path}: {SAID}; {REMEDY}"):
         return CODEC.from_json(StudyLock, content)
-    except RecordError as error:
-        raise StudyError(f"{path}: {error}; {REMEDY}") from None
 
 
 def differences(before: StudyLock, now: StudyLock) -> list[str]:

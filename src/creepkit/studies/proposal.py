@@ -37,6 +37,10 @@ FEWEST_TEMPERATURES, FEWEST_RATES = 3, 3
 """For forms of temperature; and minimum rates at each of these, where there is no curve: one more than A and n."""
 
 
+FEWEST_TO_JUDGE = 30
+"""Readings of a test below which its noise is not known from them (inverse.known_noise)."""
+
+
 MOST_REMARKS = 20
 """Files that were not read, and flags, that the comments name."""
 
@@ -311,10 +315,13 @@ class DataSummary:
         kinds = ", ".join(dict.fromkeys(h.specimen if strain_rate(h) is None else kind_of_test(h) for h in self.tests))
         stopped = sum(history.unruptured for history in self.tests)
         count = f"{len(self.tests)} test{'s' if len(self.tests) > 1 else ''} ({kinds})"
-        return [
+        lines = [
             f"{count}, {len(self.framed)} with curves or rates; {loads}; {at}",
             f"ended by rupture: {self.ruptured}; stopped before: {stopped}; with tertiary creep: {self.tertiary}",
         ]
+        few = sum(bool(h.outputs) and h.used.sum() < FEWEST_TO_JUDGE and not h.standard_deviation for h in self.tests)
+        what = f"{few} with fewer than {FEWEST_TO_JUDGE} readings, too few to judge a law by: state their strain_sd"
+        return [*lines, what] if few else lines
 
 
 def _held_levels(history: History) -> list[float]:

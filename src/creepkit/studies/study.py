@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from creepkit.checked_arguments import checked
-from creepkit.errors import StudyError, nearest
+from creepkit.errors import StudyError, refuse_unknown
 from creepkit.files.reading import read_bytes, sha256_of
 from creepkit.files.writing import check_target, write_bytes, write_text
 from creepkit.reports.attachments import problem_of_names, read_attachments
@@ -140,8 +140,7 @@ class Study:
         """
         kinds = STAGE_KINDS if only is None else [only] if isinstance(only, str) else list(only)
         for kind in kinds:
-            if kind not in STAGE_KINDS:
-                raise StudyError(f"there is no stage '{kind}'; {nearest(str(kind), STAGE_KINDS)}")
+            refuse_unknown(kind, STAGE_KINDS, StudyError, f"there is no stage '{kind}'")
         folder = self.path.parent if to is None else Path(to)
         kept = ResultFolder(folder / f"{self.path.stem}.results")
         with running_alone(kept.folder):

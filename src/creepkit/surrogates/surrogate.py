@@ -390,10 +390,7 @@ class Surrogate(Predictor, Presentable):
             nuisance_jacobian=nuisance_jacobian,
         )
 
-    def __str__(self) -> str:
-        from creepkit.reports.surrogate import surrogate_text
-
-        return surrogate_text(self)
+    shown_by = "surrogate.surrogate_text"
 
 
 def reduced_order_models() -> dict[str, Predictor]:

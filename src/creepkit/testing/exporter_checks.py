@@ -13,6 +13,7 @@ from creepkit.language.symbols import temperature
 from creepkit.records import Exporter, LawWithValues
 from creepkit.registry import default_registry, kinds
 from creepkit.testing.reports import finding
+from creepkit.testing.sample_points import with_numbers
 
 LONGEST_TEXT = 1_000_000
 """Characters of the text of one law."""
@@ -32,6 +33,7 @@ HOSTILE_NOTES = (
 def registered_sources() -> list[LawWithValues]:
     """Every registered law at the middle of its bounds, and at 1073 K where it depends on temperature."""
     laws = default_registry().values(kinds.LAWS)
+    laws = list(dict.fromkeys(one for law in laws for one in (law, with_numbers(law))))
     sources = [LawWithValues(law, law.center(), elastic=Elastic(150e3)) for law in laws]
     return [*sources, *(source.at(1073.0) for source in sources if source.law.uses(temperature))]
 

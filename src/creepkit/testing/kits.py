@@ -18,7 +18,7 @@ from creepkit import limits
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, LawError, PluginError
 from creepkit.files.time_stamps import DATE_ORDERS
-from creepkit.instruments.column_heads import TIME_UNITS, channel_unit
+from creepkit.instruments.column_heads import TIME_UNITS, channel_unit, time_factor
 from creepkit.kernels.lowering import lower
 from creepkit.language.law import CreepLaw
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
@@ -34,7 +34,7 @@ from creepkit.testing import (
 )
 from creepkit.testing.predictor_checks import PredictorCase, default_histories, law_of_check
 from creepkit.testing.reports import ConformanceCheck, ConformanceReport, finding, run
-from creepkit.testing.sample_points import draw_samples
+from creepkit.testing.sample_points import draw_samples, with_numbers
 
 
 @finding("declaration")
@@ -43,7 +43,7 @@ def check_declaration(declared: InstrumentFormat) -> str:
     unknown = [unit for unit in declared.units.values() if channel_unit(unit) is None]
     assert not unknown, f"'{unknown[0]}' is no unit of a channel; write one such as barg, psia, C"
     unit, order = declared.time_unit, declared.date_order
-    assert unit in ("", *TIME_UNITS), f"'{unit}' is no unit of times; write one of {', '.join(TIME_UNITS)}"
+    assert not unit or time_factor(unit), f"'{unit}' is no unit of times; write one of {', '.join(TIME_UNITS)}"
     assert order in ("", *DATE_ORDERS), f"'{order}' is no order of dates; write one of {', '.join(DATE_ORDERS)}"
     return "units of channels and times, and the order of dates, are known"
 
@@ -89,15 +89,16 @@ def check_law(
 ) -> ConformanceReport:
     """Run every check on a law; never raises for a law that fails one.
 
-    samples : a power of two.
+    samples : a power of two. Conditions of tests that it uses are at CHECKED_CONDITION.
     """
     try:
         lower(law, "numpy")
+        checked_law = with_numbers(law)
     except CreepkitError as error:
         return ConformanceReport(law, (ConformanceCheck("lowering", False, str(error)),))
-    sampled = draw_samples(law, samples, seed)
-    found = run(law_checks, law, sampled)
-    return ConformanceReport(law, tuple(found))
+    drawn = draw_samples(checked_law, samples, seed)
+    own = [law_checks.check_example] if law.conditions else []
+    return ConformanceReport(law, (*run(law_checks, checked_law, drawn), *run(own, law, drawn)))
 
 
 @checked

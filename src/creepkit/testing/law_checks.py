@@ -18,12 +18,13 @@ import numpy as np
 import sympy
 
 from creepkit.arrays import Bools, Floats
-from creepkit.errors import CreepkitError
+from creepkit.errors import SAID, CreepkitError, restated
 from creepkit.kernels.interface import call_entry
 from creepkit.kernels.log_form import log_form
 from creepkit.kernels.lowering import lower
 from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.kernels.rate_jumps import find_rate_jump
+from creepkit.language.algebra import with_conditions_as_parameters
 from creepkit.language.elastic import Elastic
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, strain, stress, temperature, time
@@ -141,6 +142,7 @@ def check_temperature(law: CreepLaw, samples: LawSamples) -> str | None:
 def check_example(law: CreepLaw, _: LawSamples, number: int) -> str:
     """An example of the author has the rate that he states."""
     variables, given = (*POINT_VARIABLES, *law.states), dict(law.examples[number - 1])
+    law = with_conditions_as_parameters(law)
     stated = float(given.pop("rate"))
     missing = [key for key in law.names if key not in given]
     missing += [s.name for s in variables if law.uses(s) and s.name not in given]
@@ -479,10 +481,8 @@ def check_short_integration(law: CreepLaw, samples: LawSamples) -> str | None:
         times = np.linspace(0.0, np.clip(1e-2 * np.exp(-np.clip(ln_rate, -60.0, 60.0)), 1e-3, 1e9), 12)[1:]
         loading, values = PointLoading(stress={"11": 100.0}), _values_text(law, theta)
         plan = History("states", times, {}, loading, 1000.0, specimen="point", elastic=Elastic(150e3))
-        try:
+        with restated(CreepkitError, AssertionError, f"{SAID}; {values}"):
             run = MaterialPoint().simulate(kernel, theta, plan)
-        except CreepkitError as error:
-            raise AssertionError(f"{error}; {values}") from None
         for (symbol, state), path in zip(law.states.items(), run.states.T, strict=True):
             low, high = sorted((state.initial, np.inf if state.limit is None else state.limit))
             margin = 1e-6 * max(1.0, abs(state.initial))

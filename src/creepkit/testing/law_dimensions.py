@@ -22,7 +22,7 @@ from typing import TypeAlias
 
 import sympy
 
-from creepkit.errors import LawError
+from creepkit.errors import SAID, LawError, restated
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import GAS_CONSTANT, mean_stress, principal_stress, strain, stress, temperature, time
 from creepkit.records.units import factors, spelled_factors
@@ -162,10 +162,8 @@ def check_dimensions(law: CreepLaw) -> None:
     rates = {f"term '{label}'": (term, NO_UNIT) for label, term in law.terms.items()}
     rates |= {f"rate of '{s}'": (z.rate, units[s] or NO_UNIT) for s, z in law.states.items()}
     for place, (rate, of) in rates.items():
-        try:
+        with restated(DimensionError, DimensionError, f"{place}: {SAID}"):
             unit = analysis.unit(rate)
-        except DimensionError as error:
-            raise DimensionError(f"{place}: {error}") from None
         if unit is not None and not _is_rate(unit * of.power(Fraction(-1))):
             raise DimensionError(
                 f"{place} comes out in {_text(unit)}, and must in {'' if of is NO_UNIT else f'{of} per s, '}1/s or "

@@ -26,6 +26,15 @@ STRESS_COLUMNS = [0, 4, 5]
 """Of a point, which grow together."""
 
 
+CHECKED_CONDITION = 0.05
+"""In the unit of the law: a usual number for a grain size in mm, a content, a dose."""
+
+
+def with_numbers(law: CreepLaw) -> CreepLaw:
+    """The law with CHECKED_CONDITION for each condition of the material; itself where it has none."""
+    return law.at(None, **{condition.name: CHECKED_CONDITION for condition in law.conditions})
+
+
 @dataclass(frozen=True, eq=False)
 class LawSamples:
     """Points at which the constraints of a law hold.
@@ -76,10 +85,8 @@ def draw_samples(law: CreepLaw, samples: int, seed: int = 0) -> LawSamples:
     points, theta = np.empty((0, POINT_SIZE + len(law.states))), np.empty((0, len(law.params)))
     for _ in range(_MOST_BATCHES):
         unit = sequence.random(samples)
-        new_points, new_theta = (
-            _to_points(law, unit[:, : points.shape[1]]),
-            uniform_in_bounds(law, unit[:, points.shape[1] :]),
-        )
+        new_points = _to_points(law, unit[:, : points.shape[1]])
+        new_theta = uniform_in_bounds(law, unit[:, points.shape[1] :])
         satisfied = constraints_hold(law, new_points, new_theta)
         points, theta = np.vstack([points, new_points[satisfied]]), np.vstack([theta, new_theta[satisfied]])
         if len(points) >= samples:
@@ -101,9 +108,7 @@ def _to_points(law: CreepLaw, unit: Floats) -> Floats:
     notches, and the largest principal stress above it by 1/3 to 2/3 of the latter, as any state of stress has it. In
     compression rates of damage are zero, which no relative error can be stated of.
     """
-    stress, strain, time = (
-        _log_between(u, r) for u, r in zip(unit.T, (STRESS_RANGE, STRAIN_RANGE, TIME_RANGE), strict=False)
-    )
+    stress, strain, time = map(_log_between, unit.T, (STRESS_RANGE, STRAIN_RANGE, TIME_RANGE))
     temperature = TEMPERATURE_RANGE[0] + unit[:, 3] * (TEMPERATURE_RANGE[1] - TEMPERATURE_RANGE[0])
     mean = 1.5 * stress * unit[:, 5]
     principal = mean + stress * (1.0 + unit[:, 4]) / 3.0

@@ -10,11 +10,11 @@ from creepkit.app.models import rom_data
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import Program, RecordedLoading
-from creepkit.registry import default_registry
 from helpers.export_cases import LAWS
 from helpers.javascript import run_in_node
 from helpers.page_runtime import in_page, pairs, values_that_creep
 from helpers.paths import ROOT
+from helpers.registered_laws import registered_laws
 
 AGREEMENT = 1e-10
 """Relative; it is the same core, and the law differs by rounding."""
@@ -44,8 +44,7 @@ def as_options(loading, T):
 
 
 def laws():
-    registered = {name: default_registry().law(name) for name in default_registry().laws()}
-    return registered | {name: LAWS[name] for name in ("combined with temperature", "Kachanov with temperature")}
+    return registered_laws() | {name: LAWS[name] for name in ("combined with temperature", "Kachanov with temperature")}
 
 
 def test_creep_of_every_law_is_that_of_the_specimen(tmp_path):
@@ -214,9 +213,7 @@ def check(found, run, what, rtol=DIMPLE_AGREEMENT):
 
 def test_a_dimple_of_every_law_is_that_of_the_core(model, data, tmp_path):
     cases, runs = [], []
-    laws = {name: default_registry().law(name) for name in default_registry().laws()}
-    laws["Kachanov with temperature"] = LAWS["Kachanov with temperature"]
-    for name, law in laws.items():
+    for name, law in (registered_laws() | {"warm": LAWS["Kachanov with temperature"]}).items():
         values = values_that_creep(law, 100.0, goal=0.01, duration=4e4)
         cases.append((law, "simulateDimple", values, options(JUMP)))
         runs.append((name, simulated(model, law, values, JUMP)))

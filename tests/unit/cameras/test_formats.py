@@ -191,7 +191,7 @@ def test_two_formats_for_one_head(tmp_path: Path) -> None:
 
     twin = dataclasses.replace(ck.available("cameras")["zeiss"], name="twin")
     path = written(tmp_path, zeiss(), "nodemap.txt")
-    with pytest.raises(HistoryError, match="the camera formats 'zeiss' and 'twin' both fit it; say which one"):
+    with pytest.raises(HistoryError, match="the camera formats 'zeiss' and 'twin' both accept it; say which one"):
         read_frames(path, [*FORMATS, twin])
     assert len(read_frames(path, [*FORMATS, twin], "twin")) == 1
 

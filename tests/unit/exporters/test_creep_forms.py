@@ -14,11 +14,11 @@ from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import LawWithValues, Units
-from creepkit.registry import default_registry
 from helpers.creep_form_cases import CASES
 from helpers.literature_laws import EQUATIONS, POWER, RATE, A, B, Q, a, k, law, m, n, number, omega, s_0, scale
+from helpers.registered_laws import registered_laws
 
-ALL = {name: default_registry().law(name) for name in default_registry().laws()} | EQUATIONS
+ALL = registered_laws() | EQUATIONS
 POINT = (83.0, 0.013, 7.1e4, 1041.0)
 
 

@@ -6,6 +6,7 @@ import itertools
 import math
 import re
 import warnings
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -25,10 +26,10 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import LawWithValues, Units
-from creepkit.registry import default_registry
 from helpers.export_cases import LAWS, TOLERANCE, disagreements, renamed
 from helpers.exported_programs import LANGUAGES, program_text, rates
 from helpers.literature_laws import EQUATIONS
+from helpers.registered_laws import registered_laws
 
 PROGRAMS = ("c", "javascript", "python", "numpy", "abaqus", "calculix", "mfront")
 GROUPS = (
@@ -225,9 +226,8 @@ def test_the_unit_of_a_rate_coefficient(law, name, unit):
 
 def test_converted_values_give_the_same_rates():
     """At 300 MPa, above the threshold of laws that have one, and at 40 MPa."""
-    laws = {**{name: one.value for name, one in default_registry().laws().items()}, **EQUATIONS}
     bad, converted = [], 0
-    for name, law in laws.items():
+    for name, law in (registered_laws() | EQUATIONS).items():
         source = LawWithValues(law, law.center(), units=UNITS)
         try:
             values = convert_values(source).values
@@ -259,11 +259,10 @@ A, n, C = parameters("A n C")
 
 def module(law, folder, values=None, notes=(), exporter=None, **more):
     """The exported module, loaded; of one number at a time unless another exporter is given."""
-    source = LawWithValues(law, values or law.center(), notes, **more)
-    path = folder / "exported_law.py"
-    path.write_text((exporter or PythonExporter()).text(source), encoding="utf-8")
-    spec = importlib.util.spec_from_file_location("exported_law", path)
-    loaded = importlib.util.module_from_spec(spec)
+    text = (exporter or PythonExporter()).text(LawWithValues(law, values or law.center(), notes, **more))
+    (path := folder / "exported_law.py").write_text(text, encoding="utf-8")
+    Path(importlib.util.cache_from_source(str(path))).unlink(missing_ok=True)  # of a text as long, a second ago
+    loaded = importlib.util.module_from_spec(spec := importlib.util.spec_from_file_location("exported_law", path))
     spec.loader.exec_module(loaded)
     return loaded
 

@@ -21,7 +21,7 @@ from creepkit.studies.lock import read_lock
 from helpers.paths import ROOT
 
 FORMATS = ROOT / "tests" / "data" / "formats"
-VERSIONS = sorted(path.name for path in FORMATS.iterdir() if path.is_dir())
+VERSIONS = sorted(path.name for path in FORMATS.glob("[0-9]*") if path.is_dir())
 SCHEMAS = ROOT / "docs" / "reference" / "schemas"
 
 

@@ -138,7 +138,7 @@ def test_files_of_several_parts_are_read_as_one(tmp_path: Path, monkeypatch: pyt
         ("time,p_bar\n0,1\n1,2\n", {}, ":1: the unit of 'time' is not stated"),
         ("time_s,p_bar\n0,1\n1,x\n", {}, ":3, column 2: 'p_bar' is 'x'"),
         ("time_s,p_bar\n0,1\n1,2,3\n2,3\n", {}, ":3: number of cells 3, of names 2"),
-        ("time_s,p_bar\n1,1\n0,2\n", {}, ":3: time falls from 1 to 0"),
+        ("time_s,p_bar\n1,1\n0,2\n", {}, ":3: time falls by 1 s"),
         ("time,p_bar\n10:00:00,1\n9:00:00,2\n", {}, ":3: time falls by 3600 s"),
         ("time,p_bar\n10:00:00,1\n10:61:00,2\n", {}, ":3, column 1: time is '10:61:00'"),
         ("time_s,p_bar,p_bar\n1,1,2\n", {}, ":1: the channel 'p' stands there twice"),

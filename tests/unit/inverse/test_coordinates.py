@@ -11,10 +11,10 @@ from creepkit.language import arrhenius, linear
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
-from creepkit.registry import default_registry
+from helpers.registered_laws import registered_laws
 
 LAWS = [
-    *(default_registry().law(name) for name in default_registry().laws()),
+    *registered_laws().values(),
     COMBINED.times(arrhenius(T_ref=1073.15)).with_temperature(n_2=linear(T_ref=1073.15)),
     HYPERBOLIC_SINE + ck.law("kachanov-rabotnov"),  # an exponent stands as it is beside variables it does not mention
 ]

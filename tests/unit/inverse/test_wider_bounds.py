@@ -10,8 +10,8 @@ from creepkit.inverse.identify import identify, refit
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import constant_stress
-from creepkit.registry import default_registry, kinds
 from helpers.planted_bars import BAR, bars
+from helpers.registered_laws import registered_laws
 
 NORTON, QUICK = ck.law("norton"), IdentificationSettings(starts=2, sobol_points=16)
 SOLDER = {"A": 1e-3, "n": 11.0}, (0.3, 0.35, 0.4, 0.45)
@@ -57,7 +57,7 @@ def test_a_law_is_not_excluded_by_its_own_bounds(name):
 
 
 def test_rate_coefficients_of_every_law_are_sought_beyond_their_bounds():
-    for law in default_registry().values(kinds.LAWS):
+    for law in registered_laws().values():
         coordinates = Coordinates(law, ReferencePoint(100.0, 0.01, 1e6, 900.0))
         assert all(law.table[law.names[k]].widens for k in coordinates.coefficients), law.name
 

@@ -154,7 +154,7 @@ def test_single_precision_stays_single() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: lower(NORTON).rate(VALUES, stress=1.0, stres=2.0), "has no variable 'stres': did you mean 'stress'"),
+        (lambda: lower(NORTON).rate(VALUES, stress=1.0, stres=2.0), "has no variable 'stres'; did you mean 'stress'"),
         (lambda: lower(NORTON).rate(VALUES, strain=1.0), "needs a stress, in MPa"),
         (lambda: lower(NORTON).rate({"A": 1e-10}, stress=1.0), "needs a value for n"),
         (lambda: lower(NORTON).rate({**VALUES, "m": 1.0}, stress=1.0), "has no parameter 'm'"),

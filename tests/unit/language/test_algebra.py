@@ -198,7 +198,7 @@ def test_a_constraint_follows_its_parameter_into_temperature():
         (lambda: NORTON.fix(**{"n": "five"}), "parameter 'n': 'five' is not a number"),
         (lambda: NORTON.fix(**{"k": 1}), "has no parameter 'k'"),
         *((lambda T=T: NORTON.times(arrhenius()).at(T), "temperature") for T in (0, -5, 2e4)),
-        (lambda: NORTON.with_temperature(A=linear()), "has a log scale: use exponential"),
+        (lambda: NORTON.with_temperature(A=linear()), "has a log scale: use activated"),
         (lambda: NORTON.with_temperature(A=inverse_temperature()), "has a log scale: use activated"),
         (lambda: NORTON.with_temperature(n="linear"), "n needs a form such as linear"),
         (lambda: NORTON.with_temperature(n=linear()).with_temperature(n=linear()), "depends on temperature twice"),
@@ -326,7 +326,7 @@ def test_two_states_have_two_energies_unless_they_share_a_coefficient():
     ("chosen", "message"),
     [
         ({"states": ["x"]}, "has no state 'x'"),
-        ({"terms": "crep"}, "has no term 'crep': did you mean 'creep'"),
+        ({"terms": "crep"}, "has no term 'crep'; did you mean 'creep'"),
         ({"terms": (), "states": ()}, "multiply no term and no state"),
         ({"states": ["H"]}, "state 'H' is a multiple of the creep rate"),
     ],

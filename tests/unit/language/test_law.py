@@ -66,7 +66,6 @@ BAD_LAWS = {
         "'2x' is not a plain name",
     ),
     "not finite": ({"terms": {"x": A * stress**n + sympy.zoo}}, "not finite and real"),
-    "not real": ({"terms": {"x": sympy.I * A * stress**n}}, "not finite and real"),
     "stray constraint": ({"constraints": (B >= 0,)}, "a constraint mentions unknown symbol B"),
     "no constraint": ({"constraints": (n,)}, "constraint n is not a relation"),
     "constraint that cannot hold": ({"constraints": (sympy.false,)}, "constraint False is not a relation"),
@@ -75,7 +74,6 @@ BAD_LAWS = {
 
 BAD_PARAMS = {
     "reversed bounds": ({"bounds": (8, 1)}, r"bounds are reversed or empty, \(8, 1\)"),
-    "empty bounds": ({"bounds": (1, 1)}, "reversed or empty"),
     "infinite bounds": ({"bounds": (0, float("inf"))}, "must be finite"),
     "log of zero": ({"bounds": (0, 1), "scale": "log", "unit": "1/s"}, "a log scale needs bounds above zero"),
     "missing unit": ({"scale": "log"}, 'missing unit; write unit="1/s"'),
@@ -87,7 +85,6 @@ BAD_PARAMS = {
 
 BAD_STATES = {
     "no initial value": ({"initial": float("nan")}, "initial = nan must be a finite number"),
-    "infinite limit": ({"limit": float("inf")}, "limit = inf must be a finite number"),
     "already broken": ({"initial": 0.5, "limit": 0.5}, "it starts at its limit, 0.5, so the material would never last"),
 }
 BAD_ELASTIC = {
@@ -98,8 +95,6 @@ BAD_ELASTIC = {
 BAD_VALUES = {
     "one missing": ({"A": 1e-12}, "needs a value for n"),
     "one too many": ({"A": 1e-12, "n": 5, "q": 1}, "has no parameter 'q'"),
-    "in words": ({"A": 1e-12, "n": "five"}, "parameter 'n': 'five' is not a number"),
-    "none": ({"A": 1e-12, "n": None}, "parameter 'n': None is not a number"),
     "infinite": ({"A": 1e-12, "n": float("inf")}, "inf is not a finite number"),
     "negative": ({"A": -1e-12, "n": 5}, "is negative; it must be positive"),
 }

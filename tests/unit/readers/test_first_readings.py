@@ -56,6 +56,12 @@ def test_a_clock_that_begins_just_before_zero(read):
     assert "times just below zero are zero" in test.labels["assumed"]
 
 
+def test_numbers_of_frames_and_a_low_temperature_in_a_title(read):
+    rows = "".join(f"{k},{k / 4},90,{k / 10}\n" for k in range(1, 7))
+    (test,) = read("Kriechversuch bei 30 °C\nFrame,Time (h),Stress (MPa),Strain (%)\n" + rows)
+    assert (test.condition, "'Frame' numbers the readings" in test.labels["assumed"]) == ("30 °C, 90 MPa", True)
+
+
 def test_logarithms(read):
     first, second = read(LOGARITHMS)
     assert (first.rupture_time, second.rupture_time) == (pytest.approx(10**2.5 * 3600), 3.6e6)

@@ -48,15 +48,6 @@ def test_titles_above_conditions_and_remarks_beside_frames(tmp_path: Path) -> No
     assert (test.times.size, test.labels["line 4"]) == (3, "start")
 
 
-def test_values_with_units_above_pairs_are_conditions(tmp_path: Path) -> None:
-    head = ["120 MPa / 650 °C", None, None, "140 MPa / 923.15 K", None]
-    names = ["Time (h)", "Creep strain (%)", None, "Time (h)", "Creep strain (%)"]
-    rows = [head, names, *([t, 0.01 * t, None, t, 0.02 * t] for t in (0, 1, 2))]
-    tests = ck.read_histories(workbook(tmp_path / "wide.xlsx", {"curves": rows}))
-    assert [test.loading.program().values.tolist() for test in tests] == [[120.0], [140.0]]
-    assert [test.temperature for test in tests] == [923.15, 923.15]
-
-
 SHEETS = {"575°C": (140, 160), "600 °C": (110, 130)}
 
 
@@ -81,12 +72,8 @@ def test_sheets_named_by_temperature(tmp_path: Path) -> None:
     book["575°C"]["C5"].comment = Comment("thermocouple 2 exchanged", "lab")
     book.save(path)
     tests = ck.read_histories(path)
-    assert [test.condition for test in tests] == [
-        "575 °C, 140 MPa",
-        "575 °C, 160 MPa",
-        "600 °C, 110 MPa",
-        "600 °C, 130 MPa",
-    ]
+    conditions = "575 °C, 140 MPa; 575 °C, 160 MPa; 600 °C, 110 MPa; 600 °C, 130 MPa"
+    assert "; ".join(test.condition for test in tests) == conditions
     np.testing.assert_allclose(tests[3].outputs["strain"], 1.3e-3 * np.array([0.1, 1.0, 2.0]))
     labels = tests[1].labels
     assert "temperature 575 °C from sheet '575°C' row 1" in labels["assumed"]
@@ -209,7 +196,7 @@ FILES_OF_LABORATORIES = {
     "a note in the margin": ("x_600C_120MPa.csv", "time [h];strain [%]\n0;0\n10;0,1;looks odd\n"),
     "two values in one head": (
         "x.csv",
-        "A;;B;\n120 MPa 600 °C;;140 MPa 600 °C;\ntime/h;strain/%;time/h;strain/%\n0;0;0;0\n10;0,1;9;2\n",
+        "A;;B;\n120 MPa / 873.15 K;;140 MPa 600 °C;\ntime/h;strain/%;time/h;strain/%\n0;0;0;0\n10;0,1;9;2\n",
     ),
     "names of curves": (
         "x.csv",
@@ -315,6 +302,15 @@ def test_german_names_and_units(tmp_path):
     assert one.outputs["strain"] == pytest.approx(other.outputs["strain"], rel=1e-12)
     assert one.loading.program().values[-1] == pytest.approx(20 * 9.80665, rel=1e-12)
     assert not one.includes_elastic
+
+
+def test_words_of_tables_are_words_of_heads_and_an_end_has_its_time(tmp_path):
+    head = "Versuchsende;Bruch nach 388,4 h\nBruchdehnung (%);22\nHeat no;X7\nPrüftemperatur (°C);800\n"
+    (test,) = _read(tmp_path, head + "Stress (MPa);260\nZeit (h);Dehnung (%)\n0;0\n100;0,5\n386,5;11\n")
+    assert test.rupture_time == pytest.approx(388.4 * 3600)
+    assert (test.labels["elongation_pct"], test.labels["heat"]) == ("22", "X7")
+    with pytest.raises(HistoryError, match=r"'rate \(%/h\)' is a rate .*; is it a minimum creep rate"):
+        _read(tmp_path, "stress (MPa),T (C),rate (%/h)\n80,550,6e-05\n100,550,2e-04\n")
 
 
 # ---- tables of laboratories ------------------------------------------------------------------------------------------

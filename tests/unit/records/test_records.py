@@ -360,11 +360,11 @@ def test_tests_are_selected_by_label() -> None:
 
 def test_an_error_names_the_labels_that_exist() -> None:
     cases = (
-        ({"temprature": 1073}, r"no test has a label 'temprature': did you mean 'temperature'\?"),
+        ({"temprature": 1073}, r"no test has a label 'temprature'; did you mean 'temperature'\?"),
         ({"temperature": 1100}, "no test has temperature=1100; there are 1073.15, 1123.15"),
         ({"temperature": "hot"}, "temperature=hot is not a number; write one, as in temperature=1073.15"),
         ({"alloy": "Z"}, "no test has alloy=Z; there are X, Y"),
         ({"alloy": "Y", "stress": 50}, "no test has alloy=Y and stress=50 at once"),
-        ({"pressure": 8}, r"no test has a label 'pressure': did you mean 'stress'\?"),
+        ({"pressure": 8}, r"no test has a label 'pressure'; did you mean 'stress'\?"),
     )
     assert said_otherwise((partial(ck.select_tests, TESTS, **labels), text) for labels, text in cases) == []

@@ -290,7 +290,7 @@ def test_a_law_that_the_search_holds_says_so_first() -> None:
     """An exponent of 9.5, of a search that ends at 8; one that goes on to 16 finds it and says nothing."""
     tests = planted(NORTON, {"A": 1e-26, "n": 9.5}, [(s, 1000.0) for s in (60.0, 80.0, 120.0)], seed=2, noise=3e-4)
     held = identify(NORTON.with_bounds(n=(1.0, 8.0)), tests, Steady(), settings=SETTINGS)
-    assert cautions(held)[0] == "norton is held at n = 8, where its search ends; write bounds = { n = [1, 16] }"
+    assert cautions(held)[0].endswith("n = 8, the upper bound of its search; to go on, write bounds = { n = [1, 16] }")
     wide = NORTON.with_bounds(A=(1e-40, 1e-5), n=(1.0, 16.0))
     found = identify(wide, tests, Steady(), settings=SETTINGS)
     assert found.values["n"] == pytest.approx(9.5, rel=0.02)

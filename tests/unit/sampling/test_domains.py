@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit import registry
 from creepkit.errors import DatasetError
 from creepkit.language import temperature
 from creepkit.records import Status
@@ -23,6 +22,7 @@ from creepkit.sampling.domains import (
 )
 from helpers.cantilever import Cantilever
 from helpers.mistakes import said_otherwise
+from helpers.registered_laws import registered_laws
 
 DIMPLE, BAR = ck.specimen("bulge"), ck.specimen("uniaxial")
 HOURS_12 = 43200.0
@@ -121,10 +121,10 @@ def test_a_test_takes_a_share_of_the_life_of_a_law_with_damage(name, exponent):
 # ---- every law ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", sorted(registry.default_registry().laws()))
+@pytest.mark.parametrize("name", registered_laws())
 def test_every_registered_law_has_a_box_or_says_why_not(name):
     """Rates of diffusion creep, in the bounds of its laws, hardly reach the highest ones wanted."""
-    law = ck.law(name)
+    law = registered_laws()[name]
     warm = {"temperature": (1000.0, 1100.0)} if law.uses(temperature) else {}
     if name == "norton-bailey-strain":
         with pytest.raises(DatasetError, match="no linear rate coefficient .* use the paper's sampling domain"):

@@ -147,13 +147,13 @@ def test_a_table_of_alloys_says_lengths_moduli_labels_and_exclusions(tmp_path: P
     ("old", "new", "words"),
     [
         ("Dimple", "Hole number", "has the columns dimple and alloy"),
-        ("Modulus [GPa]", "Modulus", "'Modulus' has no unit that is known"),
+        ("Modulus [GPa]", "Modulus", "'Modulus' has no unit; allowed: Modulus_MPa"),
         ("492,5;2", ";2", "a tolerance in % needs the length that it is of"),
         ("492,5;2", "-4;2", "write a number above zero"),
         ("west;D2", "west;D1", "'D1' stands there twice"),
         ("west;D2", "west;", "does not name its dimple"),
         ("148,2", "many", "is 'many'"),
-        ("grain size [um]", "Thickness [mm]", "stands there twice"),
+        ("grain size [um]", "Dicke [mm]", "is given twice"),
     ],
 )
 def test_mistakes_in_a_table_of_alloys_name_their_row(tmp_path: Path, old: str, new: str, words: str) -> None:

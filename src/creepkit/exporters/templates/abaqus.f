@@ -7,7 +7,7 @@
       character*80 cmname
       dimension decra(5), deswa(5), statev(*), predef(*), dpred(*),
      & time(3), coords(*), ec(2), esw(2)
-      double precision y($ny), slope($ny, 2), temps(2), finish, start
+      double precision y($ny), slope($ny, 2), temps($nt), finish, start
       double precision initial($ny)
 !
 !     What may be edited: the total time TIME(2) at which the load was
@@ -26,7 +26,7 @@ $initial
       start = finish - dtime*seconds
       temps(1) = temp - dtemp + to_kelvin
       temps(2) = temp + to_kelvin
-      y = initial
+$fields      y = initial
 $fetch      call ${id}_increment(start, finish, temps,
      & max(qtild*mpa, 1.0d-30), -p*mpa, ec(1), y, slope)
 !

@@ -18,20 +18,20 @@
      &    strain, y, slope)
         implicit none
         integer, parameter :: ny = $ny
-        double precision, intent(in) :: start, finish, temps(2)
+        double precision, intent(in) :: start, finish, temps($nt)
         double precision, intent(in) :: stress, mean, strain
         double precision, intent(inout) :: y(ny)
         double precision, intent(out) :: slope(ny, 2)
         double precision, parameter :: beta = $beta
-        double precision low, high, place, most, size, point(7)
+        double precision low, high, place, most, size, point($np)
         double precision origin
         logical solved
         origin = 0.0d0
 $shift_origin        low = max(start - origin, 0.0d0)**beta
         high = max(finish - origin, 0.0d0)**beta
-        point = (/ start, finish - start, temps(1), temps(2), beta,
+        point(1:7) = (/ start, finish - start, temps(1), temps(2), beta,
      &      strain, origin /)
-        slope = 0.0d0
+$carried        slope = 0.0d0
         most = high - low
         if (.not. low > 0.0d0) most = most/16
         place = low
@@ -64,11 +64,11 @@ $shift_origin        low = max(start - origin, 0.0d0)**beta
      &    slope, solved)
         implicit none
         integer, parameter :: ny = $ny, nx = $nx
-        double precision, intent(in) :: s, ds, point(7), stress, mean
+        double precision, intent(in) :: s, ds, point($np), stress, mean
         logical, intent(in) :: smallest
         double precision, intent(inout) :: y(ny), slope(ny, 2)
         logical, intent(out) :: solved
-        double precision x(nx), out(ny*(1 + nx)), a(ny, ny)
+        double precision x($mx), out(ny*(1 + nx)), a(ny, ny)
         double precision r(ny, 3), z(ny), grown, h, least
         double precision moved(ny), again(ny*(1 + nx)), hend
         integer i, pass
@@ -116,8 +116,8 @@ $shift_origin        low = max(start - origin, 0.0d0)**beta
 !
       subroutine ${id}_place(s, ds, point, stress, mean, x, h)
         implicit none
-        double precision, intent(in) :: s, ds, point(7), stress, mean
-        double precision, intent(out) :: x($nx), h
+        double precision, intent(in) :: s, ds, point($np), stress, mean
+        double precision, intent(out) :: x($mx), h
         double precision middle, time, elapsed
         middle = s + 0.5d0*ds
         elapsed = middle**(1.0d0/point(5))
@@ -131,7 +131,7 @@ $shift_origin        low = max(start - origin, 0.0d0)**beta
      &      (time - point(1))/point(2)
         x(5) = stress
         x(6) = mean
-      end subroutine ${id}_place
+$placed      end subroutine ${id}_place
 !
 ! The last resort, when even the smallest step has no solution: the
 ! material ruptures. States go to their limits, and the strain grows
@@ -140,9 +140,9 @@ $shift_origin        low = max(start - origin, 0.0d0)**beta
       subroutine ${id}_rupture(s, ds, point, stress, mean, y, slope)
         implicit none
         integer, parameter :: ny = $ny, nx = $nx
-        double precision, intent(in) :: s, ds, point(7), stress, mean
+        double precision, intent(in) :: s, ds, point($np), stress, mean
         double precision, intent(inout) :: y(ny), slope(ny, 2)
-        double precision x(nx), out(ny*(1 + nx)), grown, h, ends(ny)
+        double precision x($mx), out(ny*(1 + nx)), grown, h, ends(ny)
         integer i
         call ${id}_place(s, ds, point, stress, mean, x, h)
         call ${id}_limits(ends)
@@ -162,7 +162,7 @@ $shift_origin        low = max(start - origin, 0.0d0)**beta
       subroutine ${id}_look(x, strain, y, z, grown, out)
         implicit none
         integer, parameter :: ny = $ny, nx = $nx
-        double precision, intent(inout) :: x(nx)
+        double precision, intent(inout) :: x($mx)
         double precision, intent(in) :: strain, y(ny), z(ny), grown
         double precision, intent(out) :: out(ny*(1 + nx))
         double precision w(ny), slope(ny, 2)
@@ -170,7 +170,7 @@ $shift_origin        low = max(start - origin, 0.0d0)**beta
         x(2) = strain + y(1) + 0.5d0*grown
         w = 0.5d0*(y + z)
         call ${id}_hold(w, slope)
-        x(7:) = w(2:)
+        x(7:nx) = w(2:)
         call ${id}_law(x, out)
       end subroutine ${id}_look
 !

@@ -14,9 +14,9 @@ function valuesOf(parameters) {
 
 /** A point by name as the numbers that `kernel` takes, converted to MPa and s. */
 function pointOf(point) {
-  const names = [...pointVariables, ...law.states.map((s) => s.name)];
+  const names = [...pointVariables, ...[...law.states, ...law.conditions].map((s) => s.name)];
   const given = ordered("variable", names, new Array(names.length).fill(undefined), point);
-  const needed = ["stress", ...law.variables.filter((name) => name === "temperature")];
+  const needed = ["stress", ...law.variables.filter((name) => name === "temperature"), ...law.conditions.map((c) => c.name)];
   for (const name of needed) {
     if (given[names.indexOf(name)] === undefined) throw new RangeError(`the law needs a ${name}`);
   }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -29,42 +29,25 @@ class GlobalSearch(Protocol):
         ...
 
 
-QUARTILES = (25.0, 50.0, 75.0)
-
-
 @dataclass(frozen=True)
 class SearchTrace:
     """The costs of a global search, one row for each iteration.
 
     best_cost : (iterations,) - lowest cost so far; evaluations : (iterations,) candidates evaluated so far.
-    quartiles : (iterations, 3) - costs of that iteration's candidates, 25, 50 and 75 %.
-    refined_cost : lowest cost after local refinement of the best, which took `refinement_evaluations` simulations.
+    refined_cost : lowest cost after local refinement of the best.
     """
 
     search: str
     best_cost: Floats
     evaluations: Ints
-    quartiles: Floats = field(default_factory=lambda: np.empty((0, 3)))
     refined_cost: float | None = None
-    refinement_evaluations: int = 0
-
-    @classmethod
-    def from_costs(cls, search: str, costs: Sequence[Floats]) -> SearchTrace:
-        """The trace of a search; costs : (candidates,) of each iteration."""
-        lowest = np.minimum.accumulate([float(np.min(candidate_costs)) for candidate_costs in costs])
-        evaluations = np.cumsum([len(each) for each in costs])
-        quartiles = np.array([np.percentile(each, QUARTILES) for each in costs])
-        return cls(search, lowest, evaluations, quartiles)
-
-    def __len__(self) -> int:
-        return len(self.best_cost)
 
 
 SAME_BASIN = 0.1
 """Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
 
 
-FIRST_STEPS, LAST_STEPS = Tolerances(max_steps=3), Tolerances(tolerance=1e-4, gain=1e-4)
+FIRST_STEPS, LAST_STEPS = Tolerances(max_steps=3), Tolerances(tolerance=1e-4, gain=1e-3)
 """Of every start of least squares, and then of the best of them one after the other."""
 
 
@@ -72,8 +55,9 @@ CONTINUED, CONFIRMED = 3, 2
 """How many of the best are refined to the end at most, and how many of them that end at the best are enough."""
 
 
-SAME_POINT = 0.02
-"""Of the width of the bounds: starts that come closer than that in every coordinate lead to the same minimum."""
+SAME_POINT, SAME_COST = 0.02, 0.01
+"""Of the width of the bounds: starts that come closer than that in every coordinate lead to the same minimum. Of the
+cost of a minimum: so do those in its basin whose next step promises a cost as near."""
 
 
 def refined(
@@ -92,8 +76,7 @@ def refined(
             progress("start", k + 1, len(starts))
     ends.sort(key=lambda end: end.cost)
     for k, end in enumerate(ends[:CONTINUED]):
-        whole = curved and not end.converged
-        ends[k] = problem.minimise(end.x) if whole else _continued(problem, end, ends[:k])
+        ends[k] = _continued(problem, end, ends[:k]) if end.converged or not curved else problem.minimise(end.x)
         best = min(ends, key=lambda one: one.cost)
         if k and not curved and sum(other is best for other in ends[: k + 1]) >= CONFIRMED:
             break
@@ -102,26 +85,25 @@ def refined(
 
 def _continued(problem: LeastSquaresProblem, end: Minimum, others: Sequence[Minimum]) -> Minimum:
     """The minimum that a search leads to, a few steps at a time; that of another one where it comes to lie there."""
+    steps, near = replace(LAST_STEPS, max_steps=FIRST_STEPS.max_steps + 1), list[Minimum]()
     for _ in range(LAST_STEPS.max_steps // FIRST_STEPS.max_steps):
-        near = [o for o in others if (np.abs(end.x - o.x) <= SAME_POINT * problem.bounds.width).all()]
-        if near:
-            return near[0]
-        if end.converged:
+        near, before = [one for one in others if _leads_to(end, one, problem.bounds.width)], end.x
+        end = near[0] if near else end if end.converged else problem.minimise(end.x, tolerances=steps)
+        if np.array_equal(end.x, before) or near:  # or no step of those that are tried gains anything
             break
-        further = problem.minimise(end.x, tolerances=replace(LAST_STEPS, max_steps=FIRST_STEPS.max_steps + 1))
-        if np.array_equal(further.x, end.x):  # no step of those that are tried gains anything
-            break
-        end = further
     return end
 
 
+def _leads_to(end: Minimum, other: Minimum, width: Floats) -> bool:
+    """Whether a search leads to another minimum: it is there, or in its basin and promised its cost."""
+    apart = (np.abs(end.x - other.x) / width).max()
+    return bool(
+        apart <= SAME_POINT or (apart <= SAME_BASIN and abs(end.promised - other.cost) <= SAME_COST * other.cost)
+    )
+
+
 def refine_candidates(
-    problem: LeastSquaresProblem,
-    u: Floats,
-    costs: Floats,
-    max_count: int,
-    trace: SearchTrace,
-    progress: IterationCallback | None = None,
+    problem: LeastSquaresProblem, u: Floats, costs: Floats, max_count: int, trace: SearchTrace
 ) -> SearchResult:
     """The best different candidates refined by least squares, best first; with max_count=0 the best one as it is.
 
@@ -130,16 +112,10 @@ def refine_candidates(
     selected = _most_different(u, costs, problem.bounds.width, max(max_count, 1))
     problem.check_predicted(u[selected])
     if max_count == 0:
-        best = Minimum(u[selected[0]], float(costs[selected[0]]), converged=False, evaluations=0)
+        best = Minimum(u[selected[0]], float(costs[selected[0]]), converged=False)
         return SearchResult((best,), trace)
-    minima = []
-    for done, k in enumerate(selected):
-        minima.append(problem.minimise(u[k]))
-        if progress is not None:
-            progress("refinement", done + 1, len(selected))
-    minima.sort(key=lambda minimum: minimum.cost)
-    evaluations = sum(minimum.evaluations for minimum in minima)
-    return SearchResult(tuple(minima), replace(trace, refined_cost=minima[0].cost, refinement_evaluations=evaluations))
+    minima = sorted((problem.minimise(u[k]) for k in selected), key=lambda minimum: minimum.cost)
+    return SearchResult(tuple(minima), replace(trace, refined_cost=minima[0].cost))
 
 
 def _most_different(u: Floats, costs: Floats, width: Floats, max_count: int) -> list[int]:

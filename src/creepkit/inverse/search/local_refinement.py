@@ -5,7 +5,6 @@ The trust region reflective method of scipy, with analytic Jacobians.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -38,14 +37,14 @@ class Minimum:
     """The end of a search.
 
     x : (unknowns,) where it ended; cost : half the sum of squares there; converged : whether it met its tolerance;
-    evaluations : how many points it evaluated.
+    evaluations : how many points it evaluated. promised : cost at the end of a further step of Gauss and Newton.
     whitened_residuals : (data,) -, whitened residuals of the data there, where they were kept.
     """
 
     x: Floats
     cost: float
     converged: bool
-    evaluations: int
+    promised: float = np.inf
     whitened_residuals: Floats | None = field(default=None, repr=False)
 
 
@@ -84,7 +83,6 @@ def bounded_least_squares(
     """
     free = np.setdiff1d(np.arange(start.size), list(fixed))
     lower, upper, cache = bounds.lower[free], bounds.upper[free], dict[bytes, tuple[Minimum, Floats]]()
-    count = itertools.count(1)
 
     def evaluate(free_values: Floats) -> tuple[Minimum, Floats]:
         """The point as an end, and the derivatives there."""
@@ -98,7 +96,7 @@ def bounded_least_squares(
             cost = 0.5 * float((robust_loss(values**2) if robust else values**2).sum())
             gain = _promised_gain(values, jacobian[:, free], weights, lower - free_values, upper - free_values)
             ends = gain <= tolerances.gain * cost
-            cache[key] = Minimum(x, cost, ends, next(count), values), jacobian[:, free]
+            cache[key] = Minimum(x, cost, ends, cost - gain, values), jacobian[:, free]
         return cache[key]
 
     def jacobian(free_values: Floats) -> Floats:
@@ -122,7 +120,7 @@ def bounded_least_squares(
         )
     except _PromisesNothing:
         return next(iter(cache.values()))[0]
-    return replace(evaluate(result.x)[0], converged=result.status > 0, evaluations=int(result.nfev))
+    return replace(evaluate(result.x)[0], converged=result.status > 0)
 
 
 def _promised_gain(values: Floats, jacobian: Floats, weights: Floats, below: Floats, above: Floats) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from creepkit import limits
-from creepkit.arrays import Floats
+from creepkit.arrays import Bools, Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.bounds import LOG_RATE_BOUNDS, Bounds
@@ -30,6 +30,11 @@ INTERNAL_RATE_RANGE = (-4.0, 0.0)
 VANISHING_POWER = 3
 """Of the uniform draws of a parameter that is off at its lower bound, zero, such as a threshold stress: its scale is
 that of the tests, which may be a hundredth of its bounds, and above all tests it leaves nothing to compare."""
+
+
+FIRST_DRAWS = 2
+"""Of a law of few shapes, the better of which is refined beside the centre before any others are drawn: where both lead
+to one minimum, that was the least one (within 0.3 % of its cost) in 79 of 80 searches of planted dimples."""
 
 
 @checked
@@ -52,6 +57,10 @@ class MultiStart(Options, title="multi-start"):
         if progress is not None:
             progress("screening of draws", 0, draws)
         of_terms = single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2)
+        if share > 1 and self == MultiStart() and not (of_terms or _vanishing(problem).any()):
+            ends = refined(problem, screened_starts(problem, starts=2, draws=FIRST_DRAWS), progress)
+            if ends[0] is ends[1]:
+                return SearchResult(tuple(ends))
         points = [*of_terms, *screened_starts(problem, starts=starts, draws=draws)]
         return SearchResult(tuple(refined(problem, points, progress)))
 
@@ -91,7 +100,7 @@ def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) ->
     """
     observations, bounds, seed = problem.observations, problem.bounds, problem.settings.seed
     sobol = qmc.Sobol(bounds.lower.size, seed=seed).random(draws)
-    sobol[:, [one.off == one.bounds[0] == 0.0 for one in problem.law.params.values()]] **= VANISHING_POWER
+    sobol[:, _vanishing(problem)] **= VANISHING_POWER
     points = np.concatenate([bounds.centre[None], bounds.lower + sobol * bounds.width])
     points = _with_sampled_exponents(problem, points, np.concatenate([np.full((1, bounds.lower.size), 0.5), sobol]))
     rates, internal_rates = list(problem.coordinates.term_rates), list(problem.coordinates.state_rates)
@@ -117,6 +126,11 @@ def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) ->
         problem.check_predicted(points)
         raise FitError(f"law '{problem.law.name}': no point within its bounds can be simulated; widen the bounds")
     return [*points]
+
+
+def _vanishing(problem: LeastSquaresProblem) -> Bools:
+    """(parameters,) whether a parameter is off at its lower bound, zero, where the law is another one's minimum."""
+    return np.array([one.off == one.bounds[0] == 0.0 for one in problem.law.params.values()], bool)
 
 
 def _with_sampled_exponents(problem: LeastSquaresProblem, points: Floats, sobol: Floats) -> Floats:

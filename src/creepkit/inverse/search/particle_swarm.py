@@ -72,8 +72,9 @@ class ParticleSwarm(Options, title="particle swarm"):
             swarm.move(costs[-1])
             if progress is not None:
                 progress("generation", k + 1, self.iterations)
-        trace, u = SearchTrace.from_costs(self.description, costs), bounds.lower + swarm.best_position * bounds.width
-        return refine_candidates(problem, u, swarm.best_cost, self.refined_candidates, trace, progress)
+        lowest, counts = np.minimum.accumulate([each.min() for each in costs]), np.cumsum([len(each) for each in costs])
+        trace, u = SearchTrace(self.description, lowest, counts), bounds.lower + swarm.best_position * bounds.width
+        return refine_candidates(problem, u, swarm.best_cost, self.refined_candidates, trace)
 
     def next_velocity(self, velocity: Floats, attraction: Floats) -> Floats:
         """(particles, parameters) velocity after an iteration.

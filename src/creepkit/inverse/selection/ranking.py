@@ -181,10 +181,7 @@ class Ranking(Presentable, Plotted, Tabulated):
 
         return write_ranking(self, Path(path))
 
-    def _drawn_by(self) -> tuple[Any, Any]:
-        from creepkit.reports.ranking import draw_misfits, ranking_figure
-
-        return ranking_figure, draw_misfits
+    drawn_by = "ranking.ranking_figure", "ranking.draw_misfits"
 
     def __str__(self) -> str:
         from creepkit.reports.answer import answer_text

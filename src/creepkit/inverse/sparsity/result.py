@@ -84,10 +84,7 @@ class Sparsity(Presentable):
         verb = "suffices" if len(self.kept_terms) == 1 else "suffice"
         return f"without {dropped} of '{self.law}' {cost}: {_quoted_list(self.kept_terms)} {verb}"
 
-    def __str__(self) -> str:
-        from creepkit.reports.inference import sparsity_text
-
-        return sparsity_text(self)
+    shown_by = "inference.sparsity_text"
 
 
 def _quoted_list(names: list[str] | TermNames) -> str:

@@ -298,7 +298,7 @@ class TermContributions:
     def __init__(
         self, coordinates: Coordinates, histories: Sequence[History], predictor: Predictor | None = None
     ) -> None:
-        self.coordinates, self.law = coordinates, coordinates.law
+        self.coordinates, self.law = coordinates, coordinates.law_there
         loaded = [p for history in histories if (p := _points_of_test(history, predictor)).shape[1]]
         if not loaded:
             raise FitError("no test is ever under load: terms of a law cannot be weighed against one another")

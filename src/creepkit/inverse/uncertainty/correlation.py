@@ -59,10 +59,7 @@ class Correlation(Presentable):
                 raise FitError(f"there is no '{name}' in this correlation; it has {', '.join(self.names)}")
         return float(self.matrix[self.names.index(first), self.names.index(second)])
 
-    def __str__(self) -> str:
-        from creepkit.reports.inference import correlation_text
-
-        return correlation_text(self)
+    shown_by = "inference.correlation_text"
 
 
 @checked

@@ -146,10 +146,7 @@ class PosteriorSamples(RateStatements, Presentable, Tabulated):
 
         return to_arviz(self)
 
-    def __str__(self) -> str:
-        from creepkit.reports.inference import posterior_text
-
-        return posterior_text(self)
+    shown_by = "inference.posterior_text"
 
 
 @checked
@@ -203,14 +200,17 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
     if len(judged) < count:
         return None
     for k, points in enumerate(JUDGED_POINTS):
-        residuals, rate_effect, jacobian = posterior.residuals_and_jacobian(judged)
+        residuals, rate_effect, *slopes = (posterior.residuals if k else posterior.residuals_and_jacobian)(judged)
         exact = posterior.log_density(residuals, rate_effect)
         if k and float(np.std(exact - density(judged))) < LARGEST_ERROR:
             return samples
-        usable = np.isfinite(exact) & np.isfinite(residuals).all((1, 2)) & np.isfinite(jacobian).all((1, 2, 3))
-        known.append(tuple(part[usable] for part in (judged, residuals, jacobian, exact)))
-        u, residuals, jacobian, log_density = (np.concatenate(parts) for parts in zip(*known, strict=True))
-        if len(u) * (1 + centre.size) < 1.5 * terms:
+        usable = np.isfinite(exact) & np.isfinite(residuals).all((1, 2))
+        if slopes:
+            usable &= np.isfinite(slopes[0]).all((1, 2, 3))
+            jacobian = slopes[0][usable]
+        known.append(tuple(part[usable] for part in (judged, residuals, exact)))
+        u, residuals, log_density = (np.concatenate(parts) for parts in zip(*known, strict=True))
+        if len(jacobian) * (1 + centre.size) < 1.5 * terms:
             return None
         weights = np.exp(0.5 * np.maximum(log_density - log_density.max(), LEAST_LOG_WEIGHT))
         surface = QuadraticResiduals.fitted(u, residuals, weights, centre, shape, jacobian)

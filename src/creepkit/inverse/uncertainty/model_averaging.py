@@ -105,10 +105,7 @@ class ModelAverage(RateStatements, Presentable):
             scale = np.stack([np.hypot(own, more) for own, more in zip(scale, misses, strict=True)])
         return MixtureDistribution(np.array(self.weights), np.full(len(self.fits), NORMAL_FREEDOM), location, scale)
 
-    def __str__(self) -> str:
-        from creepkit.reports.inference import model_average_text
-
-        return model_average_text(self)
+    shown_by = "inference.model_average_text"
 
 
 def _normal_under_law(fit: Identification, function: CoordinateFunction) -> tuple[Floats, Floats]:

@@ -76,10 +76,7 @@ class ProfileLikelihood(Presentable):
     def __repr__(self) -> str:
         return f"<ProfileLikelihood of {self}>"
 
-    def __str__(self) -> str:
-        from creepkit.reports.inference import profile_text
-
-        return profile_text(self)
+    shown_by = "inference.profile_text"
 
 
 @dataclass(frozen=True)

@@ -202,7 +202,8 @@ def log_rate(
     """
     from creepkit.kernels import lower
 
-    law, reference, kernel = coordinates.law, coordinates.reference, lower(coordinates.law, "numpy")
+    law, reference = coordinates.law_there, coordinates.reference
+    kernel = lower(law, "numpy")
     check_state(stress, temperature, strain, time)
     given = (
         (stress, reference.stress),

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from creepkit.arrays import Floats
-from creepkit.errors import SolveError, nearest
+from creepkit.errors import SolveError, refuse_unknown
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import Mesh, strip_mesh, strip_nodes
 from creepkit.limits import numbers
@@ -89,8 +89,7 @@ class DimpleGeometry:
 
     def mesh_velocity(self, field: str, refinement: float = 1.0) -> Floats:
         """Derivative of the nodes of `mesh` to one length, (nodes, 2), with the columns and layers of this dimple."""
-        if field not in self.lengths:
-            raise SolveError(f"dimple: no length is called '{field}'; {nearest(field, self.lengths)}")
+        refuse_unknown(field, self.lengths, SolveError, f"dimple: no length is called '{field}'")
         layout = self._layout(refinement)
         size = DimpleDimensions(*map(complex, self._dimensions()))
         # an imaginary step is exact, also where a real one would leave the allowed range, as at roof_radial = R

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, frozen, set_fields
-from creepkit.errors import SolveError, nearest
+from creepkit.errors import SolveError, refuse_unknown
 from creepkit.fem.surface_interpolation import (
     SurfaceInterpolation,
     checked_surface_radii,
@@ -84,8 +84,7 @@ class Observation:
     radii: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.form not in get_args(Form):
-            raise SolveError(f"observation: no form is called '{self.form}'; {nearest(str(self.form), get_args(Form))}")
+        refuse_unknown(self.form, get_args(Form), SolveError, f"observation: no form is called '{self.form}'")
         if self.form == "rings":
             self._check_rings()
             return

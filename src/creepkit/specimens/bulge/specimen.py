@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import SolveError, nearest
+from creepkit.errors import SAID, SolveError, nearest, restated
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import GeometryDerivative, Mesh
 from creepkit.hookspecs import hookimpl
@@ -207,10 +207,8 @@ class Bulge(FiniteElementSpecimen):
         """The operator that a history names, or that of the specimen where it names none."""
         if not history.operator:
             return self.observation
-        try:
+        with restated(SolveError, SolveError, f"{history.origin}: {SAID}"):
             return Observation.from_text(history.operator)
-        except SolveError as error:
-            raise SolveError(f"{history.origin}: {error}") from error
 
     def planned_loading(self, levels: tuple[float, float], jump_time: float) -> Loading:
         """The loading of a sample of a data set: both pressures, MPa, the second from `jump_time`, s, on."""

@@ -51,10 +51,10 @@ def test_an_iteration_is_one_prediction_and_a_seed_gives_the_same_answer_twice()
     for seed in (7, 7, 8):
         landscape = Known(rastrigin, cube(4), IdentificationSettings(seed=seed))
         runs.append(search.minima(landscape))
-        assert landscape.calls == [12] * len(runs[-1].trace)
+        assert landscape.calls == [12] * len(runs[-1].trace.best_cost)
     np.testing.assert_array_equal(runs[0].minima[0].x, runs[1].minima[0].x)
-    np.testing.assert_array_equal(runs[0].trace.quartiles, runs[1].trace.quartiles)
-    assert (runs[0].trace.quartiles != runs[2].trace.quartiles).any()
+    np.testing.assert_array_equal(runs[0].trace.best_cost, runs[1].trace.best_cost)
+    assert (runs[0].trace.best_cost != runs[2].trace.best_cost).any()
 
 
 # ---- rules ---------------------------------------------------------------------------------------------------------

@@ -12,12 +12,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.records import is_logarithmic
+from creepkit.records.units import celsius_text
+from creepkit.reports.blocks import ends
+from creepkit.reports.words import HEADLINES, TRUTHS
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
 
 LARGEST_PER_CENT = 0.5
 """Of ln, from which on a spread is given as a factor."""
+
+
+USABLE, MOST_DESCRIBED = float(np.log(2.0)), 2
+"""Of ln, within which a law is of use: the scatter band of creep tests; and what a headline names."""
 
 
 WELL_PREDICTED = 0.5
@@ -53,23 +60,18 @@ class Description:
         unpredicted = len(ends) - len(predicted)
         return cls(_rms(rates), outputs, _spread(predicted), _spread(minima), unpredicted)
 
-    @property
-    def sentence(self) -> str:
-        """What it describes within how much, the most telling first, without a full stop; "" of nothing."""
+    def items(self) -> list[tuple[str, float]]:
+        """(what it describes, root mean square), the most telling first."""
         lost = f" ({self.unpredicted} not predicted)" if self.unpredicted else ""
-        logarithmic = [
-            (f"rupture times{lost}", self.ruptures),
-            ("minimum creep rates", self.minimum_rates),
-            ("creep rates", self.rates),
-            *((_plural(name), value) for name, value in self.outputs.items() if is_logarithmic(name)),
-        ]
-        texts = [f"{name} within {spread_text(value)}" for name, value in logarithmic if np.isfinite(value)]
-        texts += [
-            f"{_plural(name)} within {100 * value:.2g} %"
-            for name, value in self.outputs.items()
-            if np.isfinite(value) and not is_logarithmic(name)
-        ]
-        return " and ".join(texts[:2])
+        known = [(f"rupture times{lost}", self.ruptures), ("minimum creep rates", self.minimum_rates)]
+        known += [("creep rates", self.rates)]
+        order = sorted(self.outputs, key=lambda name: not is_logarithmic(name))
+        known += [(_plural(name), _as_ln(name, self.outputs[name])) for name in order]
+        return [(name, value) for name, value in known if np.isfinite(value)][:MOST_DESCRIBED]
+
+
+def _as_ln(output: str, error: float) -> float:
+    return error if is_logarithmic(output) else float(np.log1p(error))
 
 
 def spread_text(spread: float) -> str:
@@ -80,23 +82,36 @@ def spread_text(spread: float) -> str:
 
 
 def headline(fit: Identification) -> str:
-    """How well the law describes the tests, then whether it could be the true one: one sentence without a full stop."""
-    described, adequacy = Description.of(fit).sentence, fit.adequacy
-    useful = f"describes {described}" if described else "was fitted"
-    if not fit.converged:
-        truth = "but the search for its values did not converge"
-    elif adequacy is None or adequacy.verdict == "cannot be judged":
-        truth = "whether it is the true law cannot be judged"
+    """What the law is to be used for, within how much and where, then whether it could be the true one."""
+    items = Description.of(fit).items()
+    good, bad = (
+        [f"{n} within {spread_text(v)}" for n, v in items if (v <= USABLE) is usable] for usable in (True, False)
+    )
+    values = {"law": fit.law.name, "good": " and ".join(good), "bad": " and ".join(bad), "truth": _truth(fit)}
+    values |= {"where": f" ({tested_range(fit)})", "described": f"; {' and '.join(good + bad)} so far" if items else ""}
+    kind = "use in part" if good and bad else "use" if good else "use nothing" if bad else "fitted"
+    return HEADLINES[kind if fit.converged else "not found"].format(**values)
+
+
+def tested_range(fit: Identification) -> str:
+    """Stresses and temperatures of the tests."""
+    return f"{ends(fit.ranges['stress'], 3)} MPa, {celsius_text(*fit.ranges['temperature'], digits=0)}"
+
+
+def _truth(fit: Identification) -> str:
+    """Whether the law could be the true one."""
+    adequacy = fit.adequacy
+    if adequacy is None or adequacy.verdict == "cannot be judged":
+        kind = "not judged"
     elif adequacy.explains:
-        truth = "the tests do not contradict it"
+        kind = "explains"
     elif adequacy.is_explained:
-        truth = f"but {adequacy.explanations[0].headline}"
+        return TRUTHS["explained"].format(cause=adequacy.explanations[0].headline)
     elif adequacy.contradicting is not None:
-        truth = "but minimum rates and rupture times contradict one another by it"
+        kind = "two exponents"
     else:
-        shape = adequacy.misses_shape()
-        truth = "the shape of the curves contradicts it" if shape else "the tests contradict it beyond their noise"
-    return f"{fit.law.name} {useful}; {truth}"
+        kind = "shape" if adequacy.misses_shape() else "noise"
+    return TRUTHS[kind]
 
 
 def _plural(name: str) -> str:

@@ -1,0 +1,71 @@
+"""What a result says first: every sentence of headlines, cautions and next steps.
+
+Whoever words a result edits these texts and no code. A sentence has 25 words at most and no full stop; braces hold what
+the result puts in.
+"""
+
+from __future__ import annotations
+
+HEADLINES = {
+    "use": "use {law} for {good}{where}; {truth}",
+    "use in part": "use {law} for {good}, not {bad}{where}; {truth}",
+    "use nothing": "do not use {law}: {bad} at best; {truth}",
+    "fitted": "{law} was fitted; {truth}",
+    "not found": "do not use {law} yet: the search for its values did not converge{described}",
+}
+"""{kind: the first line of an answer}. where : the range of the tests."""
+
+
+TRUTHS = {
+    "not judged": "whether it is the true law cannot be judged",
+    "explains": "the tests do not contradict it",
+    "explained": "but {cause}",
+    "two exponents": "but by it minimum rates contradict rupture times",
+    "shape": "but curves differ in shape",
+    "noise": "the tests differ from it by more than their noise",
+}
+"""{kind: whether the law could be the true one}, at the end of a headline."""
+
+
+CAUTIONS = {
+    "held": "{law} is held at {name} = {value}, the {end} bound of its search; to go on, write {wider}",
+    "not converged": "the search did not end: these values may not be its best",
+    "unknown": "whether the tests contradict the law is not known",
+    "unpredicted": "it does not predict every reading of {tests}",
+    "contradicting": "minimum rates and rupture times of the tests contradict one another by this law",
+    "worst": "it is worst in {test}: {what} {amount} too {side} at {time}",
+    "remedy": "it would explain the tests with {remedy}, which nobody modelled",
+    "implausible": "it takes {nuisance}, far from what was stated",
+    "noise unknown": "the noise of readings is not known: the law cannot be judged",
+    "undecided": "the tests cannot tell it apart from {laws}",
+    "not determined": "{by} do not determine {names}",
+    "hardly determined": "{by} hardly determine {names}",
+    "one test": "without test {test} the stress exponent is {exponent}",
+    "not included": "intervals do not include {kinds}: rates move by {change}",
+    "suspect": "readings of {tests} are suspect; nothing was dropped",
+}
+"""{kind: a caution}, the most serious first."""
+
+
+NEXT = {
+    "search": "repeat the search with more starts (--starts {starts}, or starts in a study){bounds}",
+    "law": "try {law} as well, for {why}",
+    "laws": "compare it with other laws that suit the tests (creepkit init)",
+    "within": "use it between the tests only: beyond them its misfit grows",
+    "noise": "state the noise of the readings in a column {column}",
+    "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor} times there",
+    "separate otherwise": "{first} and {second} need a test apart (creepkit design)",
+    "determine": "to determine {names}, test at {stress} MPa, {celsius}, for {hours} h: the rate is known least there",
+    "determine otherwise": "make a test that determines {names} (creepkit design)",
+    "use": "forecast (creepkit predict), or export the law to your code (creepkit export)",
+}
+"""{kind: what to do now}."""
+
+
+TRY = {
+    "exponent rises": "the stress exponent rises with stress",
+    "exponent falls": "the stress exponent falls with stress",
+    "early": "this one misses the beginning of the curves",
+    "late": "this one misses the end of the curves",
+}
+"""{kind: why a law is to be tried}."""

@@ -1,0 +1,10 @@
+"""Every law that is installed, with numbers for the conditions of the material that it asks for."""
+
+from creepkit.language import CreepLaw
+from creepkit.registry import default_registry
+from creepkit.testing.sample_points import with_numbers
+
+
+def registered_laws() -> dict[str, CreepLaw]:
+    """{name: law}, by name."""
+    return {name: with_numbers(entry.value) for name, entry in sorted(default_registry().laws().items())}
