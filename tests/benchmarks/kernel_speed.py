@@ -7,8 +7,7 @@ Kernel and hand-written code run alternately on the same points (20,000 rows by 
 "derivatives" the rate with its derivatives to stress, strain, time and every parameter. Compiled functions (ours by
 LLVM, those by hand by numba) are called for all rows at once, torch runs on one thread.
 
-The second table calls compiled entries from compiled code, for one point and for a vector of eight, as the solvers do;
-the least of the repeats.
+The second table calls compiled entries as the solvers do, for one point and for eight.
 """
 
 from __future__ import annotations

@@ -135,8 +135,8 @@ def draw_minimum_rates(axes: Axes, fit: Identification, rates: Sequence[MinimumR
         own = [r for r in rates if round(r.temperature / ISOTHERMAL_RANGE) == level]
         known = sorted((r for r in own if np.isfinite([r.predicted, r.low, r.high]).all()), key=lambda r: r.stress)
         if known:
-            celsius, *columns = _columns(known, "temperature", "stress", "predicted", "low", "high")
-            curves.append(RateCurve(float(celsius.mean()), *columns))
+            celsius, stress, *rate = _columns(known, "temperature", "stress", "predicted", "low", "high")
+            curves.append(RateCurve(float(celsius.mean()), stress, rate[0], rate[1], rate[2]))
     points = RatePoints("measured", *_columns(rates, "temperature", "stress", "measured"))
     _draw(axes, fit, curves, [points], "line: by the law; band: 95 % of a single test")
     axes.set(xlabel="stress, MPa", ylabel="minimum creep rate, %/h")
