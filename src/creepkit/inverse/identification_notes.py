@@ -136,7 +136,7 @@ def identification_notes(
 def one_end_note(minima: Mapping[str, int], search: str) -> tuple[str, ...]:
     """That a search had one start alone, if it had.
 
-    minima : see inverse.search.multistart.minima_counts. search : its name.
+    minima : see inverse.initial_search. search : its name.
     """
     if minima.get("search_ends") != 1 or search != "multi-start":
         return ()
