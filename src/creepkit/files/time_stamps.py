@@ -151,7 +151,7 @@ def check_increasing(times: Floats, path: str, lines: Ints, advice: str = "") ->
 
 
 def through_midnight(seconds: Floats) -> tuple[Floats, Floats]:
-    """(rows,) times of the day, s, that go on where seconds (rows,) begin anew, and (rows,) the day of each from 0 on."""
+    """(rows,) times of the day, s, that go on where seconds (rows,) begin anew, and (rows,) days from 0 on."""
     later = np.concatenate([[0.0], np.cumsum(np.diff(seconds) < -0.5 * DAY)])
     return seconds + DAY * later, later
 
