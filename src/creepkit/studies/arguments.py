@@ -38,7 +38,6 @@ from creepkit.studies.tables import Step
 if TYPE_CHECKING:
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.language import CreepLaw
-    from creepkit.records import History
 
 
 # ---- numbers with units --------------------------------------------------------------------------------------------

@@ -58,15 +58,17 @@ SHARE_TOLERANCE = 1e-3
 """Of ln of the ratio of rates, within which a sum keeps its share."""
 
 
-APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3)
+APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3, gain=1e-3)
 """Of the reduced-order model, from which the last steps begin."""
 
 
 LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6, gain=1e-4)
 
 
-FAR_EXCLUDED = 10.0 * NOT_EXCLUDED
-"""Increase of chi-square by the reduced-order model, from which on a sum is excluded without a further run."""
+FAR_EXCLUDED, EXCLUDED_BY_STEP = 10.0 * NOT_EXCLUDED, 6.0 * NOT_EXCLUDED
+"""Increase of chi-square by the reduced-order model, and by a step of the simulated law from there, from which on a sum
+is excluded without a further run.
+"""
 
 
 SAME_FUNCTION = 0.05
@@ -171,7 +173,7 @@ class FittedLaw:
         if fit.settings.weights != "likelihood" or fit.settings.included_errors:
             with contextlib.suppress(CreepkitError):
                 refined = problem.minimise(x, tolerances=LAST_STEPS).x
-                x = min(x, refined, key=lambda one: _chi_square(problem, one))
+                x = min(x, refined, key=problem.chi_square)
         return cls(problem, x)
 
     @property
@@ -303,20 +305,13 @@ def _least_excess(
 
     It is sought by the reduced-order model, then by the predictor itself where that does not exclude it by far.
     """
-    least = _chi_square(best.problem, best.x)
+    least, last = best.problem.chi_square(best.x), LAST_STEPS
     if best.reduced is not None:
         cheap = problem.with_predictor(best.reduced.predictor).with_correction(best.reduced.correction)
         found = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS)
-        x, excess = found.x, _chi_square(cheap, found.x) - least
+        x, excess = found.x, cheap.chi_square(found.x) - least
         if found.converged and excess > FAR_EXCLUDED:
             return excess, x
-    x = problem.minimise(x, additional=share, fixed=fixed, tolerances=LAST_STEPS).x
-    return _chi_square(problem, x) - least, x
-
-
-def _chi_square(problem: LeastSquaresProblem, x: Floats) -> float:
-    """Of the data and of the priors of nuisance parameters, without the penalties of bounds."""
-    whitened = problem.whiten(problem.residuals(x).values)
-    nuisances = problem.nuisance_parameters
-    deviation = (x[problem.parameter_count :] - nuisances.mean[: nuisances.size]) ** 2 * nuisances.precision
-    return float((whitened**2).sum() + deviation.sum())
+        last = replace(last, wanted=0.5 * (least + EXCLUDED_BY_STEP))
+    x = problem.minimise(x, additional=share, fixed=fixed, tolerances=last).x
+    return problem.chi_square(x) - least, x

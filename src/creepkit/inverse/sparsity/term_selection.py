@@ -54,7 +54,7 @@ EXHAUSTIVE_LIMIT = 4
 """Terms up to which every set of them is fitted; of longer sums forward selection adds one after the other."""
 
 
-TOLERANCES = Tolerances(max_steps=40, tolerance=1e-7)
+TOLERANCES = Tolerances(max_steps=40, tolerance=1e-7, gain=1e-6)
 """Of the fits of reduced laws."""
 
 

@@ -173,12 +173,7 @@ class _ProfileTrace:
 
     def _chi_square(self, x: Floats) -> float:
         """Of the data and the priors, without the penalties of bounds, at which a value is still possible."""
-        problem = self._problem_at(x) if self.noise_model.rate > 0 else self.problem
-        whitened, nuisance_count = problem.whitened(x), x.size - self.size
-        observation_count = problem.observations.count
-        return float(
-            (whitened[:observation_count] ** 2).sum() + (whitened[whitened.size - nuisance_count :] ** 2).sum()
-        )
+        return (self._problem_at(x) if self.noise_model.rate > 0 else self.problem).chi_square(x)
 
 
 def profile(fit: Identification, quantity_or_name: str | DerivedQuantity, *, level: float = 0.95) -> ProfileLikelihood:

@@ -15,7 +15,6 @@ from creepkit.inverse.selection.challenges import (
     THRESHOLD,
     FittedLaw,
     ShareResidual,
-    _chi_square,
     _least_excess,
     altered_laws,
     challenges_of,
@@ -103,7 +102,7 @@ def test_the_share_is_held_in_the_fit(power_law_narrow):
     assert share.jacobian(x) == pytest.approx(np.array([[-1e3, 0.0, 1e3]]))
     best, _ = power_law_narrow
     single = best.least_squares_problem
-    assert _chi_square(single, best.x) == pytest.approx(
+    assert single.chi_square(best.x) == pytest.approx(
         float((single.whiten(single.residuals(best.x).values) ** 2).sum())
     )
     assert _least_excess(FittedLaw(single, best.x), single, best.x + 0.05)[0] == pytest.approx(0.0, abs=0.02)
