@@ -260,11 +260,13 @@ class CandidateTest:
         return float(levels[levels > 0][0])
 
 
-def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperature: bool = True) -> list[CandidateTest]:
+def grid_of_rig(
+    rig: Rig, base: History, *, budget: float = np.inf, by_temperature: bool = True, of: str = ""
+) -> list[CandidateTest]:
     """What a rig can make: constant loads and changes of load, durations, temperatures and dimensions.
 
     base : a test that was made of that specimen; what is not varied is as there. budget : h, the most that one may
-    take. by_temperature : whether the temperature is varied, else it is that of `base`.
+    take. by_temperature : whether the temperature is varied, else that of `base`. of : to say of the material.
     """
     longest = min(rig.longest_hours, budget - rig.setup_hours) * 3600.0
     if longest <= 0:
@@ -278,7 +280,7 @@ def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperatu
     for duration, T in product(_durations(rig, longest), temperatures):
         for loading, text in _loadings(rig, base, duration):
             at_temperature = f" at {celsius_text(T)}" if len(temperatures) > 1 else ""
-            whole = f"{text} {time_text(duration)}{at_temperature}"
+            whole = f"{text} {time_text(duration)}{at_temperature}{of}"
             times = frame_times(duration, rig.frame_interval)
             for dimensions, pieces_text in pieces:
                 description = f"{pieces_text} at {whole}" if pieces_text else whole

@@ -34,6 +34,7 @@ def test_a_planted_grain_size_exponent_is_found_and_its_forecast_asks_for_the_si
     fit = ck.identify(LAW, [bar(size, load, rng) for size in ("20", "50", "120") for load in (60.0, 80.0, 110.0)])
     exponent = fit.estimates[2]
     assert exponent.low < 2.0 < exponent.high < exponent.low + 0.4
+    assert ck.design(fit).tests[0].histories[0].labels["grain size (um)"] != "50"  # where p changes nothing
     fit.save(tmp_path / "fit.json")
     plan = ck.History("plan", [1e5, 1e6], {}, ck.constant_stress(70.0), 1000.0)
     with pytest.raises(ck.errors.HistoryError, match="states no grain size.*label grain size: 1 mm"):

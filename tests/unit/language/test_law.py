@@ -67,7 +67,6 @@ BAD_LAWS = {
     ),
     "not finite": ({"terms": {"x": A * stress**n + sympy.zoo}}, "not finite and real"),
     "stray constraint": ({"constraints": (B >= 0,)}, "a constraint mentions unknown symbol B"),
-    "no constraint": ({"constraints": (n,)}, "constraint n is not a relation"),
     "constraint that cannot hold": ({"constraints": (sympy.false,)}, "constraint False is not a relation"),
 }
 
