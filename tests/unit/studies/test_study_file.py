@@ -80,7 +80,8 @@ def test_a_misspelt_key_is_refused_with_its_line_and_nearly_always_the_right_one
         assert told.startswith(f"study.toml:{line}: unknown key '{wrong}' in ["), told
         assert re.findall(r"^\[+([\w.]+)", FULL[:position], re.MULTILINE)[-1].split(".")[0] in told
         assert f"known: {', '.join(sorted(known_keys(_table_of(position))))}" in told
-            right += f"did you mean '{key}'" in told
+        assert "\n" not in told
+        right += f"did you mean '{key}'" in told
     assert right >= 0.96 * len(MISSPELT)
 
 
@@ -232,7 +233,6 @@ def test_unknown_names_units_and_files_are_refused_before_anything_is_done(folde
     told = str(caught.value)
     assert told.startswith(f"{folder / 'study.toml'}:{line}: "), told
     assert words in told
-    assert "\n" not in told
     assert {path.name for path in folder.iterdir() if path.suffix != ".csv"} == {"study.toml"}
 
 
