@@ -79,6 +79,7 @@ BENCHMARKS = {
     "forecast_beyond": Benchmark(4, (("--campaigns", "20"),), short=("--campaigns", "1", "--truths", "sinh")),
     "usual_errors": Benchmark(8, (("--campaigns", "20"),)),
     "noise_correlation": Benchmark(4),
+    "conditions": Benchmark(30),
     "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "rate_tables": Benchmark(20, needs=DATA),
     "hostile_files": Benchmark(40, needs="gcc, for exported C", short=("--short", "--first", "700000")),

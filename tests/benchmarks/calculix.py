@@ -5,8 +5,8 @@
 Needs `ccx` on the PATH (Debian: calculix-ccx). N3, N7 and TH are on the dimple, loaded by ramps of 5 s; c1 to c3 on a
 plate with a fillet, its rim clamped, loaded at once. CalculiX is backward Euler, so two values of its tolerance cetol
 give its limit of small increments on this mesh, and with it the error in time of either code: the largest difference of
-the apex displacement from that limit, from 10 min on, in percent of the apex at the end. CPU time is that of the
-processes, user and system; creepkit's is the mean of 20 runs after compilation. --alone leaves creepkit out.
+the apex displacement from that limit, from 10 min on, in percent of the apex at the end. CPU time is user and system;
+creepkit's is the mean of 20 runs after compilation.
 """
 
 from __future__ import annotations

@@ -6,7 +6,6 @@ Dimples are simulated by finite elements (Norton's law) and watched by a virtual
 0.56 mm, rigid motion that grows to 0.3 mm and 0.2 degrees, 5 % lost subsets, noise of 1.5 um along z correlated over
 neighbouring subsets, the plate tilted by 3 degrees. The truth is what `Observation` gives of the simulated profile.
 Intervals are 95 % of each frame's outputs; scatter is the root mean square of errors less each test's own mean error.
-Correlation in space is a length in spacings, in time that of a first-order autoregression.
 """
 
 from __future__ import annotations

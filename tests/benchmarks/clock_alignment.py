@@ -4,10 +4,10 @@
 
 Planted: the reduced-order model of the dimple under programmes of pressure, with a law of creep that the alignment does
 not know; noise of 0.02 MPa and 1 um. The clock of the instrument is ahead by 0.1 s to 5 min, of either sign, and gains
-a normal deviate of 1e-4, of which the alignment knows nothing either. Columns: tests refused because several lags fit
-or none does; answers whose 95 % intervals hold the planted lag in the middle of the test; gross misses, wrong by more
-than ten half widths. The frames do not tell lags apart that put every ramp between the same frames. After a slow ramp,
-during which creep grows, take the interval for twice as wide, or align on a fast change of the load.
+a normal deviate of 1e-4, of which the alignment knows nothing. Columns: tests refused because several lags fit or none
+does; answers whose 95 % intervals hold the planted lag in the middle of the test; gross misses, wrong by more than ten
+half widths. The frames do not tell lags apart that put every ramp between the same frames. After a slow ramp, during
+which creep grows, take the interval for twice as wide, or align on a fast change of the load.
 
 The static test of dimple D1 (shared/data/cameras/dabi_static) was aligned by hand too: plateaus laid upon each other.
 """

@@ -3,8 +3,8 @@
     python tests/benchmarks/core_speed.py [--repeats 30] [--write] [--libraries before.so,now.so [--counts]]
 
 The dimple under 8 MPa, then 10 MPa from 4 h on, observed at 289 times of 12 h, by six laws of the paper; least CPU time
-of the repeats, on one thread. "Prediction" is what a fit asks for: set-up, simulation, Gaussian fits, interpolation in
-time. "Derivatives" adds those to all parameters of the law, the thickness, the modulus and the temperature.
+of the repeats, on one thread. "Prediction" is what a fit asks for; "derivatives" adds those to all parameters,
+thickness, modulus and temperature.
 """
 
 import os

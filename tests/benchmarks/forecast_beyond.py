@@ -2,11 +2,10 @@
 
     python tests/benchmarks/forecast_beyond.py [--campaigns 25] [--truths NAME ...] [--write]
 
-Bars in closed form: 6 to 12 tests at one or three temperatures; rates scatter by 3, 8 or 15 %; every second has
-primary creep. The rate depends on stress as sinh(s / 60 MPa)^4, (s - s0)^4 above a threshold, the sum of two powers (2
-and 8), s^5 exp(s / 80 MPa), or a power, with which the law is right. Forecast is a test at two thirds of the lowest
-stress. Columns: shares of times to a strain of 0.01, and of rates, inside their 95 % intervals, and half widths in ln.
-The goal is 0.90 to 0.98.
+Bars in closed form: 6 to 12 tests at one or three temperatures; rates scatter by 3, 8 or 15 %; every second has primary
+creep. The rate depends on stress as sinh(s / 60 MPa)^4, (s - s0)^4 above a threshold, the sum of two powers (2 and 8),
+s^5 exp(s / 80 MPa), or a power, with which the law is right. Forecast is a test at two thirds of the lowest stress.
+Columns: shares of times to a strain of 0.01, and of rates, inside their 95 % intervals, and half widths in ln.
 """
 
 from __future__ import annotations

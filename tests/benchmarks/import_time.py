@@ -3,8 +3,7 @@
     python tests/benchmarks/import_time.py [--write]
 
 CPU time, user and system, of a new interpreter, the least of ten runs each, all in turn; the start of the interpreter
-is included; byte code is kept, as after an installation. The floor of the first two is `import sympy` itself, in which
-laws are written.
+is included; byte code is kept, as after an installation.
 """
 
 from __future__ import annotations

@@ -13,8 +13,7 @@ loss is that of the amplitude: squared differences over squared deviations from 
 that of `fit.adequacy`, of all outputs; "left" is the standard deviation of the amplitude beyond the noise that
 neighbouring frames show. Held out: each test predicted through the reduced-order model from the others, by likelihood,
 at nominal thickness, with the step that its group shows; test 12, which moves half as much as its like, has 0.2 of it
-without the event. By likelihood Norton's n is 2.7, for the law misses the shape of curves; by the weights of the misfit
-its held out loss is 0.296. Values marked * are not determined, or at their bound; units 1/s, s, J/mol, MPa.
+without the event. Values marked * are not determined, or at their bound; units 1/s, s, J/mol, MPa.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ to the point from 50-digit arithmetic, at Sobol points of the full bounds and of
 result cancels, up to what the last bits of the inputs make.
 
 Simulations: values of a law are the middle of its bounds, its rates multiplied so that a bar creeps by about 2 % (for
-dimples 1 %) at 100 MPa. The bar is under steps of true stress with heating, the relaxation test under two steps of
-total strain, the dimple under a jump of pressure; compared are strain, stress, and amplitude, width and shape with
-those of the specimens `uniaxial` and `relaxation` and of `ck.surrogate("dimple")`, relatively, up to the earlier end.
+dimples 1 %) at 100 MPa. The bar is under steps of stress with heating, the relaxation test under two steps of strain,
+the dimple under a jump of pressure; compared are strain, stress, and amplitude, width and shape with those of
+`uniaxial` and `relaxation` and of `ck.surrogate("dimple")`, relatively, up to the earlier end.
 
 Processor times are those of one prediction in node after 20 others, in ms; "fast" is the coarse model while dragging.
 Medians and largest numbers are those over all registered laws.

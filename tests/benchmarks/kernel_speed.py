@@ -4,12 +4,10 @@
 
 Kernel and hand-written code run alternately on the same points (20,000 rows by default); each ratio is the median over
 31 repeats of the ratio of their CPU times, and the time is that of the kernel. "Rate" is the creep rate alone,
-"derivatives" the rate with its derivatives to stress, strain, time and every parameter. Compiled functions (ours
-by LLVM, those by hand by numba) are called for all rows at once, torch runs on one thread. A call of a kernel costs
-some 10 us more than its arithmetic in NumPy and some 50 us in torch, which a few thousand rows make small.
+"derivatives" the rate with its derivatives to stress, strain, time and every parameter. Compiled functions (ours by
+LLVM, those by hand by numba) are called for all rows at once, torch runs on one thread.
 
-The second table calls compiled entries from compiled code, for one point and for a vector of eight, as the solvers do;
-the least of the repeats.
+The second table calls compiled entries as the solvers do, for one point and for eight.
 """
 
 from __future__ import annotations

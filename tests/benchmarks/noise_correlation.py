@@ -5,8 +5,8 @@
 Two tests of 30 frames show an amplitude that grows and a width that falls, in closed form, with stated noise that is
 correlated in each frame. Norton's law is identified by likelihood, with the correlation stated and without. Columns:
 the share of 95 % intervals of the rate coefficient that hold the planted value; rms error of its logarithm, and half
-the width of the interval (median); the same two of generalised least squares in closed form; how often the law is said
-to explain the tests to their stated noise.
+the width of the interval (median); the same two of least squares; how often the law is said to explain the tests to
+their stated noise.
 """
 
 from __future__ import annotations

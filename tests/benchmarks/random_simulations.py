@@ -3,17 +3,15 @@
     python tests/benchmarks/random_simulations.py [--cases 100000] [--laws 200] [--seed 1] [--specimens NAME ...]
                                                   [--jobs 2] [--law SEED] [--write]
 
-Half of the laws are sums of one to three products of factors (powers, sinh, exp, log, thresholds, damage, oscillation);
-the others are random trees of operations. Laws have none to two internal variables; parameters are drawn in and beyond
-their bounds. Tests are of every registered specimen, with one to six points of load and of temperature, jumps, values
-that no test has, and sometimes other dimensions of the piece, impossible ones among them. A third of the predictions is
-differentiated. A process runs the cases of one law; "lost" counts laws whose process ended before its cases.
+Half of the laws are sums of products of factors (powers, sinh, exp, log, thresholds, damage, oscillation); the others
+are random trees of operations. Parameters are drawn in and beyond their bounds. Tests are of every registered specimen,
+with jumps and values that no test has, and sometimes impossible dimensions. A third of the predictions is
+differentiated. "lost" counts laws whose process ended before its cases.
 
 An answer is a prediction whose status agrees with its values. "refused" counts sentences of creepkit, "laws refused"
 laws that it did not take. Faults: "untrue", a complete row with a value that is not finite, an end beyond the test or a
 result that changes when it is calculated alone instead of among others; "unexplained", a test that ended early without
-a word; "traceback", any error but one of creepkit in one line; "warning", a warning of a library below; "hang", more
-than 60 s of CPU for one prediction.
+a word; "traceback", any error but one of creepkit in one line; "hang", more than 60 s of CPU.
 """
 
 import collections

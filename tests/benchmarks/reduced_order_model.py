@@ -2,11 +2,11 @@
 
     python tests/benchmarks/reduced_order_model.py [--cases 90] [--seed 3] [--write]
 
-Tests of six laws drawn over the paper's bounds, 12 h with 288 frames, by the reduced-order model and by finite
-elements of the same mesh, each in the steps of its own. The error is the largest difference of the displacement
-of the top over all frames and nodes, in % of the largest that the finite elements reach: median, 90 % and largest of
-the cases. Where a test ruptures, its frames before the first of both ruptures count; beside stands the difference of
-the times at which the middle has risen by 2.4 mm. CPU times are of the simulation alone, on one thread.
+Tests of six laws drawn over the paper's bounds, 12 h with 288 frames, by the reduced-order model and by finite elements
+of the same mesh, each in the steps of its own. The error is the largest difference of the displacement of the top over
+all frames and nodes, in % of the largest that the finite elements reach: median, 90 % and largest of the cases. Where a
+test ruptures, its frames before the first of both ruptures count; beside stands the difference of the times at which
+the middle has risen by 2.4 mm.
 """
 
 import time

@@ -4,9 +4,9 @@
 
 A plate with a dome of known shape moves as a rigid body (by 0.3 mm in all, and 0.2 degrees); the dome grows after ten
 frames at rest. Two pinhole cameras see it at 0.03 mm a pixel, with eight bits and noise of 1 grey value. pyvale
-correlates the pairs with subsets of 31 pixels (0.93 mm) that deform as affine maps; `ck.read_frames` reads what it
-writes, and `ck.extract` fits Eq. (7) within 7.5 mm, and rings. Errors are against `Observation` of the true dome, in
-frames in which it is 50 um high or more; "stated" is the standard deviation that the history carries.
+correlates the pairs with subsets of 31 pixels; `ck.read_frames` reads what it writes, and `ck.extract` fits Eq. (7)
+within 7.5 mm, and rings. Errors are against `Observation` of the true dome, in frames in which it is 50 um high or
+more; "stated" is the standard deviation that the history carries.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ Four test pieces of one kind are tested at 800 C over the middle of the range of
 frames each. The length that the specimen knows least exactly differs from piece to piece by its tolerance, and no file
 states it. The data come from a finer discretisation, with the noise that the specimen states. Columns: shares of sets
 whose 95 % interval holds the planted exponent and the rate amid the tests; half width of the latter; share of all
-lengths within their own 95 %; CPU seconds of a fit. A share of 0.95 in 20 sets lies from 0.85 to 1 in 98 of 100 cases.
+lengths within their own 95 %; CPU seconds of a fit.
 """
 
 from __future__ import annotations

@@ -5,8 +5,7 @@
 CMSX-6 (nine creep curves at one temperature), Alloy 617 (94 creep tests at six temperatures) and Inconel 625 (nine
 bulge tests by finite elements), as examples/studies declares them, and the planted study that ships. CPU time is that
 of one process on an empty folder of results, with compiled laws in the cache; then of the same run again in that
-process, which reads what is kept; the command takes about 3 s more, for Python and imports. The report is one HTML
-file, which carries study, lock and data up to the size that the study states.
+process, which reads what is kept. The report is one HTML file, which carries study, lock and data.
 """
 
 from __future__ import annotations

@@ -2,11 +2,11 @@
 
     python tests/benchmarks/verify_export.py [LAW ...] [--cetol 1e-4 1e-5] [--keep FOLDER] [--write]
 
-Each law is exported with `ck.export(law, "calculix")`, compiled by gfortran and preloaded before a CalculiX 2.20 built
-from Debian's source, which knows nothing of creepkit. One element in tension follows steps of stress for 12 h
-(compared: creep strain), and the dimple is bulged for 12 h (compared: apex displacement, mm). CalculiX is backward
-Euler: two values of its tolerance cetol give its limit of small increments, on the same mesh. Differences are the
-largest from 10 min on, in percent of the last value of that limit; increments of CalculiX stand in brackets.
+Each law is exported with `ck.export(law, "calculix")`, compiled by gfortran and preloaded before CalculiX 2.20, built
+from Debian's source. One element in tension follows steps of stress for 12 h (compared: creep strain), and the dimple
+is bulged for 12 h (compared: apex displacement, mm). CalculiX is backward Euler: two values of its tolerance cetol give
+its limit of small increments, on the same mesh. Differences are the largest from 10 min on, in percent of the last
+value of that limit; increments of CalculiX stand in brackets.
 """
 
 from __future__ import annotations

@@ -11,17 +11,14 @@ import numpy as np
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.extraction.domes import Centers
-from creepkit.extraction.options import ClockOptions
-from creepkit.instruments.imposed import channel_names, named_specimens
-from creepkit.records import Loading, Program, RecordedLoading, Specimen
+from creepkit.extraction.options import ClockOptions, ExtractionOptions
+from creepkit.instruments.imposed import Imposed, channel_names, named_specimens
+from creepkit.records import Frames, History, InstrumentRecord, Loading, Program, RecordedLoading, Specimen
 from creepkit.registry.arguments import resolve_predictor
 
 if TYPE_CHECKING:
     from creepkit.extraction import Extraction
-    from creepkit.extraction.options import ExtractionOptions
     from creepkit.extraction.temperature_fields import InfraredField
-    from creepkit.instruments.imposed import Imposed
-    from creepkit.records import Frames, History, InstrumentRecord
 
 FEWEST_AT_REST = 3
 """Frames whose level shows that there is no load: a single one is the reference, whatever it was taken under."""

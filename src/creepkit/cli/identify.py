@@ -18,14 +18,13 @@ from creepkit.inverse.search_options import SearchOptions
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.limits import STRAIN
 from creepkit.options import Option, options_of
-from creepkit.records import Predictor
+from creepkit.records import History, Predictor
 from creepkit.reports.terminal import ProgressBar, print_json, tell
 from creepkit.studies.candidates import by_likelihood, ranked_candidates
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.language import CreepLaw
-    from creepkit.records import History
     from creepkit.screening.screen import ScreeningOptions
 
 DENSE = "combined"

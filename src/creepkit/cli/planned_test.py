@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import make_dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 from creepkit.cli.command_options import Levels
 from creepkit.errors import SolveError
@@ -21,13 +21,7 @@ from creepkit.forecasts.planned_tests import (
     stated_temperature,
 )
 from creepkit.options import Options, option
-from creepkit.records import check_geometry, dimension_named, dimensions_of, known_specimens, loads_of
-
-if TYPE_CHECKING:
-    from typing import Any
-
-    from creepkit.records import Specimen
-
+from creepkit.records import Specimen, check_geometry, dimension_named, dimensions_of, known_specimens, loads_of
 
 OF_COMMANDS = ("force", "load")
 """Names of options that every command has, or that are written by --load."""

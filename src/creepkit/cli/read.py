@@ -14,13 +14,12 @@ import typer
 import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import Json
-from creepkit.errors import HistoryError
+from creepkit.errors import CreepkitError, HistoryError
 from creepkit.limits import ENERGY
 from creepkit.options import Option
 from creepkit.reports.terminal import print_json, tell, tell_written
 
 if TYPE_CHECKING:
-    from creepkit.errors import CreepkitError
     from creepkit.records import History, InstrumentRecord
 
 

@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import quoted
-from creepkit.records import Status, outputs_of
+from creepkit.records import History, Specimen, Status, outputs_of
 from creepkit.records.presentable import Presentable
-from creepkit.sampling.conditions import planned_test, specimen_conditions
+from creepkit.sampling.conditions import TimeGrid, planned_test, specimen_conditions
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
-    from creepkit.records import History, Specimen
-    from creepkit.sampling.conditions import TimeGrid
 
 
 class Column(NamedTuple):

@@ -19,7 +19,7 @@ from datetime import UTC, datetime
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import h5py
 import numpy as np
@@ -46,10 +46,6 @@ from creepkit.registry import resolve_law
 from creepkit.registry.arguments import resolve_predictor
 from creepkit.registry.specimen_documents import specimen_to_json
 from creepkit.sampling.domains import SamplingDomain, sampling_design
-
-if TYPE_CHECKING:
-    from creepkit.records import Specimen
-    from creepkit.sampling.domains import SamplingDomain
 
 GENERATION_NAME = "generation.json"
 

@@ -11,13 +11,11 @@ from creepkit.arrays import Ints
 from creepkit.dataset.dataset import FAILED, NOT_SIMULATED, Dataset, empty_columns
 from creepkit.errors import DatasetError
 from creepkit.jobs.worker_process import error_text
-from creepkit.records import Status
+from creepkit.records import Specimen, Status
 from creepkit.sampling.conditions import creep_output, hold_times
-from creepkit.sampling.domains import DrawCriterion, OutcomeCriterion, SimulationOutcome
+from creepkit.sampling.domains import DrawCriterion, OutcomeCriterion, SamplingDomain, SimulationOutcome
 
 if TYPE_CHECKING:
-    from creepkit.records import Specimen
-    from creepkit.sampling.domains import SamplingDomain
     from creepkit.sampling.rates import Draws
 
 

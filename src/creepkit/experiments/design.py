@@ -28,10 +28,10 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.selection.ranking import Ranking
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
 from creepkit.records import History
+from creepkit.records.conditions import stated_condition
 
 Progress = Callable[[str, int, int], None]
 
@@ -58,7 +58,7 @@ GREEDY_POOL, MOST_RUNS, LEAST_GAIN = 30, 6, 0.02
 
 @checked
 def design(
-    source: Ranking | ModelAverage | Identification | Sequence[Identification],
+    source: Ranking | Identification | Sequence[Identification],
     *,
     rig: Rig | Sequence[Rig] | None = None,
     goal: Goal | None = None,
@@ -91,13 +91,24 @@ def design(
     return search.run(planned, refuse=candidates is not None)
 
 
+MOST_MATERIALS = 5
+"""Of those that tests were made of, by their conditions, of which tests are planned: the ends, and some between."""
+
+
 def _grids(laws: Sequence[Identification], rigs: Sequence[Rig], budget: float | None) -> list[CandidateTest]:
     by_temperature, most = all(fit.law.uses(temperature) for fit in laws), np.inf if budget is None else budget
+    conditions = tuple(dict.fromkeys(one for fit in laws for one in fit.law.conditions))
     candidates: list[CandidateTest] = []
     for rig in rigs:
-        tests = [h for h in laws[0].histories if h.specimen == rig.specimen]
-        longest = max(tests, key=lambda h: float(h.times[-1]))
-        candidates += grid_of_rig(rig, longest, budget=most, by_temperature=by_temperature)
+        tests = sorted((h for h in laws[0].histories if h.specimen == rig.specimen), key=lambda h: float(h.times[-1]))
+        longest = {tuple(stated_condition(h, one)[0] for one in conditions): h for h in tests}
+        materials = sorted(longest)
+        for k in np.unique(np.linspace(0, len(materials) - 1, min(len(materials), MOST_MATERIALS)).round().astype(int)):
+            stated = zip(conditions, materials[k], strict=True)
+            text = "".join(f", {one.name.replace('_', ' ')} {value:.3g} {one.unit}" for one, value in stated)
+            candidates += grid_of_rig(
+                rig, longest[materials[k]], budget=most, by_temperature=by_temperature, of=text * (len(materials) > 1)
+            )
     return candidates
 
 

@@ -447,7 +447,7 @@ def test_key(history: History) -> tuple[object, ...]:
         history.specimen,
         history.loading,
         temperature if isinstance(temperature, float) else (temperature.times.tobytes(), temperature.values.tobytes()),
-        tuple(sorted(history.geometry.items())),
+        (*sorted(history.geometry.items()), *sorted(history.labels.items())),
         history.times.tobytes(),
     )
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Floats, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.held_levels import held_temperatures
@@ -99,9 +99,7 @@ class Rig(Options, title="settings of a rig"):
         for name, values in dimensions.items():
             if not all(0 < value < LONGEST_DIMENSION for value in values):
                 raise FitError(f"a rig's {name} must be lengths in mm above zero, found {values}")
-        object.__setattr__(self, "levels", (low, high))
-        object.__setattr__(self, "temperatures", tuple(temperatures))
-        object.__setattr__(self, "dimensions", dimensions)
+        set_fields(self, levels=(low, high), temperatures=tuple(temperatures), dimensions=dimensions)
 
     def refusal(self, history: History) -> str:
         """Why this rig cannot make a planned test, in a sentence; "" where it can."""
@@ -262,11 +260,13 @@ class CandidateTest:
         return float(levels[levels > 0][0])
 
 
-def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperature: bool = True) -> list[CandidateTest]:
+def grid_of_rig(
+    rig: Rig, base: History, *, budget: float = np.inf, by_temperature: bool = True, of: str = ""
+) -> list[CandidateTest]:
     """What a rig can make: constant loads and changes of load, durations, temperatures and dimensions.
 
     base : a test that was made of that specimen; what is not varied is as there. budget : h, the most that one may
-    take. by_temperature : whether the temperature is varied, else it is that of `base`.
+    take. by_temperature : whether the temperature is varied, else that of `base`. of : to say of the material.
     """
     longest = min(rig.longest_hours, budget - rig.setup_hours) * 3600.0
     if longest <= 0:
@@ -280,7 +280,7 @@ def grid_of_rig(rig: Rig, base: History, *, budget: float = np.inf, by_temperatu
     for duration, T in product(_durations(rig, longest), temperatures):
         for loading, text in _loadings(rig, base, duration):
             at_temperature = f" at {celsius_text(T)}" if len(temperatures) > 1 else ""
-            whole = f"{text} {time_text(duration)}{at_temperature}"
+            whole = f"{text} {time_text(duration)}{at_temperature}{of}"
             times = frame_times(duration, rig.frame_interval)
             for dimensions, pieces_text in pieces:
                 description = f"{pieces_text} at {whole}" if pieces_text else whole

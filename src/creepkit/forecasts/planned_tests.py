@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from creepkit.readers.vocabulary import COMPONENT_LOADING_KINDS
 from creepkit.records import (
     ZERO_CELSIUS,
     History,
+    Load,
     Loading,
     PointLoading,
     Program,
@@ -31,9 +32,6 @@ from creepkit.records import (
     loading_of,
     loads_of,
 )
-
-if TYPE_CHECKING:
-    from creepkit.records import Load
 
 
 @checked

@@ -1,4 +1,4 @@
-"""Bound and prior penalties as residuals: parameter bounds, constraints of the law, priors of nuisance parameters.
+"""Bounds of parameters and constraints of the law as limits of the unknowns, whose violation is penalised.
 
 A check finds coefficients whose bounds exclude the data.
 """
@@ -12,7 +12,6 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.language import CreepLaw
@@ -20,68 +19,39 @@ from creepkit.records import History, Predictor
 
 
 class BoundPenalties:
-    """Residuals of x = (u, e) beside those of the data.
+    """Limits of u, beyond which half of their squares is added to the cost.
 
-    Bounds of coefficients, and of exponents whose place a local exponent takes, and the constraints of the law give
-    zero inside and grow linearly outside: they do not bound single conditioned coordinates. Nuisance parameters give
-    their distance from the prior mean over its standard deviation.
+    They are those of coefficients, and of exponents whose place a local exponent takes, and the constraints of the law:
+    they do not bound single conditioned coordinates.
     """
 
     WEIGHT = 100.0
 
-    def __init__(
-        self, coordinates: Coordinates, nuisance_parameters: NuisanceParameters, points: Sequence[Floats]
-    ) -> None:
+    def __init__(self, coordinates: Coordinates, points: Sequence[Floats]) -> None:
         """points : the six variables of a law, (points,) each, at which its constraints must hold."""
-        self.coordinates, self.nuisance_parameters, law = coordinates, nuisance_parameters, coordinates.law
-        self.low, self.high = law.internal_bounds[:, list(coordinates.penalised)]
+        self.coordinates, self.penalised = coordinates, list(coordinates.penalised)
+        self.low, self.high = coordinates.law.internal_bounds[:, self.penalised]
         self._constraints = _constraint_margins(coordinates.law_there, points)
 
-    def residuals(self, x: Floats) -> Floats:
-        """(..., penalties) - residuals at x (..., unknowns)."""
-        u, e = self._split(x)
+    def limits(self, u: Floats) -> Floats:
+        """(..., limits) WEIGHT times how far u (..., parameters) is beyond each, below zero within."""
         theta = self.coordinates.theta(u)
-        margins = self._constraints(theta)
-        penalties = self.WEIGHT * np.concatenate([np.abs(self.bound_excess(theta)), np.maximum(-margins, 0.0)], axis=-1)
-        prior_residuals = (e - self.nuisance_parameters.mean[: e.shape[-1]]) * np.sqrt(
-            self.nuisance_parameters.precision
-        )
-        return np.concatenate([penalties, prior_residuals], axis=-1)
+        values = theta[..., self.penalised]
+        return self.WEIGHT * np.concatenate([values - self.high, self.low - values, -self._constraints(theta)], axis=-1)
 
     def constraint_violations(self, u: Floats) -> Floats:
         """(constraints,) how far each constraint is violated at u (parameters,); 0 where it holds."""
         return np.maximum(-self._constraints(self.coordinates.theta(u)), 0.0)
 
-    def jacobian(self, x: Floats) -> Floats:
-        """(penalties, unknowns) their derivatives at x (unknowns,); those of constraints by central differences."""
-        u, e = self._split(x)
-        theta = self.coordinates.theta(u)
-        penalised = list(self.coordinates.penalised)
-        bound_derivatives = np.sign(self.bound_excess(theta))[:, None] * self.coordinates.jacobian(u)[penalised]
+    def jacobian(self, u: Floats) -> Floats:
+        """(limits, parameters) their derivatives at u (parameters,); those of constraints by central differences."""
+        rows = self.coordinates.jacobian(u)[self.penalised]
         columns = [np.zeros(0)] * u.size
-        if self._constraints(theta).size:
-            for k in range(u.size):
-                step = np.zeros(u.size)
-                step[k] = 1e-6 * max(1.0, abs(u[k]))
-                violations = (
-                    np.maximum(-self._constraints(self.coordinates.theta(v)), 0.0) for v in (u + step, u - step)
-                )
-                columns[k] = np.subtract(*violations) / (2 * step[k])
-        penalties = self.WEIGHT * np.concatenate([bound_derivatives, np.stack(columns, axis=1)])
-        prior = np.diag(np.sqrt(self.nuisance_parameters.precision))
-        return np.block([[penalties, np.zeros((len(penalties), e.size))], [np.zeros((e.size, u.size)), prior]])
-
-    def _split(self, x: Floats) -> tuple[Floats, Floats]:
-        size = len(self.coordinates.names)
-        return x[..., :size], x[..., size:]
-
-    def bound_excess(self, theta: Floats) -> Floats:
-        """(..., penalised) distance of parameters beyond their bounds, positive above and negative below.
-
-        theta : (..., parameters) internal parameters.
-        """
-        penalised = theta[..., list(self.coordinates.penalised)]
-        return np.asarray(np.maximum(penalised - self.high, 0.0) + np.minimum(penalised - self.low, 0.0))
+        if self._constraints(self.coordinates.theta(u)).size:
+            for k, step in enumerate(np.diag(1e-6 * np.maximum(1.0, np.abs(u)))):
+                down, up = (self._constraints(self.coordinates.theta(v)) for v in (u + step, u - step))
+                columns[k] = (up - down) / (2 * step[k])
+        return self.WEIGHT * np.concatenate([rows, -rows, np.stack(columns, axis=1)])
 
 
 def _constraint_margins(law: CreepLaw, point: Sequence[Floats]) -> Callable[[Floats], Floats]:

@@ -42,6 +42,7 @@ from creepkit.inverse.identification_notes import (
 from creepkit.inverse.initial_search import SearchOutcome, StartingEstimate, initial_search
 from creepkit.inverse.iterative_estimation import (
     APPROXIMATE_LIMITS,
+    EXACT_LIMITS,
     SIMULATION_LIMITS,
     EstimationResult,
     IterationLimits,
@@ -92,7 +93,7 @@ CLEARLY = 1.2
 """Times SHAPE_MISFIT, beyond which a law misses the shape of curves whatever the last steps of its estimate are."""
 
 
-DESCRIBING_LIMITS = replace(APPROXIMATE_LIMITS, rounds=8)
+DESCRIBING_LIMITS = APPROXIMATE_LIMITS._replace(rounds=8)
 """For values by frames of equal weight, which follow the noise that is found slowly."""
 
 
@@ -304,13 +305,13 @@ def _last_estimate(
 
     It is corrected where the last estimate begins: at an end of its own, or near one that is known.
     """
-    limits = IterationLimits() if problem.predictor.reduced_order_model() is None else SIMULATION_LIMITS
-    limits = replace(limits, rounds=REFIT_ROUNDS) if how.is_near else limits
+    limits = EXACT_LIMITS if problem.predictor.reduced_order_model() is None else SIMULATION_LIMITS
+    limits = limits._replace(rounds=REFIT_ROUNDS) if how.is_near else limits
     x, known = starts[0], None
     if not (how.is_near or how.through is not None) or problem.predictor.refined() is None:
         best = _describing_estimate(_best_of(problem, starts, limits, how.progress, noise), limits, how)
         problem, x, noise = best.problem, best.x, best.noise
-        limits = replace(limits, rounds=REFIT_ROUNDS)
+        limits = limits._replace(rounds=REFIT_ROUNDS)
         if problem.predictor.refined() is None:
             return best, None
     for _ in range(MOST_CORRECTIONS):
@@ -357,7 +358,7 @@ def _best_of(
     """The likeliest of the estimates from starts (unknowns,); by likelihood the start that is best after one round."""
     estimator = _working_estimator(problem)
     if len(starts) > 1 and estimator.by_likelihood:
-        ends = [estimate_iteratively(problem, x, estimator, replace(limits, rounds=1), None, noise) for x in starts]
+        ends = [estimate_iteratively(problem, x, estimator, limits._replace(rounds=1), None, noise) for x in starts]
         best = max(ends, key=lambda end: end.log_likelihood)
         problem, starts, noise = best.problem, [best.x], best.noise
     ends = [estimate_iteratively(problem, x, estimator, limits, progress, noise) for x in starts]
@@ -380,7 +381,7 @@ def _reported(
     """Noise model, intervals, judgement and goodness of fit, all at the reported values."""
     estimator = _working_estimator(found.problem, numerical_error)
     best = within_bounds(at_reported_values(found) if estimator.by_likelihood else found)
-    problem, linear, x = best.problem, best.linear, best.x
+    problem, linear, x = best.problem.with_simulated_stresses(best.x), best.linear, best.x
     noise_model = estimator.final(linear, best.noise)
     law, coordinates, count, residuals = problem.law, problem.coordinates, problem.parameter_count, linear.residuals
     u = x[:count]
@@ -439,7 +440,7 @@ def _reported(
         effective_frames=effective_sample_size(residuals, noise_model),
         freedom=freedom_of_intervals(by_tests_alone, estimated),
         tests=tests,
-        ranges=fitted_ranges(problem),
+        ranges=fitted_ranges(problem, {e.name: e.value for e in estimates}),
         settings=problem.settings,
         provenance={
             **provenance_of(problem, search_outcome.evaluations, search_outcome.search),

@@ -7,19 +7,16 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple
 
+import numpy as np
+
 from creepkit.arrays import Floats
+from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
-from creepkit.inverse.search.local_refinement import IterationCallback
-from creepkit.inverse.search.multistart import (
-    EQUAL_PREDICTIONS,
-    EQUAL_REDUCED_ORDER_PREDICTIONS,
-    distinct,
-    minima_counts,
-)
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.records import Predictor
 
 
@@ -43,8 +40,22 @@ class StartingEstimate:
         return cls(fit.u, fit.nuisances, fit.reference, values_only)
 
 
-LARGEST_COST = 4.0
-"""Of a minimum over the least one: of those that miss the data by more than twice as much none is the likeliest."""
+EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS = 1e-5, 5e-3
+"""Root mean square difference of predictions, over the spread of what was measured, below which two minima are one. A
+reduced-order model is not better than the latter, and along a valley one start is enough for its predictor."""
+
+
+SAME_COORDINATES = 0.02
+"""Distance over the width of the bounds, in every coordinate, up to which two minima are one."""
+
+
+WORKING_ERROR = 0.3
+"""Misfit that is assumed in a search, over that spread (see inverse.noise_model.initial_working_noise)."""
+
+
+MOST_MINIMA, LARGEST_COST = 2, 4.0
+"""Starts of an estimate, and their cost over the least: of those that miss the data by more than twice as much none is
+the likeliest."""
 
 
 class SearchOutcome(NamedTuple):
@@ -73,10 +84,22 @@ def initial_search(
     searched = search_problem(problem, (reduced_order_model or predictor).for_search())
     search_result = search.minima(searched, progress)
     equal = EQUAL_PREDICTIONS if reduced_order_model is None else EQUAL_REDUCED_ORDER_PREDICTIONS
-    apart = distinct(search_result.minima, searched.bounds, equal_predictions=equal)
-    apart = [minimum for minimum in apart if minimum.cost <= LARGEST_COST * apart[0].cost]
-    counts = minima_counts(search_result.minima, searched.bounds, equal_predictions=equal)
-    return SearchOutcome([minimum.x for minimum in apart], searched.evaluations.count, search_result.trace, counts)
+    (best, *_), apart, ends = search_result.minima, list[Minimum](), search_result.minima
+    for end in ends:
+        apart += [] if any(are_one(end, other, searched.bounds, equal) for other in apart) else [end]
+    at_best = sum(are_one(end, best, searched.bounds, equal) for end in ends)
+    counts = {"search_ends": len(ends), "distinct_minima": len(apart), "ends_at_best": at_best}
+    starts = [end.x for end in apart[:MOST_MINIMA] if end.cost <= LARGEST_COST * best.cost]
+    return SearchOutcome(starts, searched.evaluations.count, search_result.trace, counts)
+
+
+def are_one(a: Minimum, b: Minimum, bounds: Bounds, equal_predictions: float = EQUAL_PREDICTIONS) -> bool:
+    """Whether two minima are near in every coordinate, or in what they predict."""
+    if (np.abs(a.x - b.x) <= SAME_COORDINATES * bounds.width).all():
+        return True
+    if not (a.whitened_residuals.size and b.whitened_residuals.size):
+        return False
+    return bool(np.mean((a.whitened_residuals - b.whitened_residuals) ** 2) < (equal_predictions / WORKING_ERROR) ** 2)
 
 
 def search_problem(problem: LeastSquaresProblem, predictor: Predictor) -> LeastSquaresProblem:

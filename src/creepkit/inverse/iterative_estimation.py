@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,21 +54,21 @@ MOST_RATE_STEPS = 3
 """Steps of the rates of tests at given values."""
 
 
-@dataclass(frozen=True)
-class IterationLimits:
-    """Rounds of an estimate, and steps of least squares in each, with their tolerance and the gain that ends them."""
+class IterationLimits(NamedTuple):
+    """Rounds of an estimate, and when least squares end in each."""
 
-    rounds: int = 8
-    steps: int = 40
-    tolerance: float = 1e-8
-    gain: float = 0.0
+    rounds: int
+    least_squares: Tolerances
 
 
-APPROXIMATE_LIMITS = IterationLimits(rounds=2, steps=8, tolerance=1e-3, gain=3e-3)
+EXACT_LIMITS = IterationLimits(8, Tolerances(max_steps=40, tolerance=1e-8))
+
+
+APPROXIMATE_LIMITS = IterationLimits(2, Tolerances(max_steps=8, tolerance=1e-3, gain=3e-3))
 """For a predictor on the way to another."""
 
 
-SIMULATION_LIMITS = IterationLimits(rounds=5, steps=25, tolerance=1e-6, gain=1e-4)
+SIMULATION_LIMITS = IterationLimits(5, Tolerances(max_steps=25, tolerance=1e-6, gain=1e-4))
 """For predictors with a reduced-order model: solvers are smooth to about that tolerance, and a step of that gain is a
 tenth of a standard deviation of some hundred readings, of which the next round leaves less."""
 
@@ -109,8 +110,8 @@ def estimate_iteratively(
     robust, by_likelihood = estimator.settings.test_loss == "student", estimator.by_likelihood
     residuals, best, is_near = problem.residuals(x), None, noise is not None
     noise = noise or estimator.starting_noise(len(problem.histories))
-    gain = LIKELIHOOD_TOLERANCE * by_likelihood
-    tolerances = Tolerances(limits.steps, max(limits.tolerance, gain), max(limits.gain, gain))
+    gain, own = LIKELIHOOD_TOLERANCE * by_likelihood, limits.least_squares
+    tolerances = replace(own, tolerance=max(own.tolerance, gain), gain=max(own.gain, gain))
     for round_index in range(limits.rounds):
         previous_weights = residuals.test_weights
         if robust:
@@ -123,15 +124,9 @@ def estimate_iteratively(
         noise = estimator.estimate(residuals, noise, linear)
         factor = _covariance_factor(problem, residuals, noise, estimator)
         problem, weights = problem.with_covariance(factor), residuals.test_weights
-        if (by_likelihood or limits.gain) and (is_near or best is not None):
-            # The covariance moves with the values: near the end each step is taken under its own. By weights it hardly
-            # does, nor do the rates of tests, and values that a bound holds are there in a step: a trust region crawls.
-            most, least, of_rates = (1, SMALL_STEP, noise.rate) if by_likelihood else (MOST_LAST_STEPS, LAST_STEP, 0.0)
-            for _ in range(most):
-                before, known = linear, replace(noise, rate=of_rates)
-                problem, linear, step = _stepped(problem, linear, factor, known, least)
-                if step <= least or linear is before:
-                    break
+        if by_likelihood and (is_near or best is not None):
+            # the covariance moves with the values: near the end each step is taken under its own
+            problem, linear, step = _stepped(problem, linear, factor, noise, SMALL_STEP)
             x, converged = linear.x, step < DOUBTFUL_STEP
         else:
             minimum = problem.minimise(x, tolerances=tolerances)

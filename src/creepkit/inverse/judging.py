@@ -24,7 +24,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
@@ -38,6 +37,7 @@ from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
 from creepkit.inverse.perturbation import DRIFT, Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.local_refinement import least_within
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, LinearSolution
 from creepkit.limits import SIGNIFICANCE
 from creepkit.records import History, is_logarithmic
@@ -105,7 +105,8 @@ class Judge:
         independent, reduced = self._independent_noise, replace(linear, residuals=residuals)
         solution = _within_bounds(reduced, CovarianceFactor.of_residuals(residuals, independent))
         noise = NoiseModel({name: OutputNoise(one.noise) for name, one in independent.outputs.items()})
-        of_frames = CovarianceFactor.of_residuals(replace(residuals, random_effect_sensitivities=None), noise).blocks
+        plain = replace(residuals, random_effect_sensitivities=None, rate_errors=None)
+        of_frames = CovarianceFactor.of_residuals(plain, noise).blocks
         white = np.einsum("tef,tf->te", of_frames, solution.weighted_residuals)
         return JudgedResiduals(
             linear.residuals,
@@ -260,11 +261,9 @@ def _within_bounds(linear: LinearisedProblem, factor: CovarianceFactor) -> Linea
     columns = np.concatenate([linear.jacobian, residuals.values[..., None]], axis=-1)
     whitened = factor.whiten(columns)[present]
     root_prior = np.sqrt(linear.precision[linear.free])
-    matrix = np.concatenate([whitened[:, :-1], np.diag(root_prior)])
-    target = -np.concatenate([whitened[:, -1], root_prior * linear.prior_residual[linear.free]])
-    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
-    low, high = linear.step_bounds[:, linear.free] * scale
-    step = lsq_linear(matrix / scale, target, bounds=(np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x / scale
+    priors = np.column_stack([np.diag(root_prior), root_prior * linear.prior_residual[linear.free]])
+    low, high = linear.step_bounds[:, linear.free]
+    step = least_within(np.concatenate([whitened, priors]), np.minimum(low, 0.0), np.maximum(high, 0.0))
     moved = residuals.values + linear.jacobian @ step
     candidates = [(values, factor.inverse_times(values)) for values in (moved, residuals.values)]
     values, weighted = min(candidates, key=lambda pair: float((pair[0] * pair[1]).sum()))

@@ -158,7 +158,8 @@ def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> t
         s.offset**2 * np.where(residuals.output_index == k, weighted_sensitivity, 0.0).sum(axis=1)
         for k, s in enumerate(noise_model.outputs.values())
     ]
-    return np.stack(offsets, axis=1), noise_model.rate**2 * (residuals.log_rate_sensitivity * weighted).sum(axis=1)
+    variance = noise_model.rate**2 + (0.0 if residuals.rate_errors is None else residuals.rate_errors**2)
+    return np.stack(offsets, axis=1), variance * (residuals.log_rate_sensitivity * weighted).sum(axis=1)
 
 
 def effective_sample_size(residuals: Residuals, noise_model: NoiseModel) -> float:

@@ -60,6 +60,7 @@ class Residuals:
     discrepancy_unit : (tests, observations) -, what a model discrepancy of one is in the transformed output: the stated
         or estimated noise of the frame; 1 % where the transform is logarithmic; 0 where there can be none.
     shared_noise : how the noise of the outputs of a frame is correlated; None where it is not.
+    rate_errors : (tests,) -, standard deviation of ln rate by errors that tests state of their material, or None.
     stopped : what tests that were stopped before rupture say, which is in their values.
     """
 
@@ -76,6 +77,7 @@ class Residuals:
     common_effects: Floats | None = None
     discrepancy_unit: Floats | None = None
     shared_noise: SharedNoise | None = None
+    rate_errors: Floats | None = None
     stopped: StoppedTests = field(default_factory=StoppedTests)
 
     def with_test_weights(self, test_weights: Floats) -> Residuals:
@@ -128,7 +130,8 @@ class Residuals:
         ]
         stacked = np.stack(effects, axis=-1)
         ends = None if self.stopped.sd is None else self.stopped.sd[..., None]
-        stacked = np.concatenate([stacked, *(one for one in (further, ends) if one is not None)], axis=-1)
+        rates = None if self.rate_errors is None else (self.rate_errors[:, None] * self.log_rate_sensitivity)[..., None]
+        stacked = np.concatenate([stacked, *(one for one in (further, ends, rates) if one is not None)], axis=-1)
         return ObservationSeries.of_observations(
             self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights, self.shared_noise
         )

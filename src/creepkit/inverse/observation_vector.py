@@ -20,13 +20,7 @@ from creepkit.inverse.compared_tests import compares_minimum_rate, followed_dura
 from creepkit.inverse.composite_predictor import compared_outputs
 from creepkit.inverse.frame_noise import frame_noise, noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_series import SharedNoise
-from creepkit.inverse.output_transforms import (
-    LinearTransform,
-    LogTransform,
-    NegativeLogTransform,
-    OutputTransform,
-    RateTransform,
-)
+from creepkit.inverse.output_transforms import LinearTransform, LogTransform, OutputTransform, SingleValueTransform
 from creepkit.quality.curve_shapes import runs_away
 from creepkit.records import History, Prediction, Predictor, is_logarithmic
 from creepkit.records.history import correlation_matrix
@@ -50,9 +44,9 @@ FLOOR_SHARE, FLOOR_NOISES = 0.01, 3.0
 def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
     """The transform of one output of these histories, all of which have it."""
     if output == RUPTURE_OUTPUT:
-        return NegativeLogTransform()
-    if output == MINIMUM_RATE_OUTPUT:
-        return RateTransform(max(float(h.minimum_rate or 0.0) for h in histories))
+        return SingleValueTransform(-1.0)
+    if output == MINIMUM_RATE_OUTPUT:  # a test that breaks at once has e times the largest rate that was measured
+        return SingleValueTransform(1.0, float(np.log(max(h.minimum_rate or 0.0 for h in histories))) + 1.0)
     return log_transform_for(histories, output) if is_logarithmic(output) else linear_transform_for(histories, output)
 
 

@@ -72,52 +72,31 @@ class LinearTransform:
 
 
 @dataclass(frozen=True)
-class NegativeLogTransform:
-    """g(t) = -ln t of a rupture time t in s: larger where a test breaks earlier, as strains are where it is faster."""
+class SingleValueTransform:
+    """g(y) = sign ln y of what a test has one of: a creep rate in 1/s, or with sign -1 a rupture time in s.
 
-    floor: float = 0.0
+    So both are larger where a test is faster, as strains are.
+    """
+
+    sign: float
     ceiling: float = 0.0
-
-    def forward(self, y: Floats) -> Floats:
-        """The compared quantity (...,) of outputs y (...,)."""
-        return -np.log(y)
-
-    def inverse(self, g: Floats) -> Floats:
-        """The rupture times (...,) s whose compared quantity is g (...,)."""
-        return np.exp(-g)
-
-    def derivative(self, y: Floats) -> Floats:
-        """dg/dy (...,) at outputs y (...,)."""
-        return -1.0 / y
-
-
-@dataclass(frozen=True)
-class RateTransform:
-    """g(r) = ln r of a creep rate r in 1/s. largest : of the measured rates, 1/s."""
-
-    largest: float
     floor: float = 0.0
 
-    @property
-    def ceiling(self) -> float:
-        """The transformed rate of a test that breaks at once: e times the largest that was measured."""
-        return float(np.log(self.largest)) + 1.0
-
     def forward(self, y: Floats) -> Floats:
-        """The compared quantity (...,) of rates y (...,)."""
-        return np.log(np.maximum(y, SMALLEST_RATE))
+        """The compared quantity (...,) of values y (...,)."""
+        return self.sign * np.log(np.maximum(y, SMALLEST_VALUE))
 
     def inverse(self, g: Floats) -> Floats:
-        """The rates (...,) 1/s whose compared quantity is g (...,)."""
-        return np.exp(g)
+        """The values (...,) whose compared quantity is g (...,)."""
+        return np.exp(self.sign * g)
 
     def derivative(self, y: Floats) -> Floats:
-        """dg/dy (...,) at rates y (...,)."""
-        return 1.0 / np.maximum(y, SMALLEST_RATE)
+        """dg/dy (...,) at values y (...,)."""
+        return self.sign / np.maximum(y, SMALLEST_VALUE)
 
 
-SMALLEST_RATE = 1e-200
+SMALLEST_VALUE = 1e-200
 """1/s; a candidate that does not creep at all is compared as if it did at this rate."""
 
 
-OutputTransform = LogTransform | LinearTransform | NegativeLogTransform | RateTransform
+OutputTransform = LogTransform | LinearTransform | SingleValueTransform

@@ -36,21 +36,18 @@ from creepkit.inverse.reference_conditions import (
     median_log_inverse_duration,
     median_log_strain_rate,
     reference_condition,
+    simulated_condition,
 )
 from creepkit.inverse.residuals import candidate_residuals, residuals_at_measured_values, residuals_of_prediction
-from creepkit.inverse.search.local_refinement import (
-    AdditionalResiduals,
-    Minimum,
-    Tolerances,
-    bounded_least_squares,
-    robust_loss,
-)
+from creepkit.inverse.search.local_refinement import Minimum, System, Tolerances, bounded_least_squares, robust_loss
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.stopped_tests import stopped_tests
 from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
+from creepkit.kernels import lower
 from creepkit.language import CreepLaw
 from creepkit.records import History, NuisanceValues, Prediction, Predictor
+from creepkit.records.conditions import stated_condition
 
 CACHED_EVALUATIONS = 4
 """Points whose residuals are cached: a search ends at one that it has evaluated, and the next begins there."""
@@ -62,10 +59,6 @@ FAILED_COST = 1e12
 
 ROUNDING = 1e-12
 """Least eigenvalue of a correlation, of a combination of unknowns that the tests do not tell."""
-
-
-HARD_BOUNDS = 100.0
-"""By what penalties of bounds weigh more where no prediction is needed, and steps may be short."""
 
 
 PRIOR_STRENGTH = 1e-4
@@ -113,6 +106,10 @@ class EvaluationCache:
         return self._residuals[key]
 
 
+STATED_STEP = 0.1
+"""Standard deviations, of central differences in conditions of the material."""
+
+
 @dataclass(frozen=True, eq=False)
 class LeastSquaresProblem:
     """A law against histories under a covariance; the unknowns are x = (u, e).
@@ -120,7 +117,8 @@ class LeastSquaresProblem:
     histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
     bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. robust : whether a single
         residual far off counts less, as in a search.
-    conditions : (2, tests) MPa and K, the reference stress and the temperature of each test.
+    conditions : (2, tests) MPa and K, the stress and the temperature of each test: of reference, before there are
+        values by which it can be simulated.
     correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
         against a more exact one (see inverse.defect_correction), or None.
     log_factors : (tests,) ln of the factors on the rates of tests about which residuals are taken, None for the law's
@@ -189,6 +187,12 @@ class LeastSquaresProblem:
 
     # ---- variants ------------------------------------------------------------------------------------------------
 
+    def with_simulated_stresses(self, x: Floats) -> LeastSquaresProblem:
+        """The same with the stresses that tests go through at unknowns x (unknowns,)."""
+        values = self.coordinates.values(x[: self.parameter_count])
+        conditions = [simulated_condition(self.law, values, h, self.predictor) for h in self.histories]
+        return replace(self, conditions=np.array(conditions).T)
+
     def with_law(self, law: CreepLaw) -> LeastSquaresProblem:
         """A law of some of this one's parameters, by name, on the same data and covariance."""
         positions = [self.law.names.index(name) for name in law.names]
@@ -253,13 +257,13 @@ class LeastSquaresProblem:
 
     @cached_property
     def bound_penalties(self) -> BoundPenalties:
-        """Penalties of bounds, constraints and priors."""
+        """Penalties of bounds and constraints."""
         points = (
             constraint_points(self.histories, self.predictor, self.observations, self.coordinates.reference.strain)
             if self.law.constraints
             else []
         )
-        return BoundPenalties(self.coordinates, self.nuisance_parameters, points)
+        return BoundPenalties(self.coordinates, points)
 
     # ---- residuals ---------------------------------------------------------------------------------------------------
 
@@ -373,7 +377,23 @@ class LeastSquaresProblem:
         assert residuals.jacobian is not None
         internal, nuisance_jacobian = np.split(residuals.jacobian, [u.size], axis=-1)
         jacobian = np.concatenate([internal @ coordinates.jacobian(u), nuisance_jacobian], axis=-1)
-        return replace(residuals, jacobian=jacobian)
+        return replace(residuals, jacobian=jacobian, rate_errors=self._stated_errors(u))
+
+    def _stated_errors(self, u: Floats) -> Floats | None:
+        """(tests,) standard deviation of ln rate by those of conditions of the material that tests state; None if none.
+
+        u : (parameters,).
+        """
+        law, (stress, kelvin), reference = self.law, self.conditions, self.coordinates.reference
+        stated = np.array([[stated_condition(h, one) for h in self.histories] for one in law.conditions], float)
+        if not stated.size or not stated[..., 1].any():
+            return None
+        point = (stress, reference.strain, reference.time, kelvin, stress, stress / 3)
+        given = (*point, *(state.initial for state in law.states.values()), *self.coordinates.theta(u))
+        steps = STATED_STEP * np.eye(len(stated))[..., None] * stated[..., 1]
+        ends = [stated[:, None, :, 0] + side * np.moveaxis(steps, 0, 1) for side in (1, -1)]
+        up, down = (lower(law, "numpy").internal_log_rate(*given, *end) for end in ends)
+        return np.asarray(np.linalg.norm(up - down, axis=0) / (2 * STATED_STEP))
 
     # ---- chi-square ------------------------------------------------------------------------------------------------
 
@@ -381,19 +401,29 @@ class LeastSquaresProblem:
         """(data[, columns]) whitened rows of the data, of values (tests, observations[, columns])."""
         return self.covariance_factor.whiten(values)[self.observations.present]
 
-    def whitened(self, x: Floats) -> Floats:
-        """(data + penalties,) - at x (unknowns,): whitened residuals of the data, then of bound and prior penalties."""
-        return np.concatenate([self.whiten(self.residuals(x).values), self.bound_penalties.residuals(x)])
+    def system(self, x: Floats) -> tuple[Floats, Floats]:
+        """(data + priors,) - whitened residuals at x (unknowns,) of data and nuisance parameters, with derivatives."""
+        residuals, nuisances, count = self.residuals(x), self.nuisance_parameters, self.parameter_count
+        assert residuals.jacobian is not None
+        data = self.whiten(np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1))
+        root, e = np.sqrt(nuisances.precision), x[count:]
+        priors = np.column_stack([root * (e - nuisances.mean[: e.size]), np.zeros((e.size, count)), np.diag(root)])
+        rows = np.concatenate([data, priors])
+        return rows[:, 0], rows[:, 1:]
 
     def jacobian(self, x: Floats) -> Floats:
-        """(data + penalties, unknowns) derivatives of the whitened residuals at x (unknowns,)."""
-        jacobian = self.residuals(x).jacobian
-        assert jacobian is not None
-        return np.concatenate([self.whiten(jacobian), self.bound_penalties.jacobian(x)])
+        """(data + priors, unknowns) derivatives of the whitened residuals at x (unknowns,)."""
+        return self.system(x)[1]
 
     def chi_square(self, x: Floats) -> float:
-        """Sum of squares of the whitened residuals at x (unknowns,), penalties included."""
-        return float((self.whitened(x) ** 2).sum())
+        """Sum of squares of the whitened residuals of data and priors at x (unknowns,), without penalties of bounds."""
+        return float((self.system(x)[0] ** 2).sum())
+
+    def limits(self, x: Floats) -> tuple[Floats, Floats]:
+        """(limits,) how far x (unknowns,) is beyond the limits of the law (see BoundPenalties), with derivatives."""
+        u = x[: self.parameter_count]
+        rows = self.bound_penalties.jacobian(u)
+        return self.bound_penalties.limits(u), np.pad(rows, ((0, 0), (0, x.size - u.size)))
 
     def cost(self, u: Floats) -> Floats:
         """(candidates,) half the loss of the data, penalties included, of u (candidates, parameters).
@@ -403,7 +433,7 @@ class LeastSquaresProblem:
         inside = self.bounds.of(range(self.parameter_count)).clip(u)
         whitened = self.whiten(np.moveaxis(self.candidate_residuals(inside), 0, -1)).T
         total = 0.5 * (robust_loss(whitened**2) if self.robust else whitened**2).sum(axis=1)
-        total += 0.5 * (self.bound_penalties.residuals(inside) ** 2).sum(axis=1)
+        total += 0.5 * (np.maximum(self.bound_penalties.limits(inside), 0.0) ** 2).sum(axis=1)
         return np.where(np.isfinite(total), total, FAILED_COST)
 
     # ---- minima ------------------------------------------------------------------------------------------------------
@@ -413,7 +443,7 @@ class LeastSquaresProblem:
         start: Floats,
         *,
         fixed: Mapping[int, float] | None = None,
-        additional: AdditionalResiduals | None = None,
+        additional: System | None = None,
         tolerances: Tolerances | None = None,
     ) -> Minimum:
         """Bounded least squares.
@@ -421,14 +451,22 @@ class LeastSquaresProblem:
         start : (unknowns,) where it begins. fixed : {position: value} of unknowns that keep their values.
         additional : further residuals.
         """
-        fixed, margin = dict(fixed or {}), 1e-9 * self.bounds.width
-        initial = np.array(start, float)
-        initial[list(fixed)] = list(fixed.values())
-        inside = np.clip(initial, self.bounds.lower + margin, self.bounds.upper - margin)
-        inside[list(fixed)] = list(fixed.values())
+        inside, bounds, held = np.array(start, float), self.bounds, dict(fixed or {})
+        inside[list(held)] = list(held.values())
+        inside = bounds.clip(inside)
+        if held:
+            ends = np.stack([bounds.lower, bounds.upper])
+            ends[:, list(held)] = list(held.values())
+            bounds = Bounds(*ends)
+
+        weak = PRIOR_STRENGTH / self.bounds.width
 
         def system(x: Floats) -> tuple[Floats, Floats]:
-            return self._system(x, additional)
+            values, jacobian = self.system(x)
+            further = [] if additional is None else [additional(x)]
+            parts = zip((values, jacobian), (weak * (x - self.bounds.centre), np.diag(weak)), *further, strict=True)
+            values, jacobian = (np.concatenate(part) for part in parts)
+            return values, jacobian
 
         if not all(np.isfinite(part).all() for part in system(inside)):
             raise FitError(
@@ -438,10 +476,8 @@ class LeastSquaresProblem:
         scale, nuisances = 0.1 * self.bounds.width, self.nuisance_parameters
         if nuisances.size:
             scale[-nuisances.size :] = np.minimum(nuisances.sd, self.bounds.width[-nuisances.size :])
-        minimum = bounded_least_squares(
-            system, inside, self.bounds, scale, tolerances or Tolerances(), fixed=fixed, robust=self.robust
-        )
-        assert minimum.whitened_residuals is not None
+        where = bounds, scale, tolerances or Tolerances(), self.limits
+        minimum = bounded_least_squares(system, inside, *where, robust=self.robust)
         return replace(minimum, whitened_residuals=minimum.whitened_residuals[: self.observations.count])
 
     def within_bounds(self, x: Floats) -> Floats:
@@ -461,38 +497,15 @@ class LeastSquaresProblem:
         whitening = (axes / np.sqrt(np.maximum(variances, ROUNDING))).T / sd
         rows = np.zeros((len(whitening), target.size))
         rows[:, free] = whitening
-        count = target.size - self.parameter_count  # of the priors of nuisance parameters, which the target knows
 
-        def system(x: Floats) -> tuple[Floats, Floats]:
-            penalties = self.bound_penalties
-            values, derivatives = penalties.residuals(x), penalties.jacobian(x)
-            end = len(values) - count
-            return (
-                np.concatenate([rows @ (x - target), HARD_BOUNDS * values[:end]]),
-                np.concatenate([rows, HARD_BOUNDS * derivatives[:end]]),
-            )
+        def distance(x: Floats) -> tuple[Floats, Floats]:
+            return rows @ (x - target), rows
 
-        if np.array_equal(self.within_bounds(target), target) and not system(target)[0].any():
+        if np.array_equal(self.within_bounds(target), target) and not (self.limits(target)[0] > 0.0).any():
             return target
-        held = {int(k): float(target[k]) for k in np.flatnonzero(~free)}
-        margin = 1e-9 * self.bounds.width
-        start = np.clip(start, self.bounds.lower + margin, self.bounds.upper - margin)
-        start[list(held)] = list(held.values())
+        held = np.where(free, np.stack([self.bounds.lower, self.bounds.upper]), target)
         scale = np.where(free, 1.0, self.bounds.width)
         scale[free] = sd
-        minimum = bounded_least_squares(
-            system, start, self.bounds, scale, Tolerances(100, 1e-10), fixed=held, robust=False
-        )
-        return self.within_bounds(minimum.x)
-
-    def _system(self, x: Floats, additional: AdditionalResiduals | None) -> tuple[Floats, Floats]:
-        """All residuals at x, (rows,), and their derivatives, (rows, unknowns)."""
-        residuals, prior_weight = self.residuals(x), PRIOR_STRENGTH / self.bounds.width
-        assert residuals.jacobian is not None
-        data = self.whiten(np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1))
-        values = [data[:, 0], self.bound_penalties.residuals(x), prior_weight * (x - self.bounds.centre)]
-        jacobians = [data[:, 1:], self.bound_penalties.jacobian(x), np.diag(prior_weight)]
-        if additional is not None:
-            values.append(additional.residuals(x))
-            jacobians.append(additional.jacobian(x))
-        return np.concatenate(values), np.concatenate(jacobians)
+        start = np.where(free, self.bounds.clip(start), target)
+        where = Bounds(*held), scale, Tolerances(100, 1e-10), self.limits
+        return self.within_bounds(bounded_least_squares(distance, start, *where).x)

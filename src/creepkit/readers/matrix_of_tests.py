@@ -17,6 +17,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from creepkit.files.delimited_text import is_missing
 from creepkit.readers.columns_of_tests import RATES, column_called, is_number_like, only_text
 from creepkit.readers.ends_of_tests import RUPTURED, legend_in
 from creepkit.readers.table import CellTable, TableRow
@@ -30,7 +31,6 @@ _HEAT = re.compile(
 _UNITS = re.compile(r"[(\[]([^()\[\]]+)[)\]]|(?:\bin|,|_)\s*([^\s,_]+)")
 _NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
 _WITH_UNIT = re.compile(r"([\d.,]+)\s*(\S+)")
-_NOT_TESTED = frozenset(("", "-", "\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}", "...", "…"))
 _DEEPEST, _SEARCHED = 4, 60
 """Rows of a head; and within which the matrix must begin."""
 
@@ -83,7 +83,7 @@ def _unfolded(table: CellTable, at: int, said: Sequence[str], first: Sequence[st
     tests, count = list[TableRow](), Counter[str]()
     for row, temperature in zip(body, temperatures.values, strict=True):
         for stress, cell in zip(stresses.values, row.cells[1:], strict=False):
-            if cell in _NOT_TESTED:
+            if is_missing(cell) or cell in ("\N{MINUS SIGN}", "...", "…"):
                 continue
             if not stress or not is_number_like(cell, dialect):
                 return None

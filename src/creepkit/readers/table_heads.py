@@ -37,7 +37,7 @@ class HeadedTable:
 
     table : its first row holds the names of the columns, with their units. written : the names without units of a row
     of their own. rows : the others of the head, above the names and below them; whole : the same with the columns that
-    are left out. times : positions of the columns of time.
+    are left out. times : positions of the columns of time, but for a clock beside one of numbers.
     """
 
     table: CellTable
@@ -148,6 +148,9 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
     whole = [row for row in searched if row.line in lines or row.line < line]
     below = replace(table, rows=[TableRow(line, with_units), *table.rows[body:]])
     times = [k for k, cell in enumerate(with_units) if is_time(cell, known)]
+    firsts = {k: first[k] for k in times if k < len(first)}
+    if any(is_number(cell, table.dialect) for cell in firsts.values()):
+        times = [k for k in times if not is_clock_time(firsts.get(k, ""))]
     return HeadedTable(below, known, written, head, whole, times)
 
 

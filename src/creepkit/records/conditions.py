@@ -49,14 +49,14 @@ def stated_condition(history: History, condition: ConditionSymbol) -> tuple[floa
         number, sd = (float((part or "0").replace(",", ".")) for part in value.groups()[:2])
         return conversion.factor * number + conversion.offset, conversion.factor * sd
     raise HistoryError(
-        f"{history.origin}: states no {name}, which the law needs; add a column '{name} ({unit})' or a line "
-        f"'label {name}: 1 {unit}'; {nearest(name, tuple(history.labels))}"
+        f"{history.origin}: states no {name}, which the law needs; add a column '{name} ({unit})', a line "
+        f"'label {name}: 1 {unit}' or in a command --label '{name}=1 {unit}'; {nearest(name, tuple(history.labels))}"
     )
 
 
 def _conversion(stated: str, wanted: str) -> UnitConversion | None:
     """How a number in one unit becomes one in another; None where they are of different kinds."""
-    if stated == wanted or (not stated and wanted == "1"):
+    if re.sub(r"[\s.]", "", stated) == re.sub(r"[\s.]", "", wanted) or (not stated and wanted == "1"):
         return UnitConversion(1.0)
     spelled = spellings(*UNITS)
     one, other = (UNITS.get(spelled.get(text, spelled.get(text.casefold(), ""))) for text in (stated, wanted))

@@ -19,6 +19,7 @@ from creepkit.integration.time_discretisation import SDIRK2_TEXT
 from creepkit.language.elastic import STATE_MODULUS
 from creepkit.records import (
     History,
+    Loading,
     NuisanceValues,
     Prediction,
     Program,
@@ -33,7 +34,6 @@ from creepkit.specimens.test_piece import kept
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import CreepLaw, Elastic
-    from creepkit.records import Loading
 
 
 STEPS = {"temperature step": 1.0, "temperature drift": 1.0, "load step": 1e-3, "modulus": 1e-3, "temperature": 1.0}

@@ -19,7 +19,7 @@ from creepkit import integration, kernels
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.integration.tensor_point import von_mises
+from creepkit.integration.tensor_point import ProportionalLoading, von_mises
 from creepkit.integration.time_discretisation import SDIRK2_TEXT
 from creepkit.language.elastic import STATE_MODULUS
 from creepkit.records import (
@@ -39,7 +39,6 @@ from creepkit.specimens.run import Run, run_from_outputs
 
 if TYPE_CHECKING:
     from creepkit.integration.tensor_integration import PointTrajectory
-    from creepkit.integration.tensor_point import ProportionalLoading
     from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import CreepLaw
 
@@ -85,6 +84,11 @@ class MaterialPoint(PointSpecimen):
     def reference_stress(self, history: History) -> Floats:
         """The von Mises stresses that are prescribed, or would be if nothing crept, (levels,) MPa."""
         return elastic_von_mises(_loading(history), None if history.elastic is None else _elastic(history))
+
+    def simulated_stress(self, law: CreepLaw, values: Mapping[str, float], history: History) -> Floats:
+        """The von Mises stresses above zero from the first loading on, (times,) MPa."""
+        stress = self.run(law, values, history).mises
+        return stress[stress > 0]
 
     def reference_strain(self, history: History) -> float:
         """The largest equivalent creep strain that a test reached, as its outputs show."""

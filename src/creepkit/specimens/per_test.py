@@ -12,13 +12,12 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import CreepkitError, SolveError, quoted
-from creepkit.records import History, Prediction, Status
+from creepkit.records import History, NuisanceValues, Prediction, Status
 from creepkit.specimens.separate_tests import TestResponse, predict_separately
 from creepkit.specimens.test_piece import TestPiece
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
-    from creepkit.records import NuisanceValues
 
 
 @dataclass(frozen=True)

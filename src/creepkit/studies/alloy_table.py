@@ -18,8 +18,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from creepkit.errors import CreepkitError, HistoryError, nearest, quoted
-from creepkit.files.delimited_text import is_number
+from creepkit.files.delimited_text import is_missing, is_number
 from creepkit.readers.conditions import StatedConditions
+from creepkit.readers.ends_of_tests import NO, YES
 from creepkit.readers.spreadsheets import read_sheets
 from creepkit.readers.table import CellTable, SourceText, TableRow, check_columns
 from creepkit.readers.text_files import read_text_table
@@ -48,11 +49,6 @@ _TOLERANCE = re.compile(r"(?:(.+) )?(?:tolerance|tol|sd|uncertainty|toleranz|uns
 
 _SEARCHED = 60
 """Rows among which the heads are looked for."""
-
-
-NOTHING = ("", "-", "no", "nein", "0", "false", "n", "none")
-PLAIN_YES = ("yes", "ja", "x", "1", "true", "y", "j", "exclude")
-"""Cells of the column of exclusions that give no reason."""
 
 
 @dataclass(frozen=True)
@@ -179,6 +175,8 @@ def _dimple(grid: CellTable, row: TableRow, heads: Mapping[str, str], specimen: 
     camera, name, reason = (entries.pop(role).text if role in entries else "" for role in COLUMNS)
     if not name:
         raise HistoryError(f"{place}: does not name its dimple; write it, such as D1")
+    reason = f"excluded by {place}" if reason.casefold() in (*YES, "exclude") else reason
+    reason = "" if is_missing(reason) or reason.casefold() in (*NO, "none") else reason
     of_tolerances = {key: entries.pop(key) for key in [*entries] if key.startswith("tolerance ")}
     stated = StatedConditions(entries, HeaderVocabulary(default_texts={"specimen": specimen.name}), place)
     modulus, lengths, tolerances = stated.take_number("modulus"), stated.geometry, dict[str, float]()
@@ -200,7 +198,7 @@ def _dimple(grid: CellTable, row: TableRow, heads: Mapping[str, str], specimen: 
         lengths,
         tolerances,
         None if modulus is None else modulus.value,
-        "" if reason.casefold() in NOTHING else f"excluded by {place}" if reason.casefold() in PLAIN_YES else reason,
+        reason,
         stated.labels,
     )
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import creepkit as ck
-from creepkit.discovery.discover import DiscoveryOptions
+from creepkit.discovery.discover import DiscoveryOptions, isothermal_tests
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.exporters.exporting import ExportOptions
 from creepkit.files.record_codec import record_to_json
@@ -177,7 +177,6 @@ def numbers_of_ranking(ranking: Ranking) -> dict[str, Any]:
 
 def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
     """The forms of temperature of the law of a group."""
-    from creepkit.discovery.discover import isothermal_tests
     from creepkit.discovery.temperature_law import temperature_law_to_json
 
     part, using, tests, law = study.file.model.temperature, study.using, list(group.histories), None

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.dataset.dataset import first_difference
+from creepkit.dataset.dataset import Dataset, first_difference
 from creepkit.errors import DatasetError
 from creepkit.files.json_documents import canonical_json
 from creepkit.files.record_codec import record_to_json
@@ -25,7 +25,6 @@ from creepkit.surrogates.parameter_gru import SurrogateMetadata, Training
 from creepkit.surrogates.surrogate import Surrogate
 
 if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
     from creepkit.sampling.conditions import TimeGrid
 
 LEAST_SAMPLES = 10

@@ -29,7 +29,7 @@ from creepkit.kernels.log_form import log_form
 from creepkit.language import CreepLaw
 from creepkit.options import Options, option
 from creepkit.records import Dimension, History, Program, Specimen, dimension_named, dimensions_of
-from creepkit.sampling.conditions import MODULUS, TEMPERATURE
+from creepkit.sampling.conditions import MODULUS, TEMPERATURE, TimeGrid
 from creepkit.surrogates.network_evaluation import ParameterNetwork, SampleArrays, Weights
 
 if TYPE_CHECKING:
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
     from creepkit.dataset.dataset import Dataset
     from creepkit.language import CreepLaw
-    from creepkit.sampling.conditions import TimeGrid
     from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors
 
 

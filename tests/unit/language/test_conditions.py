@@ -34,12 +34,24 @@ def test_a_planted_grain_size_exponent_is_found_and_its_forecast_asks_for_the_si
     fit = ck.identify(LAW, [bar(size, load, rng) for size in ("20", "50", "120") for load in (60.0, 80.0, 110.0)])
     exponent = fit.estimates[2]
     assert exponent.low < 2.0 < exponent.high < exponent.low + 0.4
+    assert ck.design(fit).tests[0].histories[0].labels["grain size (um)"] != "50"  # where p changes nothing
     fit.save(tmp_path / "fit.json")
     plan = ck.History("plan", [1e5, 1e6], {}, ck.constant_stress(70.0), 1000.0)
     with pytest.raises(ck.errors.HistoryError, match="states no grain size.*label grain size: 1 mm"):
         ck.forecast(fit, plan)
     (test,) = ck.forecast(ck.load(tmp_path / "fit.json"), plan.replace(labels={"grain_size": "0,2 mm"})).tests
     assert "grain_size 0.2 (the tests cover 0.02 to 0.12" in test.extrapolation
+
+
+def test_a_test_counts_by_the_error_that_it_states_of_its_size():
+    """A bar of 120 um stated as 75 ± 40 um leaves the exponent that the others give."""
+    rng = np.random.default_rng(3)
+    *others, last = [bar(size, load, rng) for size in ("20", "50", "120") for load in (60.0, 80.0, 110.0)]
+    labels = [{"grain_size": text} for text in ("75 um", "75 ± 40 um")]
+    found = [
+        ck.identify(LAW, [*others, *more]).values["p"] for more in ([], *([last.replace(labels=s)] for s in labels))
+    ]
+    assert abs(found[2] - found[0]) < 0.05 * abs(found[1] - found[0]) > 0.005
 
 
 IRRADIATED = CreepLaw(

@@ -67,7 +67,6 @@ BAD_LAWS = {
     ),
     "not finite": ({"terms": {"x": A * stress**n + sympy.zoo}}, "not finite and real"),
     "stray constraint": ({"constraints": (B >= 0,)}, "a constraint mentions unknown symbol B"),
-    "no constraint": ({"constraints": (n,)}, "constraint n is not a relation"),
     "constraint that cannot hold": ({"constraints": (sympy.false,)}, "constraint False is not a relation"),
 }
 
@@ -85,7 +84,6 @@ BAD_PARAMS = {
 
 BAD_STATES = {
     "no initial value": ({"initial": float("nan")}, "initial = nan must be a finite number"),
-    "infinite limit": ({"limit": float("inf")}, "limit = inf must be a finite number"),
     "already broken": ({"initial": 0.5, "limit": 0.5}, "it starts at its limit, 0.5, so the material would never last"),
 }
 BAD_ELASTIC = {
@@ -96,7 +94,6 @@ BAD_ELASTIC = {
 BAD_VALUES = {
     "one missing": ({"A": 1e-12}, "needs a value for n"),
     "one too many": ({"A": 1e-12, "n": 5, "q": 1}, "has no parameter 'q'"),
-    "in words": ({"A": 1e-12, "n": "five"}, "parameter 'n': 'five' is not a number"),
     "infinite": ({"A": 1e-12, "n": float("inf")}, "inf is not a finite number"),
     "negative": ({"A": -1e-12, "n": 5}, "is negative; it must be positive"),
 }

@@ -193,6 +193,7 @@ FILES_OF_LABORATORIES = {
     "symbols": ("x.csv", "T = 600 °C\nσ0 = 120 MPa\nt in h;ε in %\n0;0\n10;0,1\n"),
     "permille": ("x_600C.csv", "# stress_kg/mm2: 12.2365946\nt (1000 h);eps (mm/m)\n0;0\n0,01;1\n"),
     "rows of words": ("x_600C_120MPa.csv", "time [h];strain [%];note\n0;0;start\n10;0,1;door\n"),
+    "a clock amid columns": ("x_120MPa.csv", "t (h);strain [%];clock;T (C)\n0;0;08:00;600\n10;0,1;18:00;600\n"),
     "a note in the margin": ("x_600C_120MPa.csv", "time [h];strain [%]\n0;0\n10;0,1;looks odd\n"),
     "two values in one head": (
         "x.csv",

@@ -67,7 +67,6 @@ NAMES = [
     ("min rate per h", ("minimum_rate", "1/h")),
     ("minimum_rate_%/h", ("minimum_rate", "pct/h")),
     ("tr_h", ("rupture", "h")),
-    ("rupture life, hr", ("rupture", "h")),
     ("elongation (%)", ("label elongation_pct", "")),
     ("Heat No", ("label heat", "")),
     ("strain rate (1/s)", ("", "")),

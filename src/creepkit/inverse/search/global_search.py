@@ -47,7 +47,7 @@ SAME_BASIN = 0.1
 """Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
 
 
-FIRST_STEPS, LAST_STEPS = Tolerances(max_steps=3), Tolerances(tolerance=1e-4, gain=1e-3)
+FIRST_STEPS, LAST_STEPS = Tolerances(max_steps=3, gain=1e-3), Tolerances(tolerance=1e-4, gain=1e-3)
 """Of every start of least squares, and then of the best of them one after the other."""
 
 

@@ -1,142 +1,144 @@
 """Local refinement: bounded least squares from one start, a robust loss, and the record of a minimum.
 
-The trust region reflective method of scipy, with analytic Jacobians.
+Gauss and Newton's method within a trust region, which is a box as the bounds are: Nocedal & Wright, Numerical
+Optimization (2006), chapters 4 and 10; its radius is theirs. A step knows the limits that it would come to
+lie beyond, by their linear models: with those alone that are exceeded already it would be one to and fro.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Protocol
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import lsq_linear
 
 from creepkit.arrays import Floats
 from creepkit.inverse.bounds import Bounds
-from creepkit.inverse.variance_components import BOUND_TOLERANCE
 
 IterationCallback = Callable[[str, int, int], None]
 """Reports the progress of a search: (name of the step, how many are done, how many there are)."""
 
 
-class AdditionalResiduals(Protocol):
-    """Residuals beside those of the data: half the sum of their squares is added to the cost."""
-
-    def residuals(self, x: Floats) -> Floats:
-        """(additional,) - at x (unknowns,)."""
-        ...
-
-    def jacobian(self, x: Floats) -> Floats:
-        """(additional, unknowns) their derivatives at x (unknowns,)."""
-        ...
+System = Callable[[Floats], tuple[Floats, Floats]]
+"""x (unknowns,) to residuals (rows,) and their derivatives (rows, unknowns)."""
 
 
 @dataclass(frozen=True)
 class Minimum:
     """The end of a search.
 
-    x : (unknowns,) where it ended; cost : half the sum of squares there; converged : whether it met its tolerance;
-    evaluations : how many points it evaluated. promised : cost at the end of a further step of Gauss and Newton.
-    whitened_residuals : (data,) -, whitened residuals of the data there, where they were kept.
+    x : (unknowns,) where it ended; cost : half the sum of squares there; converged : whether it met its tolerance.
+    promised : cost at the end of a further step of Gauss and Newton.
+    whitened_residuals : (data,) -, whitened residuals of the data there; none where they were not kept.
     """
 
     x: Floats
     cost: float
     converged: bool
     promised: float = np.inf
-    whitened_residuals: Floats | None = field(default=None, repr=False)
+    whitened_residuals: Floats = field(default_factory=lambda: np.zeros(0), repr=False)
 
 
 @dataclass(frozen=True)
 class Tolerances:
     """When a local refinement ends.
 
-    After so many steps, at this relative change of the cost, or where a step of Gauss and Newton promises less than the
-    relative gain, which is judged before the step is simulated.
+    After so many points, at this relative change of the cost, or where a step of Gauss and Newton promises less than
+    the relative gain, or no cost as low as is wanted, which is judged before the step is simulated.
     """
 
     max_steps: int = 30
     tolerance: float = 1e-5
     gain: float = 0.0
+    wanted: float = np.inf
 
 
-class _PromisesNothing(Exception):
-    """Ends a refinement at a point from which a step would gain too little."""
+FIRST_RADIUS = 3.0
+"""Of the trust region, in scales of a step."""
 
 
 def bounded_least_squares(
-    system: Callable[[Floats], tuple[Floats, Floats]],
+    system: System,
     start: Floats,
     bounds: Bounds,
     scale: Floats,
     tolerances: Tolerances,
+    limits: System,
     *,
-    fixed: Mapping[int, float],
-    robust: bool,
+    robust: bool = False,
 ) -> Minimum:
-    """Bounded least squares by the trust region reflective method of scipy.
+    """Bounded least squares; an unknown whose bounds are equal keeps its value.
 
-    system : x (unknowns,) to residuals (rows,) and their derivatives (rows, unknowns).
-    start : (unknowns,) within the bounds; scale : (unknowns,) the scale of a step in each unknown.
-    fixed : {position: value} of unknowns that keep their values.
+    system : the residuals, of which a robust loss is taken. start : (unknowns,) within the bounds. scale : (unknowns,)
+    of a step in each unknown. limits : further residuals, which count where they are above zero.
     """
-    free = np.setdiff1d(np.arange(start.size), list(fixed))
-    lower, upper, cache = bounds.lower[free], bounds.upper[free], dict[bytes, tuple[Minimum, Floats]]()
 
-    def evaluate(free_values: Floats) -> tuple[Minimum, Floats]:
-        """The point as an end, and the derivatives there."""
-        key = free_values.tobytes()
-        if key not in cache:
-            cache.clear()
-            x = start.copy()
-            x[free] = free_values
-            values, jacobian = system(x)
-            weights = 1.0 / np.sqrt(1.0 + values**2) if robust else np.ones_like(values)
-            cost = 0.5 * float((robust_loss(values**2) if robust else values**2).sum())
-            gain = _promised_gain(values, jacobian[:, free], weights, lower - free_values, upper - free_values)
-            ends = gain <= tolerances.gain * cost
-            cache[key] = Minimum(x, cost, ends, cost - gain, values), jacobian[:, free]
-        return cache[key]
+    def best_within(x: Floats, rows: Floats, radius: float) -> tuple[Floats, float]:
+        """The least point of the model about x within a radius, and how much lower than at x it is there."""
+        low, high = (np.clip(end - x, -radius * scale, radius * scale) for end in (bounds.lower, bounds.upper))
+        beyond, slopes = limits(x)
+        linear_limits, counts = np.column_stack([slopes, beyond]), beyond > 0.0
+        at_x = float((rows[:, -1] ** 2).sum()) + _squares_above(beyond)
+        for k in range(MOST_CHANGES):  # which limits count, in turn with the step
+            step = least_within(np.concatenate([rows, linear_limits[counts]]), low, high)
+            left, before = beyond + slopes @ step, counts
+            counts = (left > 0.0) | (counts & (k > MOST_CHANGES // 2))
+            if (counts == before).all():
+                break
 
-    def jacobian(free_values: Floats) -> Floats:
-        end, derivatives = evaluate(free_values)
-        if end.converged:
-            raise _PromisesNothing
-        return derivatives
+        missed = float(((rows[:, :-1] @ step + rows[:, -1]) ** 2).sum()) + _squares_above(left)
+        return x + step, 0.5 * (at_x - missed)
 
-    try:
-        result = least_squares(
-            lambda part: np.asarray(evaluate(part)[0].whitened_residuals),
-            start[free],
-            jac=jacobian,
-            bounds=(lower, upper),
-            x_scale=scale[free],
-            loss="soft_l1" if robust else "linear",
-            max_nfev=tolerances.max_steps,
-            ftol=tolerances.tolerance,
-            xtol=10 * tolerances.tolerance,
-            gtol=tolerances.tolerance,
-        )
-    except _PromisesNothing:
-        return next(iter(cache.values()))[0]
-    return replace(evaluate(result.x)[0], converged=result.status > 0)
+    def evaluated(x: Floats) -> tuple[Floats, float, Floats, Floats]:
+        """The point, its cost, its residuals, and the rows of its linear model."""
+        values, jacobian = system(x)
+        weights = (1.0 + values**2) ** -0.25 if robust else np.ones_like(values)
+        rows = np.column_stack([jacobian, values]) * weights[:, None]
+        if not np.isfinite(rows).all():
+            return x, np.inf, values, rows
+        cost = 0.5 * (float((robust_loss(values**2) if robust else values**2).sum()) + _squares_above(limits(x)[0]))
+        return x, cost, values, np.asarray(np.linalg.qr(rows, mode="r"))
+
+    here, radius, settled = evaluated(start), FIRST_RADIUS, False
+    for further in reversed(range(tolerances.max_steps)):
+        (x, least, values, rows), tolerance = here, tolerances.tolerance
+        end, gain = best_within(x, rows, np.inf)
+        promised = least - gain
+        settled = settled or gain <= tolerances.gain * least or promised > tolerances.wanted
+        if settled or not further:
+            break
+        if (np.abs(end - x) > radius * scale).any():
+            end, gain = best_within(x, rows, radius)
+        there = evaluated(end)
+        fall, size = least - there[1], float((np.abs(end - x) / scale).max())
+        radius = 0.25 * size if not fall > 0.25 * gain else max(radius, 2.0 * size) if fall > 0.75 * gain else radius
+        settled = size <= 10.0 * tolerance or (0.25 * gain < fall <= tolerance * least)
+        here = there if fall > 0.0 else here
+    return Minimum(x, least, settled, promised, values)
 
 
-def _promised_gain(values: Floats, jacobian: Floats, weights: Floats, below: Floats, above: Floats) -> float:
-    """How much lower than here the cost is by its linear model at the end of a step of Gauss and Newton.
+MOST_CHANGES = 20
+"""Of which limits count at the end of a step; in the second half none ceases to."""
 
-    values : (rows,), jacobian : (rows, unknowns) there. weights : (rows,) derivative of the loss to squares.
-    below, above : (unknowns,) steps to the bounds; an unknown that a bound holds takes no part.
+
+def _squares_above(limits: Floats) -> float:
+    return float((np.maximum(limits, 0.0) ** 2).sum())
+
+
+def least_within(rows: Floats, low: Floats, high: Floats) -> Floats:
+    """(unknowns,) step of least squares within bounds.
+
+    rows : (rows, unknowns + 1) derivatives, then values. low, high : (unknowns,) of the step.
     """
-    gradient, tolerance = jacobian.T @ (weights * values), BOUND_TOLERANCE * (above - below)
-    moves = ~((below > -tolerance) & (gradient > 0.0) | (above < tolerance) & (gradient < 0.0))
-    normal_matrix = (jacobian[:, moves] * weights[:, None]).T @ jacobian[:, moves]
-    size = np.sqrt(np.maximum(np.diag(normal_matrix), 1e-300))
-    if not (np.isfinite(normal_matrix).all() and np.isfinite(gradient).all()):
-        return np.inf
-    scaled = gradient[moves] / size
-    return 0.5 * float(scaled @ np.linalg.lstsq(normal_matrix / np.outer(size, size), scaled, rcond=1e-12)[0])
+    step, moves = np.zeros(low.size), high > low
+    size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-150)[moves]
+    matrix, low, high = rows[:, :-1][:, moves] / size, low[moves] * size, high[moves] * size
+    best = np.linalg.lstsq(matrix, -rows[:, -1], rcond=1e-12)[0]
+    if ((best < low) | (best > high)).any():
+        best = np.clip(lsq_linear(matrix, -rows[:, -1], (low, high), method="bvls", tol=1e-12).x, low, high)
+    step[moves] = best / size
+    return step
 
 
 def robust_loss(squared: Floats) -> Floats:

@@ -6,7 +6,6 @@ evaluations of a particle swarm.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,11 +15,11 @@ from creepkit import limits
 from creepkit.arrays import Bools, Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
-from creepkit.inverse.bounds import LOG_RATE_BOUNDS, Bounds
+from creepkit.inverse.bounds import LOG_RATE_BOUNDS
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import median_log_rate_excess, median_log_rupture_excess
 from creepkit.inverse.search.global_search import SearchResult, refined
-from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
+from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.options import Options, option
 
 INTERNAL_RATE_RANGE = (-4.0, 0.0)
@@ -147,52 +146,3 @@ def _with_sampled_exponents(problem: LeastSquaresProblem, points: Floats, sobol:
     for local_exponent in coordinates.exponents:
         points[:, local_exponent.position] = conditioned[:, local_exponent.position]
     return problem.bounds.clip(points)
-
-
-EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS = 1e-5, 5e-3
-"""Root mean square difference of predictions, over the spread of what was measured, below which two minima are one. A
-reduced-order model is not better than the latter, and along a valley one start is enough for its predictor."""
-
-
-SAME_COORDINATES = 0.02
-"""Distance over the width of the bounds, in every coordinate, up to which two minima are one."""
-
-
-WORKING_ERROR = 0.3
-"""Misfit that is assumed in a search, over that spread (see inverse.noise_model.initial_working_noise)."""
-
-
-def distinct(
-    minima: Sequence[Minimum],
-    bounds: Bounds,
-    *,
-    equal_predictions: float = EQUAL_PREDICTIONS,
-    max_count: int = 2,
-    tolerance: float = SAME_COORDINATES,
-) -> list[Minimum]:
-    """The best minima that differ by more than 2 % of the bounds in some coordinate, and in what they predict."""
-    selected: list[Minimum] = []
-    for minimum in minima:
-        if not any(_same(minimum, other, bounds, equal_predictions, tolerance) for other in selected):
-            selected.append(minimum)
-    return selected[:max_count]
-
-
-def minima_counts(
-    minima: Sequence[Minimum], bounds: Bounds, *, equal_predictions: float = EQUAL_PREDICTIONS
-) -> dict[str, int]:
-    """How often a search ended: "search_ends", "distinct_minima" of them, and "ends_at_best" that are the best one.
-
-    minima : best first.
-    """
-    best = [minimum for minimum in minima if _same(minimum, minima[0], bounds, equal_predictions, SAME_COORDINATES)]
-    apart = distinct(minima, bounds, equal_predictions=equal_predictions, max_count=len(minima))
-    return {"search_ends": len(minima), "distinct_minima": len(apart), "ends_at_best": len(best)}
-
-
-def _same(a: Minimum, b: Minimum, bounds: Bounds, equal_predictions: float, tolerance: float) -> bool:
-    if (np.abs(a.x - b.x) <= tolerance * bounds.width).all():
-        return True
-    if a.whitened_residuals is None or b.whitened_residuals is None:
-        return False
-    return bool(np.mean((a.whitened_residuals - b.whitened_residuals) ** 2) < (equal_predictions / WORKING_ERROR) ** 2)

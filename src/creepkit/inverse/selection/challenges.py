@@ -32,7 +32,7 @@ from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.local_refinement import Tolerances
+from creepkit.inverse.search.local_refinement import System, Tolerances
 from creepkit.inverse.selection.perturbation_trials import Challenge, decisive_effects
 from creepkit.inverse.sparsity.term_selection import TermContributions
 from creepkit.language import CreepLaw, Param, stress
@@ -58,15 +58,17 @@ SHARE_TOLERANCE = 1e-3
 """Of ln of the ratio of rates, within which a sum keeps its share."""
 
 
-APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3)
+APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3, gain=1e-3)
 """Of the reduced-order model, from which the last steps begin."""
 
 
 LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6, gain=1e-4)
 
 
-FAR_EXCLUDED = 10.0 * NOT_EXCLUDED
-"""Increase of chi-square by the reduced-order model, from which on a sum is excluded without a further run."""
+FAR_EXCLUDED, EXCLUDED_BY_STEP = 10.0 * NOT_EXCLUDED, 6.0 * NOT_EXCLUDED
+"""Increase of chi-square by the reduced-order model, and by a step of the simulated law from there, from which on a sum
+is excluded without a further run.
+"""
 
 
 SAME_FUNCTION = 0.05
@@ -128,29 +130,19 @@ def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -
 # ---- shares of other laws --------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class ShareResidual:
-    """One residual that holds the ratio of two rates at the reference point; see search.AdditionalResiduals.
+def share_residual(first: Sequence[int], second: Sequence[int], log_ratio: float) -> System:
+    """One residual that holds the ratio of two rates at the reference point.
 
     first, second : positions of the ln rates of the terms of two laws among the unknowns. log_ratio : of the rate of
     the second law, all its terms, over that of the first.
     """
 
-    first: Sequence[int]
-    second: Sequence[int]
-    log_ratio: float
+    def residual(x: Floats) -> tuple[Floats, Floats]:
+        row, (a, b) = np.zeros((1, x.size)), (x[list(terms)] for terms in (first, second))
+        row[0, list(first)], row[0, list(second)] = -softmax(a), softmax(b)
+        return np.array([logsumexp(b) - logsumexp(a) - log_ratio]) / SHARE_TOLERANCE, row / SHARE_TOLERANCE
 
-    def residuals(self, x: Floats) -> Floats:
-        """(1,) - at x (unknowns,)."""
-        log_rates = [logsumexp(x[list(terms)]) for terms in (self.first, self.second)]
-        return np.array([(log_rates[1] - log_rates[0] - self.log_ratio) / SHARE_TOLERANCE])
-
-    def jacobian(self, x: Floats) -> Floats:
-        """(1, unknowns) derivatives at x (unknowns,)."""
-        row = np.zeros((1, x.size))
-        row[0, list(self.first)] = -softmax(x[list(self.first)]) / SHARE_TOLERANCE
-        row[0, list(self.second)] = softmax(x[list(self.second)]) / SHARE_TOLERANCE
-        return row
+    return residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +163,7 @@ class FittedLaw:
         if fit.settings.weights != "likelihood" or fit.settings.included_errors:
             with contextlib.suppress(CreepkitError):
                 refined = problem.minimise(x, tolerances=LAST_STEPS).x
-                x = min(x, refined, key=lambda one: _chi_square(problem, one))
+                x = min(x, refined, key=problem.chi_square)
         return cls(problem, x)
 
     @property
@@ -229,12 +221,12 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     x = np.concatenate([best.u, other.u, best.x[best.u.size :]])
     x[own_rates] += np.log(1.0 - SHARE)
     x[further_rates] += np.log(SHARE) + start
-    share = ShareResidual(own_rates, further_rates, float(np.log(SHARE / (1.0 - SHARE))))
+    share = share_residual(own_rates, further_rates, float(np.log(SHARE / (1.0 - SHARE))))
     excess, x = _least_excess(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
     description = f"its sum with {other.law.name}, tried with {100 * SHARE:.0f} % of the rate carried by it,"
-    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.u.size, description)
+    return AlteredLaw("sum", problem, x, excess, share(x)[1], other.u.size, description)
 
 
 def above_threshold(best: FittedLaw) -> AlteredLaw:
@@ -296,27 +288,20 @@ def _least_excess(
     problem: LeastSquaresProblem,
     x: Floats,
     *,
-    share: ShareResidual | None = None,
+    share: System | None = None,
     fixed: Mapping[int, float] | None = None,
 ) -> tuple[float, Floats]:
     """The least chi-square from x (unknowns,) above that of the best law, and where.
 
     It is sought by the reduced-order model, then by the predictor itself where that does not exclude it by far.
     """
-    least = _chi_square(best.problem, best.x)
+    least, last = best.problem.chi_square(best.x), LAST_STEPS
     if best.reduced is not None:
         cheap = problem.with_predictor(best.reduced.predictor).with_correction(best.reduced.correction)
         found = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS)
-        x, excess = found.x, _chi_square(cheap, found.x) - least
+        x, excess = found.x, cheap.chi_square(found.x) - least
         if found.converged and excess > FAR_EXCLUDED:
             return excess, x
-    x = problem.minimise(x, additional=share, fixed=fixed, tolerances=LAST_STEPS).x
-    return _chi_square(problem, x) - least, x
-
-
-def _chi_square(problem: LeastSquaresProblem, x: Floats) -> float:
-    """Of the data and of the priors of nuisance parameters, without the penalties of bounds."""
-    whitened = problem.whiten(problem.residuals(x).values)
-    nuisances = problem.nuisance_parameters
-    deviation = (x[problem.parameter_count :] - nuisances.mean[: nuisances.size]) ** 2 * nuisances.precision
-    return float((whitened**2).sum() + deviation.sum())
+        last = replace(last, wanted=0.5 * (least + EXCLUDED_BY_STEP))
+    x = problem.minimise(x, additional=share, fixed=fixed, tolerances=last).x
+    return problem.chi_square(x) - least, x

@@ -5,7 +5,7 @@ other side. Samples are drawn from a Student's t about it, weighted with the pos
 their density, and the proposal is moved to the weighted samples in a few rounds: population Monte Carlo (Cappe et al.
 (2004), J. Comput. Graph. Stat. 13, 907). The posterior is that of the problem through a cheaper predictor, corrected at
 the optimum by what it differs from the predictor there (see inverse.defect_correction), and with residuals that are
-quadratic functions of u where these prove right (see uncertainty.quadratic_residuals).
+quadratic functions of u where these prove right (see uncertainty.posterior).
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import lies_at_bound
 from creepkit.inverse.uncertainty.mixture_distribution import INTERVAL_PROBABILITIES
-from creepkit.inverse.uncertainty.posterior import Posterior
-from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals, quadratic_terms
+from creepkit.inverse.uncertainty.posterior import Posterior, QuadraticResiduals, quadratic_terms
 from creepkit.inverse.uncertainty.quantities import (
     DerivedQuantity,
     Interval,
@@ -244,7 +243,7 @@ def _corrected(quadratic: Posterior, u: Floats, log_density: Floats, weights: Fl
     return density
 
 
-LEAST_POINTS = 10
+LEAST_POINTS = 6
 """Simulated points, with derivatives, that quadratic residuals are fitted to at least."""
 
 

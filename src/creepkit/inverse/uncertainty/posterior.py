@@ -10,6 +10,10 @@ large nu. Nuisance parameters of tests are integrated out to first order about t
 residuals at the estimates, J their derivatives to the nuisance parameters, priors below, chi2(u) = |r|^2 - |Q' r|^2,
 J = Q R. The effect of a test's own rate is taken half way between the optimum and the candidate (see
 uncertainty.profile_likelihood).
+
+Over its width residuals are smooth: a response surface, quadratic functions of u fitted to values and derivatives at
+some simulated points, gives those of thousands of draws. Source: R. Myers, D. Montgomery and C. Anderson-Cook, Response
+Surface Methodology (2016), chapter 6.
 """
 
 from __future__ import annotations
@@ -18,14 +22,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats
+from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.errors_of_tests import errors_of_tests, with_expected_scatter
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances
-from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals
 
 REFIT_TOLERANCES = Tolerances(max_steps=25, tolerance=1e-7)
 """Of minima about an optimum that is known."""
@@ -59,6 +62,87 @@ def predicted_errors(fit: Identification, alone: CovarianceFactor) -> Floats:
     weighted = CovarianceFactor.of_residuals(residuals, noise).inverse_times(residuals.values)
     rest = (alone.blocks @ weighted[..., None])[..., 0]
     return np.where(residuals.present, residuals.values - rest, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class QuadraticResiduals:
+    """r(u) of (tests, observations), in v = root^-1 (u - centre).
+
+    centre : (parameters,). root : (parameters, parameters) lower triangular. coefficients : (terms, tests,
+    observations) of 1, of v, and of the products of two of its elements.
+    """
+
+    centre: Floats
+    root: Floats
+    coefficients: Floats
+
+    @classmethod
+    def fitted(
+        cls,
+        u: Floats,
+        residuals: Floats,
+        weights: Floats,
+        centre: Floats,
+        shape: Floats,
+        jacobian: Floats | None = None,
+    ) -> QuadraticResiduals:
+        """Through points u (points, parameters); residuals : (points, tests, observations); weights : (points,).
+
+        centre : (parameters,) mean of the points, about which the functions are written. shape : (parameters,
+        parameters) their covariance. jacobian : (first points, tests, observations, parameters) derivatives to u, of as
+        many points as they are known of.
+        """
+        result = cls(centre, np.asarray(np.linalg.cholesky(shape)), np.zeros(0))
+        terms, root_weights = result._terms(u), np.sqrt(weights)
+        rows, right = [root_weights[:, None] * terms], [root_weights[:, None] * residuals.reshape(len(u), -1)]
+        if jacobian is not None:
+            known, size = len(jacobian), centre.size
+            own = root_weights[:known, None, None]
+            slopes = own * np.moveaxis(result._slopes(u[:known]), -1, 1)
+            derivatives = own * np.moveaxis((jacobian @ result.root).reshape(known, -1, size), -1, 1)
+            rows.append(slopes.reshape(known * size, -1))
+            right.append(derivatives.reshape(known * size, -1))
+        coefficients = np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=1e-10)[0]
+        return cls(centre, result.root, np.asarray(coefficients.reshape(-1, *residuals.shape[1:])))
+
+    def candidate_residuals(self, u: Floats) -> Floats:
+        """(candidates, tests, observations) - of u (candidates, parameters)."""
+        return np.asarray(np.tensordot(self._terms(u), self.coefficients, axes=1))
+
+    def candidate_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
+        """The same of u (candidates, parameters), and derivatives (candidates, tests, observations, parameters)."""
+        jacobian = np.tensordot(self._slopes(u) @ np.linalg.inv(self.root), self.coefficients, axes=(1, 0))
+        return self.candidate_residuals(u), np.asarray(np.moveaxis(jacobian, 1, -1))
+
+    @property
+    def _pairs(self) -> tuple[Ints, Ints]:
+        first, second = np.triu_indices(self.centre.size)
+        return np.asarray(first, np.int64), np.asarray(second, np.int64)
+
+    def _standardised(self, u: Floats) -> Floats:
+        return np.asarray(np.linalg.solve(self.root, (u - self.centre).T).T)
+
+    def _slopes(self, u: Floats) -> Floats:
+        """(points, terms, parameters) derivatives of the terms to v."""
+        v, size = self._standardised(u), u.shape[1]
+        first, second = self._pairs
+        slopes = np.zeros((len(u), quadratic_terms(size), size))
+        slopes[:, 1 + np.arange(size), np.arange(size)] = 1.0
+        pairs = 1 + size + np.arange(len(first))
+        slopes[:, pairs, first] += v[:, second]
+        slopes[:, pairs, second] += v[:, first]
+        return slopes
+
+    def _terms(self, u: Floats) -> Floats:
+        """(points, terms) 1, v, and products of two."""
+        v = self._standardised(u)
+        first, second = self._pairs
+        return np.concatenate([np.ones((len(u), 1)), v, v[:, first] * v[:, second]], axis=1)
+
+
+def quadratic_terms(parameters: int) -> int:
+    """How many coefficients a quadratic function has."""
+    return (parameters + 1) * (parameters + 2) // 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,7 @@ from creepkit.inverse.uncertainty.importance_sampling import (
     shortened_covariance,
     with_samples,
 )
-from creepkit.inverse.uncertainty.posterior import Posterior
-from creepkit.inverse.uncertainty.quadratic_residuals import QuadraticResiduals
+from creepkit.inverse.uncertainty.posterior import Posterior, QuadraticResiduals
 from creepkit.inverse.uncertainty.quantities import exponent_at, rate_at
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
