@@ -114,7 +114,9 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         found = [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), by_rates]
         return [*(one for one in found if math.isfinite(one.value)), *_lives(fit)]
     r = fit.tested_point
-    of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
+    of_state = ""
+    if depends_on_history(fit.law):
+        of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else f", {100 * r.strain:.2g} % strain"
     stated = [f", {c.name.replace('_', ' ')} {dict(r.conditions)[c.name]:.3g} {c.unit}" for c in fit.law.conditions]
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{''.join(stated)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
@@ -405,8 +407,8 @@ def unit_text(unit: str) -> str:
 def rate_exponent_and_energy(fit: Identification) -> tuple[tuple[float, ...], ...]:
     """Creep rate, 1/s, stress exponent and activation energy, J/mol, amid the tests: of bars at the reference strain.
 
-    (value, low, high) each. Where the law has no more than stress and temperature, or no bar can be followed, those of
-    the formula.
+    (value, low, high) each. Where the law has no more than stress, temperature and time, or no bar can be followed,
+    those of the formula.
     """
     state = _state(fit)
     if state is not None:
@@ -417,7 +419,15 @@ def rate_exponent_and_energy(fit: Identification) -> tuple[tuple[float, ...], ..
 
 
 def _state(fit: Identification) -> StateAtStrain | None:
-    return state_at_strain(fit) if depends_on_history(fit.law) else None
+    return state_at_strain(fit) if depends_on_history(fit.law) and not rate_of_time(fit.law) else None
+
+
+def rate_of_time(law: CreepLaw) -> bool:
+    """Whether time is all that the rate knows of its past: its exponent is then that of equal times, which tests show.
+
+    At equal strains it is n/(1 + m) of s^n t^m, which nobody would look for.
+    """
+    return law.uses(time) and not (law.states or law.uses(strain))
 
 
 def held_quantities(fit: Identification) -> str:

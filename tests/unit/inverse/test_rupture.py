@@ -26,6 +26,7 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, constant_strain, constant_stress
+from creepkit.records.units import time_text
 from creepkit.reports.answer import key_figures
 from creepkit.specimens.relaxation import Relaxation
 from helpers.literature_laws import EQUATIONS
@@ -417,12 +418,14 @@ def curves(T: float) -> list[ck.History]:
 
 
 @pytest.mark.parametrize("name", ["time-hardening", "strain-hardening"])
-def test_of_bars_at_one_strain_exponent_and_energy_are_over_one_plus_m(name: str) -> None:
+def test_exponent_and_energy_are_those_of_equal_times_of_a_law_of_time_and_over_one_plus_m_at_one_strain(name) -> None:
     law = ck.law(name).times(ck.arrhenius(T_ref=1000.0))
     fit = ck.identify(law, [*curves(970.0), *curves(1030.0)], starts=1, usual_errors="none")
     (exponent, energy, _), state, r = key_figures(fit), state_at_strain(fit), fit.reference
-    assert exponent.where == energy.where == f"{r.stress:.4g} MPa, 727 °C, {100 * r.strain:.2g} % strain"
-    assert [exponent.value, energy.value] == pytest.approx([N / (1 + M), 200.0 / (1 + M)], rel=0.01)
+    at = f"after {time_text(r.time)}" if name == "time-hardening" else f"{100 * r.strain:.2g} % strain"
+    assert exponent.where == energy.where == f"{r.stress:.4g} MPa, 727 °C, {at}"
+    over = 1.0 if name == "time-hardening" else 1 + M
+    assert [exponent.value, energy.value] == pytest.approx([N / over, 200.0 / over], rel=0.01)
     assert state.exponent[1] < N / (1 + M) < state.exponent[2]
     reached = (r.strain * (1 + M) / (A * r.stress**N * boltzmann(r.temperature))) ** (1 / (1 + M))
     assert [state.time[0], state.rate[0]] == pytest.approx([reached, (1 + M) * r.strain / reached], rel=0.02)
