@@ -41,11 +41,11 @@ BUDGET = {
     "registry": 635,
     "reports": 5780,
     "rupture_assessment": 1840,
-    "sampling": 990,
+    "sampling": 995,
     "screening": 570,
     "specimens": 3185,
     "studies": 2975,
-    "surrogates": 1370,
+    "surrogates": 1365,
     "testing": 1814,
 }
 """{package, or modules beside packages: lines}."""
