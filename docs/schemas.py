@@ -133,29 +133,6 @@ def valued_law_schema() -> dict[str, Any]:
     }
 
 
-def ranking_schema() -> dict[str, Any]:
-    """The schema of a ranking: names of files beside it, weights, and the SHA-256 of each file."""
-    properties = {
-        "file": {"type": "string"},
-        "weight": {"type": "number", "minimum": 0, "maximum": 1},
-        "sha256": {"type": "string"},
-    }
-    entry = {"type": "object", "properties": properties, "required": ["file", "weight"], "additionalProperties": False}
-    ranking = ranking_document.RANKING
-    return {
-        "$schema": DIALECT,
-        "title": f"{ranking.name}, version {ranking.version}",
-        "type": "object",
-        "properties": {
-            "format": {"const": ranking.name},
-            "version": {"const": ranking.version},
-            "laws": {"type": "array", "items": entry, "minItems": 1, "maxItems": ranking_document.MOST_LAWS},
-        },
-        "required": ["format", "version", "laws"],
-        "additionalProperties": False,
-    }
-
-
 class StudySchema(GenerateJsonSchema):
     """Of the tables of a study file, where a short form stands for a list."""
 
@@ -182,7 +159,9 @@ def schemas() -> dict[str, dict[str, Any]]:
     return {
         "study.schema.json": study,
         "identification.schema.json": identification,
-        "ranking.schema.json": ranking_schema(),
+        "ranking.schema.json": document_schema(
+            ranking_document.RANKING, ranking_document.CODEC, ranking_document.RankingFile
+        ),
         "law.schema.json": law,
         "valued-law.schema.json": valued_law_schema(),
         "rupture-assessment.schema.json": document_schema(assessment.ASSESSMENT, assessment.CODEC, RuptureAssessment),

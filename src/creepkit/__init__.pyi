@@ -7,6 +7,7 @@ from .api.objects import example_data as example_data
 from .api.objects import law as law
 from .api.objects import load_plugin as load_plugin
 from .api.objects import specimen as specimen
+from .api.saved import load as load
 from .api.simulation import simulate as simulate
 from .app.page import interactive_page as interactive_page
 from .dataset.generation import generate as generate
@@ -34,8 +35,6 @@ from .inverse.checked_identification import select as select
 from .inverse.confirmation import confirm as confirm
 from .inverse.cross_validation import cross_validate as cross_validate
 from .inverse.goodness_of_fit import relative_squared_error as relative_squared_error
-from .inverse.identification_document import load as load
-from .inverse.ranking_document import load_ranking as load_ranking
 from .inverse.reference_conditions import with_arrhenius as with_arrhenius
 from .inverse.search.multistart import MultiStart as MultiStart
 from .inverse.search.particle_swarm import ParticleSwarm as ParticleSwarm
@@ -103,7 +102,6 @@ from .registry.reading import read_record as read_record
 from .reports.report import report as report
 from .rupture_assessment.assess import rupture as rupture
 from .rupture_assessment.assessment import RuptureSettings as RuptureSettings
-from .rupture_assessment.assessment import load_rupture_assessment as load_rupture_assessment
 from .sampling.conditions import TimeGrid as TimeGrid
 from .screening.screen import ScreeningOptions as ScreeningOptions
 from .screening.screen import screen as screen

@@ -194,7 +194,6 @@ def texts_of(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...
 def hostile_documents(folder: Path) -> Iterator[tuple[str, bool, str]]:
     """Every text of a law with values replaced by each text that would be code; what is read is exported."""
     import creepkit as ck
-    from creepkit.cli.shared import read_law_file
     from creepkit.errors import CreepkitError
 
     document = json.loads(ck.export("norton", "json", values={"A": 3e-17, "n": 4.25}))
@@ -208,7 +207,7 @@ def hostile_documents(folder: Path) -> Iterator[tuple[str, bool, str]]:
             (folder / "law.json").write_text(json.dumps(changed), encoding="utf-8")
             detail = ""
             try:
-                found = read_law_file(folder / "law.json")
+                found = ck.load(folder / "law.json")
                 programs = {target: ck.export(found, target) for target in ("python", "c", "latex")}
             except CreepkitError:
                 programs = {}

@@ -26,6 +26,23 @@ def graded(count: int, last: float) -> np.ndarray:
     return ends / ends[-1]
 
 
+def bulging(history: ck.History) -> tuple[np.ndarray, np.ndarray]:
+    """Pressures above zero, MPa, and deflections, mm, (frames,) each; of a test that shows none its levels at rest."""
+    levels = np.unique(history.load_levels)
+    if "deflection" in history.outputs:
+        heights = np.maximum(history.outputs["deflection"][history.used], 0.0)
+        pressures = history.loading.program().at(history.times[history.used])
+        seen = (pressures > 0) & np.isfinite(heights)
+        if seen.any():
+            return pressures[seen], heights[seen]
+    return levels[levels > 0], np.zeros(np.count_nonzero(levels > 0))
+
+
+def few(stresses: np.ndarray) -> np.ndarray:
+    """The least, the middle and the largest of stresses (frames,), (3,); of few themselves."""
+    return np.quantile(stresses, (0.0, 0.5, 1.0)) if stresses.size > 3 else stresses
+
+
 @dataclass(frozen=True)
 class PlateBulge(ck.Axisymmetric):
     """A flat round plate, clamped at its rim over its thickness; the deflection of its middle is measured on top."""
@@ -55,10 +72,26 @@ class PlateBulge(ck.Axisymmetric):
         return {"deflection": displacements.axial("top_left")}
 
     def reference_stress(self, history: ck.History) -> np.ndarray:
-        """Stress at the limit load of a clamped plate for each pressure level, (levels,) MPa."""
+        """Stress of a clamped plate under bending and membrane forces, (levels,) MPa: of a limit load at first.
+
+        Both share the load as 1/s^2 = 1/bending^2 + 1/membrane^2: within 13 % of the mean that creep follows in
+        simulations by Norton's law with n from 2 to 8, from deflections of a half to 2.8 thicknesses.
+        """
         plate, _ = self.of_test(history, {})
-        levels = np.unique(history.loading.program().values)
-        return LIMIT_LOAD * (plate.radius / plate.thickness) ** 2 * levels[levels > 0]
+        bending = LIMIT_LOAD * (plate.radius / plate.thickness) ** 2
+        pressures, heights = bulging(history)
+        return few(pressures * bending / np.hypot(1.0, bending / plate.membrane_stress(heights)))
+
+    def membrane_stress(self, height: np.ndarray) -> np.ndarray:
+        """Stress over the pressure, (heights,), of a cap of the height of its middle, mm, thinned as its area grows."""
+        cap = self.radius**2 + height**2
+        with np.errstate(divide="ignore"):
+            return cap**2 / (4.0 * height * self.thickness * self.flat_area)
+
+    @property
+    def flat_area(self) -> float:
+        """Area of the middle surface at rest, over pi, mm^2."""
+        return self.radius**2
 
     def growth_per_strain(self, history: ck.History) -> float:
         """mm of deflection for each unit of strain at the reference stress, while it is less than the thickness."""
@@ -105,11 +138,16 @@ class DomeBulge(PlateBulge):
         """The middle of the outer surface."""
         return {"deflection": displacements.axial("outer_first")}
 
+    @property
+    def flat_area(self) -> float:
+        """Area of the inner side at rest, over pi, mm^2."""
+        return self.radius**2 + self.rise**2
+
     def reference_stress(self, history: ck.History) -> np.ndarray:
-        """Membrane stress P R/(2 t) of each pressure level, (levels,) MPa."""
+        """Membrane stress P R/(2 t) of the cap as it is at first and as it was seen, (levels,) MPa."""
         dome, _ = self.of_test(history, {})
-        levels = np.unique(history.loading.program().values)
-        return 0.5 * dome.sphere / dome.thickness * levels[levels > 0]
+        pressures, heights = bulging(history)
+        return few(pressures * dome.membrane_stress(dome.rise + heights))
 
     def growth_per_strain(self, history: ck.History) -> float:
         """mm for each unit of reference strain: half of it strains a whole sphere; clamped at its rim it flattens less.

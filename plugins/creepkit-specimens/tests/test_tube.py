@@ -128,7 +128,22 @@ def test_the_stated_scales_are_those_of_a_thin_plate() -> None:
         "plan", specimen="plate-bulge", loading=ck.constant_load("pressure", 0.5), temperature=1000.0, times=[1.0, 2.0],
         outputs={"deflection": [0.0, 0.0]}, elastic=ck.Elastic(E=1e5),
     )  # fmt: skip
-    assert plate.reference_stress(plan) == pytest.approx([0.32 * 400.0 * 0.5], rel=1e-3)
+    assert plate.reference_stress(plan) == pytest.approx([0.32 * 400.0 * 0.5] * 2, rel=1e-3)
+
+
+def test_a_plate_states_the_stresses_that_creep_follows_while_it_bulges() -> None:
+    """At last those of a spherical cap, P R/(2 h) of the wall that its area thins, and no longer those of bending."""
+    values, p = {"A": 5e-6 / 60.0**5, "n": 5.0}, 0.3
+    run = plate_of(PlateBulge(10.0, 0.2), values, p, [100.0, 1e3, 3e3, 1e4], 1e5)
+    w = run.outputs["deflection"][-1]
+    cap = p * (100.0 + w**2) / (4.0 * w) / (0.2 * 100.0 / (100.0 + w**2))
+    (low, high), seen = run.creep_stress_range, PlateBulge(10.0, 0.2).reference_stress(run)
+    assert low == pytest.approx(cap, rel=0.1)
+    assert seen.min() == pytest.approx(low, rel=0.1)
+    assert 1.4 * cap < high < 0.32 * 2500.0 * p
+    fit = ck.identify("norton", [run], starts=1)
+    assert fit.ranges["stress"] == pytest.approx((low, high), rel=0.08)
+    assert low < fit.tested_point.stress < high
 
 
 @pytest.mark.parametrize("n", [1.0, 4.0])

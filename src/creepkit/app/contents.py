@@ -18,7 +18,6 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, ReferencePoint
 from creepkit.inverse.selection.ranking import Ranking
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.language import CreepLaw, temperature
 from creepkit.records import History, LawWithValues, Specimen, constant_stress, dimensions_of, known_specimens
 from creepkit.records.units import celsius_text
@@ -27,7 +26,7 @@ from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.relaxation import Relaxation
 from creepkit.specimens.uniaxial import Uniaxial
 
-PageSource: TypeAlias = CreepLaw | Identification | Ranking | ModelAverage | LawWithValues | str
+PageSource: TypeAlias = CreepLaw | Identification | Ranking | LawWithValues | str
 
 
 MOST_LAWS = 12
@@ -115,9 +114,6 @@ def _page_laws(source: PageSource) -> tuple[PageLaw, ...]:
     """The laws of a source, those of a ranking by falling weight."""
     if isinstance(source, LawWithValues):
         return (PageLaw(source.law, dict(source.values)),)
-    if isinstance(source, ModelAverage):  # the laws of a ranking, from its file
-        pairs = sorted(zip(source.fits, source.weights, strict=True), key=lambda pair: -pair[1])
-        return tuple(PageLaw(fit.law, fit.values, fit, float(weight)) for fit, weight in pairs[:MOST_LAWS])
     if isinstance(source, Ranking):
         return tuple(PageLaw(one.fit.law, one.fit.values, one.fit, one.weight) for one in source.laws[:MOST_LAWS])
     if isinstance(source, Identification):

@@ -33,11 +33,14 @@ def command(
 ) -> None:
     """What is not said of the rig is a little more than what it did. Ctrl-C ends the work with the best so far."""
     import creepkit as ck
+    from creepkit.inverse.selection import Ranking
     from creepkit.reports.design import design_to_json
 
     histories = ck.read_histories(tests)
     found = [read_results(path, histories) for path in fits]
-    identified: list[Any] = [fit for one in found for fit in getattr(one, "fits", (one,))]
+    identified: list[Any] = []
+    for one in found:
+        identified += [ranked.fit for ranked in one.laws] if isinstance(one, Ranking) else [one]
     source: Any = found[0] if len(found) == 1 else identified
     predictor = identified[0].predictor
     assert predictor is not None

@@ -9,7 +9,7 @@ import typer
 
 from creepkit.cli.command_options import Levels, OutputPath
 from creepkit.cli.planned_test import described_test, loads_and_lengths
-from creepkit.cli.shared import Json, Tests, show
+from creepkit.cli.shared import Json, Tests, read_results, show
 from creepkit.errors import FitError
 from creepkit.forecasts.planned_tests import ForecastOptions, PlannedTestOptions
 from creepkit.options import Option
@@ -17,7 +17,7 @@ from creepkit.reports.terminal import ProgressBar
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+    from creepkit.inverse.selection import Ranking
 
 
 def command(
@@ -47,10 +47,9 @@ def command(
     Each has its curve, a band, times to a strain or deflection and to rupture; measured ones are compared with theirs.
     """
     import creepkit as ck
-    from creepkit.inverse.ranking_document import read_fit_or_ranking
     from creepkit.reports.forecast import forecast_to_json
 
-    source = read_fit_or_ranking(fit)
+    source = read_results(fit)
     histories = ck.read_histories(tests) if tests else []
     if test.get("end") is not None:
         planned = described_test(test, piece, load)
@@ -68,13 +67,13 @@ def command(
     show(forecast, forecast_to_json, as_json=as_json, plot=plot)
 
 
-def _temperature_of(source: Identification | ModelAverage) -> float:
+def _temperature_of(source: Identification | Ranking) -> float:
     """K, that of the fitted tests, which must have had one alone."""
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
     from creepkit.records.units import celsius_text
 
-    low, high = (source if isinstance(source, Identification) else source.fits[0]).ranges["temperature"]
+    low, high = (source if isinstance(source, Identification) else source.best).ranges["temperature"]
     if high - low > ISOTHERMAL_RANGE:
         raise FitError(f"the fitted tests were made at {celsius_text(low, high)}: give --temperature-c")
     return float(0.5 * (low + high))

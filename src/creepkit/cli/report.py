@@ -11,17 +11,14 @@ import typer
 
 import creepkit as ck
 from creepkit.cli.command_options import OutputPath
-from creepkit.cli.shared import is_file_name, is_law_name, law_source, read_results
+from creepkit.cli.shared import is_law_name, law_source
 from creepkit.errors import FitError, ReportError
 from creepkit.options import Option
 from creepkit.reports.terminal import ProgressBar, tell_written
 
 if TYPE_CHECKING:
     from creepkit.app.contents import PageSource
-    from creepkit.inverse.identification import Identification
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.records import History
-    from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 
 def command(
@@ -60,8 +57,12 @@ def command(
         law = next((name for name in results if is_law_name(name)), None)
         if law is not None:
             raise ReportError(f"{law} is a law: give --app for a page of its sliders, or name results of identify")
-        found = [_read(Path(name), histories) for name in results]
-        path = ck.report(found, to or Path("report.html"), title=title)
+        found = map(ck.load, results)
+        path = ck.report(
+            [one.with_histories(histories) if hasattr(one, "with_histories") and histories else one for one in found],
+            to or Path("report.html"),
+            title=title,
+        )
     tell_written(path, err=True)
 
 
@@ -80,7 +81,7 @@ def _page_source(names: list[str], histories: list[History]) -> PageSource:
     if not named:
         histories += ck.read_histories(names)
     elif not histories or names[0].endswith(".json"):
-        return _named_source(names[0])
+        return law_source(names[0])
     return fitted_laws(named, histories)
 
 
@@ -95,29 +96,3 @@ def fitted_laws(names: list[str], histories: list[History]) -> PageSource:
         if len(laws) == 1:
             return ck.identify(laws[0], histories, progress=progress.tick)
         return ck.select(laws, histories, sums=False, progress=progress.tick)
-
-
-def _named_source(name: str) -> PageSource:
-    """A law by its name, or what a file holds."""
-    from creepkit.exporters.law_files import VALUED_LAW
-    from creepkit.files.json_documents import read_json
-    from creepkit.inverse.ranking_document import RANKING, load_ranking
-
-    if is_file_name(name):
-        data = read_json(Path(name), VALUED_LAW.kind)
-        if isinstance(data, dict) and data.get("format") == RANKING.name:
-            return load_ranking(name)
-    return law_source(name)
-
-
-def _read(path: Path, histories: list[History]) -> Identification | ModelAverage | RuptureAssessment:
-    """What a file holds, with the tests that it was made from where they are given."""
-    from creepkit.files.json_documents import read_json
-    from creepkit.files.reading import FileKind
-    from creepkit.rupture_assessment.assessment import ASSESSMENT
-
-    advice = "give an identification, a ranking.json or a rupture assessment that creepkit wrote"
-    data = read_json(path, FileKind("a result", ReportError, advice))
-    if isinstance(data, dict) and data.get("format") == ASSESSMENT.name:
-        return ck.load_rupture_assessment(path)
-    return read_results(path, histories)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import creepkit as ck
-from creepkit.errors import LawError
+from creepkit.errors import FitError, LawError
 from creepkit.limits import SEED, Limits
 from creepkit.options import Option
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+    from creepkit.inverse.selection import Ranking
     from creepkit.language import CreepLaw
     from creepkit.records import History, LawWithValues
 
@@ -51,23 +52,17 @@ def is_file_name(word: str) -> bool:
     return (Path(word).suffix != "" or Path(word).name != word) and not is_law_name(word)
 
 
-def read_law_file(path: str | Path) -> Identification | LawWithValues:
-    """What a file holds that creepkit wrote: an identification, or a law with its values."""
-    from creepkit.exporters.law_files import VALUED_LAW, valued_law_from_json
-    from creepkit.files.json_documents import read_json
+def law_source(text: str) -> CreepLaw | Identification | Ranking | LawWithValues:
+    """A law by name, or else what a file holds: an identification, a ranking, or a law with values."""
+    from creepkit.records import LawWithValues
 
-    data = read_json(Path(path), VALUED_LAW.kind)
-    if isinstance(data, dict) and data.get("format") == VALUED_LAW.name:
-        return valued_law_from_json(data, str(path))
-    from creepkit.inverse.identification_document import identification_from_json
-
-    return identification_from_json(data, str(path))
-
-
-def law_source(text: str) -> CreepLaw | Identification | LawWithValues:
-    """A law by name, or else what a file holds: an identification, or a law with values."""
     if is_file_name(text):
-        return read_law_file(text)
+        source: Identification | Ranking | LawWithValues = ck.load(text)
+        if not isinstance(source, LawWithValues) and not hasattr(source, "valued"):
+            raise LawError(
+                f"{text}: this is a {named(source)}, which has no law with values; give a result of identify or export"
+            )
+        return source
     try:
         return ck.law(text)
     except LawError as error:
@@ -78,9 +73,9 @@ def law_source(text: str) -> CreepLaw | Identification | LawWithValues:
 
 def merged_values(source: Any, given: Mapping[str, float] | None) -> dict[str, float] | None:
     """The values of the source with those given by --set in their place; None for a source's own."""
-    own: Mapping[str, float] | None = getattr(source, "values", None) if hasattr(source, "law") else None
-    if own is None:
+    if hasattr(source, "terms"):
         return dict(given or {})
+    own: Mapping[str, float] = getattr(source, "valued", source).values
     return {**own, **given} if given else None
 
 
@@ -103,18 +98,29 @@ def show(
         tell(result)
 
 
-def read_results(path: Path, histories: Sequence[History]) -> Identification | ModelAverage:
+def read_results(path: Path, histories: Sequence[History] = ()) -> Identification | Ranking:
     """A saved identification or ranking, with the tests that it was made from where they are given."""
+    import creepkit as ck
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.ranking_document import read_fit_or_ranking
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+    from creepkit.inverse.selection import Ranking
 
-    found = read_fit_or_ranking(path)
-    if not histories:
-        return found
-    if isinstance(found, Identification):
-        return found.with_histories(histories)
-    return ModelAverage(tuple(fit.with_histories(histories) for fit in found.fits), found.weights)
+    found = ck.load(path)
+    if not isinstance(found, Identification | Ranking):
+        raise FitError(
+            f"{path}: this is a {named(found)}, and neither an identification nor a ranking; give a result of identify"
+        )
+    kept: Identification | Ranking = with_tests(found, histories)
+    return kept
+
+
+def with_tests(result: Any, histories: Sequence[History]) -> Any:
+    """A saved result with the tests that it was made from, where they are given and it takes them."""
+    return result.with_histories(histories) if histories and hasattr(result, "with_histories") else result
+
+
+def named(result: Any) -> str:
+    """What a result is, in words: a rupture assessment."""
+    return re.sub(r"(?<!^)([A-Z])", r" \1", type(result).__name__).lower()
 
 
 def selected(histories: Sequence[History], only: Mapping[str, Sequence[str]] | None) -> list[History]:

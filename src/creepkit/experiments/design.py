@@ -28,7 +28,6 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.selection.ranking import Ranking
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
 from creepkit.records import History
@@ -59,7 +58,7 @@ GREEDY_POOL, MOST_RUNS, LEAST_GAIN = 30, 6, 0.02
 
 @checked
 def design(
-    source: Ranking | ModelAverage | Identification | Sequence[Identification],
+    source: Ranking | Identification | Sequence[Identification],
     *,
     rig: Rig | Sequence[Rig] | None = None,
     goal: Goal | None = None,

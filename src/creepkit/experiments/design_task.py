@@ -15,8 +15,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.extrapolation import check_isothermal, check_kelvin, extrapolation_text
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.challenges import NOT_EXCLUDED, AlteredLaw, altered_laws
-from creepkit.inverse.selection.ranking import Ranking, rank, ranking_from_scores
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, exponent_at, rate_at
 from creepkit.limits import HOTTEST, numbers
 from creepkit.options import CELSIUS, Options, option
@@ -50,10 +49,7 @@ class DesignTask:
 
     @classmethod
     def of(
-        cls,
-        source: Ranking | ModelAverage | Identification | Sequence[Identification],
-        goal: Goal | None,
-        budget: float | None,
+        cls, source: Ranking | Identification | Sequence[Identification], goal: Goal | None, budget: float | None
     ) -> DesignTask:
         """By default the law is asked for where more than one remains, or where the tests allow more than the one.
 
@@ -112,24 +108,17 @@ class DesignTask:
         )
 
 
-def _ranking_of(source: Ranking | ModelAverage | Sequence[Identification]) -> Ranking:
-    """The ranking of several laws; of a model average that of its weights, as a file has them."""
+def _ranking_of(source: Ranking | Sequence[Identification]) -> Ranking:
+    """The ranking of several laws."""
     if isinstance(source, Ranking):
         return source
-    fits = source.fits if isinstance(source, ModelAverage) else source
-    if not fits:
+    if not source:
         raise FitError("a design is made from identifications or a ranking, found none")
-    (fingerprint, count), *_ = Counter(fit.law.fingerprint for fit in fits).most_common(1)
+    (fingerprint, count), *_ = Counter(fit.law.fingerprint for fit in source).most_common(1)
     if count > 1:
-        name = next(fit.law.name for fit in fits if fit.law.fingerprint == fingerprint)
+        name = next(fit.law.name for fit in source if fit.law.fingerprint == fingerprint)
         raise FitError(f"the law {name} is given twice; give each law once")
-    if not isinstance(source, ModelAverage):
-        return rank(list(fits), challenge=False)
-    scores = -2.0 * np.log(np.maximum(source.weights, SMALLEST_WEIGHT))
-    return ranking_from_scores(fits, scores, "bic", independent_frames=max(fit.effective_frames for fit in fits))
-
-
-SMALLEST_WEIGHT = 1e-300
+    return rank(list(source), challenge=False)
 
 
 def _altered(laws: Sequence[Identification], ranking: Ranking) -> list[tuple[int, AlteredLaw]]:

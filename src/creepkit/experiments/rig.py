@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Floats, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.held_levels import held_temperatures
@@ -99,9 +99,7 @@ class Rig(Options, title="settings of a rig"):
         for name, values in dimensions.items():
             if not all(0 < value < LONGEST_DIMENSION for value in values):
                 raise FitError(f"a rig's {name} must be lengths in mm above zero, found {values}")
-        object.__setattr__(self, "levels", (low, high))
-        object.__setattr__(self, "temperatures", tuple(temperatures))
-        object.__setattr__(self, "dimensions", dimensions)
+        set_fields(self, levels=(low, high), temperatures=tuple(temperatures), dimensions=dimensions)
 
     def refusal(self, history: History) -> str:
         """Why this rig cannot make a planned test, in a sentence; "" where it can."""

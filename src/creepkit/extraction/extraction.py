@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats, Ints, frozen
+from creepkit.arrays import Bools, Floats, Ints, frozen, set_fields
 from creepkit.errors import HistoryError
 from creepkit.extraction.noise import NoiseEstimate
 from creepkit.quality.flags import QualityFlag, frame_ranges_text
@@ -94,8 +94,7 @@ class Extraction(Presentable, Plotted):
             object.__setattr__(self, name, MappingProxyType(values))
         for name in ("times", "center", "center_sd", "residual", "places"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "used", frozen(self.used, dtype=bool))
-        object.__setattr__(self, "clamped", frozen(self.clamped, dtype=bool))
+        set_fields(self, used=frozen(self.used, dtype=bool), clamped=frozen(self.clamped, dtype=bool))
 
     drawn_by = "extraction.extraction_figure", "extraction.draw_extraction"
 

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats, Ints, frozen
+from creepkit.arrays import Bools, Floats, Ints, frozen, set_fields
 from creepkit.records import SurfaceObservation
 
 PATCHES_WEIGHT = 40
@@ -67,8 +67,7 @@ class NoiseEstimate:
     lag_one: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "covariance", frozen(self.covariance))
-        object.__setattr__(self, "correlation", MappingProxyType(dict(self.correlation)))
+        set_fields(self, covariance=frozen(self.covariance), correlation=MappingProxyType(dict(self.correlation)))
 
 
 @dataclass(frozen=True, eq=False)

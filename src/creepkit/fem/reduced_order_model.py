@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from creepkit.arrays import Floats, Ints, frozen
+from creepkit.arrays import Floats, Ints, frozen, set_fields
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel, SensitivityDirections
@@ -39,8 +39,7 @@ class ReducedBasis:
     factors: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "modes", frozen(self.modes))
-        object.__setattr__(self, "points", frozen(self.points, dtype=np.int64))
+        set_fields(self, modes=frozen(self.modes), points=frozen(self.points, dtype=np.int64))
         object.__setattr__(self, "factors", frozen(self.factors))
 
     def leading(self, count: int) -> ReducedBasis:

@@ -106,13 +106,14 @@ def check_heading(data: Any, source: str, document: DocumentFormat) -> dict[str,
 
 
 OTHER_DOCUMENTS = {
-    "creepkit-ranking": (
-        "a ranking",
-        "'creepkit report' and 'creepkit predict' take it, and the identifications of its laws lie beside it",
-    ),
+    "creepkit-ranking": ("a ranking", "'creepkit report', 'creepkit predict' and 'creepkit export' take it"),
     "creepkit-identification": (
         "an identification",
         "'creepkit report', 'creepkit predict' and 'creepkit export' take it",
+    ),
+    "creepkit-temperature-law": (
+        "a law of temperature for other programs",
+        "'creepkit discover' wrote law.tex and law.py beside it, and ck.discover gives the law",
     ),
     "creepkit-valued-law": ("an exported law with its values", "'creepkit export' takes it"),
     "creepkit-law": ("a law without values", "identify its values from tests"),

@@ -141,7 +141,7 @@ def _check_uniform(marks: Bools, path: str, lines: Ints, what: str, advice: str)
 
 
 def check_increasing(times: Floats, path: str, lines: Ints, advice: str = "") -> None:
-    """HistoryError where a time, s, is before the one of the line above it."""
+    """HistoryError where one of times (rows,), s, is before that of the line above it; lines : (rows,) of the file."""
     falls = np.diff(times) < 0
     if falls.any():
         row = int(np.argmax(falls)) + 1
@@ -151,7 +151,7 @@ def check_increasing(times: Floats, path: str, lines: Ints, advice: str = "") ->
 
 
 def through_midnight(seconds: Floats) -> tuple[Floats, Floats]:
-    """Times of the day, s, that go on where they begin anew, and the day of each from 0 on."""
+    """(rows,) times of the day, s, that go on where seconds (rows,) begin anew, and (rows,) days from 0 on."""
     later = np.concatenate([[0.0], np.cumsum(np.diff(seconds) < -0.5 * DAY)])
     return seconds + DAY * later, later
 

@@ -17,7 +17,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError, refuse_unknown
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import owner_of, prior_mean
-from creepkit.inverse.reference_conditions import reference_condition
+from creepkit.inverse.reference_conditions import simulated_condition
 from creepkit.inverse.single_values import EXTRAPOLATION_FACTOR
 from creepkit.inverse.uncertainty.laplace_approximation import covariance_root
 from creepkit.inverse.uncertainty.law_misfit import LawMisfit
@@ -471,7 +471,8 @@ def drawn_law(
     rng: np.random.Generator,
 ) -> DrawnLaw:
     """What one law says of one test; weight : of the law. tolerances : {kind: standard deviation}."""
-    fit, condition = draws.fit, reference_condition(history, predictor)
+    fit = draws.fit
+    condition = simulated_condition(fit.law, fit.values, history, predictor)
     dimensions, misfit = uncertain_quantities(fit, history, predictor, tolerances), fit.misfit_at(*condition)
     of_rate = 0.0 if misfit is None else misfit.sd
     if has_sampled_draws(fit):  # samples are those of the tests alone

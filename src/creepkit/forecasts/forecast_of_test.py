@@ -27,7 +27,7 @@ from creepkit.inverse.extrapolation import HOUR, UNSEEN_RUPTURE, extrapolation_t
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
-from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.reference_conditions import simulated_stresses
 from creepkit.inverse.tested_region import outside_combinations
 from creepkit.inverse.uncertainty.laplace_approximation import is_open
 from creepkit.inverse.uncertainty.law_misfit import LawMisfit
@@ -289,17 +289,14 @@ UNITS = {"temperature": "K", "temperature drift": "K"}
 def _extrapolation(history: History, predictor: Predictor, best: DrawnLaw, asked: Sequence[TimeForecast]) -> str:
     """What of the test, or of a time stated of it, lies outside the region of the fitted tests; "" if nothing."""
     fit, temperatures = best.draws.fit, history.temperature_program().at(history.times)
-    stresses = reference_stresses(history, predictor)
-    point = {"stress": stresses[stresses > 0], "temperature": temperatures, "time": history.times[-1:]}
+    held = simulated_stresses(fit.law, fit.values, history, predictor)
+    point = {"stress": held, "temperature": temperatures, "time": history.times[-1:]}
     point |= {one.name: np.array(stated_condition(history, one)[:1]) for one in fit.law.conditions}
-    if "stress" in best.central.outputs:
-        point["stress"] = best.central.of("stress", history.times)[0]
     if "strain" in best.central.outputs:
         strain = best.central.of("strain", history.times)[0]
         point["strain"] = np.array([np.nanmax(strain, initial=0.0)])
     parts = [extrapolation_text(fit.ranges, point, NEARBY).removeprefix("extrapolated: ")]
     if "stress" not in extrapolated_names(parts[0]):
-        held = stresses[stresses > 0]  # as those of the tests, before strain or relaxation changes them
         grid = [(float(s), float(T)) for s in held for T in np.unique(np.round(temperatures, 1))]
         conditions = np.array(grid, float).reshape(-1, 2)
         parts.append(outside_combinations(fit, conditions[:, 0], conditions[:, 1]))

@@ -8,7 +8,7 @@ from typing import Literal
 
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest
-from creepkit.instruments.column_heads import time_factor
+from creepkit.instruments.column_heads import TIME_UNITS, time_factor
 from creepkit.limits import Limits
 from creepkit.options import Options, option
 
@@ -40,6 +40,4 @@ class RecordOptions(Options, title="options of a record"):
 
     def __post_init__(self) -> None:
         if self.time_unit and not time_factor(self.time_unit):
-            raise HistoryError(
-                f"time_unit is '{self.time_unit}'; {nearest(self.time_unit, ('s', 'ms', 'min', 'h', 'd'))}"
-            )
+            raise HistoryError(f"time_unit is '{self.time_unit}'; {nearest(self.time_unit, TIME_UNITS)}")

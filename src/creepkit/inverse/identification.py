@@ -28,7 +28,7 @@ from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.predictor_documents import PredictorDocument, missing_predictor
 from creepkit.inverse.problem import NOTEWORTHY_FACTOR, LeastSquaresProblem
-from creepkit.inverse.reference_conditions import ReferencePoint
+from creepkit.inverse.reference_conditions import ReferencePoint, simulated_stresses
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import LawAtTests, constant_stress_tests
 from creepkit.inverse.uncertainty.laplace_approximation import (
@@ -165,6 +165,19 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
 
         return identification_comments(self, ranking)
 
+    @cached_property
+    def simulated_stresses(self) -> tuple[Floats, ...]:
+        """Of each test the stresses (stresses,) MPa that it goes through by the law."""
+        return tuple(simulated_stresses(self.law, self.values, h, self.predictor) for h in self.histories)
+
+    @property
+    def tested_point(self) -> ReferencePoint:
+        """Where rates and exponents are stated: the reference point, its stress amid those that the tests saw."""
+        low, high = self.ranges["stress"]
+        if low <= self.reference.stress <= high:
+            return self.reference
+        return replace(self.reference, stress=float(np.sqrt(low * high)))
+
     @property
     def coordinates(self) -> Coordinates:
         """The map between conditioned coordinates and parameters."""
@@ -262,8 +275,8 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
         return np.sqrt(np.clip((NORMAL_QUANTILE * total) ** 2 - (high - value) ** 2, 0.0, (NORMAL_QUANTILE * own) ** 2))
 
     def activation_energy(self) -> tuple[float, float, float]:
-        """Activation energy -R d ln rate / d(1/T), J/mol, at the reference point with its 95 % interval."""
-        r = self.reference
+        """Activation energy -R d ln rate / d(1/T), J/mol, amid the tests with its 95 % interval."""
+        r = self.tested_point
         value, low, high = self.interval_of(activation_energy(self.coordinates, r.stress, r.temperature))
         return float(value), float(low), float(high)
 

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
-from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
+from creepkit.files.json_documents import DocumentFormat, check_heading, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import Record, RecordCodec, RecordError, ValueCodec
 from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
@@ -108,16 +107,6 @@ def identification_to_json(fit: Identification) -> dict[str, Any]:
 def write_identification(fit: Identification, path: str | Path) -> Path:
     """Write the identification; the file is whole or absent."""
     return write_json(identification_to_json(fit), Path(path), IDENTIFICATION.kind)
-
-
-@checked
-def load(path: str | Path) -> Identification:
-    """Return the identification saved in a JSON file.
-
-    It knows its specimen by name and predicts new histories; attach its own with `.with_histories(histories)`. The law
-    is rebuilt from data and its fingerprint checked.
-    """
-    return identification_from_json(read_json(Path(path), IDENTIFICATION.kind), str(path))
 
 
 COVARIANCE_ROUNDING = 1e-6

@@ -26,7 +26,7 @@ from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.prediction_failures import tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses
+from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses, simulated_stresses
 from creepkit.inverse.uncertainty.rate_scatter import unstated_member_notes
 from creepkit.language import temperature
 from creepkit.records import History, Prediction, Predictor, Status
@@ -44,11 +44,15 @@ LARGE_STRAIN, LARGE_RUPTURE_STRAIN = 0.5, 2.0
 """Strains above these are worth a word: of a test whose end is not known, and of one that was followed to it."""
 
 
-def fitted_ranges(problem: LeastSquaresProblem) -> dict[str, tuple[float, float]]:
-    """{"stress", "temperature", "strain", "time": (low, high)} of the fitted frames, MPa, K, s; and of conditions."""
+def fitted_ranges(problem: LeastSquaresProblem, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """{"stress", "temperature", "strain", "time": (low, high)} of the fitted frames, MPa, K, s; and of conditions.
+
+    values : of the law, by which stresses are simulated where they change while specimens creep.
+    """
     tests = problem.histories
+    stresses = [v for h in tests for v in simulated_stresses(problem.law, values, h, problem.predictor)]
     values_by_name = {
-        "stress": [v for h in tests for v in reference_stresses(h, problem.predictor)],
+        "stress": stresses or [0.0],
         "temperature": [v for h in tests for v in h.followed_temperatures],
         "strain": [0.0, *(reference_end_strain(h, problem.predictor) for h in tests)],
         "time": [v for h in tests for v in _time_range(h)],

@@ -73,14 +73,14 @@ def depends_on_history(law: CreepLaw) -> bool:
 
 
 def state_at_strain(fit: Identification) -> StateAtStrain | None:
-    """At the reference point; None where the law never gets to that strain, or no predictor follows bars to it.
+    """At the tested point; None where the law never gets to that strain, or no predictor follows bars to it.
 
     A derivative of the law's formula holds time, strain and internal variables. Bars under different stresses reach one
     strain at different times, so that the exponent which measured rates show is another one: with time hardening,
     rate = A s^n t^m, the strain A s^n t^(1 + m) / (1 + m) is reached after a time ~ s^(-n / (1 + m)), at a rate
     ~ s^(n / (1 + m)); and where A has an activation energy Q, that of the rate is Q / (1 + m).
     """
-    r, predictor = fit.reference, fit.predictor
+    r, predictor = fit.tested_point, fit.predictor
     if predictor is None:
         return None
     halves, stresses = np.array([0.5, 1.0]), r.stress * STRESS_RATIO ** np.array([-1.0, 0.0, 1.0, 0.0, 0.0])

@@ -36,6 +36,7 @@ from creepkit.inverse.reference_conditions import (
     median_log_inverse_duration,
     median_log_strain_rate,
     reference_condition,
+    simulated_condition,
 )
 from creepkit.inverse.residuals import candidate_residuals, residuals_at_measured_values, residuals_of_prediction
 from creepkit.inverse.search.local_refinement import (
@@ -122,7 +123,8 @@ class LeastSquaresProblem:
     histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
     bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. robust : whether a single
         residual far off counts less, as in a search.
-    conditions : (2, tests) MPa and K, the reference stress and the temperature of each test.
+    conditions : (2, tests) MPa and K, the stress and the temperature of each test: of reference, before there are
+        values by which it can be simulated.
     correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
         against a more exact one (see inverse.defect_correction), or None.
     log_factors : (tests,) ln of the factors on the rates of tests about which residuals are taken, None for the law's
@@ -190,6 +192,12 @@ class LeastSquaresProblem:
         return cls(tuple(tests), predictor, *posed)
 
     # ---- variants ------------------------------------------------------------------------------------------------
+
+    def with_simulated_stresses(self, x: Floats) -> LeastSquaresProblem:
+        """The same with the stresses that tests go through at unknowns x (unknowns,)."""
+        values = self.coordinates.values(x[: self.parameter_count])
+        conditions = [simulated_condition(self.law, values, h, self.predictor) for h in self.histories]
+        return replace(self, conditions=np.array(conditions).T)
 
     def with_law(self, law: CreepLaw) -> LeastSquaresProblem:
         """A law of some of this one's parameters, by name, on the same data and covariance."""

@@ -1,33 +1,33 @@
-"""A ranking as a file: its laws' identifications, each in a file beside it, with their weights.
+"""A ranking as a file: its laws' identifications, each in a file beside it, with what ranks them.
 
 It states the SHA-256 of each of these files: one that another run has written since under the same name is refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind, sha256_of
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import LAW_SIGNS, numbered_stems
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json, load
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json
+from creepkit.inverse.selection.perturbation_trials import Challenge
+from creepkit.inverse.selection.ranking import Criterion, RankedLaw, Ranking
 from creepkit.limits import numbers
 
 if TYPE_CHECKING:
-    from creepkit.inverse.selection import Ranking
     from creepkit.language import CreepLaw
 
 RANKING = DocumentFormat(
     "creepkit-ranking",
-    1,
+    2,
     FileKind("a ranking", FitError, "give a ranking.json that 'creepkit identify' wrote"),
     remedy="identify again",
 )
@@ -39,18 +39,25 @@ MOST_LAWS = 100
 
 @dataclass(frozen=True)
 class LawFile:
-    """A law of a ranking: the file of its identification, beside the ranking's, its weight, and SHA-256 of the file."""
+    """A law of a ranking: the file of its identification, beside the ranking's, SHA-256 of it, and as RankedLaw."""
 
     file: str
-    weight: float
     sha256: str
+    excess: float
+    weight: float
+    chi_square: float
 
 
 @dataclass(frozen=True)
 class RankingFile:
-    """What a ranking's file holds: the laws, the best first."""
+    """What a ranking's file holds: the laws, the best first, and the other fields of a Ranking."""
 
     laws: tuple[LawFile, ...]
+    criterion: Criterion
+    independent_frames: float
+    failed: dict[str, str]
+    further: tuple[str, ...]
+    challenges: tuple[Challenge, ...] | None
 
     def __post_init__(self) -> None:
         names, total = [law.file for law in self.laws], sum(law.weight for law in self.laws)
@@ -65,7 +72,13 @@ class RankingFile:
             raise FitError(f"the weights add up to {total:g}, which must be above 0 and at most 1")
 
 
-CODEC = RecordCodec(ranges={LawFile: {"weight": numbers(0.0, 1.0)}})
+UNKNOWN = numbers(0.0, nan=True, infinite=True)
+CODEC = RecordCodec(
+    ranges={
+        LawFile: {"excess": UNKNOWN, "weight": numbers(0.0, 1.0), "chi_square": UNKNOWN},
+        RankingFile: {"independent_frames": UNKNOWN},
+    }
+)
 
 
 def stems_of_laws(laws: Iterable[CreepLaw], stem: str) -> list[str]:
@@ -76,27 +89,20 @@ def stems_of_laws(laws: Iterable[CreepLaw], stem: str) -> list[str]:
 def write_ranking(ranking: Ranking, path: str | Path) -> Path:
     """Write the ranking, and the identification of each law into a file beside it; returns the ranking's path."""
     path = Path(path)
-    weights = {}
-    for stem, entry in zip(stems_of_laws((one.fit.law for one in ranking.laws), path.stem), ranking.laws, strict=True):
-        weights[entry.fit.save(path.parent / f"{stem}.json").name] = entry.weight
-    return write_ranking_document(weights, path)
+    stems = stems_of_laws((one.fit.law for one in ranking.laws), path.stem)
+    files = [one.fit.save(path.parent / f"{stem}.json") for stem, one in zip(stems, ranking.laws, strict=True)]
+    digests = [(file.name, sha256_of(file, IDENTIFICATION.kind)) for file in files]
+    return write_json(ranking_to_document(ranking, digests), path, RANKING.kind)
 
 
-def write_ranking_document(weights: Mapping[str, float], path: Path) -> Path:
-    """Write the ranking; weights : {file of an identification, which is there beside it: weight}."""
-    digests = {name: sha256_of(path.parent / name, IDENTIFICATION.kind) for name in weights}
-    return write_json(ranking_to_document(weights, digests), path, RANKING.kind)
-
-
-def ranking_to_document(weights: Mapping[str, float], digests: Mapping[str, str]) -> dict[str, Any]:
-    """The ranking as JSON-able data.
-
-    weights : {file of an identification, beside it: weight}. digests : {the same file: SHA-256 of what it holds}.
-    """
-    if len(weights) > MOST_LAWS:  # those of least weight say nothing
-        weights = dict(sorted(weights.items(), key=lambda pair: -pair[1])[:MOST_LAWS])
-    laws = tuple(LawFile(name, weight, digests[name]) for name, weight in weights.items())
-    return {**RANKING.heading, **CODEC.to_json(RankingFile(laws))}
+def ranking_to_document(ranking: Ranking, files: Sequence[tuple[str, str]]) -> dict[str, Any]:
+    """The ranking as JSON-able data; files : of each law, that of its identification, beside it, and its SHA-256."""
+    pairs = [*zip(files, ranking.laws, strict=True)][:MOST_LAWS]  # those of least weight say nothing
+    laws = tuple(LawFile(*file, one.excess, one.weight, one.chi_square) for file, one in pairs)
+    content = RankingFile(
+        laws, ranking.criterion, ranking.independent_frames, dict(ranking.failed), ranking.further, ranking.challenges
+    )
+    return {**RANKING.heading, **CODEC.to_json(content)}
 
 
 def files_of_ranking(path: Path) -> dict[str, str]:
@@ -115,33 +121,22 @@ def _ranking_file(data: Any, path: Path) -> RankingFile:
         raise FitError(f"{path}: {error}; {RANKING.kind.advice}") from None
 
 
-def read_fit_or_ranking(path: str | Path) -> Identification | ModelAverage:
-    """What a file of either holds: an identification, or the laws of a ranking with their weights."""
-    data = read_json(Path(path), IDENTIFICATION.kind)
-    if not (isinstance(data, dict) and data.get("format") == RANKING.name):
-        return identification_from_json(data, str(path))
-    return _ranking_from_json(data, Path(path))
-
-
-@checked
-def load_ranking(path: str | Path) -> ModelAverage:
-    """Return the laws of a ranking.json with their weights, as forecasts take them; the files of laws lie beside it."""
-    return _ranking_from_json(read_json(Path(path), RANKING.kind), Path(path))
-
-
-def _ranking_from_json(data: Any, path: Path) -> ModelAverage:
-    laws = _ranking_file(data, path).laws
-    fits = tuple(_fit_of_law(path, law) for law in laws)
-    if len({fit.provenance.get("data") for fit in fits}) > 1:
+def ranking_from_json(data: Any, source: str) -> Ranking:
+    """The ranking of a document; source : its path, beside which the identifications of its laws lie."""
+    path = Path(source)
+    found = _ranking_file(data, path)
+    laws = tuple(RankedLaw(_fit_of_law(path, one), one.excess, one.weight, one.chi_square) for one in found.laws)
+    if len({one.fit.provenance.get("data") for one in laws}) > 1:
         raise FitError(f"{path}: its laws were not identified alike from the same tests; {RANKING.kind.advice}")
-    return ModelAverage(fits, tuple(law.weight for law in laws))
+    failed = MappingProxyType(found.failed)
+    return Ranking(laws, found.criterion, found.independent_frames, failed, found.further, found.challenges)
 
 
 def _fit_of_law(path: Path, law: LawFile) -> Identification:
     """The identification in a file beside a ranking."""
     file = path.parent / law.file
     try:
-        fit = load(file)
+        fit = identification_from_json(read_json(file, IDENTIFICATION.kind), str(file))
     except FitError as error:
         raise FitError(f"{path} names {law.file}: {error}") from None
     if sha256_of(file, IDENTIFICATION.kind) != law.sha256:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError
+from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.compared_tests import followed_duration
 from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
@@ -99,11 +100,40 @@ def reference_stresses(history: History, predictor: Predictor | None = None) -> 
     return history.load_levels
 
 
+def simulated_stresses(
+    law: CreepLaw, values: Mapping[str, float], history: History, predictor: Predictor | None
+) -> Floats:
+    """(stresses,) MPa above zero, that a test goes through by a law with values; of reference where it has no others.
+
+    A plate that bulges sees a third of the stress that it begins with: the reference stresses alone do not say which
+    stresses tests told of.
+    """
+    own = None if predictor is None else predictor.for_history(history)
+    with suppress(CreepkitError):  # a law that ends a test before its first frame says nothing of it
+        stresses = None if own is None else own.simulated_stress(law, values, history)
+        if stresses is not None:
+            return _positive(np.atleast_1d(np.asarray(stresses, float)))
+    return _positive(reference_stresses(history, predictor))
+
+
+def _positive(stresses: Floats) -> Floats:
+    return stresses[stresses > 0]
+
+
 def reference_condition(history: History, predictor: Predictor | None = None) -> tuple[float, float]:
     """Median of the reference stresses of a test above zero, MPa, 1e-6 where none is; and its mean temperature, K."""
-    stresses = reference_stresses(history, predictor)
-    positive = stresses[stresses > 0]
-    return float(np.median(positive)) if positive.size else 1e-6, history.mean_temperature
+    return _median(_positive(reference_stresses(history, predictor))), history.mean_temperature
+
+
+def simulated_condition(
+    law: CreepLaw, values: Mapping[str, float], history: History, predictor: Predictor | None
+) -> tuple[float, float]:
+    """The same of the stresses that a test goes through by a law with values."""
+    return _median(simulated_stresses(law, values, history, predictor)), history.mean_temperature
+
+
+def _median(stresses: Floats) -> float:
+    return float(np.median(stresses)) if stresses.size else 1e-6
 
 
 def _stated(history: History, predictor: Predictor | None, method: str) -> Any:

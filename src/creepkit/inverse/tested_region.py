@@ -6,7 +6,6 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 
 SAME_TEMPERATURE = 2.0
@@ -21,9 +20,8 @@ def tested_points(fit: Identification) -> Floats:
     """(points, 2) stress, MPa, and temperature, K, of the holds of the fitted tests; none without their histories."""
     points = [
         (float(stress), T)
-        for history in fit.histories
-        for stress in reference_stresses(history, fit.predictor)
-        if stress > 0
+        for history, stresses in zip(fit.histories, fit.simulated_stresses, strict=True)
+        for stress in stresses
         for T in _distinct(history.temperature_program().at(history.used_times))
     ]
     return np.array(points, float).reshape(-1, 2)

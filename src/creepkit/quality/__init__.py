@@ -1,8 +1,8 @@
 """Data quality: checks of measured histories, each flag stated with numbers; nothing is dropped unless asked for.
 
-Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one with the
-readings of another, replicates that differ, strain of loading that nothing states, a strain above 100 %, a record of
-load or temperature that contradicts the stated program. What one test says against all others, a fit tells.
+Of frames: fracture, unloading, a creep output that decreases though its load does not, single outliers. Of tests: one
+with the readings of another, replicates that differ, strain of loading that nothing states, a strain above 100 %, a
+record of load or temperature that contradicts the stated program. What one test says against all others, a fit tells.
 Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load,
 a step of a strain by thermal expansion, idle time in which nothing crept.
 """
@@ -19,7 +19,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.language.elastic import STATE_MODULUS
 from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ranges_text
-from creepkit.quality.frames import decreasing_frames, outlier_frames, unloading_frames
+from creepkit.quality.frames import decreasing_frames, fracture_frames, outlier_frames, unloading_frames
 from creepkit.quality.idle_time import idle_flags
 from creepkit.quality.loading_strain import unstated_loading_strain
 from creepkit.quality.repeats import copied_tests, repeated_rows, replicate_deviations
@@ -50,7 +50,7 @@ __all__ = [
 ]
 
 
-FRAME_FLAG_KINDS: tuple[FlagKind, ...] = ("unloading", "falling", "outlier")
+FRAME_FLAG_KINDS: tuple[FlagKind, ...] = ("fracture", "unloading", "falling", "outlier")
 """Kinds that concern frames, which can be marked; the others question whole tests."""
 
 
@@ -198,8 +198,8 @@ def check_rig(histories: Sequence[History], *, activation_energy: float = ACTIVA
 def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] = FRAME_FLAG_KINDS) -> list[History]:
     """The histories with their suspect frames unused, and a label `suspect` that says which and why.
 
-    kinds : "unloading", "falling" and "outlier" or some of them. Whole tests are never dropped: a fit with a robust
-    loss of tests weighs them.
+    kinds : "fracture", "unloading", "falling" and "outlier" or some of them. Whole tests are never dropped: a fit with
+    a robust loss of tests weighs them.
     """
     for kind in kinds:
         if kind not in FRAME_FLAG_KINDS:
@@ -212,7 +212,8 @@ def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] 
 def _frame_flags(history: History, kinds: Collection[str]) -> list[QualityFlag]:
     """Suspect frames of a history; each check uses the frames that those before it have left."""
     result: list[QualityFlag] = []
-    for kind, search in zip(FRAME_FLAG_KINDS, (unloading_frames, decreasing_frames, outlier_frames), strict=True):
+    searches = (fracture_frames, unloading_frames, decreasing_frames, outlier_frames)
+    for kind, search in zip(FRAME_FLAG_KINDS, searches, strict=True):
         if kind in kinds and (found := list(search(history))):
             history = _with_frames_unused(history, [k for flag in found for k in flag.frames])
             result += found

@@ -11,6 +11,7 @@ from creepkit.records import History
 from creepkit.records.presentable import Presentable
 
 FlagKind = Literal[
+    "fracture",
     "unloading",
     "falling",
     "outlier",

@@ -37,6 +37,13 @@ frames that it may have: 1 in 3e4 ends of Gaussian noise fall as much.
 """
 
 
+FRACTURE_FACTOR, FRACTURE_FRACTION, LEAST_WAIT = 4.0, 0.2, 1e-3
+"""Times the most growth that the frames before lead to, and fraction of all of it, of a growth after fracture; how
+near to the singularity of accelerating creep, of the time between two readings, a reading is taken by chance. Of 6000
+planted curves to rupture 3 were flagged, and 93 % of those with a last row one to four times as high.
+"""
+
+
 FEWEST_FRAMES = 12
 """Frames under one load below which nothing is said of noise."""
 
@@ -77,6 +84,49 @@ class LoadSegment(NamedTuple):
 def grows(history: History) -> bool:
     """Whether the leading output grows with creep under a load; the stress of a relaxing bar falls, and should."""
     return output_named(growing_output(history), history.specimen).grows if history.outputs else False
+
+
+def fracture_frames(history: History) -> Iterator[QualityFlag]:
+    """The last frames, from a growth on that no acceleration of the creep before leads to: a piece is broken."""
+    segments = load_segments(history) if grows(history) else []
+    if not segments or segments[-1].frames.size <= FEWEST_FRAMES:
+        return
+    frames, jumps = segments[-1].frames, list[tuple[float, int, float, float]]()
+    t, y = history.times[frames], history.outputs[growing_output(history)][frames]
+    for first in range(max(t.size - MOST_UNLOADING_FRAMES, FEWEST_FRAMES), t.size):
+        sigma = noise_standard_deviation(t[:first], y[:first])
+        most = _most_growth(t[:first], y[:first], float(t[first]), sigma)
+        growth = float(y[first] - y[first - 1])
+        if growth > FRACTURE_FRACTION * float(np.ptp(y[:first])):
+            jumps.append((growth / (most + END_THRESHOLD * sigma), first, growth, most))
+    factor, first, growth, most = max(jumps, default=(0.0, 0, 0.0, 0.0))
+    if factor > FRACTURE_FACTOR:
+        reason = (
+            f"at {time_text(float(t[first]))} {_difference_text(history, growth)} above the frame before, and "
+            f"{_difference_text(history, most)} at most is what the creep before leads to: read after fracture"
+        )
+        yield QualityFlag.of_frames(history, "fracture", frames[first:], reason)
+
+
+def _most_growth(t: Floats, y: Floats, time: float, sigma: float) -> float:
+    """Growth from the last frame to a later time, s, if 1 over the rate goes on to fall as it did: to infinite strain.
+
+    Tertiary creep to a finite strain grows less. t, y : (frames,). Rates are those of the fewest last intervals over
+    which the output grows beyond its noise sigma, and of as many before.
+    """
+    for count in range(1, t.size // 2):
+        late, early = y[-1] - y[-1 - count], y[-1 - count] - y[-1 - 2 * count]
+        if min(late, early) > END_THRESHOLD * sigma or count == MOST_UNLOADING_FRAMES:
+            break
+    late = max(late, 0.0) + 2.0 * sigma
+    early = max(early - 2.0 * sigma, 1e-3 * late)
+    span, before = t[-1] - t[-1 - count], t[-1 - count] - t[-1 - 2 * count]
+    slowness, wait = span / late, time - float(t[-1])
+    fall = 2.0 * (before / early - slowness) / (span + before)
+    if fall <= 0.0:
+        return float(wait / slowness)
+    left = slowness / fall - 0.5 * span
+    return float(np.log(left / max(left - wait, LEAST_WAIT * wait)) / fall) if left > 0.0 else float("inf")
 
 
 def unloading_frames(history: History) -> Iterator[QualityFlag]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
+from creepkit.arrays import set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError, nearest, quoted
 from creepkit.records.units import spelled_factors
@@ -117,8 +118,7 @@ class CameraFormat:
         if not {*self.axes} <= {1, -1}:
             raise HistoryError(f"{self}: axes are {quoted(repr(self.axes), 60)}; give three factors that are 1 or -1")
         lost = tuple(self._rule(*rule) for rule in self.lost.items()) if isinstance(self.lost, Mapping) else self.lost
-        object.__setattr__(self, "columns", tuple(self._checked_columns(one) for one in given))
-        object.__setattr__(self, "lost", lost)
+        set_fields(self, columns=tuple(self._checked_columns(one) for one in given), lost=lost)
 
     def __str__(self) -> str:
         return f"camera format '{self.name}'"

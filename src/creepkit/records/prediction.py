@@ -10,7 +10,7 @@ from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
-from creepkit.arrays import Floats, Ints
+from creepkit.arrays import Floats, Ints, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import SolveError, nearest
 from creepkit.limits import numbers
@@ -177,8 +177,7 @@ class Nuisance:
             )
         if self.kind not in STEP_NUISANCES and self.start != 0.0:
             raise SolveError(f"nuisance '{self.kind}' has no start; only {', '.join(STEP_NUISANCES)} begin later")
-        object.__setattr__(self, "start", float(self.start))
-        object.__setattr__(self, "tests", tuple(self.tests))
+        set_fields(self, start=float(self.start), tests=tuple(self.tests))
 
     @property
     def key(self) -> str:

@@ -116,6 +116,16 @@ class Predictor:
         """The von Mises stress that stands for a test, MPa, (levels,) or a number; None where nothing says so."""
         return None if self.specimen is self else self.specimen.reference_stress(history)
 
+    def simulated_stress(self, law: CreepLaw, values: Mapping[str, float], history: History) -> Any:
+        """The stress that stands for a test while it creeps, MPa, (levels,): all that it goes through, by simulation.
+
+        By default what reference_stress() makes of the outputs, those simulated of a test that has none.
+        """
+        if self.specimen is not self:
+            return self.specimen.simulated_stress(law, values, history)
+        simulated = None if history.outputs else self.run(law, values, history)
+        return self.reference_stress(history if simulated is None else simulated)
+
     def reference_strain(self, history: History) -> Any:
         """The largest creep strain that a test reached, as its outputs show; None where it does not say."""
         return None if self.specimen is self else self.specimen.reference_strain(history)

@@ -113,7 +113,7 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         interval = (measured, measured - half, measured + half)
         found = [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), by_rates]
         return [*(one for one in found if math.isfinite(one.value)), *_lives(fit)]
-    r = fit.reference
+    r = fit.tested_point
     of_state = f", {100 * r.strain:.2g} % strain" if depends_on_history(fit.law) else ""
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
@@ -304,7 +304,7 @@ def _precision(fit: Identification) -> Iterator[str]:
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
             yield _said(kind, by=by, names=named(names, "parameter"))
-    exponent = float(fit.local_exponent(fit.reference.stress, warn=False)[0])
+    exponent = float(fit.local_exponent(fit.tested_point.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
     if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
         yield _said("one test", test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
@@ -410,7 +410,7 @@ def rate_exponent_and_energy(fit: Identification) -> tuple[tuple[float, ...], ..
     state = _state(fit)
     if state is not None:
         return state.rate, state.exponent, state.energy
-    stress = fit.reference.stress
+    stress = fit.tested_point.stress
     rate, exponent = fit.rate(stress, warn=False), fit.local_exponent(stress, warn=False)
     return tuple(map(float, rate)), tuple(map(float, exponent)), fit.activation_energy()
 
@@ -429,7 +429,7 @@ def held_quantities(fit: Identification) -> str:
 
 def reference_sentences(fit: Identification) -> list[str]:
     """Where the rate amid the tests is taken, and the exponent of the law's formula where that is another."""
-    r, state, held = fit.reference, _state(fit), held_quantities(fit)
+    r, state, held = fit.tested_point, _state(fit), held_quantities(fit)
     lines = []
     if state is not None:
         hours = interval_text(tuple(v / SECONDS_PER_HOUR for v in state.time))

@@ -186,7 +186,7 @@ def _usual_errors(fit: Identification) -> list[str]:
     begin = f"the intervals include errors of the tests that nobody measured (one standard deviation: {errors})"
     if rejected(fit) or not fit.estimates:
         return [begin]
-    rates = [one.rate(fit.reference.stress, warn=False) for one in (fit, fit.by_tests_alone)]
+    rates = [one.rate(fit.tested_point.stress, warn=False) for one in (fit, fit.by_tests_alone)]
     with_errors, without = (float(high / value) for value, _, high in rates)
     exact = f'{without:.3g} if these were exact (usual_errors="none")'
     return [begin, f"the rate amid the tests is known to a factor of {with_errors:.3g}; {exact}"]

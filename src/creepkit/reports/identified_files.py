@@ -35,15 +35,12 @@ def identified_files(rankings: Mapping[str, Ranking]) -> list[ExportedFile]:
     ]
     names = (f"{stem}.json" for stem in numbered_stems(texts, "law", LAW_SIGNS))
     for ranking in rankings.values():
-        weights: dict[str, float] = {}
-        digests: dict[str, str] = {}
+        beside: list[tuple[str, str]] = []
         for one in ranking.laws:
-            name = next(names)
-            weights[name] = one.weight
-            text = json_text(identification_to_json(one.fit))
-            digests[name] = hashlib.sha256(text.encode()).hexdigest()
+            name, text = next(names), json_text(identification_to_json(one.fit))
+            beside.append((name, hashlib.sha256(text.encode()).hexdigest()))
             files.append(ExportedFile(name, f"identification of {one.fit.law.name}, read by ck.load", text))
-        name, text = next(names), json_text(ranking_to_document(weights, digests))
+        name, text = next(names), json_text(ranking_to_document(ranking, beside))
         files.append(ExportedFile(name, "ranking, with the identifications in the same folder", text))
     return files
 

@@ -12,7 +12,7 @@ from creepkit.errors import CreepkitError
 from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.identified_values import MinimumRate, minimum_rates_of
 from creepkit.inverse.minimum_rates import apparent_energy, apparent_exponent
-from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_stresses
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
@@ -68,7 +68,7 @@ def has_rates(fit: Identification) -> bool:
 
 
 def _tested_stresses(fit: Identification) -> list[float]:
-    return [float(v) for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
+    return [float(v) for stresses in fit.simulated_stresses for v in stresses]
 
 
 def draw_rates(axes: Axes, fit: Identification) -> None:
@@ -106,8 +106,8 @@ def _draw_reference_rates(axes: Axes, fit: Identification) -> None:
 
 def _stresses_at(fit: Identification, T: float) -> tuple[float, float]:
     """MPa, the lowest and the highest of the tests at a temperature, K."""
-    here = [h for h in fit.histories if np.abs(np.subtract(held_temperatures(h), T)).min() < ISOTHERMAL_RANGE]
-    stresses = [float(v) for h in here for v in reference_stresses(h, fit.predictor) if v > 0]
+    here = [np.abs(np.subtract(held_temperatures(h), T)).min() < ISOTHERMAL_RANGE for h in fit.histories]
+    stresses = [float(v) for seen, is_here in zip(fit.simulated_stresses, here, strict=True) if is_here for v in seen]
     return min(stresses, default=0.0), max(stresses, default=0.0)
 
 
@@ -119,7 +119,7 @@ def own_rates(fit: Identification, test: int) -> list[tuple[float, float, float]
     """
     history, found = fit.histories[test], fit.tests[test]
     factor = 1.0 / found.minimum_rate.ratio if not found.outputs and found.minimum_rate else found.rate_factor
-    stresses = np.unique([v for v in reference_stresses(history, fit.predictor) if v > 0])
+    stresses = np.unique(fit.simulated_stresses[test])
     if factor == 1.0 or not np.isfinite(factor):
         return []
     return [
@@ -281,7 +281,8 @@ def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
 
 def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
     """Rates in %/h, 95 % intervals, at the median stress and strain of all; fits : (material, best law), in order."""
-    stress, strain = (float(v) for v in np.median([(f.reference.stress, f.reference.strain) for _, f in fits], axis=0))
+    points = [fit.tested_point for _, fit in fits]
+    stress, strain = (float(v) for v in np.median([(one.stress, one.strain) for one in points], axis=0))
     laws = list(dict.fromkeys(fit.law.name for _, fit in fits))
     colours = dict(zip(laws, distinct_colours(len(laws)), strict=True))
     rates = np.array([[float(v) for v in fit.rate(stress, strain=strain, warn=False)] for _, fit in fits])

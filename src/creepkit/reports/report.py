@@ -24,7 +24,6 @@ from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import identification_to_json
 from creepkit.inverse.selection import Ranking, rank
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.quality import check_data_quality
 from creepkit.records import History
 from creepkit.registry import default_registry, kinds
@@ -45,7 +44,6 @@ from creepkit.screening.results import AlloyResult, ScreeningResult
 Reported: TypeAlias = (
     Identification
     | Ranking
-    | ModelAverage
     | AlloyResult
     | ScreeningResult
     | TemperatureStudy
@@ -140,9 +138,8 @@ def _groups(results: Sequence[Any]) -> tuple[ReportGroup, ...]:
     ranked: list[ReportGroup] = []
     same_tests: dict[object, list[Identification]] = {}
     for one in results:
-        if isinstance(one, Identification | ModelAverage):
-            for fit in one.fits if isinstance(one, ModelAverage) else (one,):
-                same_tests.setdefault(fit.provenance.get("data", id(fit)), []).append(fit)
+        if isinstance(one, Identification):
+            same_tests.setdefault(one.provenance.get("data", id(one)), []).append(one)
         elif isinstance(one, Ranking):
             ranked.append(ReportGroup(_material(one.best), one, one.best.histories))
         elif isinstance(one, AlloyResult):

@@ -15,7 +15,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import SAID, FitError, nearest, quoted, refuse_unknown, restated
-from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
+from creepkit.files.json_documents import DocumentFormat, check_heading, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import write_text
@@ -371,19 +371,14 @@ def write_assessment(assessment: RuptureAssessment, path: str | Path) -> Path:
     return write_json({**ASSESSMENT.heading, **CODEC.to_json(assessment)}, Path(path), ASSESSMENT.kind)
 
 
-@checked
-def load_rupture_assessment(path: str | Path) -> RuptureAssessment:
-    """Return the rupture assessment saved in a JSON file: its fits predict, plot and state strengths as before.
-
-    FitError, in one sentence, says what is wrong with other files.
-    """
-    data = read_json(Path(path), ASSESSMENT.kind)
-    content = check_heading(data, str(path), ASSESSMENT)
-    with restated(RecordError, FitError, f"{path}: {SAID}; it is not a rupture assessment of this version"):
+def assessment_from_json(data: Any, source: str) -> RuptureAssessment:
+    """The rupture assessment of a document: its fits predict, plot and state strengths as before."""
+    content = check_heading(data, source, ASSESSMENT)
+    with restated(RecordError, FitError, f"{source}: {SAID}; it is not a rupture assessment of this version"):
         assessment = CODEC.from_json(RuptureAssessment, content)
     problem = _problem(assessment)
     if problem:
-        raise FitError(f"{path}: {problem}; the file is damaged")
+        raise FitError(f"{source}: {problem}; the file is damaged")
     return assessment
 
 

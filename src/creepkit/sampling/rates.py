@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.special import gammaincinv, logsumexp
 
-from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen
+from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen, set_fields
 from creepkit.errors import DatasetError, nearest
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, time
@@ -86,8 +86,7 @@ class Draws:
     condition_names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "parameters", frozen(self.parameters))
-        object.__setattr__(self, "conditions", frozen(self.conditions))
+        set_fields(self, parameters=frozen(self.parameters), conditions=frozen(self.conditions))
 
     def __len__(self) -> int:
         return len(self.parameters)

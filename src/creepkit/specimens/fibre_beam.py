@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from creepkit import integration, kernels
-from creepkit.arrays import Floats, frozen
+from creepkit.arrays import Floats, frozen, set_fields
 from creepkit.errors import SolveError
 from creepkit.integration import FibreInput, FibreModel, FibreTest, IntegrationSettings
 from creepkit.integration.time_discretisation import SDIRK4_TEXT
@@ -62,8 +62,7 @@ class BeamStations:
         object.__setattr__(self, "virtual", frozen(np.atleast_1d(virtual)))
         if not self.largest:
             object.__setattr__(self, "largest", float(np.max(np.abs(self.moments))))
-        object.__setattr__(self, "moments", frozen(np.atleast_1d(self.moments)))
-        object.__setattr__(self, "lengths", frozen(np.atleast_1d(self.lengths)))
+        set_fields(self, moments=frozen(np.atleast_1d(self.moments)), lengths=frozen(np.atleast_1d(self.lengths)))
 
 
 @dataclass(frozen=True)

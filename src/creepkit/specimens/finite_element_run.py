@@ -37,6 +37,10 @@ if TYPE_CHECKING:
 STRESS_FIELD, CREEP_STRAIN_FIELD = "stress", "creep strain"
 
 
+SETTLING, RESTING = 0.01, 1e-3
+"""Shares of the creep at first and of the time at last, and of the mean rate, in which no stress is counted."""
+
+
 class FieldValues(NamedTuple):
     """A quantity at the integration points.
 
@@ -92,6 +96,33 @@ class FiniteElementRun(Run):
         return np.asarray(
             np.einsum("pa,eai->epi", shape_functions(GAUSS_POINTS), body.nodes[body.elements]).reshape(-1, 2)
         )
+
+    @property
+    def creep_stress(self) -> tuple[Floats, Floats]:
+        """Von Mises stress of each step, MPa, the mean over the body by how much creeps, and that growth, mm^3.
+
+        (steps,) each, of the steps from one accepted time to the next; NaN where nothing creeps.
+        """
+        stress, creep = self.simulation.mises, self._field_at_steps(CREEP_STRAIN_FIELD)
+        growth = np.maximum(np.diff(creep, axis=0), 0.0) * self.model.weights.ravel()
+        with np.errstate(invalid="ignore"):
+            return (growth * 0.5 * (stress[1:] + stress[:-1])).sum(axis=1) / growth.sum(axis=1), growth.sum(axis=1)
+
+    @property
+    def creep_stress_range(self) -> Floats:
+        """The least and the largest of that stress from the first frame after zero to the last, (2,) MPa.
+
+        But for the first SETTLING of the creep, which elastic peaks and ramps leave, the last SETTLING of the time, in
+        which a body bursts, and where creep all but rests: at less than RESTING of its mean rate.
+        """
+        stress, growth = self.creep_stress
+        times, end = self.simulation.times, min(self.end_time, float(self.times[-1]))
+        first = float(np.min(self.times[self.times > 0.0], initial=end))
+        followed = (times[1:] >= first) & (times[1:] <= max((1.0 - SETTLING) * end, first))
+        total = growth[followed].sum()
+        seen = followed & (growth.cumsum() >= SETTLING * total) & (growth > RESTING * total / end * np.diff(times))
+        seen = seen if seen.any() else np.isfinite(stress)
+        return np.array([stress[seen].min(), stress[seen].max()])
 
     def _field_at_steps(self, name: str) -> Floats:
         """Values of a field at the accepted steps, (steps, points)."""

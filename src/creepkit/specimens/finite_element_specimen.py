@@ -166,3 +166,7 @@ class FiniteElementSpecimen(TestPiece):
 
         run: FiniteElementRun = run_test(FiniteElementTest.of(self, plan, {}), law, values)
         return run
+
+    def simulated_stress(self, law: CreepLaw, values: Mapping[str, float], history: History) -> Floats:
+        """The least and the largest stress that creep follows in the body, (2,) MPa; see FiniteElementRun."""
+        return self.run(law, values, history).creep_stress_range

@@ -85,6 +85,11 @@ class MaterialPoint(PointSpecimen):
         """The von Mises stresses that are prescribed, or would be if nothing crept, (levels,) MPa."""
         return elastic_von_mises(_loading(history), None if history.elastic is None else _elastic(history))
 
+    def simulated_stress(self, law: CreepLaw, values: Mapping[str, float], history: History) -> Floats:
+        """The von Mises stresses above zero from the first loading on, (times,) MPa."""
+        stress = self.run(law, values, history).mises
+        return stress[stress > 0]
+
     def reference_strain(self, history: History) -> float:
         """The largest equivalent creep strain that a test reached, as its outputs show."""
         for kind in ("strain", "strain_", "stress_"):

@@ -209,9 +209,7 @@ def settings_of_group(
     kept = []
     for nuisance in settings.nuisances:
         for test in nuisance.tests:
-            if test not in everywhere:
-                place = ("identification", "nuisances")
-                raise file.error(place, f"there is no test '{test}'; {nearest(test, everywhere)}")
+            file.check_name(("identification", "nuisances"), "test", test, everywhere)
         own = [test for test in nuisance.tests if test in names]
         if (nuisance.tests and not own) or (nuisance.kind == "rate" and len(tests) == 1 and not stated):
             continue
@@ -282,8 +280,7 @@ def tolerances_of(file: StudyFile, number: int) -> dict[str, float]:
     kinds = {f"{kind}_{_unit_of_kind(kind)}".rstrip("_"): kind for kind in (*GENERAL_NUISANCES, *all_dimensions())}
     given = file.model.forecast[number].tolerances
     for key in given:
-        if key not in kinds:
-            raise file.error(("forecast", number, "tolerances", key), f"is not known; {nearest(key, kinds)}")
+        file.check_name(("forecast", number, "tolerances", key), "tolerance", key, kinds)
     return {kinds[key]: value for key, value in given.items()}
 
 

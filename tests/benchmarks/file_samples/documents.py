@@ -12,7 +12,7 @@ import numpy as np
 from file_samples.samples import ReaderSample
 
 import creepkit as ck
-from creepkit.cli.shared import read_law_file
+from creepkit.api.saved import load
 from creepkit.errors import SurrogateError
 from creepkit.fem.mesh_files import read_mesh
 from creepkit.files.json_documents import DocumentFormat
@@ -83,7 +83,7 @@ def law_text() -> str:
 
 def samples() -> Iterator[ReaderSample]:
     """The samples of documents, data sets, weights, studies, reports and meshes."""
-    yield document("law", "x.json", law_text().encode(), read_law_file, '"format" "version"')
+    yield document("law", "x.json", law_text().encode(), load, '"format" "version"')
     yield document("data set", "x.h5", written(lambda path: ck.write_dataset(bars(4), path), "x.h5"), ck.read_dataset)
     arrays = {"w": np.linspace(0.0, 1.0, 12).reshape(3, 4), "b": np.arange(3.0)}
     weights = written(lambda path: write_safetensors(path, arrays, {"domain": {"n": [3, 6]}}, WEIGHTS), "x.safetensors")

@@ -14,17 +14,16 @@ from file_samples.results import FORMATS
 from file_samples.samples import ReaderSample
 
 import creepkit as ck
+from creepkit.api.saved import load
 from creepkit.errors import StudyError
 from creepkit.files.json_documents import json_text
 from creepkit.files.reading import read_bytes
 from creepkit.files.safetensors_files import HEADER_KEY
 from creepkit.files.writing import write_bytes
-from creepkit.inverse.identification_document import load
 from creepkit.inverse.kept_fits import KEPT_FIT, FitFolder, kept_to_json
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking
 from creepkit.reports.attachments import embed
 from creepkit.reports.contents import Attachment
-from creepkit.rupture_assessment.assessment import load_rupture_assessment
 from creepkit.screening.results import AlloyResult, read_result, write_result
 from creepkit.studies.execution import Execution, Stage
 from creepkit.studies.kept_results import ResultFolder
@@ -130,13 +129,7 @@ def run_report(path: Path) -> Any:
 
 def samples() -> Iterator[ReaderSample]:
     """The samples of kept files."""
-    yield document(
-        "rupture assessment",
-        "x.json",
-        (MADE / "rupture.json").read_bytes(),
-        load_rupture_assessment,
-        '"ranked" "tests"',
-    )
+    yield document("rupture assessment", "x.json", (MADE / "rupture.json").read_bytes(), load, '"ranked" "tests"')
     surrogate = document("surrogate", "x.safetensors", (MADE / "surrogate.safetensors").read_bytes(), load_surrogate)
     yield ReaderSample(**{**surrogate.__dict__, "repeated": ()})
     yield document("surrogate header", "x.json", header(), read_header, '"recipe" "metadata" "kind" "format"')

@@ -12,7 +12,6 @@ from creepkit.cli.identified_folder import check_identified_folder, write_rankin
 from creepkit.cli.shared import is_file_name, selected
 from creepkit.errors import CreepkitError, FitError, HistoryError, LawError
 from creepkit.inverse.candidate_laws import LawChanges
-from creepkit.inverse.ranking_document import load_ranking
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings, default_nuisances
 from creepkit.options import options_of
@@ -183,7 +182,7 @@ def test_a_later_run_leaves_nothing_of_the_former_one_and_what_is_not_its(rankin
     ck.export(rankings[0].best, "c", to=tmp_path / "norton.c")  # of creepkit, and of another command
     written = _run(rankings[1], tmp_path)
     assert _names(tmp_path) == sorted([*(path.name for path in written), "notes.txt", "norton.c"])
-    assert [fit.law.name for fit in load_ranking(tmp_path / "ranking.json").fits] == ["strain-hardening"]
+    assert [one.fit.law.name for one in ck.load(tmp_path / "ranking.json").laws] == ["strain-hardening"]
 
 
 def test_a_changed_file_of_the_former_run_is_neither_removed_nor_mixed_with_another_run(rankings, tmp_path):

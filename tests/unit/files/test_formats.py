@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.cli.shared import read_law_file
 from creepkit.errors import CreepkitError, FitError, HistoryError, SolveError, printable, quoted
 from creepkit.fem.mesh_files import read_mesh
 from creepkit.files.hdf5_files import open_hdf5
@@ -44,19 +43,19 @@ def test_files_of_every_version_are_read(version: str) -> None:
     assert len(histories) == 6
     assert {history.times.size for history in histories} == {6}
     assert {round(history.temperature, 2) for history in histories} == {1023.15, 1073.15, 1123.15}
-    fit, source = ck.load(folder / "identification.json"), read_law_file(folder / "valued_law.json")
+    fit, source = ck.load(folder / "identification.json"), ck.load(folder / "valued_law.json")
     for one in (fit, source):
         assert one.law.name == "norton"
         assert one.values["n"] == pytest.approx(5.0, rel=1e-3)  # planted
     assert fit.values["A"] == pytest.approx(1e-18, rel=0.05)
-    assert ck.load_ranking(folder / "ranking.json").rate(stress=80.0)[0] > 0
+    assert ck.load(folder / "ranking.json").best.values == fit.values
     found = json.loads((folder / "temperature_law.json").read_text(encoding="utf-8"))  # for other programs
     assert law_from_json(found["law"]).name.startswith("norton")
     assert {stage.state for stage in read_lock(folder / "study.lock").stages.values()} == {"done"}
     data = ck.read_dataset(folder / "data_set.h5")
     assert (data.law.name, data.status.size) == ("norton", 16)  # rejected samples among them
     assert ck.surrogate(folder / "surrogate.safetensors").metadata.law.name == "norton"
-    assessment = ck.load_rupture_assessment(folder / "rupture_assessment.json")
+    assessment = ck.load(folder / "rupture_assessment.json")
     assert {one.fit.method for one in assessment.ranked} == {"larson-miller"}
     assert len(assessment.tests) == 8
 
@@ -65,7 +64,7 @@ def test_every_kind_of_file_is_made_by_the_program_that_is_to_make_the_next_vers
     program(FORMATS / "make.py").make(tmp_path / "next")
     made = {path.name for path in (tmp_path / "next").glob("[!.]*")}
     assert made == {path.name for path in (FORMATS / ck.__version__).glob("[!.]*")}
-    assert ck.load_ranking(tmp_path / "next" / "ranking.json").fits[0].law.name == "norton"
+    assert ck.load(tmp_path / "next" / "ranking.json").best.law.name == "norton"
 
 
 def program(path: Path):

@@ -409,8 +409,9 @@ def test_a_ranking_saves_its_laws_beside_itself(saved_fit, tmp_path):
     ranking = ranking_from_scores([saved_fit, other], np.array([0.0, 2.0]), "bic", independent_frames=60.0)
     path = ranking.save(tmp_path / "ranking.json")
     assert path == tmp_path / "ranking.json"
-    found = ck.load_ranking(path)
-    assert [one.law.name for one in found.fits] == ["norton", "ranking"]
+    found = ck.load(path)
+    assert [one.fit.law.name for one in found.laws] == ["norton", "ranking"]
     weight = 1.0 / (1.0 + np.exp(-1.0))  # of a law whose criterion is lower by 2
-    assert found.weights == pytest.approx([weight, 1.0 - weight])
+    assert [one.weight for one in found.laws] == pytest.approx([weight, 1.0 - weight])
+    assert (found.verdict, ck.export(found, "latex")) == (ranking.verdict, ck.export(ranking, "latex"))
     assert {file.name for file in tmp_path.glob("[!.]*")} == {"ranking.json", "norton.json", "ranking-2.json"}

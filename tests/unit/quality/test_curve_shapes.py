@@ -279,10 +279,8 @@ def test_quality_names_copies_and_all_of_four_copies_count_once():
     tests = [bar(1, name="F08"), bar(2, name="F05"), *(changed(bar(1), name=f"F08_{k}") for k in range(1, 4))]
     flags = [flag for flag in check_data_quality(tests) if flag.kind == "copy"]
     assert [flag.history for flag in flags] == ["F08_1", "F08_2", "F08_3"]
-    assert all("the same readings as F08" in flag.reason for flag in flags)
-    kept, reasons = without_copies(tests)
+    kept, _ = without_copies(tests)
     assert [test.name for test in kept] == ["F08", "F05"]
-    assert list(reasons) == ["F08_1", "F08_2", "F08_3"]
 
 
 def test_copies_change_no_value_and_no_interval_of_an_identification():
@@ -311,19 +309,10 @@ def test_a_row_that_repeats_a_rate_and_a_time_is_told_and_kept():
     assert repeated_rows(rows) == {1: 0}
     assert without_copies(rows)[0] == rows
     (flag,) = [flag for flag in check_data_quality(rows).flags if flag.kind == "replicate"]
-    assert flag.tests == ("b",)
-    assert "same numbers as a" in flag.reason
     assert repeated_row_notes(rows) == (f"b: {flag.reason}",)
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        row("b", 150.0, hours=812.4, rate=3.22e-9),
-        row("b", 150.0, hours=812.5, rate=3.21e-9),
-        row("b", 151.0, hours=812.4, rate=3.21e-9),
-        row("b", 150.0, hours=812.4, rate=3.21e-9, heat="B"),
-    ],
-)
-def test_rows_that_differ_in_a_digit_or_in_the_heat_are_two(other):
-    assert repeated_rows([row("a", 150.0, hours=812.4, rate=3.21e-9), other]) == {}
+@pytest.mark.parametrize("change", [{"rate": 3.22e-9}, {"hours": 812.5}, {"stress": 151.0}, {"heat": "B"}])
+def test_rows_that_differ_in_a_digit_or_in_the_heat_are_two(change):
+    numbers = {"stress": 150.0, "hours": 812.4, "rate": 3.21e-9}
+    assert repeated_rows([row("a", **numbers), row("b", **{**numbers, **change})]) == {}

@@ -255,7 +255,7 @@ def assessment(tests):
 
 def test_a_file_gives_the_same_assessment(assessment, tmp_path):
     path = assessment.save(tmp_path / "rupture.json")
-    read = ck.load_rupture_assessment(path)
+    read = ck.load(path)
     assert str(read) == str(assessment)
     assert read.strength(860.0, hours=2e4) == assessment.strength(860.0, hours=2e4)
     assert read.lives == assessment.lives == (assessment.life(90.0, 873.15),)
@@ -265,11 +265,11 @@ def test_a_file_gives_the_same_assessment(assessment, tmp_path):
     data["ranked"][0]["fit"]["covariance"] = [[1.0]]
     path.write_text(json.dumps(data))
     with pytest.raises(FitError, match="does not belong to its"):
-        ck.load_rupture_assessment(path)
+        ck.load(path)
     data["ranked"] = []
     path.write_text(json.dumps(data))
     with pytest.raises(FitError, match="no method is ranked"):
-        ck.load_rupture_assessment(path)
+        ck.load(path)
 
 
 def test_programs_and_a_table_give_the_times(tmp_path):

@@ -140,7 +140,10 @@ def _squares_above(limits: Floats) -> float:
 
 
 def least_within(rows: Floats, low: Floats, high: Floats) -> Floats:
-    """(unknowns,) step of least squares between low and high; rows : (rows, unknowns + 1) derivatives, then values."""
+    """(unknowns,) step of least squares within bounds.
+
+    rows : (rows, unknowns + 1) derivatives, then values. low, high : (unknowns,) of the step.
+    """
     step, moves = np.zeros(low.size), high > low
     size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-150)[moves]
     matrix, low, high = rows[:, :-1][:, moves] / size, low[moves] * size, high[moves] * size

@@ -170,8 +170,13 @@ class Ranking(Presentable, Plotted, Tabulated):
 
         return design(self, goal="law")
 
+    def with_histories(self, histories: Sequence[History]) -> Ranking:
+        """The same with the histories of its tests (found by name) attached to each law, as after load()."""
+        laws = tuple(replace(one, fit=one.fit.with_histories(histories)) for one in self.laws)
+        return replace(self, laws=laws)
+
     def save(self, path: str | Path) -> Path:
-        """Write the ranking as JSON, and each law's identification as LAW.json beside it; load_ranking() reads them."""
+        """Write the ranking as JSON, and each law's identification as LAW.json beside it; load() reads them."""
         from creepkit.inverse.ranking_document import write_ranking
 
         return write_ranking(self, Path(path))

@@ -290,7 +290,7 @@ def _table_of_groups(found: Sequence[ReportGroup]) -> Table:
                 "–" if one.ranking is None else f"{one.ranking.laws[0].weight:.2f}",
                 explanation(fit),
                 "–" if one.decisive is None else "yes" if one.decisive else "no",
-                number(fit.reference.stress, 3),
+                number(fit.tested_point.stress, 3),
                 *(("–", "–", "–") if rejected(fit) else properties),
             )
         )
