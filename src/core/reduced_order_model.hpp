@@ -60,8 +60,8 @@ public:
         tangent = memory.doubles(shape.numbers() + 1);
         residual = memory.doubles(shape.rows());
         products = memory.doubles(5 * EIGHT * width);
-        side_columns = memory.doubles(4 * model.side_points * width);
-        side_rows = memory.doubles(4 * model.side_points * width);
+        side_columns = memory.doubles(2 * model.side_points * width);
+        side_rows = memory.doubles(2 * model.side_points * width);
     }
 
     int64_t point_count() const { return model.points; }
@@ -199,7 +199,7 @@ public:
     }
 
 private:
-    double *products = nullptr, *side_columns = nullptr, *side_rows = nullptr;  // (8, 5, R); (side points, 4, R) each
+    double *products = nullptr, *side_columns = nullptr, *side_rows = nullptr;  // (8, 5, R); (side points, 2, R) each
 
     // Largest of the first `count` measured displacements, mm; NaN or infinite where one is.
     double largest_of(const double* q, int64_t count) const {
@@ -239,38 +239,34 @@ private:
         }
     }
 
-    // Take the pressure's force off the internal one, and its stiffness (made symmetric) off the tangent.
+    // Take the pressure's force off the internal one, and its stiffness off the tangent.
     //
-    // A unit pressure pushes with the integral of (-dz/dx, dr/dx) r N dx, see pressure.hpp.
+    // A unit pressure pushes with the integral of (-dz/dx, dr/dx) r N dx, see pressure.hpp: with the change of the volume
+    // behind it, the integral of -r^2 dz/2, where the sides end at the axis or where they are held. The stiffness is that
+    // of the volume, two products of rows a side point; what a free end adds is left to the iterations.
     template <bool STIFF>
     void press(double pressure, const double* q) {
         if (pressure == 0.0) return;
         for (int64_t k = 0; k < model.side_points; ++k) {
             const SidePoint at = side_point(k, q);
             const double weight = pressure * model.sides[4 * k], *modes = model.side_modes + 4 * k * width;
-            double *columns = side_columns + 4 * k * width, *rows = side_rows + 4 * k * width;
+            double *columns = side_columns + 2 * k * width, *rows = side_rows + 2 * k * width;
             for (int64_t i = 0; i < width; i += LANES) {
                 const Vector r = load(modes + i), z = load(modes + width + i);
                 store(residual + i, load(residual + i) + weight * at.radius * (at.dz * r - at.dr * z));
                 if (!STIFF) continue;
-                // the symmetric part of r_modes (dz r + radius dz_modes)^T - z_modes (dr r + radius dr_modes)^T
-                const Vector across = weight * (at.dz * r + at.radius * load(modes + 3 * width + i));
-                const Vector along = weight * (at.dr * r + at.radius * load(modes + 2 * width + i));
-                store(columns + i, 0.5 * r);
-                store(columns + width + i, -0.5 * z);
-                store(columns + 2 * width + i, 0.5 * across);
-                store(columns + 3 * width + i, -0.5 * along);
-                store(rows + i, across);
-                store(rows + width + i, along);
-                store(rows + 2 * width + i, r);
-                store(rows + 3 * width + i, z);
+                const Vector slope = weight * (0.5 * at.dz * r + at.radius * load(modes + 3 * width + i));
+                store(columns + i, r);
+                store(columns + width + i, slope);
+                store(rows + i, slope);
+                store(rows + width + i, r);
             }
         }
         if (!STIFF) return;
         for (int64_t column = 0; column < shape.blocks; ++column)
             for (int64_t row = column; row < shape.blocks; ++row)
                 add_products<false>(tangent + shape.tile(column, row - column), side_columns + EIGHT * row,
-                             side_rows + EIGHT * column, width, 4 * model.side_points);
+                             side_rows + EIGHT * column, width, 2 * model.side_points);
     }
 };
 

@@ -39,13 +39,7 @@ from creepkit.inverse.reference_conditions import (
     simulated_condition,
 )
 from creepkit.inverse.residuals import candidate_residuals, residuals_at_measured_values, residuals_of_prediction
-from creepkit.inverse.search.local_refinement import (
-    AdditionalResiduals,
-    Minimum,
-    Tolerances,
-    bounded_least_squares,
-    robust_loss,
-)
+from creepkit.inverse.search.local_refinement import Minimum, System, Tolerances, bounded_least_squares, robust_loss
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.stopped_tests import stopped_tests
 from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
@@ -449,7 +443,7 @@ class LeastSquaresProblem:
         start: Floats,
         *,
         fixed: Mapping[int, float] | None = None,
-        additional: AdditionalResiduals | None = None,
+        additional: System | None = None,
         tolerances: Tolerances | None = None,
     ) -> Minimum:
         """Bounded least squares.
@@ -469,7 +463,7 @@ class LeastSquaresProblem:
 
         def system(x: Floats) -> tuple[Floats, Floats]:
             values, jacobian = self.system(x)
-            further = [] if additional is None else [(additional.residuals(x), additional.jacobian(x))]
+            further = [] if additional is None else [additional(x)]
             parts = zip((values, jacobian), (weak * (x - self.bounds.centre), np.diag(weak)), *further, strict=True)
             values, jacobian = (np.concatenate(part) for part in parts)
             return values, jacobian

@@ -182,6 +182,10 @@ class Execution:
 
         try:
             result = self._made(stage, tick)
+        except NothingToMake as nothing:
+            self._record(stage, "left out", key, str(nothing))
+            self._report(stage, 1, 1, "left out")
+            return
         except Exception as error:  # of a plugin, too: the other stages go on
             _log.debug("%s failed", stage.name, exc_info=error)
             self._record(stage, "failed", key, failure_text(error))
@@ -210,6 +214,10 @@ class Execution:
 
 
 # ---- stages ----------------------------------------------------------------------------------------------------------
+
+
+class NothingToMake(StudyError):
+    """Why what a stage makes is there already, or is not of the law that was found: no failure of the study."""
 
 
 StageKind = Literal[

@@ -29,7 +29,7 @@ from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
 from creepkit.studies.arguments import check_forecast, planned_test
 from creepkit.studies.candidates import by_likelihood, ranked_candidates
-from creepkit.studies.execution import STAGE_KINDS, Results, Stage, StageKind, Tick, stage_name
+from creepkit.studies.execution import STAGE_KINDS, NothingToMake, Results, Stage, StageKind, Tick, stage_name
 from creepkit.studies.inputs import StudyInputs, TestGroup
 from creepkit.studies.study_file import KeyPath, StudyFile
 
@@ -192,6 +192,8 @@ def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
 
     def make(results: Results, tick: Tick) -> Any:
         chosen, fit = (law, None) if law is not None else _best_candidate(study, results[need], group)
+        if chosen.uses(temperature):
+            raise NothingToMake(f"law '{chosen.name}' says itself how it depends on temperature: no form is sought")
         settings = usual if fit is None else fit.settings
         found = ck.temperature_study(chosen, tests, using, settings=settings, progress=tick, **options)
         if found.temperature_law is None:

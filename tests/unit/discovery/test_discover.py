@@ -1,6 +1,8 @@
 """discover() and refit() from creep curves to an ordinary law, on a closed-form predictor and on one dimple."""
 
 import sys
+from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from scipy.integrate import cumulative_simpson
 
 import creepkit as ck
 from creepkit.discovery.discover import discover, group_by_temperature, isothermal_tests, temperature_study
+from creepkit.discovery.regression import check_identifications
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.reference_conditions import spans_temperatures
@@ -140,11 +143,21 @@ def test_what_happened_after_the_last_used_frame_does_not_count(tests):
     step = stepped(tests[7], 20.0)
     cut = step.replace(used=np.arange(step.times.size) <= step.times.size // 2)
     assert isothermal_tests([cut]) == ([cut], "")
-    assert isothermal_tests([step], 30.0) == ([], isothermal_tests([step])[1])
-    assert np.ptp(cut.followed_temperatures) == 0.0
     before = step.replace(used=np.arange(step.times.size) < step.times.size // 2)
     assert before.mean_temperature == tests[7].temperature
     assert not spans_temperatures([before])
+
+
+def test_the_drift_of_furnaces_is_no_span_of_temperatures(alone):
+    """Means 2 K apart, each record 4 K wide, are one temperature though readings span 6 K; a test 6 K wide is not."""
+    fit = alone[0]
+    for half, refused in ((2.0, False), (3.0, True)):
+        records = [Program([0.0, h.times[-1]], [-half, half]) for h in fit.histories]
+        means = zip(fit.histories, records, (972.0, 974.0, 974.0), strict=True)
+        drift = tuple(h.replace(temperature=Program(one.times, T + one.values)) for h, one, T in means)
+        fits = [replace(fit, ranges={**fit.ranges, "temperature": (969.0, 977.0)}, histories=drift), *alone[1:]]
+        with pytest.raises(FitError, match="identify each temperature alone") if refused else nullcontext():
+            check_identifications(fits)
 
 
 # ---- the command ---------------------------------------------------------------------------------------------------

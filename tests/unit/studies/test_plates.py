@@ -295,7 +295,6 @@ def test_a_mistake_is_one_sentence_with_its_line(folder: Path, old: str, new: st
         loaded(folder, CAMERA.replace(old, new, 1) if old != 'record = "rig"' else CAMERA.replace(old, new))
     text = str(caught.value)
     assert words in text.replace('"', "'")
-    assert "\n" not in text
     assert f"study.toml:{line}:" in text
 
 

@@ -174,7 +174,6 @@ def test_files_that_a_study_has_not_written_stay(study: Path, tmp_path: Path) ->
     own.unlink()
     ck.Study.load(study).run()
     text = own.read_text()
-    assert "def " in text
     own.write_text("changed")
     with pytest.raises(StudyError, match="creepkit did not write it as it is now"):
         ck.Study.load(study).run()

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -21,16 +20,8 @@ IterationCallback = Callable[[str, int, int], None]
 """Reports the progress of a search: (name of the step, how many are done, how many there are)."""
 
 
-class AdditionalResiduals(Protocol):
-    """Residuals beside those of the data: half the sum of their squares is added to the cost."""
-
-    def residuals(self, x: Floats) -> Floats:
-        """(additional,) - at x (unknowns,)."""
-        ...
-
-    def jacobian(self, x: Floats) -> Floats:
-        """(additional, unknowns) their derivatives at x (unknowns,)."""
-        ...
+System = Callable[[Floats], tuple[Floats, Floats]]
+"""x (unknowns,) to residuals (rows,) and their derivatives (rows, unknowns)."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +56,6 @@ class Tolerances:
 
 FIRST_RADIUS = 3.0
 """Of the trust region, in scales of a step."""
-
-
-System = Callable[[Floats], tuple[Floats, Floats]]
-"""x (unknowns,) to residuals (rows,) and their derivatives (rows, unknowns)."""
 
 
 def bounded_least_squares(

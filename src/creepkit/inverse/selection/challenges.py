@@ -32,7 +32,7 @@ from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.local_refinement import Tolerances
+from creepkit.inverse.search.local_refinement import System, Tolerances
 from creepkit.inverse.selection.perturbation_trials import Challenge, decisive_effects
 from creepkit.inverse.sparsity.term_selection import TermContributions
 from creepkit.language import CreepLaw, Param, stress
@@ -130,29 +130,19 @@ def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -
 # ---- shares of other laws --------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class ShareResidual:
-    """One residual that holds the ratio of two rates at the reference point; see search.AdditionalResiduals.
+def share_residual(first: Sequence[int], second: Sequence[int], log_ratio: float) -> System:
+    """One residual that holds the ratio of two rates at the reference point.
 
     first, second : positions of the ln rates of the terms of two laws among the unknowns. log_ratio : of the rate of
     the second law, all its terms, over that of the first.
     """
 
-    first: Sequence[int]
-    second: Sequence[int]
-    log_ratio: float
+    def residual(x: Floats) -> tuple[Floats, Floats]:
+        row, (a, b) = np.zeros((1, x.size)), (x[list(terms)] for terms in (first, second))
+        row[0, list(first)], row[0, list(second)] = -softmax(a), softmax(b)
+        return np.array([logsumexp(b) - logsumexp(a) - log_ratio]) / SHARE_TOLERANCE, row / SHARE_TOLERANCE
 
-    def residuals(self, x: Floats) -> Floats:
-        """(1,) - at x (unknowns,)."""
-        log_rates = [logsumexp(x[list(terms)]) for terms in (self.first, self.second)]
-        return np.array([(log_rates[1] - log_rates[0] - self.log_ratio) / SHARE_TOLERANCE])
-
-    def jacobian(self, x: Floats) -> Floats:
-        """(1, unknowns) derivatives at x (unknowns,)."""
-        row = np.zeros((1, x.size))
-        row[0, list(self.first)] = -softmax(x[list(self.first)]) / SHARE_TOLERANCE
-        row[0, list(self.second)] = softmax(x[list(self.second)]) / SHARE_TOLERANCE
-        return row
+    return residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,12 +221,12 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     x = np.concatenate([best.u, other.u, best.x[best.u.size :]])
     x[own_rates] += np.log(1.0 - SHARE)
     x[further_rates] += np.log(SHARE) + start
-    share = ShareResidual(own_rates, further_rates, float(np.log(SHARE / (1.0 - SHARE))))
+    share = share_residual(own_rates, further_rates, float(np.log(SHARE / (1.0 - SHARE))))
     excess, x = _least_excess(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
     description = f"its sum with {other.law.name}, tried with {100 * SHARE:.0f} % of the rate carried by it,"
-    return AlteredLaw("sum", problem, x, excess, share.jacobian(x), other.u.size, description)
+    return AlteredLaw("sum", problem, x, excess, share(x)[1], other.u.size, description)
 
 
 def above_threshold(best: FittedLaw) -> AlteredLaw:
@@ -298,7 +288,7 @@ def _least_excess(
     problem: LeastSquaresProblem,
     x: Floats,
     *,
-    share: ShareResidual | None = None,
+    share: System | None = None,
     fixed: Mapping[int, float] | None = None,
 ) -> tuple[float, Floats]:
     """The least chi-square from x (unknowns,) above that of the best law, and where.

@@ -43,7 +43,7 @@ from creepkit.inverse.observation_vector import selected_frames
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import growth_per_strain, reference_end_strain, reference_stresses
 from creepkit.inverse.search.global_search import GlobalSearch
-from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, System, Tolerances
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity, TermNames
 from creepkit.kernels import lower
@@ -194,10 +194,11 @@ class TermSets:
     def of_least_norm(self) -> FittedTerms:
         """The terms that L2 leaves; those come back, the largest first, without which BIC is above that of the sum."""
         single = [self.fitted((label,)) for label in self.terms]
-        norm = ContributionNorm(TermContributions.of_problem(self.problem))
+        of_terms = TermContributions.of_problem(self.problem)
+        norm = contribution_norm(of_terms)
         starts = self._starts(self.problem, self.x, single)
         ends = [self.problem.minimise(start, additional=norm, tolerances=TOLERANCES) for start in starts]
-        contributions = norm.contributions.by_term(min(ends, key=lambda end: end.cost).x)
+        contributions = of_terms.by_term(min(ends, key=lambda end: end.cost).x)
         ordered = sorted(self.terms, key=lambda label: -contributions[label])
         count = max(sum(share >= LEAST_CONTRIBUTION for share in contributions.values()), 1)
         while True:
@@ -332,21 +333,16 @@ class TermContributions:
         return dict(zip(self.law.terms, self.values(u).tolist(), strict=True))
 
 
-@dataclass(frozen=True)
-class ContributionNorm:
-    """L2_STRENGTH x sum c_i^2 as residuals, half the sum of their squares; see search.AdditionalResiduals."""
+def contribution_norm(contributions: TermContributions) -> System:
+    """L2_STRENGTH x sum c_i^2 as residuals, half the sum of their squares; derivatives by central differences."""
 
-    contributions: TermContributions
+    def residuals(x: Floats) -> tuple[Floats, Floats]:
+        steps = DIFFERENCE_STEP * np.eye(x.size)[: len(contributions.law.params)]
+        columns = [contributions.values(x + h) - contributions.values(x - h) for h in steps]
+        slopes = np.pad(np.array(columns).T / (2 * DIFFERENCE_STEP), ((0, 0), (0, x.size - len(steps))))
+        return np.sqrt(2 * L2_STRENGTH) * contributions.values(x), np.sqrt(2 * L2_STRENGTH) * slopes
 
-    def residuals(self, x: Floats) -> Floats:
-        """(terms,) at x (unknowns,)."""
-        return np.asarray(np.sqrt(2 * L2_STRENGTH) * self.contributions.values(x))
-
-    def jacobian(self, x: Floats) -> Floats:
-        """(terms, unknowns) derivatives at x (unknowns,), by central differences."""
-        steps = DIFFERENCE_STEP * np.eye(x.size)[: len(self.contributions.law.params)]
-        columns = [(self.residuals(x + step) - self.residuals(x - step)) / (2 * DIFFERENCE_STEP) for step in steps]
-        return np.pad(np.array(columns).T, ((0, 0), (0, x.size - len(steps))))
+    return residuals
 
 
 def _points_of_test(history: History, predictor: Predictor | None) -> Floats:

@@ -28,7 +28,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, residuals_with_errors
-from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
+from creepkit.inverse.uncertainty.quantities import DerivedQuantity, gradient, quantity_of
 from creepkit.records.presentable import Presentable
 
 CONSTRAINT_WIDTH = 0.02
@@ -77,24 +77,6 @@ class ProfileLikelihood(Presentable):
         return f"<ProfileLikelihood of {self}>"
 
     shown_by = "inference.profile_text"
-
-
-@dataclass(frozen=True)
-class _QuantityConstraint:
-    """The residual (q(x) - value) / width, which holds a quantity at a value."""
-
-    function: CoordinateFunction
-    size: int
-    value: float
-    width: float
-
-    def residuals(self, x: Floats) -> Floats:
-        return np.array([(float(self.function(x[: self.size])) - self.value) / self.width])
-
-    def jacobian(self, x: Floats) -> Floats:
-        u = x[: self.size]
-        quantity_gradient = gradient(self.function, u, np.maximum(np.abs(u), 1.0))
-        return np.concatenate([quantity_gradient, np.zeros(x.size - self.size)])[None] / self.width
 
 
 @dataclass(frozen=True)
@@ -154,9 +136,14 @@ class _ProfileTrace:
         return self.problem.bounds.clip(x)
 
     def _constrained_minimum(self, start: Floats, value: float | None) -> _ProfilePoint:
-        constraint = (
-            None if value is None else _QuantityConstraint(self.function, self.size, value, CONSTRAINT_WIDTH * self.sd)
-        )
+        def held(x: Floats) -> tuple[Floats, Floats]:
+            """The residual (q(x) - value) / width, which holds the quantity at a value."""
+            u, width = x[: self.size], CONSTRAINT_WIDTH * self.sd
+            slope = gradient(self.function, u, np.maximum(np.abs(u), 1.0))
+            row = np.pad(slope, (0, x.size - self.size))[None] / width
+            return np.array([float(self.function(u)) - float(value or 0.0)]) / width, row
+
+        constraint = None if value is None else held
         x = self.problem.minimise(start, additional=constraint, tolerances=REFIT_TOLERANCES).x
         if self.noise_model.rate > 0:
             x = self._problem_at(x).minimise(x, additional=constraint, tolerances=REFIT_TOLERANCES).x

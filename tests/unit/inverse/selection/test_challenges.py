@@ -14,10 +14,10 @@ from creepkit.inverse.selection.challenges import (
     SHARE,
     THRESHOLD,
     FittedLaw,
-    ShareResidual,
     _least_excess,
     altered_laws,
     challenges_of,
+    share_residual,
 )
 from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, equivalent_laws
 from creepkit.inverse.selection.perturbation_trials import Trial
@@ -96,10 +96,10 @@ def test_a_planted_sum_of_two_fifths_is_not_decided_against():
 
 def test_the_share_is_held_in_the_fit(power_law_narrow):
     """At the least chi-square the ratio of the rates at the reference point is still that of the start."""
-    share = ShareResidual([0], [2], float(np.log(SHARE / (1 - SHARE))))
+    share = share_residual([0], [2], float(np.log(SHARE / (1 - SHARE))))
     x = np.array([-15.0, 4.0, -16.0])
-    assert share.residuals(x) == pytest.approx((-1.0 - np.log(SHARE / (1 - SHARE))) / 1e-3)
-    assert share.jacobian(x) == pytest.approx(np.array([[-1e3, 0.0, 1e3]]))
+    assert share(x)[0] == pytest.approx((-1.0 - np.log(SHARE / (1 - SHARE))) / 1e-3)
+    assert share(x)[1] == pytest.approx(np.array([[-1e3, 0.0, 1e3]]))
     best, _ = power_law_narrow
     single = best.least_squares_problem
     assert single.chi_square(best.x) == pytest.approx(
