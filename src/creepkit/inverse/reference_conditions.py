@@ -258,6 +258,11 @@ class ReferencePoint:
         conditions = () if law is None else tuple(reference_conditions(law, histories).items())
         return cls(stress, 0.5 * strain, 0.5 * time, float(np.median(temperatures)), conditions)
 
+    def conditions_text(self, law: CreepLaw) -> str:
+        """The conditions of the material for people, behind others: ", grain size 0.05 mm"; "" without any."""
+        stated = dict(self.conditions)
+        return "".join(f", {c.name.replace('_', ' ')} {stated[c.name]:.3g} {c.unit}" for c in law.conditions)
+
     def law_there(self, law: CreepLaw) -> CreepLaw:
         """The law at these conditions, or at others near by where a parameter would not matter at them."""
         there = law.at(None, **dict(self.conditions))

@@ -117,8 +117,7 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     of_state = ""
     if depends_on_history(fit.law):
         of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else f", {100 * r.strain:.2g} % strain"
-    stated = [f", {c.name.replace('_', ' ')} {dict(r.conditions)[c.name]:.3g} {c.unit}" for c in fit.law.conditions]
-    at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{''.join(stated)}"
+    at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
     by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]

@@ -11,6 +11,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
+from creepkit.records.conditions import condition_values
 from creepkit.reports.compared_values import judged_readings
 from creepkit.reports.condition_colours import ColourScale, stress_scale, temperature_scale
 from creepkit.reports.figures import empty_figure, panel_grid, shortened, span, wrapped
@@ -112,10 +113,13 @@ def summary_figures(fit: Identification) -> dict[str, Figure]:
 
 
 def _curve_scale(fit: Identification) -> ColourScale:
-    """Colours by temperature where it varies, else by stress."""
+    """Colours by temperature where it varies, else by a condition of the material that does, else by stress."""
     by_temperature = temperature_scale(fit.histories)
-    varies = np.ptp(by_temperature.values) > ISOTHERMAL_RANGE
-    return by_temperature if varies else stress_scale(fit.histories, fit.predictor)
+    stated = zip(fit.law.conditions, condition_values(fit.law, fit.histories).T, strict=True)
+    varied = [(f"{one.name.replace('_', ' ')}, {one.unit}", values) for one, values in stated if np.ptp(values) > 0]
+    scales = [by_temperature] if np.ptp(by_temperature.values) > ISOTHERMAL_RANGE else []
+    scales += [ColourScale(label, values, logarithmic=bool((values > 0).all())) for label, values in varied]
+    return [*scales, stress_scale(fit.histories, fit.predictor)][0]
 
 
 def _draw_leading(

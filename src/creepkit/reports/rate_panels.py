@@ -95,7 +95,8 @@ def _draw_reference_rates(axes: Axes, fit: Identification) -> None:
     points = [RatePoints("law × own rate of each test", *np.array(own).T)] if own else []
     _draw(axes, fit, curves, points, "95 % band: law")
     reference = fit.reference
-    initial = "\nwith internal variables as at the start" if fit.law.states else ""
+    initial = reference.conditions_text(fit.law).replace(", ", "\n", 1)
+    initial += "\nwith internal variables as at the start" if fit.law.states else ""
     axes.set(xlabel="von Mises stress, MPa", ylabel="creep rate, %/h")
     axes.set_title(
         f"the law's rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h{initial}",

@@ -497,6 +497,8 @@ def sampling_design(
     """
     if domain not in ("conditioned", "paper"):
         raise DatasetError(f"there is no sampling domain '{domain}': {nearest(domain, ('conditioned', 'paper'))}")
+    if lacking := [one.name for one in law.conditions]:
+        raise DatasetError(f"law '{law.name}' needs numbers for {', '.join(lacking)}: law.at({lacking[0]}=0.05)")
     if domain == "conditioned":
         term_groups(law)
     grid = grid or default_grid(every, specimen, ranges)
