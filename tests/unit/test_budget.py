@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 6025,
     "records": 2345,
     "registry": 635,
-    "reports": 5775,
+    "reports": 5780,
     "rupture_assessment": 1835,
     "sampling": 995,
     "screening": 570,
