@@ -32,7 +32,7 @@ FUNCTIONS = [
     for f in vars(kernel_functions).values()
     if isinstance(f, type) and issubclass(f, StableFunction) and f != StableFunction
 ]
-ONE_ARGUMENT = [f for f in FUNCTIONS if f.nargs == sympy.FiniteSet(1)]
+ONE_ARGUMENT = [f for f in FUNCTIONS if len(f.partial_derivatives) == 1]
 
 
 def evaluated(function: type[StableFunction], value: float, target: str) -> float:
