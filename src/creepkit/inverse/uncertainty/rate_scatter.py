@@ -242,16 +242,17 @@ class RateScatter:
         """Mean (unknowns + effects,) and covariance of (dx, c) about the estimate, given sd (levels,) of the effects.
 
         Where the estimate is not the optimum under this covariance (it is one of least squares), its distance from
-        that counts as an error of the estimate: dx has the mean zero, and as covariance its second moment.
+        that counts as an error of the estimate: dx has the mean zero, and as covariance its second moment. Errors
+        common to all tests move dx, and not how tests differ.
         """
         _, optimum, covariance = self.solved(sd)
         size = self.design.shape[1]
         shift, own = optimum[:size], covariance[:size, :size]
         gain = covariance[size:, :size] @ scaled_inverse(own)
-        about = own + np.outer(shift, shift) + (0.0 if self.errors is None else self.errors)
+        about = own + np.outer(shift, shift)
         mean = np.concatenate([np.zeros(size), optimum[size:] - gain @ shift])
         cross, effects = about @ gain.T, covariance[size:, size:] + gain @ np.outer(shift, shift) @ gain.T
-        return mean, np.block([[about, cross], [cross.T, effects]])
+        return mean, np.block([[about + (0.0 if self.errors is None else self.errors), cross], [cross.T, effects]])
 
     @cached_property
     def mean_joint(self) -> tuple[Floats, Floats]:

@@ -57,7 +57,6 @@ def test_the_effect_of_a_heat_is_shrunk_as_its_reliability_says():
     scatter = scatter_of(z, 1e-12, ["a", "a", "b", "b"])
     mean, covariance = scatter.joint(np.array([0.2, 0.1]))
     # Means of two tests differ by 0.5; the share of a heat's variance in that of its mean is .04 / (.04 + .01 / 2).
-    assert scatter.groups == (("heat", "a"), ("heat", "b"))
     assert mean[1:] == pytest.approx([0.25 * 0.04 / 0.045, -0.25 * 0.04 / 0.045], rel=1e-6)
     # Mean and effect of heat a together are what its two tests show, shrunk a little towards those of b: by hand, from
     # the covariance of (mean of a, mean of b), each .045, and a flat mean, var = .04 - .04^2 / .045 / 2 + ... below.
@@ -66,6 +65,9 @@ def test_the_effect_of_a_heat_is_shrunk_as_its_reliability_says():
     share = between / (between + within)
     expected = share * within + (1.0 - share) ** 2 * (between + within) / 2
     assert row @ covariance @ row == pytest.approx(expected, rel=1e-5)
+    # An error that all tests have alike moves the rates of both heats by itself, and not the heats against each other.
+    off = replace(scatter, errors=np.array([[0.09]]))
+    assert row @ off.joint(np.array([0.2, 0.1]))[1] @ row == pytest.approx(expected + 0.09, rel=1e-5)
 
 
 def test_the_unknowns_are_those_of_generalised_least_squares_about_the_estimate():
