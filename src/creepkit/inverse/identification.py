@@ -40,7 +40,6 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
 )
 from creepkit.inverse.uncertainty.quantities import (
     CoordinateFunction,
-    DerivedQuantity,
     Interval,
     PointQuantity,
     RateStatements,
@@ -87,7 +86,7 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
     log_likelihood : of the fitted frames as if they were independent (working noise), with explicit nuisances
         integrated out; of identifications by likelihood the restricted one, but for a constant of the law.
     effective_frames : number of independent frames (about one a test when tests differ from one another).
-    freedom : the median degrees of freedom of the parameters, those of profiles and samples; `covariance` is as large
+    freedom : the median degrees of freedom of the parameters, those of samples; `covariance` is as large
         as these ask for, so that 1.96 standard deviations are a 95 % interval.
     linearised : the problem made linear at the optimum, of identifications
         by likelihood; problem : what was minimised, under the covariance that was found (none of them is saved).
@@ -444,12 +443,6 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
         from creepkit.forecasts.forecast import forecast
 
         return forecast(self, tests, level=level, **options)
-
-    def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> Any:
-        """The ProfileLikelihood of a parameter, by name, or of another quantity (see uncertainty.quantities)."""
-        from creepkit.inverse.uncertainty.profile_likelihood import profile
-
-        return profile(self, quantity, level=level)
 
     def sample(self, *, draws: int = 1000, seed: int = 0, using: Predictor | None = None) -> Any:
         """PosteriorSamples by population Monte Carlo; `using` may be a surrogate."""

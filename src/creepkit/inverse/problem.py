@@ -6,7 +6,7 @@ p(x) the penalties of bounds and priors,
     chi2(x) = |L^-1 r(x)|^2 + |p(x)|^2,    x = (u, e),
 
 u the conditioned coordinates of the law and e the explicit nuisance parameters of the tests. Search, local refinement,
-ranking, intervals, profiles, posterior samples, term selection and the design of experiments share this one record.
+ranking, intervals, posterior samples, term selection and the design of experiments share this one record.
 """
 
 from __future__ import annotations

@@ -16,8 +16,6 @@ from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.correlation import correlation
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-from creepkit.inverse.uncertainty.profile_likelihood import profile
-from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Nuisance, PressureJump, Status, StressSteps, constant_stress
 from helpers.steady_rate_predictor import Steady, planted
@@ -63,7 +61,6 @@ def bounded(A_bounds):
     return NORTON.with_bounds(A=A_bounds, n=(1, 5))
 
 
-STILL = DerivedQuantity("pi", "1", "linear", lambda c: lambda u: np.full(u.shape[:-1], np.pi))
 BAR = (np.array([1.0, 10.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0)
 DIMPLES = [
     History(name, np.array([1.0]), {}, PressureJump(1.0, 1.2, 1e4), 1000.0, "bulge", minimum_rate=1e-9)
@@ -109,8 +106,6 @@ MISTAKES = [
     (lambda tests, fit: rank([fit, replace(fit, provenance={"data": "others"})]), "were made from different histories"),
     (lambda tests, fit: ck.select([], tests, "uniaxial"), "there are no candidate laws"),
     (lambda tests, fit: correlation(fit, "raw"), "is 'raw'; allowed is 'author' or 'conditioned'"),
-    (lambda tests, fit: profile(fit, "n", level=95), "level is 95"),
-    (lambda tests, fit: profile(fit, STILL), "pi does not depend on any parameter"),
     (lambda tests, fit: ModelAverage((fit,), (0.5, 0.5)), "as many laws as weights"),
     (lambda tests, fit: ModelAverage((fit,), (-1.0,)), "must not be negative"),
     (lambda tests, fit: fit.rupture_time(-10.0), "a stress that is not above zero"),
