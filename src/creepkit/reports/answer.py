@@ -288,7 +288,7 @@ def _test(fit: Identification, name: str) -> str:
 
 def _choice(ranking: Ranking | None) -> Iterator[str]:
     """What else the tests allow."""
-    if ranking is None or len(ranking.laws) < 2 or ranking.decisive or ranking.adequacy is None:
+    if ranking is None or len(ranking.laws) < 2 or ranking.adequacy is None:
         return
     unmet, others = ranking.unmet, [one.fit.law.name for one in ranking.credible[1:]]
     if others:
@@ -365,7 +365,7 @@ def chosen_text(ranking: Ranking) -> str:
     more = len(ranking.laws) - MOST_NAMED
     decided = "decisive" if ranking.decisive else "not decisive"
     if len(ranking.credible) == 1 and ranking.singled_out and ranking.challenges:
-        decided += f", for the tests allow {ranking.challenges[0].subject} as well"
+        decided += f", {'but' if ranking.decisive else 'for'} the tests allow {ranking.challenges[0].subject} as well"
     return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}"
 
 
