@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1355,
     "instruments": 1190,
     "integration": 785,
-    "inverse": 10536,
+    "inverse": 10546,
     "jobs": 250,
     "kernels": 1690,
     "language": 1537,

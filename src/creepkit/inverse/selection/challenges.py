@@ -130,8 +130,8 @@ def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -
         return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
     if found is None or found.excess > NOT_EXCLUDED:
         return None
-    sentence = f"{found.description} {_comparison_text(found.excess, found.further)}"
-    return Challenge(kind, found.problem.law.name, sentence, refutes=kind == "threshold" or found.fits_better)
+    refutes = kind == "threshold" or found.fits_better
+    return Challenge(kind, found.problem.law.name, f"{found.description} {found.comparison}", refutes)
 
 
 # ---- shares of other laws --------------------------------------------------------------------------------------------
@@ -218,7 +218,17 @@ class AlteredLaw:
     @property
     def fits_better(self) -> bool:
         """Whether chi-square is lower by more than it falls by chance (95 %) with the parameters that are not held."""
-        return _fits_better(self.excess, self.further)
+        return bool(self.excess < -chi2.ppf(0.95, max(self.further - 1, 1)))
+
+    @property
+    def comparison(self) -> str:
+        """How it compares with the best law, to follow its description."""
+        if self.fits_better:
+            return f"fits better (its chi-square is {-self.excess:.1f} lower)"
+        if abs(self.excess) < SMALLEST_SHOWN:
+            return "explains them as well (its chi-square is the same)"
+        side = "higher" if self.excess > 0 else "lower"
+        return f"explains them as well (its chi-square is {abs(self.excess):.1f} {side})"
 
 
 def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
@@ -257,22 +267,6 @@ def above_threshold(best: FittedLaw) -> AlteredLaw:
     held = np.zeros((1, x.size))
     held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
     return AlteredLaw("threshold", problem, x, excess, held, 1, f"{law.name} of {threshold:.3g} MPa")
-
-
-def _fits_better(excess: float, further: int) -> bool:
-    return bool(excess < -chi2.ppf(0.95, max(further - 1, 1)))
-
-
-def _comparison_text(excess: float, further: int = 1) -> str:
-    """How an altered law compares with the best one, from its chi-square above that of the best.
-
-    further : its parameters beyond those of the best law: by chance chi-square falls with each that is not held.
-    """
-    if _fits_better(excess, further):
-        return f"fits better (its chi-square is {-excess:.1f} lower)"
-    if abs(excess) < SMALLEST_SHOWN:
-        return "explains them as well (its chi-square is the same)"
-    return f"explains them as well (its chi-square is {abs(excess):.1f} {'higher' if excess > 0 else 'lower'})"
 
 
 def _are_one_function(problem: LeastSquaresProblem, x: Floats, own_terms: int) -> bool:
