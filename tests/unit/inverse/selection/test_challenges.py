@@ -77,7 +77,6 @@ def test_a_share_of_another_law_is_not_excluded_by_a_narrow_range(power_law_narr
     """Over 55 to 65 MPa a power law is a sinh too."""
     share, threshold = altered_laws(power_law_narrow)
     assert (share.problem.law.name, share.fits_better) == ("norton+hyperbolic-sine", False)
-    assert share.description == "its sum with hyperbolic-sine, tried with 30 % of the rate carried by it,"
     found = challenges_of(power_law_narrow)[0]
     assert (found.subject, found.refutes) == (threshold.problem.law.name, True)
 
