@@ -39,7 +39,7 @@ BUDGET = {
     "readers": 6025,
     "records": 2342,
     "registry": 635,
-    "reports": 5755,
+    "reports": 5756,
     "rupture_assessment": 1835,
     "sampling": 995,
     "screening": 570,
