@@ -21,7 +21,7 @@ class SearchOptions(Options, title="options of a search"):
     two laws are tried; None where no candidate explains the tests. criterion : of a comparison.
     """
 
-    search: Literal["multi-start", "swarm"] = option("multi-start", "How to begin.")
+    search: Literal["multi-start", "swarm"] = option("multi-start", "How to begin.", flag="begin")
     penalty: Literal["l2", "subsets"] | None = option(None, "Keep those terms of a sum that the tests need.")
     sums: bool | None = option(None, "Whether sums of two laws are tried; by default where no law explains the tests.")
     criterion: Literal["bic", "aicc"] = option("bic", "Of a comparison of laws.")
