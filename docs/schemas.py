@@ -45,7 +45,7 @@ SHORT_FORMS: dict[str, Any] = {
     "_level_or_steps": {"type": "number"},
     "_one_or_more": {"type": "string"},
     "_label_values": {},
-    "_output_weights": {},
+    "_word_or_numbers": {},
 }
 """What a study file may hold in place of what a function of its model makes of it; anything, where that is empty."""
 
@@ -180,7 +180,7 @@ HEAD = '''"""Options of verbs as keywords for type checkers and editors; `python
 from collections.abc import Mapping, Sequence
 from typing import Literal, TypedDict
 
-from creepkit.inverse.settings import OutputWeights, UsualErrors
+from creepkit.inverse.settings import UsualErrors, Weights
 from creepkit.records import Nuisance
 '''
 

@@ -101,11 +101,11 @@ tests = ck.exclude_suspect_frames(tests)
 # %%
 # One law for all tests
 # ---------------------
-# Three readings of "the fit": the paper's loss with nothing unknown but the law; the same with whole tests weighed by
-# how far they lie from the others; and with the zero of each camera and each dimple's thickness unknown.
+# Three readings of "the fit": readings of equal weight, nothing unknown but the law; the same with whole tests weighed
+# by how far they lie from the others; and with the zero of each camera and each dimple's thickness unknown.
 
 ways = {
-    "paper's loss": dict(nuisances=(), weights="paper"),
+    "law alone": dict(nuisances=(), weights="noise"),
     "robust": dict(nuisances=(), test_loss="student"),
     "offset, thickness": dict(nuisances=(ck.Nuisance("offset", sd=0.012), THICKNESS), test_loss="student"),
 }

@@ -36,8 +36,6 @@ from .inverse.confirmation import confirm as confirm
 from .inverse.cross_validation import cross_validate as cross_validate
 from .inverse.goodness_of_fit import relative_squared_error as relative_squared_error
 from .inverse.reference_conditions import with_arrhenius as with_arrhenius
-from .inverse.search.multistart import MultiStart as MultiStart
-from .inverse.search.particle_swarm import ParticleSwarm as ParticleSwarm
 from .inverse.selection.ranking import rank as rank
 from .inverse.settings import IdentificationSettings as IdentificationSettings
 from .inverse.settings import default_nuisances as default_nuisances

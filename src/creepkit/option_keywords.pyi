@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Literal, TypedDict
 
-from creepkit.inverse.settings import OutputWeights, UsualErrors
+from creepkit.inverse.settings import UsualErrors, Weights
 from creepkit.records import Nuisance
 
 class IdentificationSettingsKeywords(TypedDict, total=False):
@@ -12,7 +12,7 @@ class IdentificationSettingsKeywords(TypedDict, total=False):
     frames: int | None
     seed: int | None
     nuisances: Nuisance | str | Sequence[Nuisance | str] | None
-    weights: OutputWeights | None
+    weights: Weights | None
     test_loss: Literal["gaussian", "student"] | None
     suspect_frames: Literal["exclude", "keep"] | None
     further_laws: int | None

@@ -196,7 +196,7 @@ def _range(text: str) -> tuple[float, float]:
     return low, high
 
 
-def _output_weights(words: Sequence[str], text: str) -> Any:
+def _word_or_numbers(words: Sequence[str], text: str) -> Any:
     return text if text in words else _by_name(parsed_number, [text])
 
 
@@ -218,7 +218,7 @@ def text_form(hint: Any) -> TextForm:
         others = tuple(one for one in parts if one is not type(None))
         words = next((get_args(one) for one in others if get_origin(one) is Literal), None)
         if words is not None and len(others) > 1:
-            return TextForm(f"{'|'.join(words)}|NAME=NUMBER,...", functools.partial(_output_weights, words))
+            return TextForm(f"{'|'.join(words)}|NAME=NUMBER,...", functools.partial(_word_or_numbers, words))
         return text_form(others[0])
     if origin is Literal:
         return TextForm("|".join(parts), str)

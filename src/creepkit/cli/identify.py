@@ -81,8 +81,8 @@ def command(
 ) -> None:
     """Every law is fitted to all tests at once.
 
-    Several are compared by their likelihood, as by select() in Python, unless --weights, --begin or --penalty ask
-    for something else; one is identified as by identify(). JSON and plots of each, LaTeX and Python of the best,
+    Several are compared by their likelihood, as by select() in Python, unless --weights or --penalty ask for
+    something else; one is identified as by identify(). JSON and plots of each, LaTeX and Python of the best,
     go to a folder.
     """
     from creepkit.reports.ranking import print_ranking, ranking_to_json
@@ -131,9 +131,7 @@ def command(
     candidates = LawChanges().changed(changes).applied(candidates, histories)
     compared = search.sums is not None or ("criterion" in how and len(candidates) > 1)
     if compared and not by_likelihood(search, chosen):
-        raise FitError(
-            "--sums and --criterion compare laws by their likelihood: leave out --weights, --begin, --penalty"
-        )
+        raise FitError("--sums and --criterion compare laws by their likelihood: leave out --weights, --penalty")
     check_identified_folder(to, candidates)
     options_of_fits: dict[str, Any] = {"compared": compared, **({} if through is None else {"through": through})}
     with ProgressBar() as progress:

@@ -13,7 +13,6 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify as identify_law
 from creepkit.inverse.identify import sampled_where_needed
 from creepkit.inverse.nuisance_parameters import check_nuisance_tests
-from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.selection import Ranking
 from creepkit.inverse.selection.select import select as select_law
 from creepkit.inverse.settings import IdentificationSettings
@@ -37,7 +36,6 @@ def identify(
     histories: Sequence[History],
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
-    search: GlobalSearch | None = None,
     penalty: Literal["l2", "subsets"] | None = None,
     through: Through = "auto",
     settings: IdentificationSettings | None = None,
@@ -48,7 +46,6 @@ def identify(
 
     law : a law or its name; using : a specimen (or its name) or any predictor, or {specimen: predictor}; by default
         the specimens that the histories name.
-    search : how to begin: by default least squares from screened starts; ParticleSwarm() as in the paper.
     penalty : which terms of a sum are kept: "subsets", the set of lowest BIC, or "l2", the paper's norm of their
         contributions. Those left out stand in `sparsity` of the result, and its law is the one that remains.
     through : a cheaper predictor in which the minima of the search are refined before `using` (finite elements) gives
@@ -65,7 +62,7 @@ def identify(
     surrogate = _resolve_through(through, predictor)
     if through == "auto":
         surrogate = through_for_law(surrogate, law)
-    how: dict[str, Any] = {"settings": settings, "search": search, "through": surrogate, "progress": progress}
+    how: dict[str, Any] = {"settings": settings, "through": surrogate, "progress": progress}
     if penalty is None:
         fit = identify_law(law, histories, predictor, **how)
     else:

@@ -40,7 +40,6 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
 )
 from creepkit.inverse.uncertainty.quantities import (
     CoordinateFunction,
-    DerivedQuantity,
     Interval,
     PointQuantity,
     RateStatements,
@@ -54,7 +53,6 @@ from creepkit.records.presentable import Plotted, Presentable, Tabulated
 from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
-    from creepkit.inverse.search.global_search import SearchTrace
     from creepkit.inverse.sparsity.result import Sparsity
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit, LawMisfits
     from creepkit.inverse.variance_components import LinearisedProblem
@@ -88,9 +86,9 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
     log_likelihood : of the fitted frames as if they were independent (working noise), with explicit nuisances
         integrated out; of identifications by likelihood the restricted one, but for a constant of the law.
     effective_frames : number of independent frames (about one a test when tests differ from one another).
-    freedom : the median degrees of freedom of the parameters, those of profiles and samples; `covariance` is as large
+    freedom : the median degrees of freedom of the parameters, those of samples; `covariance` is as large
         as these ask for, so that 1.96 standard deviations are a 95 % interval.
-    search_trace : how its global search went; linearised : the problem made linear at the optimum, of identifications
+    linearised : the problem made linear at the optimum, of identifications
         by likelihood; problem : what was minimised, under the covariance that was found (none of them is saved).
     sparsity : how a penalty reduced the sum that this law was part of, if one did.
     predictor_documents : {specimen: document} of the predictor, of identifications that come from a file.
@@ -123,7 +121,6 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
     notes: tuple[str, ...] = ()
     histories: tuple[History, ...] = ()
     predictor: Predictor | None = None
-    search_trace: SearchTrace | None = field(default=None, repr=False)
     linearised: LinearisedProblem | None = field(default=None, repr=False)
     sparsity: Sparsity | None = field(default=None, repr=False)
     problem: LeastSquaresProblem | None = field(default=None, repr=False)
@@ -446,12 +443,6 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
         from creepkit.forecasts.forecast import forecast
 
         return forecast(self, tests, level=level, **options)
-
-    def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> Any:
-        """The ProfileLikelihood of a parameter, by name, or of another quantity (see uncertainty.quantities)."""
-        from creepkit.inverse.uncertainty.profile_likelihood import profile
-
-        return profile(self, quantity, level=level)
 
     def sample(self, *, draws: int = 1000, seed: int = 0, using: Predictor | None = None) -> Any:
         """PosteriorSamples by population Monte Carlo; `using` may be a surrogate."""

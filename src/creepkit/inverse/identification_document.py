@@ -56,10 +56,7 @@ LAW_CODEC = ValueCodec(law_to_json, law_from_json)
 
 
 CODEC = RecordCodec(
-    omitted={
-        Identification: ("histories", "predictor", "search_trace", "linearised", "problem"),
-        Perturbation: ("residual_change",),
-    },
+    omitted={Identification: ("histories", "predictor", "linearised", "problem"), Perturbation: ("residual_change",)},
     ranges={
         Identification: {"rms": NOT_NEGATIVE_OR_NAN, "effective_frames": POSITIVE, "freedom": POSITIVE},
         ReferencePoint: {"*": POSITIVE, "conditions": ANY_SIZE},
@@ -90,9 +87,9 @@ CODEC = RecordCodec(
         Sparsity: {"observations": NOT_NEGATIVE},
     },
     values={CreepLaw: LAW_CODEC},
-    names={"Sparsity": Sparsity, **dict.fromkeys(("SearchTrace", "LinearisedProblem"), object)},
+    names={"Sparsity": Sparsity, "LinearisedProblem": object},
 )
-"""Of identifications; histories, search trace, linearised problem and changes of residuals are not stored.
+"""Of identifications; histories, linearised problem and changes of residuals are not stored.
 
 The predictor is, by its documents.
 """

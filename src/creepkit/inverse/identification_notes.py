@@ -69,11 +69,10 @@ def _time_range(history: History) -> tuple[float, float]:
     return float(history.times[0]), float(history.used_times[-1])
 
 
-def provenance_of(problem: LeastSquaresProblem, search_evaluations: int, search: str = "") -> dict[str, str | int]:
+def provenance_of(problem: LeastSquaresProblem, search_evaluations: int) -> dict[str, str | int]:
     """Versions, fingerprints and counts; one evaluation is one candidate on all tests.
 
-    search_evaluations : of the global search, by the reduced-order model where the predictor has one. search : its
-    name, "" where it began from a given estimate.
+    search_evaluations : of the global search, by the reduced-order model where the predictor has one.
     """
     law = problem.law
     return {
@@ -84,7 +83,6 @@ def provenance_of(problem: LeastSquaresProblem, search_evaluations: int, search:
         "specimen": problem.predictor.label,
         "evaluations": problem.evaluations.count,
         "search_evaluations": search_evaluations,
-        **({"search": search} if search else {}),
         "data": data_digest(problem),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
@@ -137,12 +135,12 @@ def identification_notes(
     return (*sentences, *_test_notes(problem, tests, nuisances))
 
 
-def one_end_note(minima: Mapping[str, int], search: str) -> tuple[str, ...]:
+def one_end_note(minima: Mapping[str, int]) -> tuple[str, ...]:
     """That a search had one start alone, if it had.
 
-    minima : see inverse.initial_search. search : its name.
+    minima : see inverse.initial_search.
     """
-    if minima.get("search_ends") != 1 or search != "multi-start":
+    if minima.get("search_ends") != 1:
         return ()
     return ("the search ended once: whether another minimum is lower was not examined (raise starts)",)
 

@@ -63,9 +63,7 @@ from creepkit.inverse.perturbations import perturbations
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
-from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.search.local_refinement import IterationCallback
-from creepkit.inverse.search.multistart import MultiStart
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import LawAtTests, contradicting_values
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
@@ -104,7 +102,6 @@ def identify(
     using: Predictor | Mapping[str, Predictor],
     *,
     settings: IdentificationSettings | None = None,
-    search: GlobalSearch | None = None,
     through: Predictor | None = None,
     start: StartingEstimate | None = None,
     progress: IterationCallback | None = None,
@@ -113,7 +110,6 @@ def identify(
 
     using : predictor, such as the specimen that ck.specimen("uniaxial") returns, or {specimen: predictor} where
         histories are of several. One that offers a reduced-order model is searched with it and then refined.
-    search : how to begin; by default least squares from several screened starts (MultiStart).
     through : a cheaper predictor, such as a surrogate, in which the minima of the search are refined before `using`:
         values and intervals are those of `using`.
     A surrogate that does not know this class of laws is replaced by its specimen, or left out; a note says so.
@@ -124,7 +120,7 @@ def identify(
     using, through, notes = predictors_for_law(law, using, through)
     histories, left_out = compared_tests(law, histories, settings)
     with single_threaded_blas():
-        best, outcome, numerical_error = _estimated(law, histories, using, settings, search, through, start, progress)
+        best, outcome, numerical_error = _estimated(law, histories, using, settings, through, start, progress)
         fit = _reported(histories, best, outcome, numerical_error)
         fit = replace(fit, notes=(*left_out, *fit.notes, *widened_notes(law, fit.law), *notes))
         if start is not None and start.values_only:
@@ -197,7 +193,6 @@ def _estimated(
     histories: Sequence[History],
     using: Predictor,
     settings: IdentificationSettings,
-    search: GlobalSearch | None,
     through: Predictor | None,
     start: StartingEstimate | None,
     progress: IterationCallback | None,
@@ -211,9 +206,9 @@ def _estimated(
     start, noise = start or StartingEstimate(None), None
     problem = LeastSquaresProblem.from_histories(law, histories, using, settings, start.reference)
     if start.u is None:
-        outcome = initial_search(problem, through, search or MultiStart(), progress)
+        outcome = initial_search(problem, through, progress)
     else:
-        outcome = SearchOutcome([problem.bounds.of(range(len(law.params))).clip(start.u)], 0, None)
+        outcome = SearchOutcome([problem.bounds.of(range(len(law.params))).clip(start.u)], 0)
     known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in outcome.starts]
     how, widenings = EstimationOptions(start.u is not None, through, judged, progress), MOST_WIDENINGS
@@ -442,10 +437,7 @@ def _reported(
         tests=tests,
         ranges=fitted_ranges(problem, {e.name: e.value for e in estimates}),
         settings=problem.settings,
-        provenance={
-            **provenance_of(problem, search_outcome.evaluations, search_outcome.search),
-            **search_outcome.minima,
-        },
+        provenance={**provenance_of(problem, search_outcome.evaluations), **search_outcome.minima},
         errors=pooled_errors(histories, prediction, tests),
         error_covariance=error_covariance if problem.settings.included_errors else None,
         nuisances=nuisance_estimates,
@@ -458,7 +450,7 @@ def _reported(
         notes=(
             *suspect_frames_note(histories),
             *identification_notes(best, tests, nuisance_estimates),
-            *one_end_note(search_outcome.minima, search_outcome.search),
+            *one_end_note(search_outcome.minima),
             *(nuisance.sentence for nuisance in implausible),
             *cut_interval_notes(law, estimates),
             *domain_notes(prediction, histories),
@@ -467,7 +459,6 @@ def _reported(
         ),
         histories=tuple(histories),
         predictor=problem.predictor,
-        search_trace=search_outcome.trace,
         linearised=linear,
         problem=problem.with_covariance(CovarianceFactor.of_residuals(residuals, noise_model)),
     )

@@ -15,8 +15,8 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
-from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
+from creepkit.inverse.search.multistart import multistart_minima
 from creepkit.records import Predictor
 
 
@@ -59,38 +59,32 @@ the likeliest."""
 
 
 class SearchOutcome(NamedTuple):
-    """The end of a global search: starts of the estimation, evaluations and trace.
+    """The end of a global search: starts of the estimation, and evaluations.
 
     starts : (parameters,) conditioned coordinates each. minima : how many ends it had, and how many of them differ.
     """
 
     starts: list[Floats]
     evaluations: int
-    trace: SearchTrace | None
     minima: Mapping[str, int] = MappingProxyType({})
-
-    @property
-    def search(self) -> str:
-        """Its name; "" where it began from a given estimate."""
-        return self.trace.search if self.trace is not None else "multi-start" if self.minima else ""
 
 
 def initial_search(
-    problem: LeastSquaresProblem, through: Predictor | None, search: GlobalSearch, progress: IterationCallback | None
+    problem: LeastSquaresProblem, through: Predictor | None, progress: IterationCallback | None
 ) -> SearchOutcome:
     """The best minima that differ, by the reduced-order model of the cheapest predictor."""
     predictor = through or problem.predictor
     reduced_order_model = predictor.reduced_order_model()
     searched = search_problem(problem, (reduced_order_model or predictor).for_search())
-    search_result = search.minima(searched, progress)
+    ends = multistart_minima(searched, progress)
     equal = EQUAL_PREDICTIONS if reduced_order_model is None else EQUAL_REDUCED_ORDER_PREDICTIONS
-    (best, *_), apart, ends = search_result.minima, list[Minimum](), search_result.minima
+    best, apart = ends[0], list[Minimum]()
     for end in ends:
         apart += [] if any(are_one(end, other, searched.bounds, equal) for other in apart) else [end]
     at_best = sum(are_one(end, best, searched.bounds, equal) for end in ends)
     counts = {"search_ends": len(ends), "distinct_minima": len(apart), "ends_at_best": at_best}
     starts = [end.x for end in apart[:MOST_MINIMA] if end.cost <= LARGEST_COST * best.cost]
-    return SearchOutcome(starts, searched.evaluations.count, search_result.trace, counts)
+    return SearchOutcome(starts, searched.evaluations.count, counts)
 
 
 def are_one(a: Minimum, b: Minimum, bounds: Bounds, equal_predictions: float = EQUAL_PREDICTIONS) -> bool:

@@ -6,7 +6,7 @@ p(x) the penalties of bounds and priors,
     chi2(x) = |L^-1 r(x)|^2 + |p(x)|^2,    x = (u, e),
 
 u the conditioned coordinates of the law and e the explicit nuisance parameters of the tests. Search, local refinement,
-ranking, intervals, profiles, posterior samples, term selection and the design of experiments share this one record.
+ranking, intervals, posterior samples, term selection and the design of experiments share this one record.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from creepkit.inverse.reference_conditions import (
     simulated_condition,
 )
 from creepkit.inverse.residuals import candidate_residuals, residuals_at_measured_values, residuals_of_prediction
-from creepkit.inverse.search.local_refinement import Minimum, System, Tolerances, bounded_least_squares, robust_loss
+from creepkit.inverse.search.local_refinement import Minimum, System, Tolerances, bounded_least_squares
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.stopped_tests import stopped_tests
 from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
@@ -51,10 +51,6 @@ from creepkit.records.conditions import stated_condition
 
 CACHED_EVALUATIONS = 4
 """Points whose residuals are cached: a search ends at one that it has evaluated, and the next begins there."""
-
-
-FAILED_COST = 1e12
-"""Cost of a candidate that cannot be predicted at all."""
 
 
 ROUNDING = 1e-12
@@ -424,17 +420,6 @@ class LeastSquaresProblem:
         u = x[: self.parameter_count]
         rows = self.bound_penalties.jacobian(u)
         return self.bound_penalties.limits(u), np.pad(rows, ((0, 0), (0, x.size - u.size)))
-
-    def cost(self, u: Floats) -> Floats:
-        """(candidates,) half the loss of the data, penalties included, of u (candidates, parameters).
-
-        Nuisance parameters are at their means; all candidates are one prediction. Always finite.
-        """
-        inside = self.bounds.of(range(self.parameter_count)).clip(u)
-        whitened = self.whiten(np.moveaxis(self.candidate_residuals(inside), 0, -1)).T
-        total = 0.5 * (robust_loss(whitened**2) if self.robust else whitened**2).sum(axis=1)
-        total += 0.5 * (np.maximum(self.bound_penalties.limits(inside), 0.0) ** 2).sum(axis=1)
-        return np.where(np.isfinite(total), total, FAILED_COST)
 
     # ---- minima ------------------------------------------------------------------------------------------------------
 

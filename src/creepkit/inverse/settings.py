@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from numbers import Integral
-from typing import Any, Literal, Self, get_args
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -19,10 +19,7 @@ from creepkit.limits import SEED, SOBOL_POINTS, STARTS, Limits
 from creepkit.options import Options, option
 from creepkit.records import Nuisance, Predictor, dimension_named
 
-Weighting = Literal["automatic", "noise", "likelihood", "equal", "paper"]
-
-
-OutputWeights = Weighting | Mapping[str, float]
+Weights = Literal["automatic", "noise", "likelihood"]
 
 
 UsualErrors = Literal["usual", "none"] | Mapping[str, float]
@@ -58,8 +55,6 @@ class IdentificationSettings(Options, title="settings of an identification"):
         every output (see inverse.variance_components). "likelihood": the values too, under the usual errors. "noise":
         least squares of frames of equal weight, which describe tests best where no law explains them. "automatic",
         the default: "likelihood", but "noise" where a law misses the shape of curves (see inverse.identify.describing).
-        {output: weight}: the sum of weight times relative squared error (see inverse.goodness_of_fit); "equal" weights
-        are Eq. (4) of the paper, "paper" its Eq. (S3) for measured histories, 0.99 on D_amp.
     test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its weight.
     further_laws : that select() tries at most where no candidate explains the tests: sums, and registered laws.
     suspect_frames : "exclude": frames that unload, fall or lie apart (see quality.exclude_suspect_frames) are left out
@@ -82,9 +77,7 @@ class IdentificationSettings(Options, title="settings of an identification"):
         flag="nuisance",
         example="thickness=0.4935:0.027",
     )
-    weights: OutputWeights = option(
-        "automatic", "Of outputs; equal: Eq. (4), paper: Eq. (S3).", example="amplitude=0.99,width=0.005"
-    )
+    weights: Weights = option("automatic", "Of readings: by their likelihood; with noise all alike.")
     test_loss: Literal["gaussian", "student"] = option(
         "gaussian", "Of whole tests; with student one far from its replicates weighs less."
     )
@@ -100,7 +93,6 @@ class IdentificationSettings(Options, title="settings of an identification"):
     )
 
     def __post_init__(self) -> None:
-        _check_weights(self.weights)
         _check_usual_errors(self.usual_errors)
         for nuisance in self.nuisances:
             _check_nuisance(nuisance)
@@ -172,18 +164,6 @@ def default_nuisances(*further: Nuisance, without: Sequence[str] = ()) -> tuple[
         refuse_unknown(kind, known, FitError, f"'{kind}' is no default nuisance that could be left out")
     replaced = {*without, *(n.kind for n in further)}
     return (*(n for n in usual if n.kind not in replaced), *further)
-
-
-def _check_weights(weights: OutputWeights) -> None:
-    if isinstance(weights, str):
-        if weights not in get_args(Weighting):
-            words = ", ".join(get_args(Weighting))
-            raise FitError(f'weights is "{weights}"; allowed are {words} and a mapping such as {{"strain": 0.99}}')
-        return
-    invalid = [f"{name}: {value!r}" for name, value in weights.items() if not (np.isfinite(value) and value > 0)]
-    if invalid or not weights:
-        example = invalid[0] if invalid else "none"
-        raise FitError(f"weights must be numbers above zero for at least one output, found {example}")
 
 
 LARGEST_USUAL_ERRORS = {"temperature": 50.0, "dimensions": 10.0, "load": 0.3, "modulus": 0.3, "motion": 0.3}

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats
-from creepkit.errors import FitError
-from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
+from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import (
     ASSUMED_RATE_SD,
     MINIMUM_TESTS,
@@ -32,7 +31,7 @@ from creepkit.inverse.variance_components import (
     log_noise_prior,
     restricted_log_likelihood,
 )
-from creepkit.records import is_logarithmic, output_named
+from creepkit.records import is_logarithmic
 
 STUDENT_FREEDOM = 4.0
 """Degrees of freedom of Student's t for whole tests; the usual choice where tails are unknown (Lange et al. 1989)."""
@@ -67,10 +66,6 @@ INITIAL_SINGLE_VALUE_SD = 0.3
 """Scatter of ln of rupture times and of minimum rates to begin from: one of each test, which cannot drift."""
 
 
-SMALLEST_WEIGHT = 1e-6
-"""Relative weight of an output that the weights do not name."""
-
-
 class WorkingNoiseEstimator:
     """How the working noise follows from the settings: by likelihood, or by the weights of outputs."""
 
@@ -83,41 +78,19 @@ class WorkingNoiseEstimator:
         """errors : {output: standard deviation of what the predictor itself is wrong by}, in the output's unit."""
         self.settings, self.observations, self.predictor_errors = settings, observations, errors or {}
         self.by_likelihood = settings.weights == "likelihood"
-        self.relative_sd: Mapping[str, float] | None = None
-        if settings.weights == "equal":
-            self.relative_sd = _relative_standard_deviations(dict.fromkeys(observations.outputs, 1.0), observations)
-        elif settings.weights == "paper":
-            self.relative_sd = _relative_standard_deviations(_paper_weights(observations), observations)
-        elif not isinstance(settings.weights, str):
-            self.relative_sd = _relative_standard_deviations(settings.weights, observations)
 
     def initial(self) -> NoiseModel:
         """The working noise before anything was fitted."""
-        start = initial_working_noise(self.observations, self.settings.nuisances)
-        return (
-            start
-            if self.relative_sd is None
-            else self._in_ratio_of_weights(start, 0.3 / min(self.relative_sd.values()))
-        )
+        return initial_working_noise(self.observations, self.settings.nuisances)
 
     def estimate(
         self, residuals: Residuals, previous: NoiseModel, linearised: LinearisedProblem | None = None
     ) -> NoiseModel:
         """The working noise, given residuals; for a likelihood also the problem made linear."""
-        nuisances = self.settings.nuisances
         if self.by_likelihood:
             assert linearised is not None
             return self._by_restricted_likelihood(linearised, previous)
-        if self.relative_sd is None:
-            return estimate_variance_components(residuals, previous, nuisances)
-        offsets = predicted_random_effects(residuals, previous)[0]
-        remaining = residuals.values + residuals.offset_sensitivity * np.take_along_axis(
-            offsets, residuals.output_index, axis=1
-        )
-        relative_sd = self.observations.per_observation([self.relative_sd[name] for name in self.observations.outputs])
-        whitened = ((remaining / relative_sd) ** 2 * residuals.test_weights[:, None])[residuals.present]
-        scaled = self._in_ratio_of_weights(previous, float(np.sqrt(np.mean(whitened))))
-        return estimate_variance_components(residuals, scaled, nuisances, fixed=("misfit",))
+        return estimate_variance_components(residuals, previous, self.settings.nuisances)
 
     def starting_noise(self, tests: int) -> NoiseModel:
         """Where the iteration begins: the guess, or for a likelihood all sources of scatter at a tenth."""
@@ -227,13 +200,6 @@ class WorkingNoiseEstimator:
         size, rate = max(noise_model.discrepancy, INITIAL_DISCREPANCY), max(noise_model.rate, self._likely_rate(tests))
         return replace(noise_model, rate=rate, discrepancy=size if discrepancy else 0.0, discrepancy_length=1.0)
 
-    def _in_ratio_of_weights(self, noise_model: NoiseModel, scale: float) -> NoiseModel:
-        """Misfits in the ratio that the weights ask for, without noise of their own."""
-        assert self.relative_sd is not None
-        for name, relative in self.relative_sd.items():
-            noise_model = noise_model.with_output(name, noise=0.0, misfit=max(scale, 1e-6) * relative)
-        return noise_model
-
 
 def _drifts_at_longest(noise_model: NoiseModel, residuals: Residuals) -> bool:
     """Whether a drift that is not small beside white noise has the longest correlation that it may have."""
@@ -257,34 +223,6 @@ def with_single_value_weight(working: NoiseModel, observations: ObservationVecto
         if curves.size:
             working = working.with_output(name, misfit=working[name].misfit / float(np.sqrt(np.mean(curves))))
     return working
-
-
-def _paper_weights(observations: ObservationVector) -> dict[str, float]:
-    """The weights of the paper's loss for measured histories, Eq. (S3), as specimens state them of their outputs."""
-    stated = {name: output_named(name).weight for name in observations.outputs}
-    weights = {name: weight for name, weight in stated.items() if weight is not None}
-    if not weights:
-        raise FitError(
-            f'weights="paper" is the loss of bulge tests; none is known for {", ".join(observations.outputs)}; give '
-            "weights by output"
-        )
-    return weights
-
-
-def _relative_standard_deviations(weights: Mapping[str, float], observations: ObservationVector) -> dict[str, float]:
-    """{output: standard deviation} of independent residuals; squares add up to weight x relative squared error."""
-    unknown = [name for name in weights if name not in observations.outputs]
-    if unknown:
-        raise FitError(f"weights name '{unknown[0]}', which is not among the outputs {', '.join(observations.outputs)}")
-    transformed, standard_deviations = observations.forward(observations.values), {}
-    largest = max(weights.values())
-    for position, name in enumerate(observations.outputs):
-        values = transformed[observations.present & (observations.output_index == position)]
-        sum_of_squares = float(((values - values.mean()) ** 2).sum()) if values.size else 0.0
-        standard_deviations[name] = float(
-            np.sqrt(sum_of_squares / max(weights.get(name, 0.0), SMALLEST_WEIGHT * largest))
-        )
-    return standard_deviations
 
 
 def robust_test_weights(residuals: Residuals, working: NoiseModel) -> Floats:

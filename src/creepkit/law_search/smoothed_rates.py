@@ -34,8 +34,8 @@ ROUGHNESS = 0.05
 class SmoothedRates:
     """Points of smoothed curves.
 
-    stress : (points,) MPa. strain : (points,). time : (points,) s. temperature : (points,) K. log_rate : (points,) ln of
-    the rate in 1/s.
+    stress : (points,) MPa. strain : (points,). time : (points,) s. temperature : (points,) K. log_rate : (points,)
+    ln of the rate in 1/s.
     """
 
     stress: Floats

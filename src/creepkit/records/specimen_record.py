@@ -47,7 +47,6 @@ class Output(_OfQuantity, str):
     grows : whether it grows with creep while the load is held; a stress that relaxes does not.
     noise : standard deviation of a usual measurement, in its unit: what data sets and planted tests are made with. An
         identification takes what a test states or shows. None: not known.
-    weight : its share in the paper's loss, where outputs have shares.
     visible : how much of it plainly shows creep, in its unit; ten times the noise by default.
     change_of : the length of the test piece that grows by it, "-notch_diameter" of one that shrinks; "" for none. Files
         may then hold that length itself, or its relative change.
@@ -56,7 +55,6 @@ class Output(_OfQuantity, str):
     long_name: str
     grows: bool
     noise: float | None
-    weight: float | None
     visible: float | None
     change_of: str
 
@@ -68,7 +66,6 @@ class Output(_OfQuantity, str):
         *,
         grows: bool = True,
         noise: float | None = None,
-        weight: float | None = None,
         visible: float | None = None,
         change_of: str = "",
     ) -> Output:
@@ -80,7 +77,7 @@ class Output(_OfQuantity, str):
                 raise SolveError(f"output '{name}': {what} is {value!r}; allowed is a number above zero, or None")
         output = super().__new__(cls, name)
         output.quantity, output.long_name = quantity, long_name or name.replace("_", " ")
-        output.grows, output.noise, output.weight = grows, noise, weight
+        output.grows, output.noise = grows, noise
         output.change_of = change_of
         output.visible = visible if visible is not None else None if noise is None else VISIBLE_IN_NOISE * noise
         return output
@@ -97,7 +94,7 @@ class Output(_OfQuantity, str):
 
     def __getnewargs_ex__(self) -> tuple[tuple[str, ...], dict[str, Any]]:
         """Copies and other processes get all of it."""
-        names = ("grows", "noise", "weight", "visible", "change_of")
+        names = ("grows", "noise", "visible", "change_of")
         return (str(self), self.quantity, self.long_name), {name: getattr(self, name) for name in names}
 
 

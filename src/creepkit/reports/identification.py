@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.nuisance_parameters import NuisanceEstimate
     from creepkit.inverse.selection.ranking import Ranking
-    from creepkit.inverse.settings import IdentificationSettings
     from creepkit.inverse.single_values import SingleValue
     from creepkit.inverse.uncertainty.laplace_approximation import Estimate
     from creepkit.reports.svg import PageFigures
@@ -174,7 +173,7 @@ def interval_basis(fit: Identification) -> list[str]:
     That they hold only with the form of the law is not said of a law that the tests reject: none of its values does.
     """
     conditional = "" if rejected(fit) else constant_load_sentence(fit)
-    return [*_usual_errors(fit), _weights(fit.settings), *([conditional] if conditional else [])]
+    return [*_usual_errors(fit), WEIGHTS[fit.settings.weights], *([conditional] if conditional else [])]
 
 
 def _usual_errors(fit: Identification) -> list[str]:
@@ -197,12 +196,6 @@ WEIGHTS = {
     "noise": 'the intervals rest on readings of equal weight (weights "noise") and all the scatter that was estimated',
 }
 """{weights of a fit: what its intervals rest on}."""
-
-
-def _weights(settings: IdentificationSettings) -> str:
-    stated = settings.weights if isinstance(settings.weights, str) else f"{dict(settings.weights)}"
-    usual = f"the intervals rest on weights of the outputs ({stated}), whose relative squared errors are summed"
-    return WEIGHTS.get(stated, usual)
 
 
 # ---- tests -----------------------------------------------------------------------------------------------------------

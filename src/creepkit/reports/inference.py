@@ -1,4 +1,4 @@
-"""Text of what follows an identification: term selection, profiles, posterior, confirmation, cross-validation."""
+"""Text of what follows an identification: term selection, posterior, confirmation, cross-validation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from creepkit.inverse.uncertainty.correlation import Correlation
     from creepkit.inverse.uncertainty.importance_sampling import PosteriorSamples
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-    from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
 
 
 # ---- term selection --------------------------------------------------------------------------------------------------
@@ -36,13 +35,6 @@ def sparsity_text(sparsity: Sparsity) -> str:
 
 
 # ---- uncertainty -----------------------------------------------------------------------------------------------------
-
-
-def profile_text(profile: ProfileLikelihood) -> str:
-    """One line: the best value and the interval by the profile."""
-    low, high = (f"{end:.4g}" if end is not None else "open" for end in (profile.low, profile.high))
-    value = f"{profile.name} = {profile.best:.5g} {unit_text(profile.unit)}".rstrip()
-    return "; ".join([f"{value}, {100 * profile.level:g} % interval [{low}, {high}] by its profile", *profile.notes])
 
 
 def posterior_text(samples: PosteriorSamples) -> str:

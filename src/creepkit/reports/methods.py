@@ -6,7 +6,7 @@ Numbers that differ from material to material stand in the tables of the page.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,6 @@ from creepkit.inverse.output_transforms import LogTransform
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, NOISE_PRIOR_SD
 from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
 from creepkit.language.printing import arrhenius_exponent
-from creepkit.laws.paper import PAPER
 from creepkit.limits import SIGNIFICANCE
 from creepkit.records.loading import held_of
 from creepkit.reports.blocks import ends, listed, number, plural, printable, sentence, typeset
@@ -49,9 +48,7 @@ CITATIONS = {
     "wilshire": "B. Wilshire, A. J. Battenbough (2007), Mater. Sci. Eng. A 443, 156",
     "monkman-grant": "F. C. Monkman, N. J. Grant (1956), Proc. ASTM 56, 593",
     "lindley": "D. V. Lindley (1956), Ann. Math. Stat. 27, 986-1005",
-    "chen": f"{PAPER}, Eq. (S3)",
     "student": "K. L. Lange, R. J. A. Little, J. M. G. Taylor (1989), J. Am. Stat. Assoc. 84, 881-896",
-    "swarm": "M. Clerc, J. Kennedy (2002), IEEE Trans. Evol. Comput. 6(1), 58-73",
     "pysindy": "B. M. de Silva et al. (2020), J. Open Source Softw. 5(49), 2104",
     "creepkit": f"The authors of creepkit, creepkit (software), version {version('creepkit')}, licence Apache-2.0",
 }
@@ -194,24 +191,13 @@ def _models(fit: Identification) -> Iterator[str]:
 def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
     """How the optimum was sought, what was weighted how, and what intervals are made of."""
     settings, noise = fit.settings, fit.noise_model
-    search = str(fit.search_trace.search if fit.search_trace is not None else fit.provenance.get("search", "")).lower()
     region = f"by least squares in a trust region{cite('trust region')}"
     yield f"Parameters were sought within the bounds of the table of symbols {region}."
-    if search.startswith("multi-start"):
+    if "search_ends" in fit.provenance:
         points = f"at most {settings.sobol_points} points of a Sobol' sequence{cite('sobol')}"
         yield f"Up to {plural(settings.starts, 'start')} were picked out of {points} (seed {settings.seed})."
-    elif "swarm" in search:
-        yield f"It began where a particle swarm{cite('swarm')} ended (seed {settings.seed})."
-    minimised = "The sum of the relative squared errors of the outputs was minimised"
-    if isinstance(settings.weights, Mapping):
-        weights = ", ".join(f"{name.replace('_', ' ')} {number(value, 3)}" for name, value in settings.weights.items())
-        yield f"{minimised}, with the weights {weights}."
-    elif settings.weights == "noise":
+    if settings.weights == "noise":
         yield "Values were found by least squares of readings of equal weight."
-    elif settings.weights == "equal":
-        yield f"{minimised}, each output with equal weight."
-    elif settings.weights == "paper":
-        yield f"{minimised}, with 0.99 of the weight on the amplitude{cite('chen')}."
     components = "White and autocorrelated noise, offsets and the scatter of rates"
     yield f"{components} were estimated by restricted maximum likelihood{cite('reml')}."
     freedom = f"Satterthwaite's degrees of freedom{cite('satterthwaite')}"

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 
 def by_likelihood(asked: SearchOptions, settings: IdentificationSettings) -> bool:
-    """Whether laws are compared by their likelihood: no search, penalty or weights ask for something else."""
-    return asked.global_search is None and asked.penalty is None and settings.by_likelihood
+    """Whether laws are compared by their likelihood: no penalty or weights ask for something else."""
+    return asked.penalty is None and settings.by_likelihood
 
 
 def ranked_candidates(
@@ -48,9 +48,7 @@ def ranked_candidates(
             progress=progress,
             **options,
         )
-    options |= {
-        "settings": common_rupture_times(laws, settings), "search": asked.global_search, "penalty": asked.penalty
-    }  # fmt: skip
+    options |= {"settings": common_rupture_times(laws, settings), "penalty": asked.penalty}
     fits = []
     for k, law in enumerate(laws, start=1):
         place = f"law {k} of {len(laws)}: {law.title or law.name}"

@@ -144,7 +144,7 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
     how = {} if selection is None else values_of_table(SearchOptions, selection)
     asked = SearchOptions().changed({**values_of_table(SearchOptions, part), **how})
     if selection is not None and not by_likelihood(asked, settings):
-        what = "compares laws by their likelihood: leave out weights, search and penalty"
+        what = "compares laws by their likelihood: leave out weights and penalty"
         raise study.file.error(("selection",), what)
 
     def make(results: Results, tick: Tick) -> Ranking:

@@ -20,7 +20,7 @@ from creepkit.forecasts.planned_tests import ForecastOptions, PlannedTestOptions
 from creepkit.instruments.reading_options import RecordOptions
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.search_options import SearchOptions
-from creepkit.inverse.settings import IdentificationSettings, OutputWeights, UsualErrors
+from creepkit.inverse.settings import IdentificationSettings, UsualErrors
 from creepkit.options import Options, table_of
 from creepkit.rupture_assessment.assessment import RuptureQuestion, RuptureSettings
 
@@ -87,12 +87,12 @@ def _label_values(value: Any) -> Any:
     raise PydanticCustomError("misfit", "must be a text, a number, or a list of them")
 
 
-def _output_weights(value: Any) -> Any:
+def _word_or_numbers(value: Any) -> Any:
     """A word, or numbers by name."""
     numbers = isinstance(value, dict) and all(_is_number(one) for one in value.values())
     if isinstance(value, str) or (value and numbers):
         return value
-    raise PydanticCustomError("misfit", "must be a word such as noise, or numbers by output such as { strain = 1 }")
+    raise PydanticCustomError("misfit", "must be a word such as none, or numbers by name such as { load = 0.01 }")
 
 
 def _channels(value: Any) -> Any:
@@ -112,8 +112,7 @@ TYPES: dict[Any, Any] = {
     Path: Text,
     tuple[str, ...]: OneOrMore,
     tuple[tuple[float, ...], ...]: Annotated[list[Bounds], Field(max_length=MOST_ITEMS)],
-    OutputWeights: Annotated[Any, BeforeValidator(_output_weights)],
-    UsualErrors: Annotated[Any, BeforeValidator(_output_weights)],
+    UsualErrors: Annotated[Any, BeforeValidator(_word_or_numbers)],
 }
 """{type of an option: that of its key}, where it is another one in TOML."""
 
@@ -252,7 +251,7 @@ class IdentificationTable(_OF_IDENTIFICATION, TableModel):  # type: ignore[misc]
 _OF_SELECTION: Any = _keys(IdentificationSettings, only=("further_laws",))
 
 
-class SelectionTable(_keys(SearchOptions, without=("search", "penalty")), _OF_SELECTION):  # type: ignore[misc]
+class SelectionTable(_keys(SearchOptions, without=("penalty",)), _OF_SELECTION):  # type: ignore[misc]
     """[selection]: how laws are compared; without sums, sums are tried where no candidate explains the tests."""
 
 

@@ -179,7 +179,7 @@ def test_tests_together_are_known_no_worse_than_the_best_of_them_alone():
     assert (np.array(together) < np.min(alone, axis=0)).all(), widths
 
 
-def test_values_profiles_and_samples_are_one_estimate_whatever_errors_are_included():
+def test_values_and_samples_are_one_estimate_whatever_errors_are_included():
     """Of nine planted curves, within 0.2 standard deviations; errors that vanish move nothing."""
     curves, law = ck.read_histories(ck.example_data("planted creep curves")), ck.law("strain-hardening")
     none, vanishing, usual = (
@@ -188,8 +188,6 @@ def test_values_profiles_and_samples_are_one_estimate_whatever_errors_are_includ
     )
     sd, draws = np.sqrt(np.diag(usual.covariance)), usual.sample(draws=1000).u
     shifts = [100.0 * (vanishing.u - none.u), usual.u - none.u, draws.mean(axis=0) - usual.u] / sd
-    for one in usual.estimates[1:3]:
-        shifts = np.append(shifts, (usual.profile(one.name).best - one.value) / (one.high - one.low) * 3.92)
     assert np.abs(shifts).max() < 0.2
     np.testing.assert_allclose(draws.std(axis=0), sd, rtol=0.2)
 

@@ -4,17 +4,12 @@ import numpy as np
 
 from creepkit.inverse.selection import rank
 from creepkit.inverse.uncertainty.correlation import Correlation
-from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
 from creepkit.laws.norton import NORTON
 from creepkit.reports import words
 from helpers.log_rate_predictor import known_scatter, measured
 from helpers.paths import ROOT
 
-AXIS = np.array([10.0, 100.0])
-RECORDS = [
-    Correlation(("ln A", "n"), np.array([[1.0, -0.5], [-0.5, 1.0]]), np.ones(2)),
-    ProfileLikelihood("n", "1", AXIS, np.ones(2), 4.0, None, 5.0, 3.84, 0.95, (3.0, 5.0)),
-]
+RECORDS = [Correlation(("ln A", "n"), np.array([[1.0, -0.5], [-0.5, 1.0]]), np.ones(2))]
 
 
 def test_records_print_as_text() -> None:

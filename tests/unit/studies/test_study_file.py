@@ -153,8 +153,12 @@ def test_values_of_a_wrong_type_are_refused_with_their_line():
         ("# stress_MPa: 100\nTime (h),Creep strain (%)\n0.5,0.1\n", 2, "but looks like data"),
         ("a = " + "[" * 3000, None, "too deep"),
         ('[data]\nfiles = ["a"]\n[study]\nseed = ' + "1" * 5000, None, "too large"),
-        ('[data]\nfiles = ["a"]\n[identification]\nlaws = ["norton"]\nweights = { s = 1e400 }', 5, "numbers by output"),
-        ('[data]\nfiles = ["a"]\n[identification]\nlaws = ["norton"]\nweights = { s = 1' + "0" * 400 + "}", 5, ""),
+        (
+            '[data]\nfiles = ["a"]\n[identification]\nlaws = ["norton"]\nusual_errors = { load = 1e400 }',
+            5,
+            "numbers by name",
+        ),
+        ('[data]\nfiles = ["a"]\n[identification]\nlaws = "a"\nusual_errors = { load = 1' + "0" * 400 + "}", 5, ""),
     ],
 )
 def test_other_layouts_are_refused(text, line, words):

@@ -1,26 +1,22 @@
 """Multi-start least squares: of many Sobol draws the best, and the centre of the bounds, are refined.
 
-Measured on creep problems: a few selected starts with exact Jacobians find the least cost at a hundredth of the
-evaluations of a particle swarm.
+For a sum of terms the optimum of each term alone is a start too.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import qmc
 
-from creepkit import limits
 from creepkit.arrays import Bools, Floats
-from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.bounds import LOG_RATE_BOUNDS
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import median_log_rate_excess, median_log_rupture_excess
-from creepkit.inverse.search.global_search import SearchResult, refined
-from creepkit.inverse.search.local_refinement import IterationCallback
-from creepkit.options import Options, option
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
 
 INTERNAL_RATE_RANGE = (-4.0, 0.0)
 """Range of draws for an internal variable: ln of its rate times the duration of a test."""
@@ -36,32 +32,20 @@ FIRST_DRAWS = 2
 to one minimum, that was the least one (within 0.3 % of its cost) in 79 of 80 searches of planted dimples."""
 
 
-@checked
-@dataclass(frozen=True)
-class MultiStart(Options, title="multi-start"):
-    """Least squares from the centre of the bounds and the best of screened Sobol draws.
-
-    starts, draws : None for those of the settings. For a sum of terms each term's own optimum is a start too.
-    """
-
-    starts: int | None = option(None, "Starts of least squares.", limits.STARTS)
-    draws: int | None = option(None, "Sobol points that are screened for them.", limits.SOBOL_POINTS)
-
-    def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
-        """The minima of all starts, best first; a sum's best single term stands behind the best."""
-        settings, shapes = problem.settings, problem.bounds.lower.size - len(problem.coordinates.term_rates)
-        share = {0: 8, 1: 8, 2: 4}.get(shapes, 1)  # rates are not drawn: they are shifted to those of the data
-        starts = self.starts or min(settings.starts, max(2 * settings.starts // share, 2))
-        draws = self.draws or max(settings.sobol_points // share, 1)
-        if progress is not None:
-            progress("screening of draws", 0, draws)
-        of_terms = single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2)
-        if share > 1 and self == MultiStart() and not (of_terms or _vanishing(problem).any()):
-            ends = refined(problem, screened_starts(problem, starts=2, draws=FIRST_DRAWS), progress)
-            if ends[0] is ends[1]:
-                return SearchResult(tuple(ends))
-        points = [*of_terms, *screened_starts(problem, starts=starts, draws=draws)]
-        return SearchResult(tuple(refined(problem, points, progress)))
+def multistart_minima(problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> list[Minimum]:
+    """The minima of all starts, best first, of a problem whose unknowns are the conditioned coordinates u alone."""
+    settings, shapes = problem.settings, problem.bounds.lower.size - len(problem.coordinates.term_rates)
+    share = {0: 8, 1: 8, 2: 4}.get(shapes, 1)  # rates are not drawn: they are shifted to those of the data
+    starts, draws = min(settings.starts, max(2 * settings.starts // share, 2)), max(settings.sobol_points // share, 1)
+    if progress is not None:
+        progress("screening of draws", 0, draws)
+    of_terms = single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2)
+    if share > 1 and not (of_terms or _vanishing(problem).any()):
+        ends = refined(problem, screened_starts(problem, starts=2, draws=FIRST_DRAWS), progress)
+        if ends[0] is ends[1]:
+            return ends
+    points = [*of_terms, *screened_starts(problem, starts=starts, draws=draws)]
+    return refined(problem, points, progress)
 
 
 def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
@@ -146,3 +130,64 @@ def _with_sampled_exponents(problem: LeastSquaresProblem, points: Floats, sobol:
     for local_exponent in coordinates.exponents:
         points[:, local_exponent.position] = conditioned[:, local_exponent.position]
     return problem.bounds.clip(points)
+
+
+# ---- refinement ------------------------------------------------------------------------------------------------------
+
+SAME_BASIN = 0.1
+"""Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
+
+
+FIRST_STEPS, LAST_STEPS = Tolerances(max_steps=3, gain=1e-3), Tolerances(tolerance=1e-4, gain=1e-3)
+"""Of every start of least squares, and then of the best of them one after the other."""
+
+
+CONTINUED, CONFIRMED = 3, 2
+"""How many of the best are refined to the end at most, and how many of them that end at the best are enough."""
+
+
+SAME_POINT, SAME_COST = 0.02, 0.01
+"""Of the width of the bounds: starts that come closer than that in every coordinate lead to the same minimum. Of the
+cost of a minimum: so do those in its basin whose next step promises a cost as near."""
+
+
+def refined(
+    problem: LeastSquaresProblem, starts: Sequence[Floats], progress: IterationCallback | None = None
+) -> list[Minimum]:
+    """The ends that starts (parameters,) of least squares lead to, best first; far worse ones after few steps.
+
+    A law with internal variables, whose valleys are long and curved, takes each of the best to its end.
+    """
+    ends, curved = [], bool(problem.coordinates.state_rates)
+    if progress is not None:
+        progress("start", 0, len(starts))
+    for k, u in enumerate(starts):
+        ends.append(problem.minimise(u, tolerances=FIRST_STEPS))
+        if progress is not None:
+            progress("start", k + 1, len(starts))
+    ends.sort(key=lambda end: end.cost)
+    for k, end in enumerate(ends[:CONTINUED]):
+        ends[k] = _continued(problem, end, ends[:k]) if end.converged or not curved else problem.minimise(end.x)
+        best = min(ends, key=lambda one: one.cost)
+        if k and not curved and sum(other is best for other in ends[: k + 1]) >= CONFIRMED:
+            break
+    return sorted(ends, key=lambda end: end.cost)
+
+
+def _continued(problem: LeastSquaresProblem, end: Minimum, others: Sequence[Minimum]) -> Minimum:
+    """The minimum that a search leads to, a few steps at a time; that of another one where it comes to lie there."""
+    steps, near = replace(LAST_STEPS, max_steps=FIRST_STEPS.max_steps + 1), list[Minimum]()
+    for _ in range(LAST_STEPS.max_steps // FIRST_STEPS.max_steps):
+        near, before = [one for one in others if _leads_to(end, one, problem.bounds.width)], end.x
+        end = near[0] if near else end if end.converged else problem.minimise(end.x, tolerances=steps)
+        if np.array_equal(end.x, before) or near:  # or no step of those that are tried gains anything
+            break
+    return end
+
+
+def _leads_to(end: Minimum, other: Minimum, width: Floats) -> bool:
+    """Whether a search leads to another minimum: it is there, or in its basin and promised its cost."""
+    apart = (np.abs(end.x - other.x) / width).max()
+    return bool(
+        apart <= SAME_POINT or (apart <= SAME_BASIN and abs(end.promised - other.cost) <= SAME_COST * other.cost)
+    )

@@ -42,7 +42,6 @@ from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.observation_vector import selected_frames
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import growth_per_strain, reference_end_strain, reference_stresses
-from creepkit.inverse.search.global_search import GlobalSearch
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, System, Tolerances
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity, TermNames
@@ -76,7 +75,6 @@ def identify_sparse(
     using: Predictor | Mapping[str, Predictor],
     *,
     penalty: Literal["l2", "subsets"] = "subsets",
-    search: GlobalSearch | None = None,
     through: Predictor | None = None,
     settings: IdentificationSettings | None = None,
     progress: IterationCallback | None = None,
@@ -91,7 +89,7 @@ def identify_sparse(
             "identify it without penalty, or a sum of laws with it"
         )
     how = {"settings": settings, "progress": progress}
-    full = identify(law, histories, using, search=search, through=through, **how)  # type: ignore[arg-type]
+    full = identify(law, histories, using, through=through, **how)  # type: ignore[arg-type]
     problem, screening = full.least_squares_problem, through_for_law(through, law)
     terms = TermSets(problem if screening is None else problem.with_predictor(screening), full.x)
     chosen = terms.lowest_bic() if penalty == "subsets" else terms.of_least_norm()
@@ -115,7 +113,7 @@ def identify_sparse(
         reduced=chosen.statistics(fit),
         observations=problem.observations.count,
     )
-    return replace(fit, search_trace=full.search_trace, sparsity=record)
+    return replace(fit, sparsity=record)
 
 
 @dataclass(frozen=True, eq=False)

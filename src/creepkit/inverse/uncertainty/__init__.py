@@ -1,1 +1,1 @@
-"""Uncertainty of identified laws: intervals, profile likelihood, posterior samples, model averaging and correlation."""
+"""Uncertainty of identified laws: intervals, posterior samples, model averaging and correlation."""

@@ -169,7 +169,7 @@ def sample_posterior(
         shape = _first_shape(fit, posterior)
         u = posterior_samples(posterior, posterior.optimum, shape, seed, draws=draws, least=0.5 * draws)
     if u is None:
-        raise FitError(f"law '{fit.law.name}': its posterior could not be sampled; profile(name) follows it")
+        raise FitError(f"law '{fit.law.name}': its posterior could not be sampled; give more tests, or fix a parameter")
     if fit.error_covariance is not None:
         sd = np.sqrt(np.diag(fit.covariance))
         scaled = fit.error_covariance / np.outer(sd, sd)

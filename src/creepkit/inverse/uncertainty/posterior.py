@@ -8,8 +8,7 @@ degrees of freedom of that covariance and K parameters
 the multivariate Student's t (Box & Tiao (1973), Bayesian Inference in Statistical Analysis, 2.7); -chi2(u) / 2 for
 large nu. Nuisance parameters of tests are integrated out to first order about their estimates: with r the whitened
 residuals at the estimates, J their derivatives to the nuisance parameters, priors below, chi2(u) = |r|^2 - |Q' r|^2,
-J = Q R. The effect of a test's own rate is taken half way between the optimum and the candidate (see
-uncertainty.profile_likelihood).
+J = Q R. The effect of a test's own rate is taken half way between the optimum and the candidate.
 
 Over its width residuals are smooth: a response surface, quadratic functions of u fitted to values and derivatives at
 some simulated points, gives those of thousands of draws. Source: R. Myers, D. Montgomery and C. Anderson-Cook, Response
@@ -26,41 +25,24 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.errors_of_tests import errors_of_tests, with_expected_scatter
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances
 
-REFIT_TOLERANCES = Tolerances(max_steps=25, tolerance=1e-7)
-"""Of minima about an optimum that is known."""
-
-
 OPTIMUM_TOLERANCES = Tolerances(gain=1e-3)
 """Of the optimum that a posterior is about: ln p is right there to a tenth."""
-
-
-def residuals_with_errors(fit: Identification) -> tuple[Residuals, NoiseModel]:
-    """Residuals at the optimum, and the noise, under whose covariance values are found by likelihood.
-
-    It holds those errors of the tests that the intervals include; without them another point would be the optimum.
-    """
-    problem, noise = fit.least_squares_problem, fit.noise_model
-    residuals = fit.residuals_of(problem)
-    if fit.error_covariance is None:
-        return residuals, noise
-    linear = problem.linearised(fit.x, residuals)
-    errors = errors_of_tests(problem, fit.x, linear, noise)
-    return linear.with_errors(errors).residuals, with_expected_scatter(problem, linear, noise)
 
 
 def predicted_errors(fit: Identification, alone: CovarianceFactor) -> Floats:
     """(tests, observations) of the residuals, what the errors of the tests did there: their best linear prediction.
 
     With C = C0 + S S', C0 that of `alone`, it is S S' C^-1 r = r - C0 C^-1 r: under C0 the rest has the optimum that
-    values by likelihood have under C.
+    values by likelihood, under the errors that the intervals include, have under C.
     """
-    residuals, noise = residuals_with_errors(fit)
-    weighted = CovarianceFactor.of_residuals(residuals, noise).inverse_times(residuals.values)
-    rest = (alone.blocks @ weighted[..., None])[..., 0]
+    problem, noise = fit.least_squares_problem, fit.noise_model
+    linear = problem.linearised(fit.x, fit.residuals_of(problem))
+    residuals = linear.with_errors(errors_of_tests(problem, fit.x, linear, noise)).residuals
+    whole = CovarianceFactor.of_residuals(residuals, with_expected_scatter(problem, linear, noise))
+    rest = (alone.blocks @ whole.inverse_times(residuals.values)[..., None])[..., 0]
     return np.where(residuals.present, residuals.values - rest, 0.0)
 
 

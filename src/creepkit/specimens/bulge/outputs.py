@@ -5,11 +5,11 @@ from __future__ import annotations
 from creepkit.records import Output
 
 OBSERVED = (
-    Output("amplitude", "length", noise=0.0015, weight=0.99, visible=0.02),
-    Output("width", "length", grows=False, noise=0.02, weight=0.005),
-    Output("shape", "number", grows=False, noise=0.02, weight=0.005),
+    Output("amplitude", "length", noise=0.0015, visible=0.02),
+    Output("width", "length", grows=False, noise=0.02),
+    Output("shape", "number", grows=False, noise=0.02),
 )
-"""Columns of what is observed: D_amp in mm, S_d in mm, S_p. Noise as measured on real dimples; the paper's weights."""
+"""Columns of what is observed: D_amp in mm, S_d in mm, S_p. Noise as measured on real dimples."""
 
 
 MOST_RINGS = 8
