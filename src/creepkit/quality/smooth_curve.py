@@ -123,6 +123,12 @@ class SmoothCurve:
         r = float((left[1:] * left[:-1]).sum()) / variance if variance > 0 else 0.0
         return float(np.sqrt((1 + r) / (1 - r))) if 0 < r < 1 else 1.0
 
+    def fitted(self) -> tuple[Floats, Floats]:
+        """(points,) values of the curve less its noise, and their rates, unit of the output a second."""
+        values, seconds = self._fitted(), 1e-6 * (self.times - self.start)
+        ends = self.position(self.times + seconds), self.position(self.times - seconds)
+        return values, self._slope(values) * (ends[0] - ends[1]) / (2.0 * seconds)
+
     def rate_step(self, time: float) -> RateStep:
         """The step of the slope at a time (s), with a step of the value fitted beside it."""
         one = np.array([time])
