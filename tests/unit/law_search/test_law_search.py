@@ -88,7 +88,7 @@ def test_a_planted_law_is_found_and_stands_on_the_front() -> None:
 
 def test_tests_without_curves_of_bars_are_refused() -> None:
     rate = ck.History(
-        "minimum", np.zeros(0), {}, minimum_rate=1e-8, temperature=900.0, loading=ck.constant_stress(80.0)
+        "minimum", np.array([3.6e6]), {}, minimum_rate=1e-8, temperature=900.0, loading=ck.constant_stress(80.0)
     )
     with pytest.raises(FitError, match="creep curves of bars"):
         ck.search_laws([rate])
