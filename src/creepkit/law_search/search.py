@@ -16,6 +16,7 @@ from itertools import product
 from time import process_time
 from typing import TYPE_CHECKING, Any, Unpack
 
+from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.candidates import candidates
@@ -24,13 +25,16 @@ from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.information_criteria import bic_penalty
+from creepkit.inverse.initial_search import StartingEstimate, search_problem
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures, with_arrhenius
+from creepkit.inverse.search.multistart import refined
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.law_search.grammar import HARDENING, SOFTENING, STRESS, Product, Sentence
 from creepkit.law_search.proposals import proposed_products, proposed_sums
 from creepkit.law_search.results import LawSearch, SearchedLaw
-from creepkit.law_search.smoothed_rates import SmoothedRates
+from creepkit.law_search.smoothed_rates import RateFit, SmoothedRates
 from creepkit.limits import Limits
 from creepkit.options import Options, option, takes_options
 from creepkit.records import History, Predictor
@@ -39,8 +43,8 @@ from creepkit.registry.arguments import resolve_predictors
 if TYPE_CHECKING:
     from creepkit.option_keywords import LawSearchOptionsKeywords
 
-BEAM, TRIED = 3, 4
-"""Sentences that are changed in turn, and neighbours of each that are identified."""
+BEAM, TRIED, SIMPLER = 3, 5, 2
+"""Sentences that are changed in turn, and neighbours of each that are identified, and of those with less parameters."""
 
 
 MOST_RANKED, NEAR, REGISTERED_RANKED = 4, 20.0, 2
@@ -111,8 +115,7 @@ class _Search:
     settings: IdentificationSettings
     end: float
     progress: Callable[[str, int, int], None] | None
-    screened: dict[Sentence, float] = field(default_factory=dict)
-    log_rates: dict[Sentence, Any] = field(default_factory=dict)
+    screened: dict[Sentence, RateFit] = field(default_factory=dict)
     fits: dict[Sentence | str, Identification] = field(default_factory=dict)
     failed: dict[Sentence | str, str] = field(default_factory=dict)
     registered: list[Sentence | str] = field(default_factory=list)
@@ -127,8 +130,8 @@ class _Search:
         singles = [Product(*factors) for factors in product(STRESS, HARDENING, SOFTENING)]
         singles = list(dict.fromkeys([*proposed_products(self.rates, optimizer), *singles]))
         self.screen([replace(first, products=(one,)) for one in singles])
-        by_screen = sorted(self.screened, key=self.screened.__getitem__)
-        fitted = {one.products[0]: self.log_rates[one] for one in by_screen[: 3 * BEAM]}
+        by_screen = sorted(self.screened, key=self.screen_score)
+        fitted = {one.products[0]: self.screened[one].log_rate for one in by_screen[: 3 * BEAM]}
         sums = [replace(first, products=products) for products in proposed_sums(self.rates, fitted, optimizer)]
         self.screen(sums)
         self.identify([*by_screen[: BEAM + TRIED], *sums])
@@ -140,14 +143,19 @@ class _Search:
             expanded.add(chosen)
             near = [one for one in chosen.neighbours(self.temperatures) if one not in self.fits]
             self.screen(near)
-            near = sorted((one for one in near if one in self.screened), key=self.screened.__getitem__)
-            self.identify(near[:TRIED])
+            near = sorted((one for one in near if one in self.screened), key=self.screen_score)
+            simpler = [one for one in near if len(one.law.params) < len(chosen.law.params)]
+            self.identify([*near[:TRIED], *simpler[:SIMPLER]])
         self.untried = sum(one not in expanded for one in self.best(BEAM))
 
     def screen(self, sentences: Sequence[Sentence]) -> None:
         """Fit sentences to the smoothed rates."""
         for one in self._in_time([s for s in sentences if s not in self.screened], "smoothed rates"):
-            self.screened[one], self.log_rates[one] = self.rates.fitted(one.law)
+            self.screened[one] = self.rates.fitted(one)
+
+    def screen_score(self, sentence: Sentence) -> float:
+        """The criterion of a sentence on the smoothed rates."""
+        return self.screened[sentence].score
 
     def identify(self, sentences: Sequence[Sentence]) -> None:
         """Identify sentences from the curves, with few starts and frames."""
@@ -167,9 +175,20 @@ class _Search:
     def _identify(self, key: Sentence | str, law: CreepLaw) -> None:
         quick = replace(self.settings, starts=2, sobol_points=64, frames=20, weights="likelihood", usual_errors="none")
         try:
-            self.fits[key] = identify(law, self.tests, self.predictor, settings=quick)
+            start = self._start(law, self.screened[key].theta, quick) if isinstance(key, Sentence) else None
+            self.fits[key] = identify(law, self.tests, self.predictor, settings=quick, start=start)
         except CreepkitError as error:
             self.failed[key] = str(error)
+
+    def _start(self, law: CreepLaw, theta: Floats, settings: IdentificationSettings) -> StartingEstimate:
+        """Where least squares of the curves end that begin at values from the smoothed rates.
+
+        theta : (starts, parameters) internal values.
+        """
+        problem = LeastSquaresProblem.from_histories(law, self.tests, self.predictor, settings)
+        searched = search_problem(problem, problem.predictor.for_search())
+        ends = refined(searched, [*searched.bounds.clip(searched.coordinates.u(theta))])
+        return StartingEstimate(ends[0].x, reference=problem.coordinates.reference, values_only=True)
 
     def _in_time(self, sentences: Sequence[Sentence], to: str) -> Iterator[Sentence]:
         """Sentences, one after the other, while there is time."""
