@@ -71,7 +71,7 @@ def command(
 
 def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
-    from creepkit.reports.answer import answer_text, asked_figures, strength_figures
+    from creepkit.reports.answer import answer_text, asked_figures, rupture_figures
 
     tell(result.title)
     told = [(one.name, one.state, one.sentence) for one in result.stages if one.state != "made" or one.sentence]
@@ -84,7 +84,7 @@ def print_result(result: StudyResult) -> None:
     if result.forecasts or result.rupture:
         of = {name: f"{group}: " if len(result.rankings) > 1 else "" for name, group in result.forecast_groups.items()}
         lines = [f"{of[name]}{one.line}" for name, found in result.forecasts.items() for one in asked_figures(found)]
-        lines += [one.line for assessment in result.rupture.values() for one in strength_figures(assessment)]
+        lines += [one.line for assessment in result.rupture.values() for one in rupture_figures(assessment)]
         for line in lines[:MOST_FIGURES]:
             tell(line)
     for group, ranking in result.rankings.items():

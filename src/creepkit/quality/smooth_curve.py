@@ -41,15 +41,17 @@ class SmoothCurve:
     """A fitted curve; times are counted from the start of its load.
 
     times, values : (points,) s and unit of the output. start : s, when its load was there. clock : the time scale in
-    which the spline is smooth.
+    which the spline is smooth. noise : standard deviation of the points.
     """
 
     times: Floats
     values: Floats
     start: float
     clock: str
+    noise: float
     _basis: Floats
     _variances: Floats
+    _stiffness: float
 
     def position(self, times: Floats) -> Floats:
         """(...,) times (s) on the clock of the spline, from 0 to 1 over the curve."""
@@ -69,6 +71,12 @@ class SmoothCurve:
         estimate, sd, freedom = self._effects(self._steps(times), self._ramps(times))
         scores = _normal_score(estimate / sd, freedom)
         return times, scores / max(1.0, robust_spread(scores)), estimate
+
+    def fitted(self) -> tuple[Floats, Floats]:
+        """(points,) values of the curve less its noise, and their rates, unit of the output a second."""
+        values, seconds = self._fitted(), 1e-6 * (self.times - self.start)
+        ends = self.position(self.times + seconds), self.position(self.times - seconds)
+        return values, self._slope(values) * (ends[0] - ends[1]) / (2.0 * seconds)
 
     def _ramps(self, times: Floats) -> Floats:
         return np.asarray(np.maximum(self.position(self.times)[:, None] - self.position(times)[None, :], 0.0))
@@ -95,6 +103,16 @@ class SmoothCurve:
         estimate, square = (np.take_along_axis(a, best, axis=0)[0] for a in (value, variance / information))
         return estimate, np.sqrt(square), degrees
 
+    def _fitted(self) -> Floats:
+        """(points,) values of the curve less its noise."""
+        u = self._basis.T @ self.values
+        return np.asarray(self.values - self._basis @ (u / (1.0 + self._stiffness * self._variances)))
+
+    def _slope(self, values: Floats) -> Floats:
+        """(points,) slope of a smooth curve."""
+        s = self.position(self.times)
+        return np.asarray(np.interp(s, 0.5 * (s[1:] + s[:-1]), np.diff(values) / np.diff(s)))
+
 
 def smooth_curve(times: Floats, values: Floats, start: float, level_shifts: Sequence[float] = ()) -> SmoothCurve:
     """Fit a curve, with steps of the value at known times (s).
@@ -116,7 +134,7 @@ def robust_spread(scores: Floats) -> float:
 
 
 def _fit(times: Floats, values: Floats, start: float, clock: str, shifts: Sequence[float]) -> tuple[float, SmoothCurve]:
-    empty = SmoothCurve(times, values, start, clock, np.zeros(0), np.zeros(0))
+    empty = SmoothCurve(times, values, start, clock, 0.0, np.zeros(0), np.zeros(0), 0.0)
     s = empty.position(times)
     design = np.column_stack([np.vander(s, 3), empty._steps(np.array(shifts))])
     complement = np.linalg.qr(design, mode="complete")[0][:, design.shape[1] :]
@@ -129,7 +147,9 @@ def _fit(times: Floats, values: Floats, start: float, clock: str, shifts: Sequen
     floor = (_NOISE_FLOOR * float(np.ptp(values)) + 1e-300) ** 2
     noise = np.maximum((weights * u**2).mean(axis=1), floor)
     likelihood = -0.5 * (u.size * np.log(noise) - np.log(weights).sum(axis=1))
-    return float(likelihood.max()), SmoothCurve(times, values, start, clock, basis, variances)
+    k = int(np.argmax(likelihood))
+    sigma, stiffness = float(noise[k] ** 0.5), float(_STIFFNESS[k])
+    return float(likelihood[k]), SmoothCurve(times, values, start, clock, sigma, basis, variances, stiffness)
 
 
 def _normal_score(ratio: Floats, freedom: int) -> Floats:

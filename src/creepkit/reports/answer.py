@@ -136,8 +136,8 @@ def _lives(fit: Identification) -> list[KeyFigure]:
         return []
     end, test = max(broken, key=lambda pair: pair[0].measured)
     said = f"measured {_written_out(end.measured / SECONDS_PER_HOUR, 3)} h"
-    values = (end.predicted, end.low, end.high)
-    return [_with_interval("time to rupture", test.condition, values, 1 / SECONDS_PER_HOUR, "h", said)]
+    hours = [time / SECONDS_PER_HOUR for time in (end.predicted, end.low, end.high)]
+    return [_with_interval("time to rupture", test.condition, hours, unit="h", remark=said)]
 
 
 def _with_interval(
@@ -173,8 +173,7 @@ def _shown(test: TestForecast, *, times: bool) -> Iterator[KeyFigure]:
     life = [one for one in reached if not one.output and (one.median <= end or (times and len(test.times) == 1))]
     wanted = [*([one for one in reached if one.output] if times else ()), *life]
     for one in wanted:
-        hours = (one.median, one.low, one.high)
-        label = f"time to {event_text(one)}"
+        hours, label = (one.median, one.low, one.high), f"time to {event_text(one)}"
         yield _with_interval(label, where, hours, 1 / SECONDS_PER_HOUR, "h", test.extrapolated(one))
     predicted = [(name, one) for name, one in test.outputs.items() if np.isfinite(one.value).any()]
     for name, output in [] if wanted else predicted[:1]:
@@ -185,17 +184,22 @@ def _shown(test: TestForecast, *, times: bool) -> Iterator[KeyFigure]:
         yield _with_interval(label, where, values, factor, unit, test.extrapolated())
 
 
-def strength_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
-    """The rupture strength at the longest time asked for, a figure a temperature, with the interval of its mean."""
+def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
+    """Times to rupture at the stresses asked for, and the strength at the longest time, a figure a temperature of each.
+
+    With intervals of their means.
+    """
     found = [one for one in assessment.strengths if one.method == "average" and one.value is not None]
-    longest, figures = max((one.hours for one in found), default=0.0), list[KeyFigure]()
-    for one in found:
-        low, high = (math.nan if bound is None else bound for bound in one.bounds_of_mean)
-        if one.hours == longest and one.value is not None:
-            name, where = f"rupture strength at {longest:g} h", celsius_text(one.temperature, one.temperature, digits=0)
-            remark = "extrapolated beyond the tests" if one.extrapolation else ""
-            figures.append(KeyFigure(name, where, one.value, low, high, "MPa", remark))
-    return figures
+    hours = max((one.hours for one in found), default=0.0)
+    stated: list[Any] = [(f"time to rupture at {one.stress:g} MPa", one.hours, "h", one) for one in assessment.lives]
+    stated += [(f"rupture strength at {hours:g} h", one.value, "MPa", one) for one in found if one.hours == hours]
+    return [_of_mean(*one) for one in stated]
+
+
+def _of_mean(name: str, value: float, unit: str, one: Any) -> KeyFigure:
+    low, high = (math.nan if bound is None else bound for bound in one.bounds_of_mean)
+    remark = "extrapolated beyond the tests" if one.extrapolation else ""
+    return KeyFigure(name, celsius_text(one.temperature, digits=0), value, low, high, unit, remark)
 
 
 def tests_text(fit: Identification) -> str:
@@ -288,7 +292,7 @@ def _test(fit: Identification, name: str) -> str:
 
 def _choice(ranking: Ranking | None) -> Iterator[str]:
     """What else the tests allow."""
-    if ranking is None or len(ranking.laws) < 2 or ranking.decisive or ranking.adequacy is None:
+    if ranking is None or len(ranking.laws) < 2 or ranking.adequacy is None:
         return
     unmet, others = ranking.unmet, [one.fit.law.name for one in ranking.credible[1:]]
     if others:
@@ -365,7 +369,7 @@ def chosen_text(ranking: Ranking) -> str:
     more = len(ranking.laws) - MOST_NAMED
     decided = "decisive" if ranking.decisive else "not decisive"
     if len(ranking.credible) == 1 and ranking.singled_out and ranking.challenges:
-        decided += f", for the tests allow {ranking.challenges[0].subject} as well"
+        decided += f", {'but' if ranking.decisive else 'for'} the tests allow {ranking.challenges[0].subject} as well"
     return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}"
 
 

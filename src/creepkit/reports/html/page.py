@@ -19,6 +19,7 @@ from creepkit.reports.answer import (
     asked_figures,
     interval_text,
     rate_exponent_and_energy,
+    rupture_figures,
     tests_text,
     titled_law,
 )
@@ -176,6 +177,7 @@ def findings_section(contents: ReportContents, figures: PageFigures) -> PageSect
         blocks.append(Paragraph(reasons.format(listed), "warning"))
     if len(found) == 1:
         asked = [figure for forecast in contents.forecasts.values() for figure in asked_figures(forecast)]
+        asked += [figure for one in contents.rupture.values() for figure in rupture_figures(one)]
         files = files_to_download(contents)[:MOST_FILES]
         blocks.append(group_answer(found[0], figures, asked=asked, quality=contents.quality, files=files))
     elif not found:
