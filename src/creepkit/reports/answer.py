@@ -353,7 +353,7 @@ def answer(
     remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
     figures, n = key_figures(fit), fit.values.get("n", math.nan)
     exponent = next((one.value for one in figures if one.name.endswith("stress exponent")), math.nan)
-    other = "; n is a constant of the law, not its stress exponent" * (abs(n - exponent) > OTHER_EXPONENT * exponent)
+    other = "; n is not the stress exponent" * (abs(n - exponent) > OTHER_EXPONENT * exponent)
     return Answer(
         fit.headline,
         titled_law(fit.law),
