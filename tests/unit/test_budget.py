@@ -17,7 +17,7 @@ BUDGET = {
     "api": 285,
     "app": 600,
     "cameras": 830,
-    "cli": 2174,
+    "cli": 2132,
     "core": 70,
     "dataset": 713,
     "discovery": 1375,
@@ -35,11 +35,11 @@ BUDGET = {
     "language": 1542,
     "law_search": 1105,
     "laws": 140,
-    "modules": 750,
+    "modules": 747,
     "quality": 1117,
     "readers": 6025,
     "records": 2342,
-    "registry": 635,
+    "registry": 608,
     "reports": 5771,
     "rupture_assessment": 1835,
     "sampling": 960,
@@ -47,7 +47,7 @@ BUDGET = {
     "specimens": 3203,
     "studies": 2787,
     "surrogates": 1365,
-    "testing": 1814,
+    "testing": 1777,
 }
 """{package, or modules beside packages: lines}."""
 
