@@ -17,7 +17,6 @@ from creepkit.files.hdf5_files import open_hdf5
 from creepkit.files.reading import VARIABLE, FileKind, raised, read_bytes
 from creepkit.language.law_codec import law_from_json
 from creepkit.records import histories_in
-from creepkit.studies.lock import read_lock
 from helpers.paths import ROOT
 
 FORMATS = ROOT / "tests" / "data" / "formats"
@@ -51,7 +50,6 @@ def test_files_of_every_version_are_read(version: str) -> None:
     assert ck.load(folder / "ranking.json").best.values == fit.values
     found = json.loads((folder / "temperature_law.json").read_text(encoding="utf-8"))  # for other programs
     assert law_from_json(found["law"]).name.startswith("norton")
-    assert {stage.state for stage in read_lock(folder / "study.lock").stages.values()} == {"done"}
     data = ck.read_dataset(folder / "data_set.h5")
     assert (data.law.name, data.status.size) == ("norton", 16)  # rejected samples among them
     assert ck.surrogate(folder / "surrogate.safetensors").metadata.law.name == "norton"
