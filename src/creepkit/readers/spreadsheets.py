@@ -22,7 +22,7 @@ from xml.etree import ElementTree
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
-from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, how_to_raise, raised, read_bytes
+from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
 from creepkit.readers.columns_of_tests import column_called, head_of_tests
 from creepkit.readers.frames import UNUSED, unknown_text
 from creepkit.readers.history_csv import histories_of_tests
@@ -73,10 +73,10 @@ def read_sheets(path: Path) -> list[CellTable]:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of what a workbook holds beside its cells
-            size, most = sum(part.file_size for part in archive.infolist()), raised(MAXIMUM_UNPACKED_BYTES)
-            if size > most:
-                what = f"unpacks to {size / 1e6:.0f} MB, more than {most / 1e6:g} MB"
-                raise HistoryError(f"{path}: {what}; save it as CSV, or {how_to_raise(size, most)}")
+            size = sum(part.file_size for part in archive.infolist())
+            if size > MAXIMUM_UNPACKED_BYTES:
+                what = f"unpacks to {size / 1e6:.0f} MB, more than {MAXIMUM_UNPACKED_BYTES / 1e6:g} MB"
+                raise HistoryError(f"{path}: {what}; save it as CSV")
             book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
             # Counted from 1904, days come out as they are in the file; from 1900, the 59th and the 60th are one.
             first_day, book.epoch = book.epoch, _DAY_ZERO
