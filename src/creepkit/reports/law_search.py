@@ -34,7 +34,7 @@ def law_search_text(search: LawSearch) -> str:
 
 def effort_text(search: LawSearch) -> str:
     """How many sentences were tried in which time, and what was left out."""
-    tried = f"{plural(len(search.tried), 'sentence')} of the grammar identified in {search.seconds:.0f} s of CPU time"
+    tried = f"{plural(len(search.tried), 'law')} identified in {search.seconds:.0f} s of CPU time"
     if not search.untried:
         return f"{tried}; no change of one factor improves the best"
     return f"{tried}; the budget of {search.budget:g} s left changes of {plural(search.untried, 'sentence')} untried"
