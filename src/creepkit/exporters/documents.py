@@ -248,6 +248,13 @@ class MathmlPrinter(ReadableSums, MathMLPresentationPrinter):  # type: ignore[mi
             factors.append(self._exponential(self._print(rest)))
         return self._node("mrow", *factors)
 
+    def _print_Pow(self, expr: Any) -> Any:
+        """[sinh(x)]^n, which sympy prints as sinh(x)^n."""
+        if not isinstance(expr.base, sympy.functions.elementary.hyperbolic.HyperbolicFunction):
+            return super()._print_Pow(expr)
+        opening, closing = self._leaf("mo", "["), self._leaf("mo", "]")
+        return self._node("msup", self._node("mrow", opening, self._print(expr.base), closing), self._print(expr.exp))
+
     def _arrhenius_factor(self, activation: ArrheniusExponent) -> Any:
         """exp[-(Q/R)(1/T - 1/T_ref)], or exp[-Q/(R T)]."""
         sign = [self._leaf("mo", "−")] if activation.sign else []

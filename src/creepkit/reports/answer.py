@@ -54,6 +54,10 @@ MOST_ASKED = 4
 """Numbers of forecasts on the first screen."""
 
 
+OTHER_EXPONENT = 0.1
+"""Of the stress exponent, by which a value called n differs from it where this is said."""
+
+
 NOTEWORTHY_EXPONENT = 0.15
 """Of the stress exponent, by which leaving out one test changes it, from which on this is said."""
 
@@ -124,7 +128,8 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
         by_tests = f"{by_rates.text} by measured minimum rates" if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
-    included = "with usual errors" if any(one.included for one in fit.unmodelled) else ""
+    kinds = [one.kind.replace("_", " ") for one in fit.unmodelled if one.included]
+    included = f"with errors of {', '.join(dict.fromkeys(kinds))}" if kinds else ""
     return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included), *_lives(fit)]
 
 
@@ -198,7 +203,7 @@ def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
 
 def _of_mean(name: str, value: float, unit: str, one: Any) -> KeyFigure:
     low, high = (math.nan if bound is None else bound for bound in one.bounds_of_mean)
-    remark = "extrapolated beyond the tests" if one.extrapolation else ""
+    remark = f"by rupture methods, mean{', extrapolated beyond the tests' * bool(one.extrapolation)}"
     return KeyFigure(name, celsius_text(one.temperature, digits=0), value, low, high, unit, remark)
 
 
@@ -216,7 +221,8 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
     choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
     tests = [*(one for one in fit.notes if one.startswith(LENGTHS_BY_DEFAULT)), *_of_tests(fit)]
     of_law = [*tests, *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
-    return list(dict.fromkeys([*of_law, *_held(others), *_data(quality)]))
+    rejected = fit.adequacy is not None and fit.adequacy.rejects  # so that another law may be better
+    return list(dict.fromkeys([*of_law, *(_held(others) if rejected else ()), *_data(quality)]))
 
 
 def _of_tests(fit: Identification) -> Iterator[str]:
@@ -345,15 +351,19 @@ def answer(
     remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
     remarks += [chosen_text(ranking)] if ranking is not None and len(ranking.laws) > 1 else []
     remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
+    figures, n = key_figures(fit), fit.values.get("n", math.nan)
+    exponent = next((one.value for one in figures if one.name.endswith("stress exponent")), math.nan)
+    other = "; n is not the stress exponent" * (abs(n - exponent) > OTHER_EXPONENT * exponent)
     return Answer(
         fit.headline,
         titled_law(fit.law),
         equations(fit.law),
         [(symbols[e.name], f"{e.value:.4g}", interval_ends(fit.law, e), unit_text(e.unit)) for e in fit.estimates],
-        [(one.name, one.where, one.text, one.remark) for one in [*asked[:MOST_ASKED], *key_figures(fit)]],
+        [(one.name, one.where, one.text, one.remark) for one in [*asked[:MOST_ASKED], *figures]],
         cautions(fit, ranking, quality)[:MOST_CAUTIONS],
         next_step(fit, ranking),
         remarks,
+        units=f"{Answer.units}{other}",
         **page,
     )
 

@@ -247,7 +247,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     excess, x = _least_excess(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
-    description = f"its sum with {other.law.name}, tried with {100 * SHARE:.0f} % of the rate carried by it,"
+    description = f"its sum with {100 * SHARE:.0f} % of the rate by {other.law.name}"
     return AlteredLaw("sum", problem, x, excess, share(x)[1], other.u.size, description)
 
 

@@ -152,7 +152,10 @@ def block_shown(block: Block, names: LawNames) -> Block:
             block,
             headline=said(block.headline),
             picture=None if block.picture is None else block_shown(block.picture, names),
-            values=[cells((one[0], one[1], one[3])) for one in block.values],
+            values=[
+                cells((name, f"{value}{' (at the bound of its search)' * (f'{value} (search bound)' in ends)}", unit))
+                for name, value, ends, unit in block.values
+            ],
             figures=[cells(one) for one in block.figures],
             cautions=[said(one) for one in block.cautions],
             next_step=said(block.next_step),
