@@ -16,6 +16,7 @@ from creepkit.quality.frames import (
     TEMPERATURE_TOLERANCE,
     extrapolate,
     load_segments,
+    rounding_step,
     scatter_about_line,
 )
 from creepkit.quality.smooth_curve import SmoothCurve, smooth_curve
@@ -23,8 +24,14 @@ from creepkit.records import History, growing_output, output_named
 from creepkit.records.recorded_programs import running_median
 from creepkit.records.units import time_text, times_text
 
-JUMP_THRESHOLD, FEW_POINTS_CORRECTION = 7.0, 10.0
-"""Standard deviations of a step of the value; the threshold is this times (1 + correction / points)."""
+JUMP_THRESHOLD, ROUNDING_STEPS = 5.0, 2.0
+"""Standard deviations of a step of the value, and steps of rounded readings, that it must exceed.
+
+Planted in 2000 curves of 18 to 70 readings (power, exponential and logarithmic primary, tertiary and steady creep;
+noise 0.1 to 2 % of all strain), steps of 4, 6, 8, 12, 20 and 40 standard deviations of a reading were found in 10, 24,
+44, 73, 88 and 96 %; none was found in the curves without a step, nor in 750 whose noise is autocorrelated, whose
+readings are rounded or whose rate changes, and 3 in 250 with a single outlier of ten.
+"""
 
 
 MOST_JUMPS = 3
@@ -51,19 +58,20 @@ def find_jumps(histories: Sequence[History]) -> list[Jump]:
     results = []
     for k, history in enumerate(histories):
         for times, values, start in _parts(history):
-            shifts: list[float] = []
+            shifts, least = list[float](), ROUNDING_STEPS * rounding_step(values)
             for _ in range(MOST_JUMPS):
                 curve = smooth_curve(times, values, start, shifts)
                 gaps, scores, sizes = curve.level_shift_scores()
                 worst = int(np.argmax(np.abs(scores))) if scores.size else 0
-                threshold = JUMP_THRESHOLD * (1 + FEW_POINTS_CORRECTION / curve.times.size)
-                if not scores.size or abs(scores[worst]) < threshold:
+                if not scores.size or abs(scores[worst]) < JUMP_THRESHOLD or abs(sizes[worst]) < least:
                     break
                 after = int(np.searchsorted(curve.times, gaps[worst]))
                 shifts.append(float(gaps[worst]))
-                if _stands_out(curve, after, float(sizes[worst])):
+                left = smooth_curve(times, values, start, shifts).level_shift_scores()[1]
+                score = float(scores[worst]) / max(1.0, 1.4826 * float(np.median(np.abs(left))))
+                if abs(score) > JUMP_THRESHOLD and _stands_out(curve, after, float(sizes[worst])):
                     between = (float(curve.times[after]), float(curve.times[after - 1]))
-                    results.append(Jump(k, *between, float(sizes[worst]), float(scores[worst])))
+                    results.append(Jump(k, *between, float(sizes[worst]), score))
     return results
 
 

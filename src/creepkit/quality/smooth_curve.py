@@ -59,18 +59,26 @@ class SmoothCurve:
         return np.asarray((_CLOCKS[self.clock](times - self.start) - first) / (last - first))
 
     def level_shift_scores(self) -> tuple[Floats, Floats, Floats]:
-        """Times (s), scores and sizes of a step of the value in every gap between points, beside a step of the slope.
+        """Times (s), scores and sizes of a step of the value in every gap between points, the rate as it was.
 
-        Each (gaps,). A score is the estimate over its standard deviation, as a standard normal number, and over the
-        spread of all of them where that is above 1.
+        Each (gaps,). A score is the estimate over its standard deviation, as a standard normal number.
         """
         k = np.arange(FEWEST_POINTS_BESIDE, self.times.size - FEWEST_POINTS_BESIDE + 1)
         times = 0.5 * (self.times[k - 1] + self.times[k])
         if not times.size:
             return times, times, times
-        estimate, sd, freedom = self._effects(self._steps(times), self._ramps(times))
-        scores = _normal_score(estimate / sd, freedom)
-        return times, scores / max(1.0, robust_spread(scores)), estimate
+        u, columns = self._basis.T @ self.values, self._basis.T @ self._steps(times)
+        degrees = u.size - 1
+        floor = u.size * (_NOISE_FLOOR * float(np.ptp(self.values)) + 1e-300) ** 2
+        weights = 1.0 / (1.0 + np.outer(_STIFFNESS, self._variances))
+        information, product = weights @ columns**2, weights @ (columns * u[:, None])  # (stiffnesses, gaps)
+        sizes = product / information
+        variance = np.maximum((weights @ u**2)[:, None] - sizes * product, floor) / degrees
+        likelihood = np.log(weights).sum(axis=1)[:, None] - degrees * np.log(variance) - np.log(information)
+        best = likelihood.argmax(axis=0)[None]
+        size, square = (np.take_along_axis(one, best, axis=0)[0] for one in (sizes, variance / information))
+        ratio = size / np.sqrt(square)
+        return times, -np.sign(ratio) * ndtri(np.maximum(stdtr(degrees, -np.abs(ratio)), 1e-300)), size
 
     def fitted(self) -> tuple[Floats, Floats]:
         """(points,) values of the curve less its noise, and their rates, unit of the output a second."""
@@ -78,30 +86,8 @@ class SmoothCurve:
         ends = self.position(self.times + seconds), self.position(self.times - seconds)
         return values, self._slope(values) * (ends[0] - ends[1]) / (2.0 * seconds)
 
-    def _ramps(self, times: Floats) -> Floats:
-        return np.asarray(np.maximum(self.position(self.times)[:, None] - self.position(times)[None, :], 0.0))
-
     def _steps(self, times: Floats) -> Floats:
         return np.asarray((self.times[:, None] > times[None, :]).astype(float))
-
-    def _effects(self, regressors: Floats, beside: Floats) -> tuple[Floats, Floats, int]:
-        """Estimate and standard deviation of each regressor beside another one each, and the freedom."""
-        u, columns, others = (self._basis.T @ part for part in (self.values, regressors, beside))
-        degrees = u.size - 2
-        floor = u.size * (_NOISE_FLOOR * float(np.ptp(self.values)) + 1e-300) ** 2
-        weights = 1.0 / (1.0 + np.outer(_STIFFNESS, self._variances))
-        pairs = [(columns, columns), (columns, u[:, None]), (columns, others), (others, others), (others, u[:, None])]
-        cc, cu, co, oo, ou = (weights @ (a * b) for a, b in pairs)  # (stiffnesses, regressors)
-        inverse = np.divide(1.0, oo, out=np.zeros_like(oo), where=oo > 0)
-        information = np.maximum(cc - co**2 * inverse, 1e-12 * np.maximum(cc, 1e-300))
-        value = (cu - co * ou * inverse) / information
-        remainder = (weights @ u**2)[:, None] - ou**2 * inverse - value**2 * information
-        variance = np.maximum(remainder, floor) / degrees
-        likelihood = np.log(weights).sum(axis=1)[:, None] - degrees * np.log(variance) - np.log(information)
-        likelihood -= np.log(oo, out=np.zeros_like(oo), where=oo > 0)
-        best = likelihood.argmax(axis=0)[None]
-        estimate, square = (np.take_along_axis(a, best, axis=0)[0] for a in (value, variance / information))
-        return estimate, np.sqrt(square), degrees
 
     def _fitted(self) -> Floats:
         """(points,) values of the curve less its noise."""
@@ -124,15 +110,6 @@ def smooth_curve(times: Floats, values: Floats, start: float, level_shifts: Sequ
     return max(curves, key=lambda pair: pair[0])[1]
 
 
-def robust_spread(scores: Floats) -> float:
-    """Standard deviation of scores about zero by the median of their sizes; 0 of none.
-
-    scores : (times,), those that are NaN left out.
-    """
-    known = np.abs(scores[np.isfinite(scores)])
-    return float(1.4826 * np.median(known)) if known.size else 0.0
-
-
 def _fit(times: Floats, values: Floats, start: float, clock: str, shifts: Sequence[float]) -> tuple[float, SmoothCurve]:
     empty = SmoothCurve(times, values, start, clock, 0.0, np.zeros(0), np.zeros(0), 0.0)
     s = empty.position(times)
@@ -150,8 +127,3 @@ def _fit(times: Floats, values: Floats, start: float, clock: str, shifts: Sequen
     k = int(np.argmax(likelihood))
     sigma, stiffness = float(noise[k] ** 0.5), float(_STIFFNESS[k])
     return float(likelihood[k]), SmoothCurve(times, values, start, clock, sigma, basis, variances, stiffness)
-
-
-def _normal_score(ratio: Floats, freedom: int) -> Floats:
-    """A ratio with Student's distribution as the standard normal number of the same probability."""
-    return np.asarray(-np.sign(ratio) * ndtri(np.maximum(stdtr(freedom, -np.abs(ratio)), 1e-300)))

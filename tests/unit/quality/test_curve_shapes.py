@@ -14,7 +14,7 @@ import creepkit as ck
 from creepkit.quality import check_data_quality, repeated_row_notes, without_copies
 from creepkit.quality.curve_shapes import falls_logarithmically, shows_primary_creep, shows_tertiary_creep
 from creepkit.quality.repeats import agreement_by_chance, copied_tests, repeated_rows
-from creepkit.records import History, PressureJump, StressSteps
+from creepkit.records import History, PressureJump, StressSteps, constant_stress
 from helpers.paths import SHARED, needs_shared_data
 
 CONCAVE = {
@@ -132,6 +132,22 @@ def test_a_raise_of_the_pressure_is_no_jump():
     rng = np.random.default_rng(4)
     for _ in range(5):
         assert not [f for f in check_data_quality([dimple(rng, k, P2=10.0) for k in range(2, 8)]) if f.kind == "jump"]
+
+
+def test_a_knocked_extensometer_is_found_in_few_readings_and_not_where_there_was_none():
+    """Strain as t^0.4, read at 1, 2, 4 ... 32 h and then daily: a step of 12 times the noise, and none."""
+    hours, rng = np.r_[2.0 ** np.arange(6), 24.0 * np.arange(2, 22)], np.random.default_rng(8)
+    found = []
+    for _ in range(30):
+        strain = 2.6e-3 * (hours / 480.0) ** 0.4 + 3e-5 * rng.standard_normal(hours.size)
+        for step in (0.0, 3.6e-4):
+            values = {"strain": strain + step * (hours > 140.0)}
+            test = History("b", 3600.0 * hours, values, constant_stress(300.0), 673.0)
+            found += [(step, flag) for flag in check_data_quality([test]) if flag.kind == "jump"]
+    assert {step for step, _ in found} == {3.6e-4}
+    assert len(found) > 18
+    assert {flag.time for _, flag in found} == {3600.0 * 144.0}
+    assert np.mean([flag.jumps["b"] for _, flag in found]) == pytest.approx(3.6e-4, rel=0.1)
 
 
 def test_a_jump_of_the_camera_is_one_finding_for_all_tests():
