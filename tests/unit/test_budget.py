@@ -20,7 +20,7 @@ BUDGET = {
     "cli": 2182,
     "core": 70,
     "dataset": 713,
-    "discovery": 1375,
+    "discovery": 1377,
     "experiments": 1355,
     "exporters": 2679,
     "extraction": 1295,
