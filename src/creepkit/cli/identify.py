@@ -47,7 +47,9 @@ def command(
     changes: Annotated[dict[str, Any], LawChanges],
     how: Annotated[dict[str, Any], SearchOptions],
     to: Annotated[
-        Path, typer.Option(help="Folder for results; made if needed."), OutputPath("folder", ("ranking.json",))
+        Path,
+        typer.Option(help="Folder for results; made if needed. Of --search also a file LAW.py."),
+        OutputPath("folder", ("ranking.json",)),
     ] = Path("identified"),
     reader: Reader = None,
     only: Only = None,
@@ -158,15 +160,20 @@ def _search(
     as_json: bool,
 ) -> None:
     """Search laws, and write the ranking and the front."""
+    from creepkit.law_search.law_file import write_law_file
     from creepkit.reports.law_search import law_search_text
     from creepkit.reports.ranking import ranking_to_json
 
     _tell_assumptions(histories)
-    check_identified_folder(to, [])
+    if to.suffix != ".py":
+        check_identified_folder(to, [])
     with ProgressBar() as progress:
         found = ck.search_laws(histories, using, settings=settings, progress=progress.tick, **budget)
-    written = [*write_ranking(found.ranking, to), to / "front.png"]
-    found.plot(written[-1])
+    if to.suffix == ".py":
+        written = [write_law_file(found.ranking.valued, to)]
+    else:
+        written = [*write_ranking(found.ranking, to), to / "front.png"]
+        found.plot(written[-1])
     if as_json:
         front = [{"law": one.law.name, "complexity": one.complexity, "misfit": one.misfit} for one in found.front]
         print_json({**ranking_to_json(found.ranking, written), "front": front})

@@ -188,5 +188,5 @@ def _multiplied(
 
 
 def operations(law: CreepLaw) -> int:
-    """Operations of the rate as it is written."""
-    return int(sympy.count_ops(law.rate))
+    """Operations of the rate, and of those of internal variables, as they are written."""
+    return int(sympy.count_ops([law.rate, *(state.rate for state in law.states.values())]))

@@ -63,14 +63,9 @@ class LawSearch(Presentable, Plotted, Tabulated):
         return self.ranking.best
 
     @property
-    def compared(self) -> tuple[SearchedLaw, ...]:
-        """The laws of the ranking, best first."""
-        return tuple(SearchedLaw(one.fit.law, one.fit.rms, one.excess) for one in self.ranking.laws)
-
-    @property
     def front(self) -> tuple[SearchedLaw, ...]:
-        """The laws of which none simpler has a smaller misfit, simplest first."""
-        return front_of([*self.compared, *self.tried])
+        """The laws tried of which none simpler has a smaller misfit, simplest first."""
+        return front_of(self.tried)
 
     drawn_by = "law_search.front_figure", "law_search.draw_front"
 

@@ -21,6 +21,7 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.candidates import candidates
 from creepkit.inverse.checked_identification import select
+from creepkit.inverse.compared_tests import common_rupture_times
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
@@ -89,21 +90,29 @@ def search_laws(
     settings = settings or IdentificationSettings()
     predictor = resolve_predictors(using, tests)
     sound, _ = sound_tests(list(tests), settings)
-    search = _Search(sound, predictor, settings, started + SHARE_OF_BEAM * options.budget, progress)
+    registered = [with_arrhenius(one, sound) for one in candidates(sound)] if options.registered else []
+    end = started + SHARE_OF_BEAM * options.budget
+    search = _Search(sound, predictor, _quick(settings, registered), registered, end, progress)
     search.run(optimizer)
-    if options.registered:
-        search.identify_registered()
-    if not search.fits:
+    if not search.best(1):
         raise FitError(f"no sentence of the grammar could be identified: {next(iter(search.failed.values()), 'none')}")
-    ranked = [one for one in search.best(MOST_RANKED) if search.score(one) < search.least + NEAR]
+    best = search.best(MOST_RANKED)
+    ranked = [one for one in best if search.score(one) < search.score(best[0]) + NEAR]
     ranked += [one for one in search.best(REGISTERED_RANKED, search.registered) if one not in ranked]
     laws = [search.fits[one].law for one in ranked]
     ranking = select(laws, tests, using, settings=settings, sums=False, progress=progress)
+    least = min(map(search.score, search.fits))
     tried = tuple(
-        SearchedLaw(fit.law, fit.rms, search.score(key) - search.least, key in search.registered)
+        SearchedLaw(fit.law, fit.rms, search.score(key) - least, key in search.registered)
         for key, fit in sorted(search.fits.items(), key=lambda pair: search.score(pair[0]))
     )
     return LawSearch(ranking, tried, options.budget, process_time() - started, search.untried)
+
+
+def _quick(settings: IdentificationSettings, registered: Sequence[CreepLaw]) -> IdentificationSettings:
+    """Those of identifications on the way, alike for laws that can rise to rupture and others."""
+    alike = common_rupture_times([*registered, Product(softening="strain").law], settings)
+    return replace(alike, starts=2, sobol_points=64, frames=20, weights="likelihood", usual_errors="none")
 
 
 @dataclass
@@ -113,6 +122,7 @@ class _Search:
     tests: Sequence[History]
     predictor: Any
     settings: IdentificationSettings
+    registered_laws: Sequence[CreepLaw]
     end: float
     progress: Callable[[str, int, int], None] | None
     screened: dict[Sentence, RateFit] = field(default_factory=dict)
@@ -139,7 +149,7 @@ class _Search:
         while self.fits and process_time() < self.end:
             chosen = next((one for one in self.best(BEAM) if one not in expanded), None)
             if chosen is None:
-                return
+                break
             expanded.add(chosen)
             near = [one for one in chosen.neighbours(self.temperatures) if one not in self.fits]
             self.screen(near)
@@ -147,6 +157,7 @@ class _Search:
             simpler = [one for one in near if len(one.law.params) < len(chosen.law.params)]
             self.identify([*near[:TRIED], *simpler[:SIMPLER]])
         self.untried = sum(one not in expanded for one in self.best(BEAM))
+        self.identify_registered()
 
     def screen(self, sentences: Sequence[Sentence]) -> None:
         """Fit sentences to the smoothed rates."""
@@ -164,28 +175,27 @@ class _Search:
             self._identify(one, one.law)
 
     def identify_registered(self) -> None:
-        """Identify the registered laws that suit the tests; one that a sentence is stands under it."""
+        """Identify the registered laws; one that a sentence is stands under it."""
         known = {fit.law.fingerprint: key for key, fit in self.fits.items()}
-        for law in (with_arrhenius(one, self.tests) for one in candidates(self.tests)):
+        for law in self.registered_laws:
             key = known.get(law.fingerprint, law.name)
             self.registered.append(key)
             if key not in self.fits:
                 self._identify(key, law)
 
     def _identify(self, key: Sentence | str, law: CreepLaw) -> None:
-        quick = replace(self.settings, starts=2, sobol_points=64, frames=20, weights="likelihood", usual_errors="none")
         try:
-            start = self._start(law, self.screened[key].theta, quick) if isinstance(key, Sentence) else None
-            self.fits[key] = identify(law, self.tests, self.predictor, settings=quick, start=start)
+            start = self._start(law, self.screened[key].theta) if isinstance(key, Sentence) else None
+            self.fits[key] = identify(law, self.tests, self.predictor, settings=self.settings, start=start)
         except CreepkitError as error:
             self.failed[key] = str(error)
 
-    def _start(self, law: CreepLaw, theta: Floats, settings: IdentificationSettings) -> StartingEstimate:
+    def _start(self, law: CreepLaw, theta: Floats) -> StartingEstimate:
         """Where least squares of the curves end that begin at values from the smoothed rates.
 
         theta : (starts, parameters) internal values.
         """
-        problem = LeastSquaresProblem.from_histories(law, self.tests, self.predictor, settings)
+        problem = LeastSquaresProblem.from_histories(law, self.tests, self.predictor, self.settings)
         searched = search_problem(problem, problem.predictor.for_search())
         ends = refined(searched, [*searched.bounds.clip(searched.coordinates.u(theta))])
         return StartingEstimate(ends[0].x, reference=problem.coordinates.reference, values_only=True)
@@ -208,8 +218,3 @@ class _Search:
         """The keys of lowest criterion, of sentences or `among` others."""
         keys = [key for key in self.fits if (isinstance(key, Sentence) if among is None else key in among)]
         return sorted(keys, key=self.score)[:count]
-
-    @property
-    def least(self) -> float:
-        """The lowest criterion."""
-        return min(map(self.score, self.fits))

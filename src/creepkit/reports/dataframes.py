@@ -107,11 +107,9 @@ def _(fit: Identification) -> tuple[Any, str]:
 
 @_rows.register
 def _(search: LawSearch) -> tuple[Any, str]:
-    front, names = {id(one) for one in search.front}, ("parameters", "complexity", "misfit", "excess")
-    laws = [*search.compared, *search.tried]
-    return [
-        {"law": one.law.name, **{name: getattr(one, name) for name in names}, "front": id(one) in front} for one in laws
-    ], ""
+    front, names = search.front, ("parameters", "complexity", "misfit", "excess", "registered")
+    rows = [{"law": one.law.name, **{name: getattr(one, name) for name in names}} for one in search.tried]
+    return [{**row, "front": one in front} for row, one in zip(rows, search.tried, strict=True)], ""
 
 
 @_rows.register

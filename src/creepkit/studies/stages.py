@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -187,11 +187,11 @@ def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
         if chosen.uses(temperature):
             raise NothingToMake(f"law '{chosen.name}' says itself how it depends on temperature: no form is sought")
         settings = usual if fit is None else fit.settings
-        found = ck.temperature_study(chosen, tests, using, settings=settings, progress=tick, **options)
+        # One law has one set of values: those of its identification, with what the study bounds and fixes.
+        found = ck.temperature_study(chosen, tests, using, settings=settings, joint_fit=fit, progress=tick, **options)
         if found.temperature_law is None:
             raise StudyError(found.notes[-1])
-        # One law has one set of values: those of its identification, with what the study bounds and fixes.
-        return found if fit is None or part.moduli else replace(found, joint_fit=fit)
+        return found
 
     def document(found: Any) -> Any:
         """The temperature law as `creepkit discover --to` writes it; None of a plugin's law that cannot be stored."""

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.law_search.grammar import HARDENING, SOFTENING, STRESS, Product, Sentence
+from creepkit.law_search.law_file import write_law_file
 from creepkit.law_search.proposals import proposed_products, proposed_sums
 from creepkit.law_search.smoothed_rates import SmoothedRates
 from creepkit.testing import check_law
@@ -35,6 +36,13 @@ def test_an_exchange_of_a_factor_leads_back() -> None:
     exchanged = [one for one in sentence.neighbours() if len(one.products) == 2 and one.temperature == "arrhenius"]
     assert len(exchanged) == 2 * (4 + 4 + 1)
     assert all(sentence in one.neighbours() for one in exchanged)
+
+
+@pytest.mark.parametrize("law", [Product("threshold", "time saturation", "strain").law, ck.law("kachanov-rabotnov")])
+def test_a_law_file_holds_the_same_law(law: ck.CreepLaw, tmp_path) -> None:
+    path = write_law_file(ck.law_with_values(law, law.center()), tmp_path / f"found_{len(law.states)}.py")
+    ck.load_plugin(path)
+    assert ck.law(f"found-{len(law.states)}") == law
 
 
 def rates(log_rate) -> SmoothedRates:
