@@ -40,7 +40,7 @@ BUDGET = {
     "readers": 6035,
     "records": 2342,
     "registry": 608,
-    "reports": 5780,
+    "reports": 5783,
     "rupture_assessment": 1835,
     "sampling": 960,
     "screening": 570,
