@@ -63,7 +63,7 @@ def command(
 
 def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
-    from creepkit.reports.answer import answer_text, asked_figures, rupture_figures
+    from creepkit.reports.answer import answer_text, asked_figures, line_of_group, rupture_figures
 
     tell(result.title)
     told = [(one.name, one.state, one.sentence) for one in result.stages if one.state != "made" or one.sentence]
@@ -81,7 +81,8 @@ def print_result(result: StudyResult) -> None:
             tell(line)
     for group, ranking in result.rankings.items():
         alone = len(result.rankings) == 1
-        tell(answer_text(ranking.best, ranking, result.report) if alone else f"{group}: {ranking.best.headline}")
+        best = ranking.best
+        tell(answer_text(best, ranking, result.report) if alone else f"{group}: {line_of_group(best)}")
     if result.report is not None:
         tell(f"report: {result.report}")
 

@@ -373,6 +373,13 @@ def answer_text(fit: Identification, ranking: Ranking | None = None, more: objec
     return as_text([answer(fit, ranking, more=str(more))])
 
 
+def line_of_group(fit: Identification) -> str:
+    """The headline of one alloy of several, with its stress exponent and creep rate and where they hold."""
+    figures = [one for one in key_figures(fit) if one.name.endswith("stress exponent") or one.name == "creep rate"]
+    numbers = ", ".join(f"{one.name} {one.text}" for one in figures)
+    return f"{fit.headline}; {numbers} at {figures[0].where}" if figures else fit.headline
+
+
 def chosen_text(ranking: Ranking) -> str:
     """Whether the choice of the law is decisive, and the weights of the laws; weights do not say why one is not."""
     weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED])
