@@ -122,7 +122,9 @@ def _exponent_rises(stress: Floats, temperature: Floats, rate: Floats) -> bool:
 
 
 def threshold_laws(stress: Floats, temperature: Floats, rate: Floats, T_ref: str) -> list[str]:
-    """Names of the laws above a threshold stress that minimum rates (tests,) prefer to Norton's by an F test.
+    """Names of the laws above a threshold stress that minimum rates prefer to Norton's by an F test.
+
+    stress, temperature, rate : (tests,) MPa, K, 1/s.
 
     ln rate = a + n ln(s - s_0) - Q/(R T) is fitted to them with s_0 of a grid, constant or falling as the temperature
     rises. One that follows the stresses down bends ln rate over ln stress at each temperature alone, and shows as an
