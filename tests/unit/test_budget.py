@@ -37,7 +37,7 @@ BUDGET = {
     "laws": 140,
     "modules": 747,
     "quality": 1117,
-    "readers": 6035,
+    "readers": 6036,
     "records": 2342,
     "registry": 608,
     "reports": 5783,
