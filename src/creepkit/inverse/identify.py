@@ -95,6 +95,10 @@ DESCRIBING_LIMITS = APPROXIMATE_LIMITS._replace(rounds=8)
 """For values by frames of equal weight, which follow the noise that is found slowly."""
 
 
+UNRELATED_RATES = 0.7
+"""Scatter of ln rate, a factor of two between tests, from which on a law describes none of them."""
+
+
 @kept_where_asked
 def identify(
     law: CreepLaw,
@@ -329,15 +333,19 @@ def _last_estimate(
 
 
 def _describing_estimate(found: EstimationResult, limits: IterationLimits, how: EstimationOptions) -> EstimationResult:
-    """An estimate by likelihood, or where it clearly misses the shape of curves that of frames of equal weight."""
+    """An estimate by likelihood, or that of frames of equal weight where it clearly misses curves, or rates altogether.
+
+    With rates that share nothing the exponent would be that of the bend of single curves.
+    """
     problem, linear, noise = found.problem, found.linear, found.noise
     if how.judged is None or problem.settings.weights != "likelihood" or _wider_law(found) is not None:
         return found
-    if not autocorrelated_components(noise):  # the curves are followed to a white noise
-        return found
-    judge = Judge(problem, noise, {} if problem.correction is not None else problem.predictor.error, how.judged)
-    if not judge.adequacy(judged_at(problem, linear, noise)).misses_shape(CLEARLY):
-        return found
+    if noise.rate < UNRELATED_RATES:
+        if not autocorrelated_components(noise):  # the curves are followed to a white noise
+            return found
+        judge = Judge(problem, noise, {} if problem.correction is not None else problem.predictor.error, how.judged)
+        if not judge.adequacy(judged_at(problem, linear, noise)).misses_shape(CLEARLY):
+            return found
     _check_bounds(found)
     problem = replace(problem.about_rates(found.x, None), settings=replace(problem.settings, weights="noise"))
     return estimate_iteratively(problem, found.x, _working_estimator(problem), limits, how.progress)

@@ -453,11 +453,12 @@ def conditions_in_text(text: str, place: str, known: Terms) -> list[SourceText]:
         return " ; "
 
     rest = _ASSIGNED.sub(take, text)
+    is_all = not _VALUE.sub("", rest).strip(" ,;/|@()-–_")  # a sheet called "25 °C"
     for match in _VALUE.finditer(rest):
         quantity = _quantity_of(match[2], known)
         is_range = _RANGE.search(rest[: match.start()]) is not None
         number = float(match[1].replace(",", "."))
-        is_at = _AT_TEST.search(rest[: match.start()]) is not None
+        is_at = is_all or _AT_TEST.search(rest[: match.start()]) is not None
         if unit_suffix(match[2]) in ("GPa", "Pa") or (quantity == "temperature" and number < _LOWEST and not is_at):
             continue
         if quantity:
