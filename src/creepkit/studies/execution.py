@@ -225,7 +225,6 @@ StageKind = Literal[
     "record",
     "quality",
     "identification",
-    "confirmation",
     "temperature",
     "rupture",
     "forecast",
