@@ -29,6 +29,7 @@ from creepkit.instruments.reading_options import RecordOptions
 from creepkit.inverse import identification_document, ranking_document
 from creepkit.inverse.identification import Identification, IdentificationSettings
 from creepkit.language import CreepLaw, law_codec
+from creepkit.law_search.search import LawSearchOptions
 from creepkit.rupture_assessment import assessment
 from creepkit.rupture_assessment.assessment import RuptureAssessment
 from creepkit.studies.tables import StudyTables
@@ -187,7 +188,7 @@ from creepkit.records import Nuisance
 def keywords_text() -> str:
     """The stub: a TypedDict for each record of options that a public function takes as keywords."""
     text = HEAD
-    for record in (IdentificationSettings, DiscoveryOptions, RecordOptions):
+    for record in (IdentificationSettings, DiscoveryOptions, LawSearchOptions, RecordOptions):
         text += f"\nclass {record.__name__}Keywords(TypedDict, total=False):\n"
         (tree,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
         for field in (one for one in tree.body if isinstance(one, ast.AnnAssign)):  # type: ignore[attr-defined]

@@ -62,6 +62,7 @@ from .language.temperature_forms import arrhenius as arrhenius
 from .language.temperature_forms import exponential as exponential
 from .language.temperature_forms import inverse_temperature as inverse_temperature
 from .language.temperature_forms import linear as linear
+from .law_search.search import search_laws as search_laws
 from .quality import check_data_quality as check_data_quality
 from .quality import exclude_suspect_frames as exclude_suspect_frames
 from .readers.history_csv import write_history as write_history

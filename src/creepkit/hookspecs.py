@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Any
 import pluggy
 
 if TYPE_CHECKING:
-    import typer
-
     from creepkit.language.law import CreepLaw
     from creepkit.records import CameraFormat, Exporter, InstrumentFormat, Reader, Specimen
 
@@ -60,11 +58,3 @@ def creepkit_exporters() -> Sequence[Exporter]:  # type: ignore[empty-body]
 @hookspec
 def creepkit_temperature_forms() -> Mapping[str, Any]:  # type: ignore[empty-body]
     """Return {name: function of T_ref} giving temperature forms or factors."""
-
-
-@hookspec
-def creepkit_commands(app: typer.Typer) -> None:
-    """Add commands to the command line.
-
-    `creepkit --help` lists them, and so imports the modules that the entry points `creepkit.commands` name.
-    """

@@ -132,5 +132,3 @@ MEGAPASCAL = numbers(0, 1e6)
 MILLIMETRE = numbers(0, 1e6)
 STRAIN = numbers(0, 100, above=True)
 POISSON = numbers(-1, 0.5, above=True)
-ENERGY = numbers(0, 1e9)
-"""J/mol."""

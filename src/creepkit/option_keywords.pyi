@@ -25,6 +25,10 @@ class DiscoveryOptionsKeywords(TypedDict, total=False):
     moduli: bool | None
     within: float | None
 
+class LawSearchOptionsKeywords(TypedDict, total=False):
+    budget: float | None
+    registered: bool | None
+
 class RecordOptionsKeywords(TypedDict, total=False):
     time: str | None
     date: str | None

@@ -80,7 +80,6 @@ BENCHMARKS = {
     "usual_errors": Benchmark(8, (("--campaigns", "20"),)),
     "noise_correlation": Benchmark(4),
     "conditions": Benchmark(30),
-    "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "rate_tables": Benchmark(20, needs=DATA),
     "hostile_files": Benchmark(40, needs="gcc, for exported C", short=("--short", "--first", "700000")),
     "mutations": Benchmark(90, (("build/mutations.jsonl",),), "g++"),

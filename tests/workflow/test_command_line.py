@@ -140,7 +140,7 @@ def test_a_folder_becomes_a_study_and_its_results(folder: Path, tmp_path: Path) 
     assert ran.exit_code == 0, ran.output
     told = json.loads(ran.stdout)
     assert {one["state"] for one in told["stages"]} == {"made"}
-    assert {"study.lock", "law.tex", "law.py"} <= {path.name for path in (tmp_path / "made").iterdir()}
+    assert {"law.tex", "law.py"} <= {path.name for path in (tmp_path / "made").iterdir()}
     assert len([one for one in folder.iterdir() if one.name[0] != "."]) == 5  # the data, the notes and the study
 
 

@@ -1,6 +1,5 @@
 """The guide "Extend creepkit": every example is a file of its own, loaded and used as that of an outsider."""
 
-import json
 import re
 from pathlib import Path
 
@@ -12,7 +11,6 @@ import creepkit as ck
 from creepkit.errors import LawError, SolveError
 from creepkit.records import Dimension, LawWithValues
 from creepkit.registry import Plugin, Registry, default_registry
-from helpers.command_line import creepkit, one_line
 from helpers.paths import ROOT
 
 GUIDE = ROOT / "docs" / "extend"
@@ -256,27 +254,3 @@ def test_an_exponent_steps_between_two_values() -> None:
         ck.law("norton").with_temperature(A=transition())
     with pytest.raises(LawError, match="width is 0"):
         transition(width=0)
-
-
-# ---- commands ------------------------------------------------------------------------------------------------------
-
-
-def test_commands_run_and_are_listed() -> None:
-    loaded("command")
-    assert creepkit("--plugin", "example_0.py", "greet").stdout == f"creepkit {ck.__version__}\n"
-    text = creepkit("--plugin", "example_0.py", "--plugin", "example_1.py", "--help").stdout
-    assert text.split("Commands of plugins:\n")[1].splitlines() == [
-        "  greet  Say which version runs.",
-        "  life   Say when a bar reaches a strain.",
-    ]
-
-
-def test_the_command_says_when_a_strain_is_reached() -> None:
-    """Of Norton's law under dead weight, whose logarithmic strain e is reached at (1 - exp(-n e)) / (n A s^n)."""
-    loaded("command")
-    words = ("--plugin", "example_1.py", "life", "norton", "--set", "A=1e-16", "--set", "n=5")
-    answer = creepkit(*words, "--stress", "100", "--json")
-    hours = (1 - np.exp(-5 * 0.01)) / (5 * 1e-16 * 100.0**5) / 3600
-    assert json.loads(answer.stdout)["hours"] == pytest.approx(hours, rel=1e-3)
-    assert "does not reach a strain of 0.01" in one_line(creepkit(*words, "--stress", "1"))
-    assert creepkit(*words[:-1], "n=five", "--stress", "100").exit_code == 2

@@ -131,6 +131,15 @@ def test_the_stated_scales_are_those_of_a_thin_plate() -> None:
     assert plate.reference_stress(plan) == pytest.approx([0.32 * 400.0 * 0.5] * 2, rel=1e-3)
 
 
+@pytest.mark.parametrize(("A", "n"), [(1.2e-17, 5.5), (4e-15, 4.0)])
+def test_a_thin_plate_creeps_as_by_a_mesh_of_three_times_as_many_elements_a_side(A: float, n: float) -> None:
+    plates = PlateBulge(8.0, 0.5), PlateBulge(8.0, 0.5, refinement=3.0, tolerance=5e-4)
+    times = [1.0, 60.0, 600.0, 14400.0]
+    heights = [plate_of(one, {"A": A, "n": n}, 4.0, times, 140e3).outputs["deflection"] for one in plates]
+    creep, fine = (one[1:] - one[0] for one in heights)
+    assert creep == pytest.approx(fine, rel=6e-3)
+
+
 def test_a_plate_states_the_stresses_that_creep_follows_while_it_bulges() -> None:
     """At last those of a spherical cap, P R/(2 h) of the wall that its area thins, and no longer those of bending."""
     values, p = {"A": 5e-6 / 60.0**5, "n": 5.0}, 0.3

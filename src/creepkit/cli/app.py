@@ -19,7 +19,7 @@ import typer
 from typer.core import TyperGroup
 
 from creepkit.cli.ending import exit_code_of_signal, interrupted_sentence, say, sentence_of
-from creepkit.errors import PluginError, nearest, printable
+from creepkit.errors import nearest, printable
 
 STAGES: dict[str, dict[str, str]] = {
     "Begin": {
@@ -84,12 +84,7 @@ def built(name: str) -> Any:
 
 
 class CommandGroup(TyperGroup):
-    """The group of all commands; it asks plugins for theirs when a command is not one of creepkit's own.
-
-    Only then all plugins are imported; `creepkit --help` imports those alone whose text names the hook for commands.
-    """
-
-    _plugins_asked = False
+    """The group of all commands."""
 
     def make_context(self, *names: Any, **options: Any) -> Any:
         """Read the command line; `--help` and `--version` print what they are asked for already here."""
@@ -130,51 +125,28 @@ class CommandGroup(TyperGroup):
             raise typer.Exit(1) from None
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Creepkit's own commands, in the order of work."""
+        """The commands, in the order of work."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the command of this name, creepkit's own or a plugin's; say which plugins failed where none has it."""
+        """Return the command of this name; None where there is none."""
         name = ALIASES.get(cmd_name, cmd_name)
-        if name in COMMANDS:  # anew for each command line: options may be those of a plugin file
-            if name not in ctx.meta:
-                ctx.meta[name] = built(name)
-            return ctx.meta[name]
-        if name not in self.commands and not self._plugins_asked:
-            self._plugins_asked = True
-            added, problems = _plugin_commands()
-            self.commands.update(added)
-            for problem in problems if name not in added else ():
-                say(problem)
-        return self.commands.get(name)
+        if name in COMMANDS and name not in ctx.meta:  # anew for each command line: options may be those of a plugin
+            ctx.meta[name] = built(name)
+        return ctx.meta[name] if name in COMMANDS else None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the command of the first word; a usage error with the nearest for one that there is not."""
         word = args[0]
         if not word.startswith("-") and self.get_command(ctx, word) is None:
-            known = [*COMMANDS, *self.commands]
-            ctx.fail(f"No such command '{printable(word)}'; {nearest(word, known)}")
+            ctx.fail(f"No such command '{printable(word)}'; {nearest(word, COMMANDS)}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write creepkit's own commands by stage, those of plugins, and what is wrong with plugins."""
+        """Write the commands by stage."""
         for stage, commands in STAGES.items():
             with formatter.section(stage):
                 formatter.write_dl([(f"{name:12}", sentence) for name, sentence in commands.items()])
-        failed = []
-        try:
-            _load_plugin_files(ctx.params.get("plugin"))
-        except PluginError as error:
-            failed = [str(error)]
-        added, problems = _plugin_commands()
-        shown = [(name, one.get_short_help_str(80)) for name, one in sorted(added.items()) if not one.hidden]
-        if shown:
-            with formatter.section("Commands of plugins"):
-                formatter.write_dl(shown)
-        if failed or problems:
-            with formatter.section("Plugins that failed"):
-                for problem in (*failed, *problems):
-                    formatter.write(f"  {problem}\n")
 
 
 app = typer.Typer(
@@ -221,28 +193,6 @@ def _load_plugin_files(files: list[Path] | None) -> None:
         for plugin in [known.load_file(file) for file in files]:
             for sentence in known.replaced(plugin):
                 say(sentence)
-
-
-def _plugin_commands() -> tuple[dict[str, Any], list[str]]:
-    """Return {name: command} of what plugins add, and a sentence for each plugin or command that cannot be used."""
-    from creepkit import registry
-
-    added: dict[str, Any] = {}
-    problems: list[str] = []
-    for plugin, commands_of_plugin in registry.default_registry().command_lines():
-        try:
-            commands = typer.main.get_group(commands_of_plugin).commands
-        except Exception as error:  # of the signature of somebody else's command
-            problems.append(f"{plugin.provenance}: its commands cannot be used: {' '.join(str(error).split())}")
-            continue
-        problems += [plugin.problem] if plugin.problem else []
-        for name, command in commands.items():
-            if name in COMMANDS or name in added:
-                other = "creepkit" if name in COMMANDS else "another plugin"
-                problems.append(f"{plugin.provenance} adds the command '{name}', which {other} has already; rename it")
-            else:
-                added[name] = command
-    return added, problems
 
 
 def _is_of_the_command_line(error: Exception) -> bool:

@@ -42,7 +42,7 @@ class OutputPath:
 
     def check(self, path: Path, *, force: bool) -> None:
         """Raise CreepkitError where nothing can be written to `path`, or by force alone."""
-        if self.kind == "folder":
+        if self.kind == "folder" and path.suffix != ".py":
             check_folder_target(path, CreepkitError, self.names)
         else:
             check_target(path, CreepkitError, force=force or self.kind == "resumed")

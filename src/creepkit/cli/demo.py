@@ -65,7 +65,7 @@ def command(
     studies = {to / "creep_curves": MEASURED, to / "bulge_test": PLANTED_BULGE}
     results = [_run(source, folder) for folder, source in studies.items()]
     tell(f"time: {time.perf_counter() - started:.0f} s")
-    tell(f"results, the best law of each as LaTeX and Python, and the study files' locks: {to}")
+    tell(f"results, and the best law of each as LaTeX and Python: {to}")
     tell(f"reports: {' '.join(str(result.report) for result in results)}")
 
 

@@ -15,10 +15,11 @@ from creepkit.errors import FitError
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.search_options import SearchOptions
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.law_search.search import LawSearchOptions
 from creepkit.limits import STRAIN
 from creepkit.options import Option, options_of
 from creepkit.records import History, Predictor
-from creepkit.reports.terminal import ProgressBar, print_json, tell
+from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_written
 from creepkit.studies.candidates import by_likelihood, ranked_candidates
 
 if TYPE_CHECKING:
@@ -44,7 +45,9 @@ def command(
     changes: Annotated[dict[str, Any], LawChanges],
     how: Annotated[dict[str, Any], SearchOptions],
     to: Annotated[
-        Path, typer.Option(help="Folder for results; made if needed."), OutputPath("folder", ("ranking.json",))
+        Path,
+        typer.Option(help="Folder for results; made if needed. Of --search also a file LAW.py."),
+        OutputPath("folder", ("ranking.json",)),
     ] = Path("identified"),
     reader: Reader = None,
     only: Only = None,
@@ -55,6 +58,10 @@ def command(
     through: Annotated[
         Predictor | None, Option(help="Search through a surrogate, and end with the specimen itself.")
     ] = None,
+    search_laws: Annotated[
+        bool, Option(help="Search laws that nobody wrote down, beside registered ones.", flag="search")
+    ] = False,
+    budget: Annotated[dict[str, Any], LawSearchOptions],
     further_tests: Annotated[bool, Option(help="Say which tests would distinguish the remaining laws.")] = False,
     each: Annotated[
         Literal["alloy"] | None,
@@ -79,13 +86,21 @@ def command(
     from creepkit.screening.screen import CANDIDATE_LAWS
 
     search, chosen = SearchOptions().changed(how), IdentificationSettings().changed(settings)
-    if each is None:
+    if search_laws:
+        given = {"--law": law is not None, "--by": each is not None, "--through": through is not None}
+        given |= {one.flag: one.name in how for one in options_of(SearchOptions)}
+        given |= {one.flag: one.name in changes for one in options_of(LawChanges)}
+        advice = "is not for a search of laws: leave it out, or --search"
+    elif each is None:
         given = {
+            **{one.flag: one.name in budget for one in options_of(LawSearchOptions)},
             "--compositions": compositions is not None,
             "--dense": dense != DENSE,
             "--workers": workers is not None,
         }
         advice = "is for a plate: add --by alloy, or leave it out"
+        if budget:
+            advice = "is for a search of laws: add --search, or leave it out"
     else:
         given = {one.flag: one.name in how for one in options_of(SearchOptions)}
         given |= {"--temperature": "temperature" in changes, "--further-tests": further_tests}
@@ -95,6 +110,9 @@ def command(
     histories = selected(ck.read_histories(files, reader), only)
     if up_to is not None:
         histories = _truncate_at_strain(histories, up_to)
+    if search_laws:
+        _search(histories, using, to, chosen, budget, as_json)
+        return
     candidates = [ck.law(name) for name in dict.fromkeys(law or CANDIDATE_LAWS)]
     if each is not None:
         options = ck.ScreeningOptions(settings=chosen, through=through, dense=dense)
@@ -119,6 +137,38 @@ def command(
         print_ranking(ranking, written, len(histories))
     if further_tests:
         tell(ranking.further_tests(), err=as_json)
+
+
+def _search(
+    histories: list[History],
+    using: Predictor | None,
+    to: Path,
+    settings: IdentificationSettings,
+    budget: dict[str, Any],
+    as_json: bool,
+) -> None:
+    """Search laws, and write the ranking and the front."""
+    from creepkit.law_search.law_file import write_law_file
+    from creepkit.reports.law_search import law_search_text
+    from creepkit.reports.ranking import ranking_to_json
+
+    _tell_assumptions(histories)
+    if to.suffix != ".py":
+        check_identified_folder(to, [])
+    with ProgressBar() as progress:
+        found = ck.search_laws(histories, using, settings=settings, progress=progress.tick, **budget)
+    if to.suffix == ".py":
+        written = [write_law_file(found.ranking.valued, to)]
+    else:
+        written = [*write_ranking(found.ranking, to), to / "front.png"]
+        found.plot(written[-1])
+    if as_json:
+        front = [{"law": one.law.name, "complexity": one.complexity, "misfit": one.misfit} for one in found.front]
+        print_json({**ranking_to_json(found.ranking, written), "front": front})
+        return
+    tell(f"{law_search_text(found)}\n")
+    for path in written:
+        tell_written(path)
 
 
 def _screen(

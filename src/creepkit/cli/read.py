@@ -15,7 +15,6 @@ import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import Json
 from creepkit.errors import CreepkitError, HistoryError
-from creepkit.limits import ENERGY
 from creepkit.options import Option
 from creepkit.reports.terminal import print_json, tell, tell_written
 
@@ -31,9 +30,6 @@ def command(
     *,
     reader: Annotated[str | None, Option(help="Reader of the files, or format of records.")] = None,
     ignore: Annotated[tuple[str, ...], Option(help="Columns that nobody needs.", example="load_kN,date")] = (),
-    activation_energy: Annotated[
-        float | None, Option(help="J/mol, to put a factor on the creep rate as a step of temperature.", limits=ENERGY)
-    ] = None,
     to: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Each test as CSV, in s, MPa, mm and K."), OutputPath("folder")
     ] = None,
@@ -49,7 +45,7 @@ def command(
 
     A record of an instrument is shown with its channels, units, gaps and clock.
     """
-    from creepkit.quality import ACTIVATION_ENERGY, remark_flags
+    from creepkit.quality import remark_flags
     from creepkit.readers.questions import merged
     from creepkit.records import Histories
     from creepkit.reports import histories as report
@@ -71,8 +67,7 @@ def command(
             tell_written(path)
     found, unread = _readable_tests(files, reader, ignored)
     framed = [history for history in found if history.outputs]
-    energy = ACTIVATION_ENERGY if activation_energy is None else activation_energy
-    quality = ck.check_data_quality(framed, activation_energy=energy)
+    quality = ck.check_data_quality(framed)
     remarked = tuple(remark_flags([history for history in found if not history.outputs]))
     quality = replace(quality, flags=(*quality.flags, *remarked), tests=len(found if remarked else framed))
     if as_json:

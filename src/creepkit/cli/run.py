@@ -32,13 +32,10 @@ def command(
     ] = None,
     to: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="For results, lock, exports and report; by default beside it."),
+        typer.Option(metavar="FOLDER", help="For results, exports and report; by default beside it."),
         OutputPath("folder"),
     ] = None,
     again: Annotated[bool, typer.Option("--again", help="Make everything again.")] = False,
-    locked: Annotated[
-        bool, typer.Option("--locked", help="Refuse to run where anything differs from study.lock.")
-    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print how each stage ended as JSON.")] = False,
 ) -> None:
     """Only what changed runs again. Interrupted, it goes on where it was when it is started again. A report is written
@@ -47,22 +44,17 @@ def command(
     from creepkit.errors import StudyError
     from creepkit.studies.study import Study, study_of_report
 
-    from_report = study.suffix.lower() in REPORT_SUFFIXES
-    if from_report:
+    if study.suffix.lower() in REPORT_SUFFIXES:
         folder = to if to is not None else study.parent / f"{study.stem}_study"
         loaded, target = study_of_report(study, folder), folder
     else:
         loaded, target = Study.load(study), to if to is not None else study.parent
     with ProgressBar() as progress:
-        result = loaded.run(to=target, only=only or None, again=again, locked=locked, progress=progress.tick)
-    for change in result.changes:
-        tell(f"since the last lock: {change}", err=True)
+        result = loaded.run(to=target, only=only or None, again=again, progress=progress.tick)
     if as_json:
         print_json(result_to_json(result))
     else:
         print_result(result)
-    if from_report and not result.changes:
-        tell(f"all numbers are those of {study}", err=as_json)
     if result.failures:
         first = result.failures[0]
         others = f" ({len(result.failures) - 1} more)" if len(result.failures) > 1 else ""
@@ -71,7 +63,7 @@ def command(
 
 def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
-    from creepkit.reports.answer import answer_text, asked_figures, strength_figures
+    from creepkit.reports.answer import answer_text, asked_figures, line_of_group, rupture_figures
 
     tell(result.title)
     told = [(one.name, one.state, one.sentence) for one in result.stages if one.state != "made" or one.sentence]
@@ -84,18 +76,19 @@ def print_result(result: StudyResult) -> None:
     if result.forecasts or result.rupture:
         of = {name: f"{group}: " if len(result.rankings) > 1 else "" for name, group in result.forecast_groups.items()}
         lines = [f"{of[name]}{one.line}" for name, found in result.forecasts.items() for one in asked_figures(found)]
-        lines += [one.line for assessment in result.rupture.values() for one in strength_figures(assessment)]
+        lines += [one.line for assessment in result.rupture.values() for one in rupture_figures(assessment)]
         for line in lines[:MOST_FIGURES]:
             tell(line)
     for group, ranking in result.rankings.items():
         alone = len(result.rankings) == 1
-        tell(answer_text(ranking.best, ranking, result.report) if alone else f"{group}: {ranking.best.headline}")
+        best = ranking.best
+        tell(answer_text(best, ranking, result.report) if alone else f"{group}: {line_of_group(best)}")
     if result.report is not None:
         tell(f"report: {result.report}")
 
 
 def result_to_json(result: StudyResult) -> dict[str, object]:
-    """Stages, exclusions, changes and the verdict of each group."""
+    """Stages, exclusions and the verdict of each group."""
     return {
         "title": result.title,
         "stages": [
@@ -103,7 +96,6 @@ def result_to_json(result: StudyResult) -> dict[str, object]:
             for one in result.stages
         ],
         "exclusions": [{"test": e.test, "frames": e.frames, "reason": e.reason} for e in result.exclusions],
-        "changes": result.changes,
         "verdicts": {group: ranking.verdict for group, ranking in result.rankings.items()},
         "report": None if result.report is None else str(result.report),
     }

@@ -11,7 +11,7 @@ import typer
 import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.shared import PAPER_SPECIMEN, Json, Seed
-from creepkit.errors import DatasetError, SolveError
+from creepkit.errors import SolveError
 from creepkit.jobs.worker_pools import ParallelExecution
 from creepkit.limits import SAMPLES, SECONDS
 from creepkit.options import Option
@@ -29,9 +29,7 @@ Specimen = Annotated[str, Option(help="Any specimen that says how its tests are 
 def generate(
     law: Annotated[str, typer.Argument(metavar="LAW", help="Name of a law.")],
     *,
-    to: Annotated[
-        Path | None, typer.Option(help="HDF5 file to write; its shards lie in FILE.parts."), OutputPath("resumed")
-    ] = None,
+    to: Annotated[Path, typer.Option(help="HDF5 file; its shards lie in FILE.parts."), OutputPath("resumed")],
     samples: Annotated[int | None, Option(help="Accepted samples wanted.", limits=SAMPLES)] = None,
     draws: Annotated[int | None, Option(help="Or draws, whatever becomes of them.", limits=SAMPLES)] = None,
     specimen: Specimen = PAPER_SPECIMEN,
@@ -45,7 +43,6 @@ def generate(
         Option(help="Range of a condition, in MPa, s, mm, K, N.", flag="range", example="P1=5:20"),
     ] = None,
     execution: Annotated[dict[str, Any], ParallelExecution],
-    dry_run: Annotated[bool, Option(help="Say what would be drawn; simulate nothing.")] = False,
     as_json: Json = False,
 ) -> None:
     """Simulate a data set for training.
@@ -53,7 +50,7 @@ def generate(
     Interrupted, it goes on where it was when it is started again in the same way.
     """
     from creepkit.dataset.generation import resolve_design
-    from creepkit.reports.dataset import print_acceptance, print_dataset
+    from creepkit.reports.dataset import print_dataset
 
     chosen = ParallelExecution(**execution)
     changes: dict[str, Any] = {"domain": domain, **(conditions or {})}
@@ -61,11 +58,6 @@ def generate(
         changes["every"] = interval
     piece = ck.specimen(specimen)
     design = resolve_design(law, piece, **changes)
-    if dry_run:
-        print_acceptance(design, seed, as_json)
-        return
-    if to is None:
-        raise DatasetError("--to FILE is missing: name the HDF5 file to write, such as --to combined.h5")
     with ProgressBar() as progress:
         data = ck.generate(
             design, piece, samples, draws=draws, seed=seed, to=to, execution=chosen, progress=progress.tick

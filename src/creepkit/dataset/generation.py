@@ -226,8 +226,7 @@ class ProgressRecord:
         drawn = len(self.done) * self.job.rows
         if self.samples is not None and drawn >= MOST_DRAWS_WITHOUT_ACCEPTED and not self.accepted:
             raise DatasetError(
-                f"none of the first {drawn} draws was accepted; see 'creepkit surrogate generate --dry-run', change "
-                "the design, or ask for draws instead of samples"
+                f"none of the first {drawn} draws was accepted; change the design, or ask for draws instead of samples"
             )
 
     @property

@@ -262,12 +262,14 @@ def temperature_study(
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
     settings: IdentificationSettings | None = None,
+    joint_fit: Identification | None = None,
     progress: IterationCallback | None = None,
     **changes: Unpack[DiscoveryOptionsKeywords],
 ) -> TemperatureStudy:
     """Identify moduli, then the law times Arrhenius, then each temperature alone, and discover forms of temperature.
 
     law : without temperature. using : a predictor, or the name of a specimen; by default those that the tests name.
+    joint_fit : that of the law times Arrhenius from these tests, where it was made; not with moduli, which change it.
     changes : fields of DiscoveryOptions.
 
     Tests whose used frames are not at one temperature are left out, and a temperature that cannot be identified alone
@@ -293,7 +295,8 @@ def temperature_study(
         moduli_fit = moduli(with_arrhenius(law, histories), histories, predictor, settings=settings)
         if moduli_fit.elastic is not None:
             histories = [h.replace(elastic=moduli_fit.elastic) for h in histories]
-    joint_fit = identify(with_arrhenius(law, histories), histories, predictor, settings=settings, progress=progress)
+    if joint_fit is None or options.moduli:
+        joint_fit = identify(with_arrhenius(law, histories), histories, predictor, settings=settings, progress=progress)
     isothermal_fits, failures = _isothermal_fits(law, histories, predictor, options.within, settings, progress)
     notes += suspect_frames_note(histories)
     temperature_law = None

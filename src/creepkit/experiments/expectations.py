@@ -20,7 +20,7 @@ the best candidates the step begins at the draw of the posterior of b which expl
 the bounds of b. A chi-square that is expected by one step is off by up to a factor of two.
 
 The information is the mutual information of law and outcome (Box & Hill (1967), Technometrics 9, 57), in nats: the mean
-decrease of the entropy of the weights. A decisive verdict has to exclude more than the other laws: shares of them, and
+decrease of the entropy of the weights. Planned tests have to exclude more than the other laws: shares of them, and
 a threshold stress (selection.challenges). Those that the tests allow are compared in the same way with the law that
 they alter. The mean of chi-square over laws, with weights, is the T-criterion (Atkinson & Fedorov (1975), Biometrika
 62, 57); it grows without limit where a verdict is certain already.

@@ -53,7 +53,7 @@ class Design(Presentable, Plotted):
     """The next tests, the best first.
 
     goal : "parameters", "law", or the name of a quantity. laws, weights : that remain, the best first.
-    altered : names of what the tests allow beside them, which a decisive verdict has to exclude (goal "law").
+    altered : names of what the tests allow beside them, which planned tests have to exclude (goal "law").
     tests : all that were considered; without those that were left out, {description: why}.
     plan : the run to make, or the runs that fit the budget (h of machine time) together, and expected : what they tell.
     notes : what the expectation does not include.
@@ -136,9 +136,9 @@ def _and(names: tuple[str, ...]) -> str:
 
 
 def _separated(design: Design) -> str:
-    """What a decisive verdict does."""
+    """What planned tests do that exclude all but one law."""
     if len(design.laws) == 1:
-        return f"makes {design.laws[0]} decisive, against {_and(design.altered)},"
+        return f"tells {design.laws[0]} from {_and(design.altered)}"
     against = ", and from what the tests allow beside each," if design.altered else ""
     return f"separates {_and(design.laws)}{against}"
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import html
 import html.entities
+import math
 import re
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -247,14 +248,24 @@ class MathmlPrinter(ReadableSums, MathMLPresentationPrinter):  # type: ignore[mi
             factors.append(self._exponential(self._print(rest)))
         return self._node("mrow", *factors)
 
+    def _print_Pow(self, expr: Any) -> Any:
+        """[sinh(x)]^n, which sympy prints as sinh(x)^n."""
+        if not isinstance(expr.base, sympy.functions.elementary.hyperbolic.HyperbolicFunction):
+            return super()._print_Pow(expr)
+        opening, closing = self._leaf("mo", "["), self._leaf("mo", "]")
+        return self._node("msup", self._node("mrow", opening, self._print(expr.base), closing), self._print(expr.exp))
+
     def _arrhenius_factor(self, activation: ArrheniusExponent) -> Any:
-        """exp[-(Q/R)(1/T - 1/T_ref)]."""
-        energy = self._node("mfrac", self._print(activation.energy), self._leaf("mi", "R"))
+        """exp[-(Q/R)(1/T - 1/T_ref)], or exp[-Q/(R T)]."""
+        sign = [self._leaf("mo", "−")] if activation.sign else []
+        below = [self._leaf("mi", symbol) for symbol in ("R" if math.isfinite(activation.T_ref) else "RT")]
+        energy = self._node("mfrac", self._print(activation.energy), self._node("mrow", *below))
+        if len(below) > 1:
+            return self._exponential(self._node("mrow", *sign, energy))
         reference = self._node("mrow", self._leaf("mn", f"{activation.T_ref:g}"), self._leaf("mtext", "\u00a0K"))
         warm, at_reference = (self._node("mfrac", self._leaf("mn", "1"), T) for T in (self._leaf("mi", "T"), reference))
         opening, minus, closing = (self._leaf("mo", sign) for sign in "(−)")
         difference = self._node("mrow", opening, warm, minus, at_reference, closing)
-        sign = [self._leaf("mo", "−")] if activation.sign else []
         return self._exponential(self._node("mrow", *sign, energy, difference))
 
     def _exponential(self, argument: Any) -> Any:

@@ -14,7 +14,7 @@ from pathlib import Path
 import h5py
 
 from creepkit.errors import CreepkitError, quoted
-from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, how_to_raise, raised
+from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable
 from creepkit.files.writing import ADVICE, replace_on_success
 
 LARGEST_COMPRESSION = 100
@@ -60,7 +60,7 @@ def open_hdf5(path: Path, kind: FileKind) -> Iterator[h5py.File]:
 def _check(file: h5py.File, path: Path, kind: FileKind) -> None:
     """Raise the error of `kind` for a file that would have HDF5 open other files, or that unpacks to too much."""
     groups, known, size = [file], {h5py.h5o.get_info(file.id).addr}, 0
-    most = max(raised(MAXIMUM_UNPACKED_BYTES), LARGEST_COMPRESSION * path.stat().st_size)
+    most = max(MAXIMUM_UNPACKED_BYTES, LARGEST_COMPRESSION * path.stat().st_size)
     while groups:
         group = groups.pop()
         for name in group:
@@ -72,10 +72,7 @@ def _check(file: h5py.File, path: Path, kind: FileKind) -> None:
                 )
             size += item.nbytes if is_array else 0
             if size > most:
-                raise kind.error(
-                    f"{path}: its arrays have more than {most / 1e6:g} MB unpacked; {kind.advice}, or "
-                    f"{how_to_raise(size, most)}"
-                )
+                raise kind.error(f"{path}: its arrays have more than {most / 1e6:g} MB unpacked; {kind.advice}")
             if isinstance(item, h5py.Group) and (place := h5py.h5o.get_info(item.id).addr) not in known:
                 known.add(place)  # links may lead back to where they came from
                 groups.append(item)

@@ -1,12 +1,8 @@
-"""Opening files that a user hands over: regular files only, of limited size, text in UTF-8, one clear error for all.
-
-An environment variable, and that alone, allows more than the usual size.
-"""
+"""Opening files that a user hands over: regular files only, of limited size, text in UTF-8, one clear error for all."""
 
 from __future__ import annotations
 
 import hashlib
-import math
 import os
 import stat
 from collections.abc import Iterator
@@ -16,36 +12,6 @@ from io import BufferedReader
 from pathlib import Path
 
 from creepkit.errors import CreepkitError, quoted
-
-VARIABLE = "CREEPKIT_LIMITS"
-"""Environment variable: a number of 1 or more by which all limits on files that are read are multiplied."""
-
-
-LARGEST_FACTOR = 1e6
-
-
-def raised(limit: int) -> int:
-    """A limit on files as it holds in this process: the usual one, or larger where the environment says so."""
-    text = os.environ.get(VARIABLE, "").strip()
-    if not text:
-        return limit
-    try:
-        factor = float(text) if len(text) < 20 else math.nan
-    except ValueError:
-        factor = math.nan
-    if not 1.0 <= factor <= LARGEST_FACTOR:
-        raise CreepkitError(
-            f"the environment variable {VARIABLE} is '{quoted(text)}'; write a number from 1 to {LARGEST_FACTOR:g}"
-        )
-    return int(limit * factor)
-
-
-def how_to_raise(found: float, limit: int) -> str:
-    """What to do where more was found than `limit` allows today, as the end of a sentence."""
-    usual = limit / (raised(1_000_000) / 1e6)
-    needed = min(found / usual, LARGEST_FACTOR) if math.isfinite(found) else 10.0
-    return f"if it is right, {VARIABLE}={max(math.ceil(needed * 1.05), 2)} in the environment allows more"
-
 
 DEFAULT_MAXIMUM_BYTES = 50_000_000
 """Bytes; no document of creepkit is near it, and a reader must not load what memory cannot hold."""
@@ -60,19 +26,13 @@ class FileKind:
     """A kind of file that creepkit reads or writes.
 
     noun : with its article, as messages name it: "an identification". error : what is raised for a file of this kind.
-    advice : what to do about a file that is something else. maximum_bytes : largest size that is read, unless
-    VARIABLE allows more.
+    advice : what to do about a file that is something else. maximum_bytes : largest size that is read.
     """
 
     noun: str
     error: type[CreepkitError]
     advice: str
     maximum_bytes: int = DEFAULT_MAXIMUM_BYTES
-
-    @property
-    def most_bytes(self) -> int:
-        """The largest size that is read in this process."""
-        return raised(self.maximum_bytes)
 
 
 _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
@@ -94,8 +54,8 @@ def read_bytes(path: Path, kind: FileKind, *, first: int | None = None) -> bytes
     """
     with open_binary(path, kind, any_size=first is not None) as stream:
         content = stream.read() if first is None else stream.read(first)
-    if first is None and len(content) > kind.most_bytes:
-        raise kind.error(_too_large(path, kind, len(content)))
+    if first is None and len(content) > kind.maximum_bytes:
+        raise kind.error(_too_large(path, kind))
     return content
 
 
@@ -151,19 +111,16 @@ def _open_regular(path: Path, kind: FileKind, *, any_size: bool = False) -> int:
         problem = f"{path}: is a folder; {kind.advice}"
     elif not stat.S_ISREG(status.st_mode):
         problem = f"{path}: is no regular file but a device, a pipe or the like; {kind.advice}"
-    elif not any_size and status.st_size > kind.most_bytes:
-        problem = _too_large(path, kind, status.st_size)
+    elif not any_size and status.st_size > kind.maximum_bytes:
+        problem = _too_large(path, kind)
     if problem:
         os.close(descriptor)
         raise kind.error(problem)
     return descriptor
 
 
-def _too_large(path: Path, kind: FileKind, size: int) -> str:
-    return (
-        f"{path}: larger than {kind.most_bytes / 1e6:g} MB, which {kind.noun} never is; {kind.advice}, or "
-        f"{how_to_raise(size, kind.most_bytes)}"
-    )
+def _too_large(path: Path, kind: FileKind) -> str:
+    return f"{path}: larger than {kind.maximum_bytes / 1e6:g} MB, which {kind.noun} never is; {kind.advice}"
 
 
 def _cause(error: Exception) -> str:

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError
 from creepkit.forecasts.banded_output import (
     CHOICE_OF_LAW,
     LAW,
@@ -22,7 +21,6 @@ from creepkit.forecasts.banded_output import (
     OutputForecast,
 )
 from creepkit.forecasts.draws import DrawnLaw, LawDraws, crossing_times, drawn_law, first_crossing, has_sampled_draws
-from creepkit.forecasts.measured_test import TestScore, score_test
 from creepkit.inverse.extrapolation import HOUR, UNSEEN_RUPTURE, extrapolation_text
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
@@ -65,11 +63,23 @@ class TimeForecast:
         return self.measured <= self.high if self.censored else self.low <= self.measured <= self.high
 
 
+@dataclass(frozen=True)
+class FramesInside:
+    """How a measured test compares with its forecast.
+
+    share : {output: share of frames inside the pointwise band}. whole : {output: whether all of its frames are inside
+    the simultaneous band}.
+    """
+
+    share: Mapping[str, float]
+    whole: Mapping[str, bool]
+
+
 @dataclass(frozen=True, eq=False)
 class TestForecast:
     """The forecast of one test.
 
-    outputs : {name: its curve and band}. times : to targets and to rupture. score : of a measured test, else None.
+    outputs : {name: its curve and band}. times : to targets and to rupture. inside : of a measured test, else None.
     includes : what the bands are made of, with sizes. caution : why bands are not those of the tests, or "".
     extrapolation : beyond the fitted ranges, in one sentence, or "". misfit : what the law of most weight misses there,
     where bands and times hold that.
@@ -82,7 +92,7 @@ class TestForecast:
     times: tuple[TimeForecast, ...]
     includes: Mapping[str, str]
     extrapolation: str = ""
-    score: TestScore | None = None
+    inside: FramesInside | None = None
     notes: tuple[str, ...] = ()
     caution: str = ""
     misfit: LawMisfit | None = None
@@ -131,14 +141,11 @@ def forecast_test(
     if RUPTURE_OUTPUT not in fit.noise_model.outputs and any(not t.output for t in times):
         notes.append(UNSEEN_RUPTURE)
     notes += [f"the solver did not finish {failed} of the draws; they are left out"] if failed else []
-    score = None
-    if any(usable_frames(history, name).any() for name in history.outputs if name in outputs):
-        score, problem = _score(drawn, history, banded, predictor, outputs)
-        notes += [problem] if problem else []
+    inside = _inside(banded, outputs)
     includes = _includes(drawn, best, outputs)
     extrapolation = _extrapolation(banded, predictor, best, times)
     caution = _caution([one.draws for one in drawn])
-    return TestForecast(history, outputs, times, includes, extrapolation, score, tuple(notes), caution, best.misfit)
+    return TestForecast(history, outputs, times, includes, extrapolation, inside, tuple(notes), caution, best.misfit)
 
 
 MOST_TIMES = 300
@@ -229,26 +236,17 @@ def _measured_crossing(history: History, output: str, target: float) -> float:
 # ---- what is said beside it ----------------------------------------------------------------------------------
 
 
-def _score(
-    drawn: Sequence[DrawnLaw],
-    full: History,
-    banded: History,
-    predictor: Predictor,
-    outputs: Mapping[str, OutputForecast],
-) -> tuple[TestScore | None, str]:
-    """The score of a measured test, or why it has none; banded : the test at the times of bands."""
-    inside, whole = {}, {}
+def _inside(banded: History, outputs: Mapping[str, OutputForecast]) -> FramesInside | None:
+    """How a measured test compares with its bands; banded : the test at their times."""
+    shares, whole = {}, {}
     for name, forecast in outputs.items():
         if name not in banded.outputs or not usable_frames(banded, name).any():
             continue
         used, band = usable_frames(banded, name) & (banded.times > 0), forecast.band
         values = banded.outputs[name]
-        inside[name] = float(((values >= band.low) & (values <= band.high))[used].mean())
+        shares[name] = float(((values >= band.low) & (values <= band.high))[used].mean())
         whole[name] = bool(((values >= band.lowest) & (values <= band.highest))[used].all())
-    try:
-        return score_test(drawn, predictor, full, inside, whole), ""
-    except CreepkitError as error:
-        return None, f"no score: {error}"
+    return FramesInside(shares, whole) if shares else None
 
 
 def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, OutputForecast]) -> dict[str, str]:

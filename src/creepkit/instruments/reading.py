@@ -12,7 +12,6 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest, quoted, refuse_unknown
-from creepkit.files.reading import how_to_raise, raised
 from creepkit.files.time_stamps import DAY, ClockColumn, ResolvedTimes, check_increasing, is_clock_time, resolve
 from creepkit.instruments.column_heads import (
     KNOWN_UNITS,
@@ -67,9 +66,8 @@ def _record(
     missing, count = MISSING | {*chosen.missing, *given.missing}, 0
     for rows in reader.parts():
         count += len(columns.channels) * rows.lines.size
-        if count > (most := raised(MOST_VALUES)):
-            what = f"more than {most} readings; ask for channels=[...], or {how_to_raise(2 * most, most)}"
-            raise HistoryError(f"{path}: {what}")
+        if count > MOST_VALUES:
+            raise HistoryError(f"{path}: more than {MOST_VALUES} readings; ask for channels=[...]")
         lines.append(rows.lines)
         times.add(rows)
         values.append([rows.readings(one.position, missing) for one in columns.channels])

@@ -48,11 +48,11 @@ FEWEST_RUPTURES = 4
 def candidates(histories: Sequence[History]) -> list[CreepLaw]:
     """Laws that suit tests, the simplest first; those of plugins that are not installed are left out.
 
-    Laws of steady creep are Norton's and, where three stresses or more differ by half, Garofalo's sine, or a threshold
-    stress, constant or linear in temperature, where minimum rates prefer it; with primary creep where a third of the
-    curves show it, with and without where a third relax, and logarithmic creep where a third of them go with ln t, else
-    beside hardening by strain and by time. Where a third of the curves show tertiary creep, or where a table states
-    rupture times, laws with damage are added.
+    Laws of steady creep are Norton's and, where three stresses or more differ by half, Garofalo's sine, and where
+    minimum rates prefer them a threshold stress, constant or linear in temperature, or a sum of two powers, each with
+    an activation energy; with primary creep where a third of the curves show it, with and without where a third relax,
+    and logarithmic creep where a third of them go with ln t, else beside hardening by strain and by time. Where a third
+    of the curves show tertiary creep, or where a table states rupture times, laws with damage are added.
     """
     return list(named_candidates(histories).values())
 
@@ -65,7 +65,7 @@ def named_candidates(histories: Sequence[History]) -> dict[str, CreepLaw]:
     curves, several = [h for h in tests if h.outputs], _several_stresses(tests)
     steady = ["norton", *(["hyperbolic-sine"] if several else [])]
     if several:
-        steady += threshold_laws(tests)
+        steady += laws_of_changing_exponent(tests)
     if 2 * len(curves) < len(tests):
         ruptures = sum(h.rupture_time is not None for h in tests if not h.outputs) >= FEWEST_RUPTURES
         names = [*steady, *(["kachanov-rabotnov", *(["sinh-damage"] if several else [])] if ruptures else [])]
@@ -90,20 +90,47 @@ def _several_stresses(tests: Sequence[History]) -> bool:
     return len(distinct) >= FEWEST_STRESSES and distinct[-1] >= STRESS_RATIO * distinct[0]
 
 
-def threshold_laws(tests: Sequence[History]) -> list[str]:
-    """Names of the laws above a threshold stress that minimum rates prefer to Norton's by an F test.
-
-    ln rate = a + n ln(s - s_0) - Q/(R T) is fitted to them with s_0 of a grid, constant or falling as the temperature
-    rises. One that follows the stresses down bends ln rate over ln stress at each temperature alone, and shows as an
-    activation energy that depends on stress.
-    """
+def laws_of_changing_exponent(tests: Sequence[History]) -> list[str]:
+    """Names of the laws that minimum rates prefer to Norton's, as ln rate over ln stress bends up or down."""
     points = np.array(
         [(*reference_condition(h), measured_minimum_rate(h)) for h in tests if h.loading.quantity == "stress"]
     ).reshape(-1, 3)
     stress, temperature, rate = points[np.isfinite(points).all(axis=1)].T
     if stress.size == 0:
         return []
-    rise, T_ref, names = temperature - temperature.min(), f"{reference_temperature(tests):g}", list[str]()
+    several = float(np.ptp(temperature)) > ISOTHERMAL_RANGE
+    if _exponent_rises(stress, temperature, rate):
+        return ["double-power" if several else "norton+norton"]
+    return threshold_laws(stress, temperature, rate, f"{reference_temperature(tests):g}")
+
+
+def _exponent_rises(stress: Floats, temperature: Floats, rate: Floats) -> bool:
+    """Whether ln rate is quadratic in ln stress with a positive coefficient, the exponent at each temperature free.
+
+    At one temperature a sum of powers bends up only; an exponent that goes with 1/T alone does not.
+    """
+    x, inverse = np.log(stress / stress.mean()), temperature.mean() / temperature - 1.0
+    several = float(np.ptp(temperature)) > ISOTHERMAL_RANGE
+    columns = np.column_stack([x**2, np.ones_like(x), x, *([inverse, x * inverse] if several else [])])
+    freedom = len(x) - columns.shape[1]
+    if freedom < 2 or np.linalg.matrix_rank(columns) < columns.shape[1]:
+        return False
+    coefficients = np.linalg.lstsq(columns, np.log(rate))[0]
+    variance = float(((np.log(rate) - columns @ coefficients) ** 2).sum()) / freedom
+    sd = (variance * np.linalg.inv(columns.T @ columns)[0, 0]) ** 0.5
+    return bool(stats.t.sf(coefficients[0] / max(sd, 1e-12), freedom) < CHANCE)
+
+
+def threshold_laws(stress: Floats, temperature: Floats, rate: Floats, T_ref: str) -> list[str]:
+    """Names of the laws above a threshold stress that minimum rates prefer to Norton's by an F test.
+
+    stress, temperature, rate : (tests,) MPa, K, 1/s.
+
+    ln rate = a + n ln(s - s_0) - Q/(R T) is fitted to them with s_0 of a grid, constant or falling as the temperature
+    rises. One that follows the stresses down bends ln rate over ln stress at each temperature alone, and shows as an
+    activation energy that depends on stress.
+    """
+    rise, names = temperature - temperature.min(), list[str]()
     several, share = rise.max() > ISOTHERMAL_RANGE, rise / max(rise.max(), 1.0)
     levels = (share >= 0.0, rise < ISOTHERMAL_RANGE, rise > rise.max() - ISOTHERMAL_RANGE)
     all_least, coldest, hottest = (THRESHOLDS * stress[level].min() for level in levels)

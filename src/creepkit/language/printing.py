@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import sympy
@@ -15,7 +16,10 @@ from creepkit.language.symbols import GAS_CONSTANT, LATEX_SYMBOLS, temperature
 
 
 class ArrheniusExponent(NamedTuple):
-    """exp[-(Q/R)(1/T - 1/T_ref)] recognised in an expression: Q in J/mol, T_ref in K; -Q is `energy` after `sign`."""
+    """exp[-(Q/R)(1/T - 1/T_ref)] recognised in an expression: Q in J/mol; -Q is `energy` after `sign`.
+
+    T_ref : K; infinite in exp[-Q/(R T)].
+    """
 
     Q: sympy.Expr
     T_ref: float
@@ -25,24 +29,28 @@ class ArrheniusExponent(NamedTuple):
 
 
 def arrhenius_exponent(exponent: sympy.Expr) -> ArrheniusExponent | None:
-    """Read an exponent of the form (Q/R)(1/T_ref - 1/T); None when it is another function of temperature."""
+    """Read an exponent of the form (Q/R)(1/T_ref - 1/T); None when it is another function of temperature.
+
+    Without a reference it is another one too where no R can be told from its number, as in exp(-6000/T).
+    """
     per_T = sympy.Symbol("per_T", positive=True)
     polynomial = sympy.expand(exponent.xreplace({temperature: 1 / per_T})).as_poly(per_T)
     if polynomial is None or polynomial.degree() != 1:
         return None
     slope, start = polynomial.coeff_monomial(per_T), polynomial.coeff_monomial(1)
-    T_ref = sympy.S.Zero if start.is_zero else -slope / start  # 0.0 differs from 0 in sympy
-    if not (T_ref.is_Number and T_ref > 0):
-        return None
+    T_ref = sympy.oo if start.is_zero else -slope / start  # 0.0 differs from 0 in sympy
     number, remainder = (-slope * GAS_CONSTANT).as_coeff_Mul()
+    known = T_ref.is_finite or abs(number - _without_rounding(number, 4)) < 1e-9 * abs(number)
+    if not (T_ref.is_extended_positive and T_ref.is_number and known):
+        return None
     Q = _without_rounding(number) * remainder
     sign, energy = ("", -Q) if Q.could_extract_minus_sign() else ("-", Q)
-    return ArrheniusExponent(Q, float(_without_rounding(T_ref)), sign, energy)
+    return ArrheniusExponent(Q, float(T_ref if T_ref is sympy.oo else _without_rounding(T_ref)), sign, energy)
 
 
-def _without_rounding(number: sympy.Expr) -> sympy.Expr:
+def _without_rounding(number: sympy.Expr, digits: int = 12) -> sympy.Expr:
     """The number without the last digits, which products of R and T_ref have rounded."""
-    rounded = float(f"{float(number):.12g}")
+    rounded = float(f"{float(number):.{digits}g}")
     return sympy.Integer(int(rounded)) if rounded.is_integer() else sympy.Float(rounded)
 
 
@@ -80,6 +88,8 @@ class LatexLawPrinter(ReadableSums, LatexPrinter):  # type: ignore[misc]
         return text if exp is None else rf"\left({text}\right)^{{{exp}}}"
 
     def _arrhenius_factor(self, found: ArrheniusExponent) -> str:
+        if math.isinf(found.T_ref):
+            return rf"\exp\!\left[{found.sign}\frac{{{self._print(found.energy)}}}{{R T}}\right]"
         difference = rf"\left(\frac{{1}}{{T}} - \frac{{1}}{{{found.T_ref:g}\,\mathrm{{K}}}}\right)"
         return rf"\exp\!\left[{found.sign}\frac{{{self._print(found.energy)}}}{{R}}{difference}\right]"
 
@@ -101,6 +111,8 @@ class TextPrinter(ReadableSums, StrPrinter):  # type: ignore[misc]
         return "*".join([*factors, *([f"exp({self._print(rest)})"] if rest != 0 or not factors else [])])
 
     def _arrhenius_factor(self, found: ArrheniusExponent) -> str:
+        if math.isinf(found.T_ref):
+            return f"exp({found.sign}{self._print(found.energy)}/(R*T))"
         return f"exp({found.sign}{self._print(found.energy)}/R*(1/T - 1/{found.T_ref:g}))"
 
 

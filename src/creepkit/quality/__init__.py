@@ -3,8 +3,8 @@
 Of frames: fracture, unloading, a creep output that decreases though its load does not, single outliers. Of tests: one
 with the readings of another, replicates that differ, strain of loading that nothing states, a strain above 100 %, a
 record of load or temperature that contradicts the stated program. What one test says against all others, a fit tells.
-Of the rig: a change of creep rate at one clock time in several tests, a jump of an output without a step of the load,
-a step of a strain by thermal expansion, idle time in which nothing crept.
+Of the rig: a jump of an output without a step of the load, a step of a strain by thermal expansion, idle time in which
+nothing crept.
 """
 
 from __future__ import annotations
@@ -23,19 +23,10 @@ from creepkit.quality.frames import decreasing_frames, fracture_frames, outlier_
 from creepkit.quality.idle_time import idle_flags
 from creepkit.quality.loading_strain import unstated_loading_strain
 from creepkit.quality.repeats import copied_tests, repeated_rows, replicate_deviations
-from creepkit.quality.rig import (
-    ACTIVATION_ENERGY,
-    common_rate_changes,
-    expansion_flags,
-    find_jumps,
-    jump_flags,
-    rate_change_flag,
-    record_flags,
-)
+from creepkit.quality.rig import expansion_flags, find_jumps, jump_flags, record_flags
 from creepkit.records import History, known_specimens, output_named
 
 __all__ = [
-    "ACTIVATION_ENERGY",
     "FRAME_FLAG_KINDS",
     "DataQuality",
     "QualityFlag",
@@ -55,15 +46,11 @@ FRAME_FLAG_KINDS: tuple[FlagKind, ...] = ("fracture", "unloading", "falling", "o
 
 
 @checked
-def check_data_quality(histories: Sequence[History], *, activation_energy: float = ACTIVATION_ENERGY) -> DataQuality:
-    """What looks wrong: frames, tests far from others, and what happened in several tests at one time.
+def check_data_quality(histories: Sequence[History]) -> DataQuality:
+    """What looks wrong: frames, tests that are copies of others or far from them, and what the rig did.
 
-    Tests are compared where they are of the same alloy and specimen and were loaded alike; one clock is supposed for
-    tests of one kind of specimen whose frames were taken at the same times. activation_energy : J/mol,
-    with which a factor on the creep rate is put as a step of temperature.
+    Tests are compared where they are of the same alloy and specimen and were loaded alike.
     """
-    if not (np.isfinite(activation_energy) and activation_energy > 0):
-        raise HistoryError(f"an activation energy of {activation_energy:g} J/mol is not above zero; try 400e3")
     framed = [_frame_flags(history, FRAME_FLAG_KINDS) for history in histories]
     flags = [flag for each in framed for flag in each]
     flags += [flag for rule in TEST_RULES for flag in rule(histories)]
@@ -74,7 +61,7 @@ def check_data_quality(histories: Sequence[History], *, activation_energy: float
         for history, each in zip(histories, framed, strict=True)
     ]
     flags += check_loading_strain(sound)
-    flags += check_rig(sound, activation_energy=activation_energy)
+    flags += check_rig(sound)
     return DataQuality(tuple(flags), len(histories))
 
 
@@ -180,18 +167,14 @@ def check_loading_strain(histories: Sequence[History]) -> list[QualityFlag]:
     return [flag for history in histories if (flag := unstated_loading_strain(history)) is not None]
 
 
-def check_rig(histories: Sequence[History], *, activation_energy: float = ACTIVATION_ENERGY) -> list[QualityFlag]:
-    """What the rig did: records that differ from the program, jumps, changes of rates across tests.
+def check_rig(histories: Sequence[History]) -> list[QualityFlag]:
+    """What the rig did: records that differ from the program, idle time, jumps and thermal expansion.
 
-    histories : without suspect frames, see exclude_suspect_frames. activation_energy : J/mol.
+    histories : without suspect frames, see exclude_suspect_frames.
     """
-    flags = [flag for history in histories for flag in record_flags(history, activation_energy)]
-    flags += [flag for history in histories for flag in idle_flags(history)]
-    jumps = find_jumps(histories)
-    flags += jump_flags(histories, jumps)
-    flags += [flag for history in histories for flag in expansion_flags(history)]
-    changes = common_rate_changes(histories, jumps)
-    return [*flags, *(rate_change_flag(histories, change, activation_energy) for change in changes)]
+    flags = [flag for history in histories for flag in (*record_flags(history), *idle_flags(history))]
+    flags += jump_flags(histories, find_jumps(histories))
+    return [*flags, *(flag for history in histories for flag in expansion_flags(history))]
 
 
 @checked

@@ -23,7 +23,6 @@ FlagKind = Literal[
     "record",
     "jump",
     "idle",
-    "rate change",
     "unreadable",
     "few points",
     "motion",
@@ -39,10 +38,7 @@ class QualityFlag:
 
     tests : names of the histories. kind : what is wrong. frames : which frames of a single history, counted from 0;
     empty for a whole test, and for what began at a time. reason : a sentence with the numbers. time : s, when it
-    happened; earliest, latest : s, times that are as likely. rate_factors : {test: factor on its creep rate};
-    factor_errors : {test: factor by which that one may be off either way, nominally 95 %}.
-    temperature_steps : {test: K} that would make these factors at the activation energy assumed. jumps : {test: step of
-    its leading output}, mm or strain. proposal : what may be done about it.
+    happened. jumps : {test: step of its leading output}, mm or strain. proposal : what may be done about it.
     """
 
     tests: tuple[str, ...]
@@ -50,17 +46,11 @@ class QualityFlag:
     frames: tuple[int, ...]
     reason: str
     time: float | None = None
-    earliest: float | None = None
-    latest: float | None = None
-    rate_factors: Mapping[str, float] = field(default_factory=dict)
-    factor_errors: Mapping[str, float] = field(default_factory=dict)
-    temperature_steps: Mapping[str, float] = field(default_factory=dict)
     jumps: Mapping[str, float] = field(default_factory=dict)
     proposal: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("rate_factors", "factor_errors", "temperature_steps", "jumps"):
-            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+        object.__setattr__(self, "jumps", MappingProxyType(dict(self.jumps)))
 
     @classmethod
     def of_frames(cls, history: History, kind: FlagKind, frames: Iterable[int], reason: str) -> QualityFlag:

@@ -56,8 +56,6 @@ def idle_flags(history: History) -> Iterator[QualityFlag]:
                 f"from {times_text(start, end)} nothing crept for {time_text(part.idle)}: {growing_output(history)} "
                 "grows by less than a quarter of what the rates before and after lead to",
                 time=start,
-                earliest=start,
-                latest=end,
                 proposal=f"if the load or the furnace was off, subtract {time_text(part.idle)} from the later times",
             )
 

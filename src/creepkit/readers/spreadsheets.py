@@ -16,13 +16,14 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from decimal import Decimal
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
-from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, how_to_raise, raised, read_bytes
+from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
 from creepkit.readers.columns_of_tests import column_called, head_of_tests
 from creepkit.readers.frames import UNUSED, unknown_text
 from creepkit.readers.history_csv import histories_of_tests
@@ -39,7 +40,7 @@ from creepkit.readers.table import (
     without_ignored,
     without_logarithms,
 )
-from creepkit.readers.table_heads import names_time
+from creepkit.readers.table_heads import conditions_in_text, names_time
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.tests_file import SEPARATE
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, words_of
@@ -73,10 +74,10 @@ def read_sheets(path: Path) -> list[CellTable]:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of what a workbook holds beside its cells
-            size, most = sum(part.file_size for part in archive.infolist()), raised(MAXIMUM_UNPACKED_BYTES)
-            if size > most:
-                what = f"unpacks to {size / 1e6:.0f} MB, more than {most / 1e6:g} MB"
-                raise HistoryError(f"{path}: {what}; save it as CSV, or {how_to_raise(size, most)}")
+            size = sum(part.file_size for part in archive.infolist())
+            if size > MAXIMUM_UNPACKED_BYTES:
+                what = f"unpacks to {size / 1e6:.0f} MB, more than {MAXIMUM_UNPACKED_BYTES / 1e6:g} MB"
+                raise HistoryError(f"{path}: {what}; save it as CSV")
             book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
             # Counted from 1904, days come out as they are in the file; from 1900, the 59th and the 60th are one.
             first_day, book.epoch = book.epoch, _DAY_ZERO
@@ -337,7 +338,8 @@ class SpreadsheetReader:
             conditions = _conditions_by_test(sheet, self.vocabulary)
             states = any(not key.startswith("label ") for entries in conditions.values() for key in entries)
             if states or any(_agreement(key, test) for key in conditions for test in tests):
-                tests = list(_with_conditions(sheet, tests, conditions))
+                titles = _titles(sheet, self.vocabulary.terms())
+                tests = list(_with_conditions(sheet, tests, conditions, titles))
             else:  # remarks
                 aside.append(f"sheet '{sheet.sheet}' not read as it has no column of time")
                 notes |= _note_of_sheet(sheet)
@@ -376,7 +378,7 @@ def _conditions_by_test(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[
     named = [sum(map(bool, row.cells)) > 1 and bool(_keys_tests(row, known)) for row in sheet.rows[:_FILLED_ROWS]]
     if True not in named[: len(sheet.rows) - 1]:
         return {}
-    sheet = replace(sheet, rows=sheet.rows[named.index(True) :])  # rows above the names are titles
+    sheet = replace(sheet, rows=sheet.rows[named.index(True) :])
     table = named_columns(without_ignored(sheet, 0, vocabulary.ignored))
     (column, *_), tests = [*_keys_tests(TableRow(0, table.columns), known), -1], dict[str, dict[str, SourceText]]()
     by_alloy = known.condition(table.columns[column]) == "alloy"
@@ -396,6 +398,13 @@ def _conditions_by_test(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[
     return tests
 
 
+def _titles(sheet: CellTable, known: Terms) -> tuple[SourceText, ...]:
+    """What rows above the names of a sheet of conditions state of all tests."""
+    above = takewhile(lambda row: sum(map(bool, row.cells)) < 2 or not _keys_tests(row, known), sheet.rows)
+    texts = ((cell, sheet.location(row.line)) for row in above for cell in row.cells)
+    return tuple(one for text in texts for one in conditions_in_text(*text, known))
+
+
 def _key_of_condition(name: str, known: Terms) -> str:
     return known.condition(name) if known.is_condition(name) else column_called(name).key or f"label {name}"
 
@@ -408,9 +417,15 @@ def _note_of_sheet(sheet: CellTable) -> dict[str, SourceText]:
 
 
 def _with_conditions(
-    sheet: CellTable, tests: Sequence[TabulatedTest], stated: Mapping[str, Mapping[str, SourceText]]
+    sheet: CellTable,
+    tests: Sequence[TabulatedTest],
+    stated: Mapping[str, Mapping[str, SourceText]],
+    titles: Sequence[SourceText],
 ) -> Iterator[TabulatedTest]:
-    """The tests with what a sheet of conditions says of them, by their name, or that of their sheet or alloy."""
+    """The tests with what a sheet of conditions says of them, by their name, or that of their sheet or alloy.
+
+    titles : what it says of all.
+    """
     most = [max((_agreement(key, test) for key in stated), default=0) for test in tests]
     found = [[key for key in stated if n and _agreement(key, test) == n] for n, test in zip(most, tests, strict=True)]
     unused = sorted(stated.keys() - {key for keys in found for key in keys})
@@ -427,7 +442,8 @@ def _with_conditions(
             if not extra[key].says_the_same(test.entries[key]):
                 what = f"'{key}' is {quoted(extra[key].text, 60)}, and {test.entries[key].location} says another one"
                 raise HistoryError(f"{extra[key].location}: {what}; correct one of them")
-        yield replace(test, entries={**test.entries, **extra})
+        table = replace(test.table, sources=(*test.table.sources, *titles))
+        yield replace(test, entries={**test.entries, **extra}, table=table)
 
 
 SPREADSHEET = SpreadsheetReader("xlsx", "a spreadsheet .xlsx: a test a sheet, or several side by side")

@@ -12,7 +12,7 @@ import re
 import threading
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
 from types import ModuleType
@@ -27,18 +27,12 @@ from creepkit.registry.kinds import PluginKind, group_of
 from creepkit.registry.plugin_sources import PluginFile, Provenance, Source, name_key
 
 if TYPE_CHECKING:
-    import typer
-
     from creepkit.language.law import CreepLaw
     from creepkit.records import Predictor, Specimen
 
 
 MORE_LAWS = 'plugins bring more: pip install "creepkit[plugins]"'
 """The end of the sentence about a law that is not installed."""
-
-
-COMMANDS = "creepkit_commands"
-"""The hook by which plugins add commands."""
 
 
 _T = TypeVar("_T")
@@ -57,13 +51,11 @@ class Plugin:
     """One plugin: where it came from, and what it offers or why it cannot be used.
 
     contributions : {kind: {name: object}}, by the labels of registry.kinds.
-    commands : whether it adds commands to the command line.
     problem : one sentence when the plugin is broken, else empty.
     """
 
     source: Source
     contributions: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    commands: bool = False
     problem: str = ""
 
     @property
@@ -244,25 +236,6 @@ class Registry:
                 self._plugins[source.place] = self._registered(source)
             return self._plugins[source.place]
 
-    def command_lines(self) -> list[tuple[Plugin, typer.Typer]]:
-        """[(plugin, a command line with its commands)]; that of a plugin that is broken is empty."""
-        import typer
-
-        group = group_of(COMMANDS)
-        self._load(source for source in self._sources if source.offers(group))
-        results = []
-        for place, plugin in [(one.source.place, one) for one in self._loaded() if one.source.offers(group)]:
-            app = typer.Typer()
-            try:
-                if plugin.commands:
-                    self._called(plugin.source, COMMANDS, app=app)
-            except PluginError as error:
-                app.registered_commands.clear()
-                self._plugins[place] = replace(plugin, problem=str(error))
-            if plugin.commands or plugin.problem:
-                results.append((self._plugins[place], app))
-        return results
-
     def _load(self, sources: Iterable[Source]) -> None:
         """Import these plugins, each once; of one that cannot be used the reason is kept.
 
@@ -303,7 +276,7 @@ class Registry:
         except PluginError:
             self._manager.unregister(module)
             raise
-        return Plugin(source, offered, commands=COMMANDS in hooks)
+        return Plugin(source, offered)
 
     def _offered(self, kind: PluginKind[_T], source: Source) -> dict[str, _T]:
         """{name: object} of a kind that one plugin offers; PluginError when that is not what the hook promises."""

@@ -54,6 +54,10 @@ MOST_ASKED = 4
 """Numbers of forecasts on the first screen."""
 
 
+OTHER_EXPONENT = 0.1
+"""Of the stress exponent, by which a value called n differs from it where this is said."""
+
+
 NOTEWORTHY_EXPONENT = 0.15
 """Of the stress exponent, by which leaving out one test changes it, from which on this is said."""
 
@@ -124,7 +128,8 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
         by_tests = f"{by_rates.text} by measured minimum rates" if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
-    included = "with usual errors" if any(one.included for one in fit.unmodelled) else ""
+    kinds = [one.kind.replace("_", " ") for one in fit.unmodelled if one.included]
+    included = f"with errors of {', '.join(dict.fromkeys(kinds))}" if kinds else ""
     return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included), *_lives(fit)]
 
 
@@ -136,8 +141,8 @@ def _lives(fit: Identification) -> list[KeyFigure]:
         return []
     end, test = max(broken, key=lambda pair: pair[0].measured)
     said = f"measured {_written_out(end.measured / SECONDS_PER_HOUR, 3)} h"
-    values = (end.predicted, end.low, end.high)
-    return [_with_interval("time to rupture", test.condition, values, 1 / SECONDS_PER_HOUR, "h", said)]
+    hours = [time / SECONDS_PER_HOUR for time in (end.predicted, end.low, end.high)]
+    return [_with_interval("time to rupture", test.condition, hours, unit="h", remark=said)]
 
 
 def _with_interval(
@@ -173,8 +178,7 @@ def _shown(test: TestForecast, *, times: bool) -> Iterator[KeyFigure]:
     life = [one for one in reached if not one.output and (one.median <= end or (times and len(test.times) == 1))]
     wanted = [*([one for one in reached if one.output] if times else ()), *life]
     for one in wanted:
-        hours = (one.median, one.low, one.high)
-        label = f"time to {event_text(one)}"
+        hours, label = (one.median, one.low, one.high), f"time to {event_text(one)}"
         yield _with_interval(label, where, hours, 1 / SECONDS_PER_HOUR, "h", test.extrapolated(one))
     predicted = [(name, one) for name, one in test.outputs.items() if np.isfinite(one.value).any()]
     for name, output in [] if wanted else predicted[:1]:
@@ -185,17 +189,22 @@ def _shown(test: TestForecast, *, times: bool) -> Iterator[KeyFigure]:
         yield _with_interval(label, where, values, factor, unit, test.extrapolated())
 
 
-def strength_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
-    """The rupture strength at the longest time asked for, a figure a temperature, with the interval of its mean."""
+def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
+    """Times to rupture at the stresses asked for, and the strength at the longest time, a figure a temperature of each.
+
+    With intervals of their means.
+    """
     found = [one for one in assessment.strengths if one.method == "average" and one.value is not None]
-    longest, figures = max((one.hours for one in found), default=0.0), list[KeyFigure]()
-    for one in found:
-        low, high = (math.nan if bound is None else bound for bound in one.bounds_of_mean)
-        if one.hours == longest and one.value is not None:
-            name, where = f"rupture strength at {longest:g} h", celsius_text(one.temperature, one.temperature, digits=0)
-            remark = "extrapolated beyond the tests" if one.extrapolation else ""
-            figures.append(KeyFigure(name, where, one.value, low, high, "MPa", remark))
-    return figures
+    hours = max((one.hours for one in found), default=0.0)
+    stated: list[Any] = [(f"time to rupture at {one.stress:g} MPa", one.hours, "h", one) for one in assessment.lives]
+    stated += [(f"rupture strength at {hours:g} h", one.value, "MPa", one) for one in found if one.hours == hours]
+    return [_of_mean(*one) for one in stated]
+
+
+def _of_mean(name: str, value: float, unit: str, one: Any) -> KeyFigure:
+    low, high = (math.nan if bound is None else bound for bound in one.bounds_of_mean)
+    remark = f"by rupture methods, mean{', extrapolated beyond the tests' * bool(one.extrapolation)}"
+    return KeyFigure(name, celsius_text(one.temperature, digits=0), value, low, high, unit, remark)
 
 
 def tests_text(fit: Identification) -> str:
@@ -212,7 +221,8 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
     choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
     tests = [*(one for one in fit.notes if one.startswith(LENGTHS_BY_DEFAULT)), *_of_tests(fit)]
     of_law = [*tests, *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
-    return list(dict.fromkeys([*of_law, *_held(others), *_data(quality)]))
+    rejected = fit.adequacy is not None and fit.adequacy.rejects  # so that another law may be better
+    return list(dict.fromkeys([*of_law, *(_held(others) if rejected else ()), *_data(quality)]))
 
 
 def _of_tests(fit: Identification) -> Iterator[str]:
@@ -288,7 +298,7 @@ def _test(fit: Identification, name: str) -> str:
 
 def _choice(ranking: Ranking | None) -> Iterator[str]:
     """What else the tests allow."""
-    if ranking is None or len(ranking.laws) < 2 or ranking.decisive or ranking.adequacy is None:
+    if ranking is None or len(ranking.laws) < 2 or ranking.adequacy is None:
         return
     unmet, others = ranking.unmet, [one.fit.law.name for one in ranking.credible[1:]]
     if others:
@@ -341,15 +351,19 @@ def answer(
     remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
     remarks += [chosen_text(ranking)] if ranking is not None and len(ranking.laws) > 1 else []
     remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
+    figures, n = key_figures(fit), fit.values.get("n", math.nan)
+    exponent = next((one.value for one in figures if one.name.endswith("stress exponent")), math.nan)
+    other = "; n is not the stress exponent" * (abs(n - exponent) > OTHER_EXPONENT * exponent)
     return Answer(
         fit.headline,
         titled_law(fit.law),
         equations(fit.law),
         [(symbols[e.name], f"{e.value:.4g}", interval_ends(fit.law, e), unit_text(e.unit)) for e in fit.estimates],
-        [(one.name, one.where, one.text, one.remark) for one in [*asked[:MOST_ASKED], *key_figures(fit)]],
+        [(one.name, one.where, one.text, one.remark) for one in [*asked[:MOST_ASKED], *figures]],
         cautions(fit, ranking, quality)[:MOST_CAUTIONS],
         next_step(fit, ranking),
         remarks,
+        units=f"{Answer.units}{other}",
         **page,
     )
 
@@ -359,13 +373,20 @@ def answer_text(fit: Identification, ranking: Ranking | None = None, more: objec
     return as_text([answer(fit, ranking, more=str(more))])
 
 
+def line_of_group(fit: Identification) -> str:
+    """The headline of one alloy of several, with its stress exponent and creep rate and where they hold."""
+    figures = [one for one in key_figures(fit) if one.name.endswith("stress exponent") or one.name == "creep rate"]
+    numbers = ", ".join(f"{one.name} {one.text}" for one in figures)
+    return f"{fit.headline}; {numbers} at {figures[0].where}" if figures else fit.headline
+
+
 def chosen_text(ranking: Ranking) -> str:
     """Whether the choice of the law is decisive, and the weights of the laws; weights do not say why one is not."""
     weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED])
     more = len(ranking.laws) - MOST_NAMED
     decided = "decisive" if ranking.decisive else "not decisive"
     if len(ranking.credible) == 1 and ranking.singled_out and ranking.challenges:
-        decided += f", for the tests allow {ranking.challenges[0].subject} as well"
+        decided += f", {'but' if ranking.decisive else 'for'} the tests allow {ranking.challenges[0].subject} as well"
     return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}"
 
 

@@ -127,12 +127,11 @@ class Answer:
 
     remarks : on the choice of the law. values : (symbol, value, ends of its interval, unit) of the parameters.
     picture : a Picture, or the Paragraph that says why there is none.
-    more : what shows the rest.
+    more : what shows the rest. units : of the values.
     figures : (name, where it holds, value with interval, remark).
     """
 
     kind: ClassVar[str] = "answer"
-    units: ClassVar[str] = "stress in MPa, time in s, strain as a fraction"
     headline: str
     law: Cell
     equations: Sequence[Rich]
@@ -144,6 +143,7 @@ class Answer:
     picture: Any = None
     files: Sequence[tuple[str, str, str]] = ()
     more: str = ".details()"
+    units: str = "true stress over 1 MPa, time over 1 s, strain as a fraction"
 
 
 Block: TypeAlias = Answer | Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads

@@ -114,7 +114,7 @@ def print_plugins(plugins: Sequence[Plugin], conflicts: Sequence[str]) -> None:
     rows = []
     for one in plugins:
         offers = [f"{kind} {name}" for kind, names in one.contributions.items() for name in names]
-        offered = ", ".join(offers + ["commands"] * one.commands)
+        offered = ", ".join(offers)
         rows.append((one.provenance.name, one.provenance.origin, offered, "broken" if one.problem else "ok"))
     print_table(f"{len(rows)} plugins", ("plugin", "from", "offers", "status"), rows)
     for sentence in (*(plugin.problem for plugin in plugins if plugin.problem), *conflicts):
@@ -127,6 +127,6 @@ def plugin_to_json(plugin: Plugin) -> dict[str, Any]:
         "name": plugin.provenance.name,
         "from": plugin.provenance.origin,
         "status": "broken" if plugin.problem else "ok",
-        **fields_to_json(plugin, "problem commands"),
+        **fields_to_json(plugin, "problem"),
         "offers": {word: list(things) for word, things in plugin.contributions.items()},
     }

@@ -12,6 +12,7 @@ from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.importance_sampling import PosteriorSamples
+from creepkit.law_search.results import LawSearch
 from creepkit.readers.history_csv import HISTORY_CSV, histories_of_tests
 from creepkit.readers.questions import Question
 from creepkit.readers.table_layouts import tests_in
@@ -102,6 +103,13 @@ def _(assessment: RuptureAssessment) -> tuple[Any, str]:
 def _(fit: Identification) -> tuple[Any, str]:
     names = ("value", "low", "high", "unit", "verdict")
     return [{"parameter": e.name, **{name: getattr(e, name) for name in names}} for e in fit.estimates], "parameter"
+
+
+@_rows.register
+def _(search: LawSearch) -> tuple[Any, str]:
+    front, names = search.front, ("parameters", "complexity", "misfit", "excess", "registered")
+    rows = [{"law": one.law.name, **{name: getattr(one, name) for name in names}} for one in search.tried]
+    return [{**row, "front": one in front} for row, one in zip(rows, search.tried, strict=True)], ""
 
 
 @_rows.register

@@ -1,18 +1,13 @@
-"""Data sets, and the sampling domains that they are drawn from, as text and JSON."""
+"""Data sets as text and JSON."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from creepkit.arrays import Bools
 from creepkit.dataset.dataset import summary
 from creepkit.reports.blocks import aligned
 from creepkit.reports.terminal import print_json, tell, tell_written
-from creepkit.sampling.domains import Acceptance, OutcomeCriterion, SamplingDomain
-from creepkit.sampling.domains import acceptance as evaluate_acceptance
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -53,46 +48,3 @@ def print_dataset(data: Dataset, to: Path, part: str | None, as_json: bool) -> N
         tell_written(to, f": {to.stat().st_size / 1e6:.1f} MB; remove {to}.parts when no more samples are wanted")
     else:
         tell(f"part {part} is done in {to}.parts; the same command without --part merges all parts into {to}")
-
-
-# ---- sampling domains ------------------------------------------------------------------------------------------------
-
-
-def acceptance_text(acceptance: Acceptance) -> str:
-    """What was drawn, one line a criterion, and which share would be simulated."""
-    domain = acceptance.design
-    test = f"{domain.specimen} test of {domain.grid.frames} frames"
-    lines = [
-        f"law '{domain.law.name}', {domain.name} sampling domain, {test}: {len(acceptance.draws)} draws, seed "
-        f"{acceptance.seed}",
-        f"{'criterion':<14} {'meet it':>8} {'rejected':>9}  asks",
-    ]
-    remaining = np.ones(len(acceptance.draws), bool)
-    for criterion in domain.criteria:
-        if isinstance(criterion, OutcomeCriterion):
-            numbers = f"{'after simulation':>18}"
-        else:
-            is_met = acceptance.criteria_met[criterion.name]
-            numbers = f"{_percent(is_met):>8} {_percent(remaining & ~is_met):>9}"
-            remaining = remaining & is_met
-        lines.append(f"{criterion.name:<14} {numbers}  {criterion.text}")
-    return "\n".join([
-        *lines,
-        f"{_percent(acceptance.kept)} of the draws would be simulated; {_percent(acceptance.useful)} of all "
-        "have a rate at which creep is visible and the test lasts (others may, too)",
-    ])  # fmt: skip
-
-
-def _percent(mask: Bools) -> str:
-    return f"{100 * float(mask.mean()):.1f} %"
-
-
-def print_acceptance(design: SamplingDomain, seed: int, as_json: bool) -> None:
-    """Print what the design would draw."""
-    result = evaluate_acceptance(design, seed=seed)
-    if as_json:
-        met = {name: float(passed.mean()) for name, passed in result.criteria_met.items()}
-        fractions = {"simulated": float(result.kept.mean()), "useful": float(result.useful.mean())}
-        print_json({"draws": len(result.draws), "met": met, **fractions})
-    else:
-        tell(f"{result}\nnothing was simulated")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.records import is_logarithmic
-from creepkit.records.units import celsius_text
+from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import ends
 from creepkit.reports.words import HEADLINES, TRUTHS
 
@@ -88,7 +88,9 @@ def headline(fit: Identification) -> str:
         [f"{n} within {spread_text(v)}" for n, v in items if (v <= USABLE) is usable] for usable in (True, False)
     )
     values = {"law": fit.law.name, "good": " and ".join(good), "bad": " and ".join(bad), "truth": _truth(fit)}
-    values |= {"where": f" ({tested_range(fit)})", "described": f"; {' and '.join(good + bad)} so far" if items else ""}
+    longest = fit.ranges["time"][1]
+    where = f"{tested_range(fit)}, to {time_text(longest)}" if longest > 0.0 else tested_range(fit)
+    values |= {"where": f" ({where})", "described": f"; {' and '.join(good + bad)} so far" if items else ""}
     kind = "use in part" if good and bad else "use" if good else "use nothing" if bad else "fitted"
     return HEADLINES[kind if fit.converged else "not found"].format(**values)
 

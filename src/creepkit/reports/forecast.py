@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
     from creepkit.forecasts.banded_output import OutputForecast
     from creepkit.forecasts.forecast import Forecast
-    from creepkit.forecasts.forecast_of_test import TestForecast, TimeForecast
-    from creepkit.forecasts.measured_test import TestScore
+    from creepkit.forecasts.forecast_of_test import FramesInside, TestForecast, TimeForecast
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit
     from creepkit.reports.svg import PageFigures
 
@@ -68,8 +67,8 @@ def _lines(test: TestForecast) -> Iterator[str]:
         yield misfit_sentence(test.misfit)
     if test.caution:
         yield test.caution
-    if test.score is not None:
-        yield from score_lines(test.score)
+    if test.inside is not None:
+        yield inside_sentence(test.inside)
     leading = next(iter(test.outputs.values()), None)
     if leading is not None and (shares := end_shares(leading)):
         parts = ", ".join(f"{part} {100 * share:.0f} %" for part, share in shares.items())
@@ -113,17 +112,14 @@ def _time_text(one: TimeForecast, end: float) -> str:
     return f"{text}; before the end of the test at {hours_number(end)} h with probability {one.chance:.2g}"
 
 
-def score_lines(score: TestScore) -> list[str]:
+def inside_sentence(inside: FramesInside) -> str:
     """How a measured test compares, in one line."""
-    inside = ", ".join(
+    shares = ", ".join(
         f"{name} {100 * share:.0f} % of the frames in the band"
-        + (" and the whole curve in the wider one" if score.whole_inside[name] else "")
-        for name, share in score.inside.items()
+        + (" and the whole curve in the wider one" if inside.whole[name] else "")
+        for name, share in inside.share.items()
     )
-    return [
-        f"measured: {inside}; a test lies as far off, or farther, with probability {score.departure_p_value:.2g} "
-        f"(noise of its frames included: {score.p_value:.2g})"
-    ]
+    return f"measured: {shares}"
 
 
 def end_shares(one: OutputForecast) -> dict[str, float]:
@@ -144,7 +140,7 @@ def forecast_to_json(forecast: Forecast) -> dict[str, Any]:
 
 
 def _test_to_json(test: TestForecast) -> dict[str, Any]:
-    misfit, score = test.misfit, test.score
+    misfit = test.misfit
     return {
         "name": test.name,
         "condition": test.history.condition,
@@ -166,9 +162,7 @@ def _test_to_json(test: TestForecast) -> dict[str, Any]:
             "factor": misfit.factor,
             "nearest": {**fields_to_json(misfit, "stress temperature"), "factor": math.exp(misfit.log_factor)},
         },
-        "score": None
-        if score is None
-        else fields_to_json(score, "inside whole_inside freedom p_value departure_p_value log_score"),
+        "inside": None if test.inside is None else fields_to_json(test.inside, "share whole"),
     }
 
 
@@ -316,7 +310,7 @@ def _legend(of: Figure | Axes, forecast: Forecast, tests: Sequence[TestForecast]
         Line2D([], [], color="#1f3f73", lw=1.3, label="identified law"),
         Patch(color="#3b6fb6", alpha=0.45, label=f"{per_cent} of measured values"),
         Patch(color="#3b6fb6", alpha=0.15, label=f"{per_cent} of whole curves"),
-        *([Line2D([], [], color="black", marker=".", ls="", label="measured")] if any(t.score for t in tests) else []),
+        *([Line2D([], [], color="black", marker=".", ls="", label="measured")] if any(t.inside for t in tests) else []),
         *(
             Line2D([], [], color=colour, label=f"time to {word}: median, {per_cent}", **look)
             for rupture, word, colour in times

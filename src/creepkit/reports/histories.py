@@ -173,8 +173,8 @@ def quality_blocks(quality: DataQuality, most: int | None = None) -> list[Block]
 
 
 def data_quality_to_json(quality: DataQuality) -> dict[str, Any]:
-    """The flags with all their numbers, for JSON: times in s, steps of temperature in K, jumps in the output's unit."""
-    names = "tests kind frames reason time earliest latest rate_factors factor_errors temperature_steps jumps proposal"
+    """The flags with all their numbers, for JSON: times in s, jumps in the output's unit."""
+    names = "tests kind frames reason time jumps proposal"
     return {"tests": quality.tests, "flags": [fields_to_json(flag, names) for flag in quality.flags]}
 
 

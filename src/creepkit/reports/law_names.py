@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -144,5 +145,6 @@ def law_expression(law: CreepLaw) -> sympy.Expr:
     for exponential in rate.atoms(sympy.exp):
         for part in sympy.Add.make_args(exponential.args[0]):
             if found := arrhenius_exponent(part):
-                rate = rate.subs(part, -found.Q / R * (1 / temperature - 1 / T_ref))
+                reference = 1 / T_ref if math.isfinite(found.T_ref) else 0
+                rate = rate.subs(part, -found.Q / R * (1 / temperature - reference))
     return rate

@@ -161,7 +161,7 @@ def _laws(found: Sequence[ReportGroup], cite: Callable[..., str]) -> Iterator[st
         rate for one in found for rate in (*one.fit.law.terms.values(), *(s.rate for s in one.fit.law.states.values()))
     ]
     exponents = (part for rate in rates for e in rate.atoms(sympy.exp) for part in sympy.Add.make_args(e.args[0]))
-    factors = {arrhenius.T_ref for arrhenius in map(arrhenius_exponent, exponents) if arrhenius is not None}
+    factors = {one.T_ref for one in map(arrhenius_exponent, exponents) if one is not None} - {math.inf}
     if factors:
         shown = listed([f"{number(T, 6)} K" for T in sorted(factors)])
         yield f"Rate coefficients of laws with an activation energy are those at T_ref = {shown}."

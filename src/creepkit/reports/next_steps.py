@@ -73,7 +73,7 @@ LATE = 0.5
 
 
 LACKING = {
-    "exponent rises": ("hyperbolic-sine",),
+    "exponent rises": ("hyperbolic-sine", "double-power"),
     "exponent falls": ("threshold-stress",),
     "early": ("{law}*primary", "strain-hardening", "time-hardening", "theta-projection"),
     "late": ("mpc-omega", "kachanov-rabotnov", "sinh-damage", "liu-murakami", "theta-projection"),

@@ -27,7 +27,6 @@ from creepkit.language import CreepLaw, temperature
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import ROOM_TEMPERATURE, Specimen, Status
-from creepkit.records.presentable import Presentable
 from creepkit.sampling.coefficients import (
     draw_stress_scales,
     solve_coefficients,
@@ -57,7 +56,6 @@ from creepkit.sampling.rates import (
     author_parameters,
     ln_term_fractions,
     log10_rate,
-    mean_ln_rate,
     reference_stress_of,
     sobol_rows,
 )
@@ -421,61 +419,6 @@ class ConditionedDomain(SamplingDomain):
         )
         theta = solve_coefficients(groups, theta, ln_rates, points)
         return author_parameters(self.law, solve_damage_coefficients(self.law, theta, unit_coordinates, points))
-
-
-DEFAULT_DRAWS = 4096
-"""Rows drawn."""
-
-
-@dataclass(frozen=True, eq=False)
-class Acceptance(Presentable):
-    """What is known of a design without simulating it.
-
-    draws : rows of the design. criteria_met : {criterion before simulation: (rows,) whether it is met on its own}.
-    log10_strains : (rows,) log10 of the mean rate at the reference stress times the duration of the test.
-    useful_strains : (rows, 2) log10 of the strains between which creep is visible and the test lasts, as a rule.
-    """
-
-    design: SamplingDomain
-    seed: int
-    draws: Draws
-    criteria_met: Mapping[str, Bools]
-    log10_strains: Floats
-    useful_strains: Floats
-
-    @property
-    def kept(self) -> Bools:
-        """Which rows meet every criterion that needs no simulation, (rows,)."""
-        return np.asarray(np.all([np.ones(len(self.draws), bool), *self.criteria_met.values()], axis=0))
-
-    @property
-    def useful(self) -> Bools:
-        """Which of them have a useful rate, (rows,); of the others some may be useful, too.
-
-        Of Eq. (2) in the paper's sampling domain 8 % have, and 16 % of 600 simulated draws crept visibly and lasted:
-        the paper's test piece relieves itself of stress as it deflects, and so outlasts rates above the window.
-        """
-        in_range = (self.log10_strains >= self.useful_strains[:, 0]) & (self.log10_strains <= self.useful_strains[:, 1])
-        return np.asarray(self.kept & in_range)
-
-    shown_by = "dataset.acceptance_text"
-
-
-def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0) -> Acceptance:
-    """Return what a design's criteria reject before simulation, and how its rates lie; nothing is simulated.
-
-    draws : number of rows; a rejection counts for the first criterion that is not met.
-    """
-    rows = design.draw(0, draws, seed)
-    criteria_met = {c.name: c.passes(design.law, rows) for c in design.criteria if isinstance(c, DrawCriterion)}
-    end, reference = design.conditions.end, design.reference_stress
-    points = reference.evaluation_points(rows, end)
-    log10_rates = mean_ln_rate(design.law, design.law.to_internal(rows.parameters), points) / np.log(10.0)
-    log10_end_times = np.log10(rows.condition("end_time", end))
-    useful_rates = np.stack(np.broadcast_arrays(*reference.useful_rates(rows, end)), axis=1)
-    return Acceptance(
-        design, seed, rows, criteria_met, log10_rates + log10_end_times, useful_rates + log10_end_times[:, None]
-    )
 
 
 def sampling_design(

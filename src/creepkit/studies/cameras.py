@@ -297,7 +297,7 @@ class StudyCamera:
             record_to_json(asdict(said)),
             [self.label, self.operator, predictor_fingerprint(self.specimen)],
         ]
-        return Stage("extraction", "", settings, make, ExtractedTests, _numbers_of_frames, name=self.name)
+        return Stage("extraction", "", settings, make, ExtractedTests, name=self.name)
 
     def _imposed(self, hashes: Mapping[Path, list[str]]) -> Stage:
         part, path, index = self.part, self.files[2], self.record_number
@@ -324,8 +324,7 @@ class StudyCamera:
             record_to_json(asdict(self.clock)),
             [part.infrared and part.infrared.model_dump(), [hashes[one] for one in self.images]],
         ]
-        numbers, needs = _numbers_of_records, (self.name,)
-        return Stage("record", "", settings, make, ImposedOnTests, numbers, needs, name=self.record_name)
+        return Stage("record", "", settings, make, ImposedOnTests, (self.name,), name=self.record_name)
 
     # ---- its tests -------------------------------------------------------------------------------------------------
 
@@ -427,35 +426,6 @@ def flagged_frames(extractions: Mapping[str, Extraction]) -> list[Exclusion]:
         for name, one in extractions.items()
         for flag in one.flags
     ]
-
-
-def _numbers_of_frames(extracted: ExtractedTests) -> dict[str, Any]:
-    """Frames used, the centre and the last outputs of each test piece."""
-    return {
-        one.name: {
-            "frames": int(one.used.sum()),
-            "centre": one.center,
-            **{name: float(values[one.used][-1]) for name, values in one.outputs.items() if one.used.any()},
-        }
-        for one in extracted.tests
-    }
-
-
-def _numbers_of_records(imposed: ImposedOnTests) -> dict[str, Any]:
-    """The alignment of the clocks, and when the load began and how warm it was at each test piece."""
-    clock = imposed.tests[0].alignment
-    return {
-        "lag_s": clock.lag,
-        "interval_s": clock.lag_interval,
-        **{
-            one.specimen: {
-                "zero_s": one.time_zero,
-                "temperature_C": float(one.temperature.values.mean()) - ZERO_CELSIUS,
-                "temperature_sd_K": one.temperature_sd,
-            }
-            for one in imposed.tests
-        },
-    }
 
 
 def _without_folders(extraction: Extraction, folder: Path) -> Extraction:

@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.files.locking import locked
-from creepkit.files.record_codec import RecordError, record_to_json
+from creepkit.files.record_codec import RecordError
 from creepkit.inverse.kept_fits import COMPUTING, keep_fits
 from creepkit.jobs.progress import ProgressCallback, duration_text, series_of_task
 from creepkit.records import History, Predictor
@@ -34,7 +34,6 @@ class StageRecord:
 
     name, kind, group : of the stage. state : "made", "kept" from an earlier run, "failed", or "left out" where it was
     not asked for. key : hash of all that decides its result. sentence : why it failed, or cannot be kept.
-    numbers : of its result, which study.lock records.
     """
 
     name: str
@@ -43,7 +42,6 @@ class StageRecord:
     state: Literal["made", "kept", "failed", "left out"]
     key: str
     sentence: str = ""
-    numbers: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 class LazyResults(dict[str, Any]):
@@ -115,9 +113,8 @@ class Execution:
         key = self._key(stage)
         missing = [name for name in stage.needs if name not in self.results]
         if not wanted:
-            numbers = self._read(stage, key) if read_others and not missing else None
-            if numbers is not None:
-                self._record(stage, "kept", key, "was not asked for; the report shows what was kept of it", numbers)
+            if read_others and not missing and self._read(stage, key):
+                self._record(stage, "kept", key, "was not asked for; the report shows what was kept of it")
             else:
                 lacking = "was not asked for, and nothing of these inputs is kept: the report lacks it"
                 self._record(stage, "left out", key, lacking if read_others else "")
@@ -125,9 +122,8 @@ class Execution:
             self._record(stage, "failed", key, f"{missing[0]} failed, which it needs")
         else:
             self._report(stage, 0, 1, place)
-            numbers = self._read(stage, key)
-            if numbers is not None:
-                self._record(stage, "kept", key, stage.remark, numbers)
+            if self._read(stage, key):
+                self._record(stage, "kept", key, stage.remark)
                 self._report(stage, 1, 1, "kept from before")
             else:
                 self._make(stage, key)
@@ -138,17 +134,15 @@ class Execution:
         versions = {name: version(name) for name in COMPUTING}
         return key_of({"kind": stage.kind, "settings": stage.settings, "needs": needs, "versions": versions})
 
-    def _record(
-        self, stage: Stage, state: Any, key: str, sentence: str = "", numbers: Mapping[str, Any] | None = None
-    ) -> None:
-        self.records.append(StageRecord(stage.name, stage.kind, stage.group, state, key, sentence, numbers or {}))
+    def _record(self, stage: Stage, state: Any, key: str, sentence: str = "") -> None:
+        self.records.append(StageRecord(stage.name, stage.kind, stage.group, state, key, sentence))
 
     def _report(self, stage: Stage, done: int, total: int, note: str) -> None:
         if self.progress is not None:
             self.progress(stage.name, done, total, note)
 
-    def _read(self, stage: Stage, key: str) -> Any:
-        """The numbers of a result of this key, None where there is none that can be read.
+    def _read(self, stage: Stage, key: str) -> bool:
+        """Whether there is a result of this key that can be read.
 
         A record is read at once, for its file may be damaged; what is no record is made again when it is asked for.
         """
@@ -159,12 +153,11 @@ class Execution:
                 if stage.record
                 else lambda: self._made(stage, lambda task, done, total: None)
             )
-            numbers = data["numbers"]
+            document = data.get("document")
         except (CreepkitError, LookupError, AttributeError, TypeError, ValueError, ArithmeticError, AssertionError):
-            return None
-        self.results[stage.name] = result
-        self.documents[stage.name] = data.get("document")
-        return numbers
+            return False
+        self.results[stage.name], self.documents[stage.name] = result, document
+        return True
 
     def _codec(self, stage: Stage) -> Any:
         return codec_of(self.histories, stage.predictor)
@@ -194,8 +187,7 @@ class Execution:
         if getattr(result, "interrupted", False):  # by Ctrl-C, with the best so far, which is not the result
             raise KeyboardInterrupt
         self.results[stage.name] = result
-        kept = {"numbers": record_to_json(dict(stage.numbers(result)))}
-        sentence = stage.remark
+        kept, sentence = dict[str, Any](), stage.remark
         try:
             if stage.document is not None:
                 kept["document"] = self.documents[stage.name] = stage.document(result)
@@ -205,7 +197,7 @@ class Execution:
         except RecordError as error:  # of what a plugin brought
             again = f"is made again in each run, for it cannot be stored: {failure_text(error)}"
             sentence = "; ".join(filter(None, (sentence, again)))
-        self._record(stage, "made", key, sentence, kept["numbers"])
+        self._record(stage, "made", key, sentence)
         self._report(stage, 1, 1, f"done in {duration_text(time.monotonic() - start)}")
 
     def _made(self, stage: Stage, tick: Callable[[str, int, int], None]) -> Any:
@@ -245,11 +237,6 @@ Results = Mapping[str, Any]
 """{name of a stage: its result}."""
 
 
-def no_numbers(result: Any) -> dict[str, Any]:
-    """The numbers of a stage of which study.lock records none."""
-    return {}
-
-
 @dataclass(frozen=True)
 class Stage:
     """One stage.
@@ -258,7 +245,6 @@ class Stage:
     settings : JSON-able data of all that decides the result beside what it `needs`, names of other stages.
     make : from the results of these, with something to report progress to. record : class of the result, by which a
         file is read; None where the result is made again from identifications that are kept.
-    numbers : of its result by name, which study.lock records, so that a run says whether it gives them again.
     document : what of a result that no record can be read from is written down, as JSON-able data.
     predictor : of identifications that its file holds. file : that an export is written to, "" for other stages.
     remark : what is known beforehand that the result leaves out of account, "" where nothing is.
@@ -270,7 +256,6 @@ class Stage:
     settings: Any
     make: Callable[[Results, Tick], Any]
     record: Any = None
-    numbers: Callable[[Any], Mapping[str, Any]] = no_numbers
     needs: tuple[str, ...] = ()
     document: Callable[[Any], Any] | None = None
     predictor: Predictor | None = field(default=None, repr=False)

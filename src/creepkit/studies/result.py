@@ -26,12 +26,15 @@ from creepkit.reports.contents import (
 from creepkit.reports.identified_files import identified_files
 from creepkit.studies.execution import StageRecord
 from creepkit.studies.inputs import DATA_FILE, InputFile, StudyInputs, TestGroup
-from creepkit.studies.lock import PACKAGES
 from creepkit.studies.study_file import StudyFile
 from creepkit.studies.tables import ReportTable
 
 CARRIED_FOLDER = "inputs"
 """Of the data files that a report carries."""
+
+
+PACKAGES = ("creepkit", "numpy", "scipy", "sympy", "torch", "llvmlite", "pydantic")
+"""Whose versions a report states."""
 
 
 MOST_IDENTIFIED = 1_000_000
@@ -55,20 +58,17 @@ if TYPE_CHECKING:
 class StudyResult:
     """What a run of a study gave: ordinary records, by group of tests or by name.
 
-    file, lock_path : the study, and the lock of this run. inputs : its tests. files : that were read.
-    exclusions : what was left out. stages : how each ended, and results : {stage: its result}. changes : what differs
-    from the study.lock that was there, one sentence each. report : the page, where one was asked for.
+    file : the study. inputs : its tests. files : that were read. exclusions : what was left out. stages : how each
+    ended, and results : {stage: its result}. report : the page, where one was asked for.
     extractions, imposed : {test of a camera: what its frames gave, and what its instrument recorded}.
     documents : {stage: its result as JSON-able data, which other commands read}.
     """
 
     file: StudyFile
-    lock_path: Path
     inputs: StudyInputs
     files: tuple[InputFile, ...]
     exclusions: tuple[Exclusion, ...]
     stages: tuple[StageRecord, ...]
-    changes: tuple[str, ...] = ()
     report: Path | None = None
     results: Any = field(default_factory=dict, repr=False)
     extractions: Mapping[str, Extraction] = field(default_factory=dict, repr=False)
@@ -206,9 +206,8 @@ class StudyResult:
         )
 
     def _attachments(self) -> tuple[list[Attachment], list[str]]:
-        """Study, lock and data files; without the data, and a note, where they are larger than the study allows."""
-        lock = read_bytes(self.lock_path, DATA_FILE)
-        attached = [Attachment("study.toml", self.file.text.encode()), Attachment("study.lock", lock)]
+        """Study and data files; without the data, and a note, where they are larger than the study allows."""
+        attached = [Attachment("study.toml", self.file.text.encode())]
         allowed = (self.file.model.report or ReportTable()).attach_MB
         names = [f"{CARRIED_FOLDER}/{one.name}" for one in self.files]
         size = sum(one.path.stat().st_size for one in self.files) / 1e6
@@ -216,7 +215,7 @@ class StudyResult:
         if not problem and size > allowed:
             problem = f"they have {size:.3g} MB, more than the {allowed:g} MB that the study lets it carry"
         if problem:
-            return attached, [f"the report does not carry the data files: {problem}; study.lock has their hashes"]
+            return attached, [f"the report does not carry the data files: {problem}; it lists their hashes"]
         contents = [read_bytes(one.path, DATA_FILE) for one in self.files]
         return [*attached, *(Attachment(*pair) for pair in zip(names, contents, strict=True))], []
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from creepkit.exporters.exporting import ExportOptions
 from creepkit.files.record_codec import record_to_json
 from creepkit.files.writing import hashed_stem
 from creepkit.forecasts.planned_tests import ForecastOptions
-from creepkit.inverse.fingerprints import predictor_fingerprint, short_hash
+from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.inverse.kept_fits import history_digest
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.search_options import SearchOptions
@@ -160,15 +160,7 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
         "using": study.using_fingerprint,
         "tests": _digests(tests),
     }
-    return Stage("identification", group.name, described, make, Ranking, numbers_of_ranking, predictor=using)
-
-
-def numbers_of_ranking(ranking: Ranking) -> dict[str, Any]:
-    """Weights and values of the laws."""
-    return {
-        "weights": {one.fit.law.name: one.weight for one in ranking.laws},
-        "values": {one.fit.law.name: one.fit.values for one in ranking.laws},
-    }
+    return Stage("identification", group.name, described, make, Ranking, predictor=using)
 
 
 def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
@@ -191,11 +183,11 @@ def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
         if chosen.uses(temperature):
             raise NothingToMake(f"law '{chosen.name}' says itself how it depends on temperature: no form is sought")
         settings = usual if fit is None else fit.settings
-        found = ck.temperature_study(chosen, tests, using, settings=settings, progress=tick, **options)
+        # One law has one set of values: those of its identification, with what the study bounds and fixes.
+        found = ck.temperature_study(chosen, tests, using, settings=settings, joint_fit=fit, progress=tick, **options)
         if found.temperature_law is None:
             raise StudyError(found.notes[-1])
-        # One law has one set of values: those of its identification, with what the study bounds and fixes.
-        return found if fit is None or part.moduli else replace(found, joint_fit=fit)
+        return found
 
     def document(found: Any) -> Any:
         """The temperature law as `creepkit discover --to` writes it; None of a plugin's law that cannot be stored."""
@@ -206,12 +198,9 @@ def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:
     law_fingerprint = None if law is None else law.fingerprint
     described = [part.model_dump(), record_to_json(asdict(usual)), study.using_fingerprint, law_fingerprint]
 
-    def numbers(found: Any) -> dict[str, Any]:
-        return {"forms": found.temperature_law.forms, "values": found.temperature_law.values}
-
     remark = isothermal_tests(tests, options.get("within", ISOTHERMAL_RANGE))[1]
     described, needs = [*described, _digests(tests)], (need,) if need else ()
-    return Stage("temperature", group.name, described, make, None, numbers, needs, document=document, remark=remark)
+    return Stage("temperature", group.name, described, make, None, needs, document=document, remark=remark)
 
 
 def _best_candidate(study: StageInputs, ranking: Ranking, group: TestGroup) -> tuple[CreepLaw, Identification | None]:
@@ -244,13 +233,7 @@ def _rupture_stage(study: StageInputs, group: TestGroup) -> Stage:
         return ck.rupture(tests, settings=settings, **how)
 
     described = [part.model_dump(), record_to_json(asdict(settings)), _digests(tests)]
-    return Stage("rupture", group.name, described, make, RuptureAssessment, _numbers_of_rupture)
-
-
-def _numbers_of_rupture(assessment: RuptureAssessment) -> dict[str, Any]:
-    """The strengths that there are."""
-    known = [one for one in assessment.strengths if one.value is not None]
-    return {f"{one.method} {one.hours:g} h {one.temperature:g} K": one.value for one in known}
+    return Stage("rupture", group.name, described, make, RuptureAssessment)
 
 
 def _forecast_stage(study: StageInputs, number: int) -> Stage:
@@ -280,18 +263,7 @@ def _forecast_stage(study: StageInputs, number: int) -> Stage:
         return ck.forecast(ranking, tests, tolerances=tolerances or None, progress=tick, **how)
 
     name, described = f"forecast of {part.name}", [part.model_dump(), _digests(measured)]
-    return Stage("forecast", groups[0].name, described, make, Forecast, _numbers_of_forecast, (need,), name=name)
-
-
-def _numbers_of_forecast(forecast: Forecast) -> dict[str, Any]:
-    """Outputs at the end of each test, and times with their intervals."""
-    return {
-        test.name: {
-            **{name: float(output.value[-1]) for name, output in test.outputs.items()},
-            **{time.event: [time.value, time.low, time.high] for time in test.times},
-        }
-        for test in forecast.tests
-    }
+    return Stage("forecast", groups[0].name, described, make, Forecast, (need,), name=name)
 
 
 def _design_stage(study: StageInputs, group: TestGroup) -> Stage:
@@ -309,10 +281,7 @@ def _design_stage(study: StageInputs, group: TestGroup) -> Stage:
         rigs = arguments.rigs_of_study(study.file, rigs_of(best.histories, best.predictor))
         return ck.design(results[need], rig=rigs, goal=asked.quantity, budget=asked.budget, seed=seed, progress=tick)
 
-    def numbers(design: Design) -> dict[str, Any]:
-        return {"plan": [test.description for test in design.plan]}
-
-    return Stage("design", group.name, [part.model_dump(), seed], make, Design, numbers, (need,))
+    return Stage("design", group.name, [part.model_dump(), seed], make, Design, (need,))
 
 
 def export_name(file: StudyFile, number: int) -> str:
@@ -341,12 +310,9 @@ def _export_stage(study: StageInputs, number: int, group: TestGroup) -> Stage:
         law = source.temperature_law if part.law == "temperature" else source  # a ranking gives its verdict along
         return ExportedFile(file, part.target, options.text(law, part.target))
 
-    def numbers(export: ExportedFile) -> dict[str, Any]:
-        return {"hash of the text": short_hash(export.text.encode())}
-
     name = f"export {number + 1}{f' of {group.name}' if group.name else ''}: {part.target}"
     described = [part.model_dump(), file]
-    return Stage("export", group.name, described, make, ExportedFile, numbers, (need,), file=file, name=name)
+    return Stage("export", group.name, described, make, ExportedFile, (need,), file=file, name=name)
 
 
 OF_EACH_GROUP: Mapping[StageKind, Callable[[StageInputs, TestGroup], Stage]] = {

@@ -14,6 +14,7 @@ from creepkit.errors import StudyError, refuse_unknown
 from creepkit.files.reading import read_bytes, sha256_of
 from creepkit.files.writing import check_target, write_bytes, write_text
 from creepkit.reports.attachments import problem_of_names, read_attachments
+from creepkit.reports.contents import versions_of
 from creepkit.studies import arguments
 from creepkit.studies.arguments import check_forecast
 from creepkit.studies.cameras import StudyCamera, cameras_of, flagged_frames
@@ -28,8 +29,7 @@ from creepkit.studies.execution import (
 )
 from creepkit.studies.inputs import DATA_FILE, InputFile, input_files, read_inputs
 from creepkit.studies.kept_results import ResultFolder, key_of
-from creepkit.studies.lock import changed_results, differences, lock_of, read_lock, write_lock
-from creepkit.studies.result import CARRIED_FOLDER, StudyResult
+from creepkit.studies.result import CARRIED_FOLDER, PACKAGES, StudyResult
 from creepkit.studies.stages import StageInputs, export_name, stages_of
 from creepkit.studies.study_file import KeyPath, StudyFile, read_study_file
 
@@ -95,7 +95,7 @@ class Study:
         data = [*self.paths, *(path for camera in self.cameras for path in camera.all_files)]
         places: list[tuple[KeyPath, str]] = [(("export", k, "file"), name) for k, name in enumerate(exports)]
         places += [] if model.report is None else [(("report", "file"), model.report.file)]
-        taken = {one.casefold() for one in (file.path.name, f"{file.path.stem}.lock", f"{file.path.stem}.results")}
+        taken = {one.casefold() for one in (file.path.name, f"{file.path.stem}.results")}
         for key, name in places:
             among_data = any(fnmatchcase(name, pattern.removeprefix("./")) for pattern in model.data.files)
             if problem_of_names([name]) or "/" in name:
@@ -124,14 +124,13 @@ class Study:
         to: str | Path | None = None,
         only: str | Sequence[str] | None = None,
         again: bool = False,
-        locked: bool = False,
         progress: ProgressCallback | None = None,
     ) -> StudyResult:
         """Carry out the study; what was made before from the same inputs is read, not made again.
 
-        to : folder for results, lock, exports and report; by default that of the study file.
+        to : folder for results, exports and report; by default that of the study file.
         only : kinds of stages, such as "identification", which are carried out with those that they need.
-        again : make everything again. locked : StudyError where anything differs from the study.lock that is there.
+        again : make everything again.
         progress : called as progress(task, done, total, note). Files of the names of exports and report that creepkit
         did not write are replaced within `with ck.overwriting():` alone.
 
@@ -147,7 +146,7 @@ class Study:
             if again:
                 kept.clear()
             run = _Run(self, folder, kept, progress or (lambda task, done, total, note: None))
-            return run.result(kinds, locked=locked)
+            return run.result(kinds)
 
     def report_contents(self) -> ReportContents:
         """What ck.report(study) shows: the study is carried out, or read where nothing changed."""
@@ -156,24 +155,17 @@ class Study:
 
 @dataclass(frozen=True)
 class _Run:
-    """One run of a study, whose results are `kept`; lock, exports and report are written to `folder`."""
+    """One run of a study, whose results are `kept`; exports and report are written to `folder`."""
 
     study: Study
     folder: Path
     kept: ResultFolder
     progress: ProgressCallback
 
-    @property
-    def lock_path(self) -> Path:
-        return self.folder / f"{self.study.path.stem}.lock"
-
-    def result(self, kinds: Sequence[str], *, locked: bool) -> StudyResult:
+    def result(self, kinds: Sequence[str]) -> StudyResult:
         file, cameras = self.study.file, self.study.cameras
         self.progress("reading", 0, 1, "")
-        before, files = read_lock(self.lock_path), self.input_files()
-        changes = [] if before is None else differences(before, lock_of(file, files))
-        if locked:
-            self.refuse(["there is no lock"] if before is None else changes)
+        files = self.input_files()
         execution = Execution(self.kept, self.progress)
         watched = [stage for camera in cameras for stage in camera.stages(files)]
         execution.run(watched, [stage.name for stage in watched])  # whatever is asked for is made of their tests
@@ -185,22 +177,15 @@ class _Run:
         wanted = needed_stages(stages, kinds)
         self.check_exports([stage for stage in stages if stage.name in wanted])
         execution.run(stages, wanted, read_others="report" in kinds)
-        if before is not None:
-            changes += changed_results(before, execution.records)
-        if locked:
-            self.refuse(changes)
-        write_lock(lock_of(file, files, execution.records, before), self.lock_path)
         of_cameras = [test for camera in cameras for test in camera.tests(execution.results)]
         extractions = {name: one for name, one, _ in of_cameras}
         failed = [one for camera in cameras for one in camera.failed(execution.results)]
         result = StudyResult(
             file,
-            self.lock_path,
             inputs,
             tuple(files),
             (*flagged_frames(extractions), *failed, *inputs.exclusions),
             tuple(execution.records),
-            tuple(changes),
             results=execution.results,
             extractions=extractions,
             imposed={name: under for name, _, under in of_cameras if under is not None},
@@ -217,18 +202,12 @@ class _Run:
         """All data files, those of cameras and forecasts included, without what the study itself writes."""
         file, model = self.study.file, self.study.file.model
         outputs = [*(one.file for one in model.export), model.report and model.report.file]
-        own = [self.study.path, self.lock_path, *(self.folder / name for name in outputs if name)]
+        own = [self.study.path, *(self.folder / name for name in outputs if name)]
         paths = [*self.study.paths, *(path for camera in self.study.cameras for path in camera.all_files)]
         for k, part in enumerate(model.forecast):
             paths += file.paths(("forecast", k, "tests"), part.tests)
         predictor = arguments.predictor_path(file)
         return input_files(file, [*paths, *([] if predictor is None else [predictor])], own)
-
-    def refuse(self, changes: Sequence[str]) -> None:
-        """StudyError where anything differs from the lock."""
-        if changes:
-            what = f"the study cannot be repeated exactly: {changes[0]}; leave --locked out"
-            raise StudyError(f"{self.lock_path}: {what}")
 
     def check_exports(self, stages: Sequence[Stage]) -> None:
         """StudyError, before all the work, for exports that could not be written."""
@@ -242,7 +221,8 @@ class _Run:
 
         path = self.folder / name
         shown = [(one.name, one.sentence) for one in result.stages if one.state in ("failed", "left out")]
-        key = key_of([sha256_of(self.lock_path, DATA_FILE), shown, name])
+        made_from = [[one.name, one.sha256] for one in result.files], [[one.name, one.key] for one in result.stages]
+        key = key_of([self.study.file.text, versions_of(PACKAGES), *made_from, shown, name])
         state, sentence = "kept", ""
         if not path.is_file() or self.kept.load("report", key) != sha256_of(path, DATA_FILE):
             self.progress("report", 0, 1, "")
@@ -260,26 +240,23 @@ class _Run:
 # ---- back from a report ----------------------------------------------------------------------------------------------
 
 
-STUDY_NAME, LOCK_NAME, INPUTS = "study.toml", "study.lock", f"{CARRIED_FOLDER}/"
+STUDY_NAME, INPUTS = "study.toml", f"{CARRIED_FOLDER}/"
 
 
 def study_of_report(report: Path, folder: Path) -> Study:
-    """Write what a report carries to a folder, and read its study; files that are there already must be the same.
-
-    The lock of the report is written where none is there, so that a run says what differs from the report's.
-    """
+    """Write what a report carries to a folder, and read its study; files that are there already must be the same."""
     files = read_attachments(report)
     if STUDY_NAME not in files:
         raise StudyError(f"{report}: carries no {STUDY_NAME}; give a report that 'creepkit run study.toml' wrote")
     for name in files:
-        if name not in (STUDY_NAME, LOCK_NAME) and not name.startswith(INPUTS):
+        if name != STUDY_NAME and not name.startswith(INPUTS):
             raise StudyError(
-                f"{report}: carries '{name}', and a report carries {STUDY_NAME}, {LOCK_NAME} and data below {INPUTS} "
-                "alone; use the report as creepkit wrote it"
+                f"{report}: carries '{name}', and a report carries {STUDY_NAME} and data below {INPUTS} alone; "
+                "use the report as creepkit wrote it"
             )
     for name, content in files.items():
         path = folder / name
-        if path.exists() and name != LOCK_NAME and read_bytes(path, DATA_FILE) != content:
+        if path.exists() and read_bytes(path, DATA_FILE) != content:
             raise StudyError(f"{path}: is there already, and differs from what {report} carries; give --to FOLDER")
         if not path.exists():
             try:
@@ -292,6 +269,6 @@ def study_of_report(report: Path, folder: Path) -> Study:
     if not inputs.is_dir():
         raise StudyError(
             f"{report}: carries hashes of its data alone; the study is in {folder / STUDY_NAME}: "
-            f"put the files that {folder / LOCK_NAME} names into {inputs}, and run the report again"
+            f"put the data files that the report lists into {inputs}, and run the report again"
         )
     return Study.load(folder / STUDY_NAME, root=inputs)

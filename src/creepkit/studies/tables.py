@@ -1,6 +1,6 @@
 """What a study file may hold: strict models of its tables. Units stand in the names of keys.
 
-A key that is missing takes the default of the function that it goes to, which study.lock then records.
+A key that is missing takes the default of the function that it goes to.
 """
 
 from __future__ import annotations

@@ -20,7 +20,6 @@ import sympy
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import SAID, CreepkitError, restated
 from creepkit.kernels.interface import call_entry
-from creepkit.kernels.log_form import log_form
 from creepkit.kernels.lowering import lower
 from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.kernels.rate_jumps import find_rate_jump
@@ -307,7 +306,8 @@ def check_torch_gradients(law: CreepLaw, samples: LawSamples, where: str) -> str
     derivatives = lower(law, "numpy").internal_derivatives(*samples.arguments())
     exact = np.stack([*derivatives.point.values(), *derivatives.params.values()], axis=1)
     expected = exact / derivatives.rate[:, None]
-    accurate = np.isfinite(expected) & (np.minimum(np.abs(exact), np.abs(expected)) > _SMALLEST_ACCURATE)
+    sizes = np.minimum(np.minimum(np.abs(exact), np.abs(expected)), derivatives.rate[:, None])
+    accurate = np.isfinite(expected) & (sizes > _SMALLEST_ACCURATE)
     difference = float(np.max(np.abs(found - expected) / np.abs(expected), where=accurate, initial=0.0))
     assert difference <= DERIVATIVE_TOLERANCE, f"{difference:.1e}"
     return f"{difference:.1e}"
@@ -336,48 +336,6 @@ def _switch_difference(law: CreepLaw, samples: LawSamples, name: str, value: flo
     finite = np.isfinite(expected)
     difference = np.abs(off[finite] - expected[finite]) / np.maximum(np.abs(expected[finite]), NEGLIGIBLE_RATE)
     return float(difference.max(initial=0.0)) if np.isfinite(off[finite]).all() else np.inf
-
-
-@finding("every term off")
-def check_all_off(law: CreepLaw, samples: LawSamples) -> str | None:
-    """With every rate coefficient at zero the rate is 0 and the update finite, in every target."""
-    positions = log_form(law).coefficients
-    switches = {k for k, p in enumerate(law.params.values()) if p.scale == "log" and p.off == 0}
-    coefficients = {k for own in positions for k in own[:1]}
-    if not coefficients <= switches or not all(positions):
-        return None
-    theta = samples.theta.copy()
-    theta[:, sorted(coefficients)] = -np.inf
-    off = LawSamples(samples.points, theta)
-    for target, evaluate in KERNEL_EVALUATORS.items():
-        table = evaluate(law, off)
-        finite = np.isfinite(table.rows).all() and np.isfinite(table.log_rates).all()
-        zero = finite and (table.rows[:, 0, 0] < NEGLIGIBLE_RATE).all()
-        assert zero, f"the {target} kernel leaves a rate, or a number that is not finite"
-    assert _updates(law, off).all(), "the update entry is not finite"
-    return "rate 0, update finite"
-
-
-@finding("leading exponent of time")
-def check_leading_exponent(law: CreepLaw, samples: LawSamples) -> str:
-    """The exponent of time at the start, against slopes of the author's terms at 1e-12 s; logarithms die out slowly."""
-    exact, compiled = MultiprecisionLaw(law), lower(law, "compiled")
-    gaps = []
-    for start in ((1e-40, 1e-12), (1e-80, 1e-24)):
-        points, theta = samples.points[:16].copy(), samples.theta[:16]
-        points[:, 1:3] = start
-        slopes = [_leading_exponent(exact, p, t) for p, t in zip(points, theta, strict=True)]
-        gaps.append(np.abs(compiled.leading_exponent(theta, points) - slopes))
-    early, earlier = gaps
-    assert ((earlier <= 1e-6) | (earlier <= 0.6 * early)).all(), f"{earlier.max(initial=0.0):.1e}"
-    return f"{earlier.max(initial=0.0):.1e}"
-
-
-def _leading_exponent(exact: MultiprecisionLaw, point: Floats, theta: Floats) -> float:
-    """Smallest (1 + a)/(1 - b) of the terms; one that starts slower than any power, or with strain, does not lead."""
-    time_exponents, strain_exponents = (log_log_derivatives(exact, point, theta, v) for v in (time, strain))
-    pairs = zip(time_exponents, strain_exponents, strict=True)
-    return min(((1 + a) / (1 - b) for a, b in pairs if a < 1e3 and b < 1 - 1e-6), default=1.0)
 
 
 def log_log_derivatives(exact: MultiprecisionLaw, point: Floats, theta: Floats, variable: sympy.Symbol) -> list[float]:

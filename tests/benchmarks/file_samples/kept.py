@@ -27,29 +27,12 @@ from creepkit.reports.contents import Attachment
 from creepkit.screening.results import AlloyResult, read_result, write_result
 from creepkit.studies.execution import Execution, Stage
 from creepkit.studies.kept_results import ResultFolder
-from creepkit.studies.lock import STUDY_LOCK, read_lock
-from creepkit.studies.stages import numbers_of_ranking
 from creepkit.studies.study import study_of_report
 from creepkit.surrogates.surrogate import SURROGATE, load_surrogate
 from helpers.paths import ROOT
 
 MADE = ROOT / "tests" / "data" / "mutated"
 HASH = "0123456789abcdef" * 4
-
-
-def lock() -> dict[str, Any]:
-    """A study.lock of one stage, the parts as a run writes them."""
-    stage = {"key": HASH[:16], "state": "done", "numbers": {"weights": {"norton": 1.0}}}
-    return {
-        **STUDY_LOCK.heading,
-        "study": HASH,
-        "versions": {"python": "3.11.7", "creepkit": "0.1.0", "numpy": "2.4.6"},
-        "inputs": {"data/a.csv": HASH, "data/b.csv": HASH},
-        "declared": {"study": {"title": "planted", "seed": 0}, "forecast": []},
-        "settings": {"starts": 4, "frames": 12, "loss": "linear"},
-        "laws": {"norton": HASH[:16]},
-        "stages": {"identification": stage},
-    }
 
 
 def read_kept_fit(path: Path) -> Any:
@@ -95,7 +78,7 @@ class StageResult:
     def _making(self, made: Any) -> Stage:
         make = made if callable(made) else lambda results, tick: made
         settings = {"laws": ["norton"]}
-        return Stage("identification", "", settings, make, Ranking, numbers_of_ranking)
+        return Stage("identification", "", settings, make, Ranking)
 
 
 def read_header(path: Path) -> Any:
@@ -120,11 +103,9 @@ def header() -> bytes:
 
 
 def run_report(path: Path) -> Any:
-    """The study and its lock, written to a new folder as `creepkit run report.html` does."""
+    """The study, written to a new folder as `creepkit run report.html` does."""
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-        study = study_of_report(path, Path(folder) / "study")
-        lock_path = Path(folder) / "study" / "study.lock"
-        return study.file.model, read_lock(lock_path)
+        return study_of_report(path, Path(folder) / "study").file.model
 
 
 def samples() -> Iterator[ReaderSample]:
@@ -141,8 +122,7 @@ def samples() -> Iterator[ReaderSample]:
     yield document("alloy result", "x.json", alloy, read_result, '"laws" "verdict" "weight"')
     stage = StageResult()
     yield document("stage result", "x.json", stage.content(), stage, '"weight" "stage"')
-    yield document("study lock", "study.lock", json_text(lock()).encode(), read_lock, '"versions" "stages" "study"')
-    files = {"study.toml": STUDY.encode(), "study.lock": json_text(lock()).encode(), "inputs/a.csv": CREEP.encode()}
+    files = {"study.toml": STUDY.encode(), "inputs/a.csv": CREEP.encode()}
     yield document("report of a run", "x.html", report(files), run_report)
 
 

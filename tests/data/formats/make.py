@@ -47,7 +47,6 @@ def make(folder: Path) -> None:
     identified(groups, folder)
     planned(folder)
     ck.rupture(rupture_tests(), "larson-miller").save(folder / "rupture_assessment.json")
-    locked(folder)
 
 
 def creep_tests(folder: Path) -> dict[float, list[ck.History]]:
@@ -99,16 +98,6 @@ def rupture_tests() -> list[ck.History]:
             load = ck.constant_stress(stress)
             tests.append(ck.History(name, np.zeros(1), {}, load, T, rupture_time=3600.0 * life))
     return tests
-
-
-def locked(folder: Path) -> None:
-    """The lock of a study of two of the tests."""
-    with tempfile.TemporaryDirectory() as scratch:
-        for source in folder.glob("1073K_*.csv"):
-            (Path(scratch) / source.name).write_bytes(source.read_bytes())
-        (Path(scratch) / "study.toml").write_text(STUDY)
-        ck.Study.load(Path(scratch) / "study.toml").run()
-        (folder / "study.lock").write_bytes((Path(scratch) / "study.lock").read_bytes())
 
 
 if __name__ == "__main__":

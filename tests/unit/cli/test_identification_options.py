@@ -86,6 +86,8 @@ def test_what_has_no_effect_with_or_without_a_plate_is_refused() -> None:
     of_plate = (["--sums"], ["--penalty", "l2"], ["--criterion", "aicc"], ["--further-tests"])
     cases = [(words, f"{words[0]} is for a plate: add --by alloy, or leave it out") for words in alone]
     cases += [(["--by=alloy", *words], f"{words[0]} is not for a plate, ") for words in of_plate]
+    cases += [(["--budget-s", "5"], "--budget-s is for a search of laws: add --search")]
+    cases += [(["--search", "--law", "norton"], "--law is not for a search of laws")]
     answers = [(one_line(creepkit("identify", "tests", *words)), sentence) for words, sentence in cases]
     assert [(answer, sentence) for answer, sentence in answers if sentence not in answer] == []
 

@@ -146,7 +146,7 @@ def test_a_change_of_stress_separates_hardening_by_strain_from_hardening_by_time
     assert max(t.expectation.probability for t in steady) < 0.5
 
 
-def test_one_law_is_made_decisive_by_excluding_what_the_tests_allow_beside_it():
+def test_one_law_is_told_from_what_the_tests_allow_beside_it():
     """A small change of stress singles strain hardening out, but does not exclude a share of time hardening."""
     jump = StressSteps(((0.0, 50.0), (2e4, 52.0)), "stress")
     tests = bars(STRAIN_HARDENING, SPL, [constant_stress(45.0, "stress"), jump], seed=0)
@@ -155,7 +155,7 @@ def test_one_law_is_made_decisive_by_excluding_what_the_tests_allow_beside_it():
     assert ranking.challenges
     found = design(ranking)
     assert "strain-hardening+time-hardening" in found.altered
-    assert "makes strain-hardening decisive, against strain-hardening+time-hardening" in found.sentence
+    assert "tells strain-hardening from strain-hardening+time-hardening" in found.sentence
     made = carried_out(BAR, STRAIN_HARDENING, SPL, found.best.histories, seed=1)
     assert found.best.expectation.probability > 0.95
     after = [identify(law, [*tests, *made], BAR, settings=LIKELY) for law in (STRAIN_HARDENING, TIME_HARDENING)]

@@ -62,7 +62,7 @@ def check_mathml(law):
 def test_mathml_reads_as_the_equation():
     _, (rate, *_) = page(COMBINED)
     first, second, third = rate.findall(f".//{{{documents.MATHML_NAMESPACE}}}mtr")
-    assert flat(first) == "ε˙cr=A1sinh(σeB)n1"
+    assert flat(first) == "ε˙cr=A1[sinh(σeB)]n1"
     assert flat(second) == "+A2εcrm1σen2"
     assert flat(third) == "+A3σen3tm2"
 

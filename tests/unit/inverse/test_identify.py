@@ -287,14 +287,14 @@ def test_tables_of_rates_and_lives():
     assert names(rows) == ["norton", "hyperbolic-sine", "kachanov-rabotnov", "sinh-damage"]
 
 
-def test_rates_over_a_threshold_stress_bend_down_at_each_temperature_and_those_of_a_power_law_do_not():
+def test_rates_over_a_threshold_stress_bend_down_at_each_temperature_those_of_two_powers_up_and_of_one_not_at_all():
     stress = np.array([150.0, 185.0, 225.0, 105.0, 140.0, 180.0, 70.0, 95.0, 140.0])
     kelvin, scatter = np.repeat([813.15, 843.15, 873.15], 3), np.random.default_rng(3).standard_normal(9)
     factors = 1e-15 * np.exp(0.05 * scatter - 3e5 / 8.314 * (1 / kelvin - 1 / 843.15))
 
-    def named(s_0):
-        rows = zip(stress, kelvin, factors * (stress - s_0) ** 4.0, strict=True)
-        end = np.array([1e6])
+    def named(s_0, high=0.0):
+        rates = factors * ((stress - s_0) ** 4.0 + high * (stress / 140.0) ** 12)
+        rows, end = zip(stress, kelvin, rates, strict=True), np.array([1e6])
         tests = [ck.History("m", end, {}, ck.constant_stress(s), T, minimum_rate=rate) for s, T, rate in rows]
         return list(named_candidates(tests))
 
@@ -302,6 +302,7 @@ def test_rates_over_a_threshold_stress_bend_down_at_each_temperature_and_those_o
     assert named(40.0) == ["norton", "hyperbolic-sine", "threshold-stress"]
     assert named(65.0 - 0.7 * (kelvin - 843.15)) == ["norton", "hyperbolic-sine", falling]
     assert named(0.0) == ["norton", "hyperbolic-sine"]
+    assert named(0.0, 140.0**4) == ["norton", "hyperbolic-sine", "double-power"]
     forms = ck.law("threshold-stress").with_temperature(s_0=ck.linear(T_ref=843.15))
     assert ck.law(falling).fingerprint == forms.times(ck.arrhenius(T_ref=843.15)).fingerprint
 

@@ -7,6 +7,7 @@ import sympy
 
 from creepkit.errors import LawError
 from creepkit.language import (
+    GAS_CONSTANT,
     CreepLaw,
     Elastic,
     Param,
@@ -16,6 +17,7 @@ from creepkit.language import (
     states,
     strain,
     stress,
+    temperature,
     time,
     wachtman,
 )
@@ -169,6 +171,12 @@ def test_a_parameter_may_be_called_as_a_function_is():
 def test_latex_shows_arrhenius_as_people_write_it():
     expected = r"A \sigma_e^{n} \exp\!\left[-\frac{Q}{R}\left(\frac{1}{T} - \frac{1}{1073.15\,\mathrm{K}}\right)\right]"
     assert NORTON.times(arrhenius(T_ref=1073.15)).latex() == r"\dot{\varepsilon}_{cr} = " + expected
+    params = {A: RATE, B: Param("activation energy", unit="J/mol", bounds=(1e4, 9e5))}
+    about_none, in_kelvin = (
+        law(terms={"x": A * sympy.exp(-B / (R * temperature))}, params=params) for R in (GAS_CONSTANT, 1)
+    )
+    assert ["A*exp(-B/(R*T))" in str(about_none), "A*exp(-B/temperature)" in str(in_kelvin)] == [True, True]
+    assert about_none.latex().endswith(r"A \exp\!\left[-\frac{B}{R T}\right]")
 
 
 # ---- elastic -------------------------------------------------------------------------------------------------------

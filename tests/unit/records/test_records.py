@@ -263,8 +263,8 @@ def test_a_record_off_the_stated_temperature_is_a_finding(tmp_path):
     head = ["stress_MPa: 100", "temperature_C: 800"]
     history = written(tmp_path, head, {"temperature_C": celsius})
     (flag,) = (f for f in check_data_quality([history]) if f.kind == "record")
-    assert (flag.time, flag.temperature_steps["x"]) == (7260.0, pytest.approx(-10.0))
-    assert flag.rate_factors["x"] == pytest.approx(np.exp(-400e3 / 8.314462618 * (1 / 1063.15 - 1 / 1073.15)))
+    assert flag.time == 7260.0
+    assert "by -10 K" in flag.reason
     close = written(tmp_path, head, {"temperature_C": 800.0 + 1.5 * np.sin(TIMES / 1000.0)})
     assert not [f for f in check_data_quality([close]) if f.kind == "record"]
 

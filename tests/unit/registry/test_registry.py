@@ -304,21 +304,6 @@ def test_a_law_is_found_whatever_its_capitals_and_by_its_aliases() -> None:
     assert registry.one(kinds.EXPORTERS, "tex").name == "latex"
 
 
-def test_a_plugin_whose_commands_fail_is_told_and_the_others_add_theirs(write: Write) -> None:
-    head = "from creepkit.language import hookimpl\n\n@hookimpl\ndef creepkit_commands(app):\n"
-    registry = Registry()
-    registry.load_file(write("failing", head + "    app.no_such_method()\n"))
-    registry.load_file(write("working", head + "    app.command('work')(lambda: None)\n"))
-
-    apps = {plugin.provenance.name: app.registered_commands for plugin, app in registry.command_lines()}
-
-    assert [command.name for command in apps["working"]] == ["work"]
-    assert apps["failing"] == []
-    problems = {p.provenance.name: p.problem for p in registry.plugins()}
-    assert "creepkit_commands raised AttributeError" in problems["failing"]
-    assert problems["working"] == ""
-
-
 def test_threads_that_ask_first_wait_until_all_plugins_are_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
     waiting = threading.Barrier(4)
     original = plugin_sources.InstalledModule.load

@@ -4,12 +4,13 @@ A weight is relative to the laws tried, and an information criterion prefers the
 are therefore asked before an answer is called decisive:
 
 1. May a share of the rate come from another law? The best law and each other law tried are added, the second carrying
-   SHARE of the rate at the reference point, and the sum is fitted: where its chi-square is not larger by more than
-   3.84 (95 %, one degree of freedom), the tests do not exclude it; where it is smaller by more than its further
-   parameters give by chance, it fits better. Both
+   SHARE of the rate at the reference point, and the sum is fitted: where its chi-square is smaller by more than its
+   further parameters give by chance (95 %), it fits better, and the answer is not decisive; where it is not larger by
+   more than 3.84 (95 %, one degree of freedom), the tests do not exclude it, which is said beside the answer. Both
    are the least under the covariance of the best law's identification.
 2. May there be a threshold? The stress s in the terms of the best law is replaced by s - s_0, with s_0 THRESHOLD of
-   the reference stress, and judged likewise. One that has a threshold is not asked for another.
+   the reference stress: the answer is not decisive where the tests do not exclude it, for with one the law is another
+   below them. One that has a threshold is not asked for another.
 3. Does the answer rest on something nobody measured? The laws are ranked again with each unmodelled effect (see
    selection.perturbation_trials).
 """
@@ -76,10 +77,17 @@ SAME_FUNCTION = 0.05
 
 
 def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
-    """The challenges of the first of some identifications, best first; the first law that is found ends the search."""
-    laws = (_challenge(*alteration) for alteration in _alterations(fits))
-    first_law = next((challenge for challenge in laws if challenge is not None), None)
-    return (*([first_law] if first_law is not None else []), *decisive_effects(fits))
+    """The challenges of the first of some identifications, those first for which it is not decisive.
+
+    The first altered law of those ends the search; of the others the first is kept.
+    """
+    allowed: list[Challenge] = []
+    for alteration in _alterations(fits):
+        challenge = _challenge(*alteration)
+        if challenge is not None and challenge.refutes:
+            return (challenge, *decisive_effects(fits))
+        allowed += [] if challenge is None else [challenge]
+    return (*decisive_effects(fits), *allowed[:1])
 
 
 def altered_laws(fits: Sequence[Identification], limit: float = NOT_EXCLUDED) -> list[AlteredLaw]:
@@ -122,9 +130,8 @@ def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -
         return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
     if found is None or found.excess > NOT_EXCLUDED:
         return None
-    return Challenge(
-        kind, found.problem.law.name, f"{found.description} {_comparison_text(found.excess, found.further)}"
-    )
+    refutes = kind == "threshold" or found.fits_better
+    return Challenge(kind, found.problem.law.name, f"{found.description} {found.comparison}", refutes)
 
 
 # ---- shares of other laws --------------------------------------------------------------------------------------------
@@ -208,6 +215,21 @@ class AlteredLaw:
     further: int
     description: str
 
+    @property
+    def fits_better(self) -> bool:
+        """Whether chi-square is lower by more than it falls by chance (95 %) with the parameters that are not held."""
+        return bool(self.excess < -chi2.ppf(0.95, max(self.further - 1, 1)))
+
+    @property
+    def comparison(self) -> str:
+        """How it compares with the best law, to follow its description."""
+        if self.fits_better:
+            return f"fits better (its chi-square is {-self.excess:.1f} lower)"
+        if abs(self.excess) < SMALLEST_SHOWN:
+            return "explains them as well (its chi-square is the same)"
+        side = "higher" if self.excess > 0 else "lower"
+        return f"explains them as well (its chi-square is {abs(self.excess):.1f} {side})"
+
 
 def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     """The sum of the best law and another one that carries SHARE of the rate; None where it is the best law itself.
@@ -225,7 +247,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     excess, x = _least_excess(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
-    description = f"its sum with {other.law.name}, tried with {100 * SHARE:.0f} % of the rate carried by it,"
+    description = f"its sum with {100 * SHARE:.0f} % of the rate by {other.law.name}"
     return AlteredLaw("sum", problem, x, excess, share(x)[1], other.u.size, description)
 
 
@@ -245,18 +267,6 @@ def above_threshold(best: FittedLaw) -> AlteredLaw:
     held = np.zeros((1, x.size))
     held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
     return AlteredLaw("threshold", problem, x, excess, held, 1, f"{law.name} of {threshold:.3g} MPa")
-
-
-def _comparison_text(excess: float, further: int = 1) -> str:
-    """How an altered law compares with the best one, from its chi-square above that of the best.
-
-    further : its parameters beyond those of the best law: by chance chi-square falls with each that is not held.
-    """
-    if excess < -chi2.ppf(0.95, max(further - 1, 1)):
-        return f"fits better (its chi-square is {-excess:.1f} lower)"
-    if abs(excess) < SMALLEST_SHOWN:
-        return "explains them as well (its chi-square is the same)"
-    return f"explains them as well (its chi-square is {abs(excess):.1f} {'higher' if excess > 0 else 'lower'})"
 
 
 def _are_one_function(problem: LeastSquaresProblem, x: Floats, own_terms: int) -> bool:

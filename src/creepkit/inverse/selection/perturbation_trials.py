@@ -38,12 +38,14 @@ class Challenge:
 
     kind : "sum" of the best law with another, a "threshold" stress of it, or an "unmodelled effect". subject : the name
         of the law that is allowed, or the effect.
-    sentence : for people, to follow "but".
+    sentence : for people, to follow "but". refutes : whether the law is not decisive for it. A sum that explains the
+        tests no better than by chance does not: it says how much of another law they allow.
     """
 
     kind: Literal["sum", "threshold", "unmodelled effect"]
     subject: str
     sentence: str
+    refutes: bool = True
 
     def __str__(self) -> str:
         return self.sentence

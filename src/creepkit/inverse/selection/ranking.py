@@ -2,8 +2,8 @@
 
 Weights are of the laws tried. An answer is decisive where one of them has more than 95 % of the weight, explains the
 tests to their noise (see inverse.adequacy), was among the laws asked for, and stands every challenge: no sum with a
-share of another law explains the tests as well, and no unmodelled effect would change the answer (see
-selection.challenges).
+share of another law explains the tests better, no threshold as well, and no unmodelled effect would change the answer
+(see selection.challenges). What share of another law the tests allow is said beside it.
 
 Laws are compared under a common covariance (see selection.discrimination), where each fits best under it whatever
 weights its values were found with: chi-square + K ln n (BIC), or + 2K + 2K(K+1)/(n-K-1) (AICc), with n the independent
@@ -106,8 +106,8 @@ class Ranking(Presentable, Plotted, Tabulated):
             unmet["asked"] = "it is none of the laws asked for"
         if self.challenges is None:
             unmet["challenges"] = "what else the tests allow was not examined"
-        elif self.challenges:
-            unmet["challenges"] = "; and ".join(challenge.sentence for challenge in self.challenges)
+        elif refuting := [challenge.sentence for challenge in self.challenges if challenge.refutes]:
+            unmet["challenges"] = "; and ".join(refuting)
         return unmet
 
     @property
@@ -142,7 +142,8 @@ class Ranking(Presentable, Plotted, Tabulated):
         if "alternatives" in unmet:
             return f"{unmet['alternatives']}; {self.adequacy_text}"
         if not unmet:
-            return f"decisive: {best}, of {len(self.laws)} laws tried; {self.adequacy_text}"
+            allowed = "".join(f"; but {challenge}" for challenge in self.challenges or ())
+            return f"decisive: {best}, of {len(self.laws)} laws tried; {self.adequacy_text}{allowed}"
         return f"not decisive: {_reason(self, unmet)}"
 
     @property
@@ -200,7 +201,7 @@ def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
     names, best, count = [r.fit.law.name for r in ranking.credible], ranking.best.law.name, len(ranking.laws)
     lost = f"; {unmet['convergence']}" if "convergence" in unmet else ""
     adequacy, weight = ranking.adequacy, f"weight {ranking.laws[0].weight:.2f} of the laws tried{lost}"
-    named = unmet["challenges"] if ranking.challenges else ""
+    named = unmet.get("challenges", "") if ranking.challenges else ""
     if adequacy is not None and adequacy.rejects:
         if adequacy.lies_in_tests:
             first = adequacy.explanations[0].headline

@@ -19,6 +19,7 @@ from creepkit.reports.answer import (
     asked_figures,
     interval_text,
     rate_exponent_and_energy,
+    rupture_figures,
     tests_text,
     titled_law,
 )
@@ -151,7 +152,10 @@ def block_shown(block: Block, names: LawNames) -> Block:
             block,
             headline=said(block.headline),
             picture=None if block.picture is None else block_shown(block.picture, names),
-            values=[cells((one[0], one[1], one[3])) for one in block.values],
+            values=[
+                cells((name, f"{value}{' (at the bound of its search)' * (f'{value} (search bound)' in ends)}", unit))
+                for name, value, ends, unit in block.values
+            ],
             figures=[cells(one) for one in block.figures],
             cautions=[said(one) for one in block.cautions],
             next_step=said(block.next_step),
@@ -176,6 +180,7 @@ def findings_section(contents: ReportContents, figures: PageFigures) -> PageSect
         blocks.append(Paragraph(reasons.format(listed), "warning"))
     if len(found) == 1:
         asked = [figure for forecast in contents.forecasts.values() for figure in asked_figures(forecast)]
+        asked += [figure for one in contents.rupture.values() for figure in rupture_figures(one)]
         files = files_to_download(contents)[:MOST_FILES]
         blocks.append(group_answer(found[0], figures, asked=asked, quality=contents.quality, files=files))
     elif not found:

@@ -1,0 +1,220 @@
+"""search_laws: sentences are proposed, changed one factor at a time, fitted in full, and ranked beside registered laws.
+
+1. Rates of smoothed curves propose: all products, those of a sparse regression, and sums that another one keeps.
+2. A beam of the best, by the criterion of a quick identification from the curves, is changed: of each sentence's
+   neighbours those that fit the smoothed rates best are identified in turn, until no change helps or the budget is
+   spent.
+3. The sentences on the front and near the best, and the registered laws that suit the tests, are identified and
+   ranked as by select().
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+from time import process_time
+from typing import TYPE_CHECKING, Any, Unpack
+
+from creepkit.arrays import Floats
+from creepkit.checked_arguments import checked
+from creepkit.errors import CreepkitError, FitError
+from creepkit.inverse.candidates import candidates
+from creepkit.inverse.checked_identification import select
+from creepkit.inverse.compared_tests import common_rupture_times
+from creepkit.inverse.history_checks import sound_tests
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identify import identify
+from creepkit.inverse.information_criteria import bic_penalty
+from creepkit.inverse.initial_search import StartingEstimate, search_problem
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures, with_arrhenius
+from creepkit.inverse.search.multistart import refined
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.language import CreepLaw
+from creepkit.law_search.grammar import HARDENING, SOFTENING, STRESS, Product, Sentence
+from creepkit.law_search.proposals import proposed_products, proposed_sums
+from creepkit.law_search.results import LawSearch, SearchedLaw
+from creepkit.law_search.smoothed_rates import RateFit, SmoothedRates
+from creepkit.limits import Limits
+from creepkit.options import Options, option, takes_options
+from creepkit.records import History, Predictor
+from creepkit.registry.arguments import resolve_predictors
+
+if TYPE_CHECKING:
+    from creepkit.option_keywords import LawSearchOptionsKeywords
+
+BEAM, TRIED, SIMPLER = 3, 5, 2
+"""Sentences that are changed in turn, and neighbours of each that are identified, and of those with less parameters."""
+
+
+MOST_RANKED, NEAR, REGISTERED_RANKED = 4, 20.0, 2
+"""Sentences that are ranked at the end, their criterion above the least up to which they are, and registered laws."""
+
+
+SHARE_OF_BEAM = 0.6
+"""Of the budget; what is left is for the ranking."""
+
+
+@checked
+@dataclass(frozen=True)
+class LawSearchOptions(Options, title="options of a search of laws"):
+    """What search_laws() is asked beside the settings of its identifications.
+
+    budget : CPU seconds; no further sentence is tried after them, and the ranking at the end is whole. registered :
+    whether the registered laws that suit the tests are ranked beside.
+    """
+
+    budget: float = option(60.0, "CPU time for trying laws; what is left out is said.", Limits(1, 1e6), unit="s")
+    registered: bool = option(True, "Rank the registered laws that suit the tests beside.")
+
+
+@takes_options(LawSearchOptions)
+@checked
+def search_laws(
+    tests: Sequence[History],
+    using: Predictor | str | Mapping[str, Predictor | str] | None = None,
+    *,
+    optimizer: Any = None,
+    settings: IdentificationSettings | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+    **changes: Unpack[LawSearchOptionsKeywords],
+) -> LawSearch:
+    """Search laws that nobody wrote down: sentences of a grammar of rate equations, ranked beside registered laws.
+
+    tests : creep curves of bars. using : as of identify(). optimizer : of pysindy, which proposes sentences; by default
+    STLSQ with several thresholds. settings : of the last identifications.
+    FitError for tests without creep curves of bars. See law_search.grammar for what a sentence is.
+    """
+    started, options = process_time(), LawSearchOptions().changed(changes)
+    settings = settings or IdentificationSettings()
+    predictor = resolve_predictors(using, tests)
+    sound, _ = sound_tests(list(tests), settings)
+    registered = [with_arrhenius(one, sound) for one in candidates(sound)] if options.registered else []
+    end = started + SHARE_OF_BEAM * options.budget
+    search = _Search(sound, predictor, _quick(settings, registered), registered, end, progress)
+    search.run(optimizer)
+    if not search.best(1):
+        raise FitError(f"no sentence of the grammar could be identified: {next(iter(search.failed.values()), 'none')}")
+    best = search.best(MOST_RANKED)
+    ranked = [one for one in best if search.score(one) < search.score(best[0]) + NEAR]
+    ranked += [one for one in search.best(REGISTERED_RANKED, search.registered) if one not in ranked]
+    laws = [search.fits[one].law for one in ranked]
+    ranking = select(laws, tests, using, settings=settings, sums=False, progress=progress)
+    least = min(map(search.score, search.fits))
+    tried = tuple(
+        SearchedLaw(fit.law, fit.rms, search.score(key) - least, key in search.registered)
+        for key, fit in sorted(search.fits.items(), key=lambda pair: search.score(pair[0]))
+    )
+    return LawSearch(ranking, tried, options.budget, process_time() - started, search.untried)
+
+
+def _quick(settings: IdentificationSettings, registered: Sequence[CreepLaw]) -> IdentificationSettings:
+    """Those of identifications on the way, alike for laws that can rise to rupture and others."""
+    alike = common_rupture_times([*registered, Product(softening="strain").law], settings)
+    return replace(alike, starts=2, sobol_points=64, frames=20, weights="likelihood", usual_errors="none")
+
+
+@dataclass
+class _Search:
+    """What was tried so far: criteria on smoothed rates, and quick identifications from the curves."""
+
+    tests: Sequence[History]
+    predictor: Any
+    settings: IdentificationSettings
+    registered_laws: Sequence[CreepLaw]
+    end: float
+    progress: Callable[[str, int, int], None] | None
+    screened: dict[Sentence, RateFit] = field(default_factory=dict)
+    fits: dict[Sentence | str, Identification] = field(default_factory=dict)
+    failed: dict[Sentence | str, str] = field(default_factory=dict)
+    registered: list[Sentence | str] = field(default_factory=list)
+    untried: int = 0
+
+    def run(self, optimizer: Any) -> None:
+        """Fill `fits`."""
+        self.rates = SmoothedRates.of_tests(self.tests)
+        several = spans_temperatures(self.tests)
+        self.temperatures = ("arrhenius", "arrhenius of each") if several else ("none",)
+        first = Sentence((), self.temperatures[0], reference_temperature(self.tests))
+        singles = [Product(*factors) for factors in product(STRESS, HARDENING, SOFTENING)]
+        singles = list(dict.fromkeys([*proposed_products(self.rates, optimizer), *singles]))
+        self.screen([replace(first, products=(one,)) for one in singles])
+        by_screen = sorted(self.screened, key=self.screen_score)
+        fitted = {one.products[0]: self.screened[one].log_rate for one in by_screen[: 3 * BEAM]}
+        sums = [replace(first, products=products) for products in proposed_sums(self.rates, fitted, optimizer)]
+        self.screen(sums)
+        self.identify([*by_screen[: BEAM + TRIED], *sums])
+        expanded = set[Sentence]()
+        while self.fits and process_time() < self.end:
+            chosen = next((one for one in self.best(BEAM) if one not in expanded), None)
+            if chosen is None:
+                break
+            expanded.add(chosen)
+            near = [one for one in chosen.neighbours(self.temperatures) if one not in self.fits]
+            self.screen(near)
+            near = sorted((one for one in near if one in self.screened), key=self.screen_score)
+            simpler = [one for one in near if len(one.law.params) < len(chosen.law.params)]
+            self.identify([*near[:TRIED], *simpler[:SIMPLER]])
+        self.untried = sum(one not in expanded for one in self.best(BEAM))
+        self.identify_registered()
+
+    def screen(self, sentences: Sequence[Sentence]) -> None:
+        """Fit sentences to the smoothed rates."""
+        for one in self._in_time([s for s in sentences if s not in self.screened], "smoothed rates"):
+            self.screened[one] = self.rates.fitted(one)
+
+    def screen_score(self, sentence: Sentence) -> float:
+        """The criterion of a sentence on the smoothed rates."""
+        return self.screened[sentence].score
+
+    def identify(self, sentences: Sequence[Sentence]) -> None:
+        """Identify sentences from the curves, with few starts and frames."""
+        fresh = [s for s in dict.fromkeys(sentences) if s not in self.fits and s not in self.failed]
+        for one in self._in_time(fresh, "curves"):
+            self._identify(one, one.law)
+
+    def identify_registered(self) -> None:
+        """Identify the registered laws; one that a sentence is stands under it."""
+        known = {fit.law.fingerprint: key for key, fit in self.fits.items()}
+        for law in self.registered_laws:
+            key = known.get(law.fingerprint, law.name)
+            self.registered.append(key)
+            if key not in self.fits:
+                self._identify(key, law)
+
+    def _identify(self, key: Sentence | str, law: CreepLaw) -> None:
+        try:
+            start = self._start(law, self.screened[key].theta) if isinstance(key, Sentence) else None
+            self.fits[key] = identify(law, self.tests, self.predictor, settings=self.settings, start=start)
+        except CreepkitError as error:
+            self.failed[key] = str(error)
+
+    def _start(self, law: CreepLaw, theta: Floats) -> StartingEstimate:
+        """Where least squares of the curves end that begin at values from the smoothed rates.
+
+        theta : (starts, parameters) internal values.
+        """
+        problem = LeastSquaresProblem.from_histories(law, self.tests, self.predictor, self.settings)
+        searched = search_problem(problem, problem.predictor.for_search())
+        ends = refined(searched, [*searched.bounds.clip(searched.coordinates.u(theta))])
+        return StartingEstimate(ends[0].x, reference=problem.coordinates.reference, values_only=True)
+
+    def _in_time(self, sentences: Sequence[Sentence], to: str) -> Iterator[Sentence]:
+        """Sentences, one after the other, while there is time."""
+        for k, one in enumerate(sentences):
+            if process_time() > self.end and self.fits:
+                return
+            if self.progress is not None:
+                self.progress(f"laws fitted to {to}", k + 1, len(sentences))
+            yield one
+
+    def score(self, key: Sentence | str) -> float:
+        """The criterion of a quick identification."""
+        fit = self.fits[key]
+        return -2.0 * fit.log_likelihood + bic_penalty(len(fit.law.params), fit.effective_frames)
+
+    def best(self, count: int, among: Collection[Sentence | str] | None = None) -> list[Any]:
+        """The keys of lowest criterion, of sentences or `among` others."""
+        keys = [key for key in self.fits if (isinstance(key, Sentence) if among is None else key in among)]
+        return sorted(keys, key=self.score)[:count]

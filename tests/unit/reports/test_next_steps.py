@@ -1,0 +1,58 @@
+"""The law to try and the test to make, and the line of one alloy of several, from bars whose law was planted."""
+
+import re
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.reports.answer import line_of_group
+from creepkit.reports.next_steps import further_test, law_to_try
+
+STRESSES = np.array([80.0, 110.0, 150.0, 200.0])
+AMID = float(np.exp(np.log(STRESSES).mean()))
+
+
+def bars(strain=lambda x: x, n=4.0):
+    """Bars whose strain is 0.02 `strain` of the time over that in which 1e-9 (s/AMID)^n 1/s makes 0.02; noise 1 %."""
+    rng, shares = np.random.default_rng(3), np.linspace(0.02, 0.98, 30)
+    durations = 0.02 / (1e-9 * (STRESSES / AMID) ** n)
+    values = [0.02 * strain(shares) * np.exp(0.01 * rng.standard_normal(shares.size)) for _ in STRESSES]
+    return [
+        ck.History(f"b{s:g}", shares * end, {"strain": one}, ck.constant_stress(s, control="stress"), 900.0)
+        for s, end, one in zip(STRESSES, durations, values, strict=True)
+    ]
+
+
+@pytest.fixture(scope="module")
+def steady():
+    return ck.identify("norton", bars())
+
+
+def test_the_law_to_try_has_the_part_of_the_curves_that_this_one_misses():
+    early = ck.identify("norton", bars(lambda x: x + 0.5 * (1 - np.exp(-10 * x))))
+    assert law_to_try(early, []) == ("norton*primary", "early")
+    assert law_to_try(early, ["norton*primary"]) == ("strain-hardening", "early")
+    late = ck.identify("norton", bars(lambda x: -np.log(1 - x)))
+    assert law_to_try(late, ["mpc-omega*arrhenius"]) == ("kachanov-rabotnov", "late")
+
+
+def test_the_test_that_tells_most_of_a_power_law_is_farthest_from_those_that_were_made(steady):
+    stress, kelvin, hours, factor = further_test(steady, None)
+    assert (stress, kelvin) == pytest.approx((0.8 * 80.0, 900.0))  # 64 MPa is farther below AMID than 250 above
+    assert hours == pytest.approx(steady.reference.strain / (1e-9 * (64.0 / AMID) ** 4) / 3600, rel=0.05)
+    rate, _, high = steady.rate(64.0, warn=False)
+    assert factor == pytest.approx(float(high / rate), rel=0.02)
+
+
+def test_two_power_laws_that_cross_amid_the_tests_are_told_apart_at_their_end_and_the_same_law_nowhere(steady):
+    stress, _, _, factor = further_test(steady, ck.identify("norton", bars(n=6.0)))
+    assert stress == pytest.approx(64.0)
+    assert factor == pytest.approx((AMID / 64.0) ** 2, rel=0.05)
+    assert further_test(steady, steady) is None
+
+
+def test_the_line_of_an_alloy_states_its_law_its_exponent_and_its_rate_with_intervals(steady):
+    found = re.search(r"stress exponent (\S+) \[.*\], creep rate (\S+) %/h \[.*\] at (\S+) MPa", line_of_group(steady))
+    assert "norton" in line_of_group(steady)
+    assert [float(one) for one in found.groups()] == pytest.approx([4.0, 1e-9 * 3.6e5, AMID], rel=0.03)
