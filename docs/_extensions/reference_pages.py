@@ -6,7 +6,6 @@ import pkgutil
 from pathlib import Path
 from types import ModuleType
 
-from findings_page import findings_page
 from sphinx.application import Sphinx
 
 import creepkit
@@ -17,8 +16,7 @@ PAGES = Path(__file__).parents[1] / "reference" / "pages"
 def write_pages(app: Sphinx) -> None:
     """Write the pages that autodoc then fills."""
     PAGES.mkdir(parents=True, exist_ok=True)
-    own = {"public_names": _public_names(), "what_is_said_when": findings_page()}
-    pages = {**own, **{name: _package(name) for name in package_names()}}
+    pages = {"public_names": _public_names(), **{name: _package(name) for name in package_names()}}
     for stale in {path.stem for path in PAGES.glob("*.rst")} - pages.keys():
         (PAGES / f"{stale}.rst").unlink()
     for name, text in pages.items():

@@ -39,7 +39,7 @@ def exists_after_build(path: Path) -> bool:
     """Whether a link into a folder that `make docs` fills will lead somewhere."""
     folder = next(DOCS / folder for folder in WRITTEN_AT_BUILD if path.is_relative_to(DOCS / folder))
     if folder.name != "gallery":
-        return path.stem in {"index", "public_names", "what_is_said_when"}
+        return path.stem in {"index", "public_names"}
     return path.stem == "index" or (ROOT / "examples" / f"{path.stem}.py").is_file()
 
 

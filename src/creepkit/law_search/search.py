@@ -20,9 +20,8 @@ from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.candidates import candidates
-from creepkit.inverse.checked_identification import select
 from creepkit.inverse.compared_tests import common_rupture_times
-from creepkit.inverse.history_checks import sound_tests
+from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.information_criteria import bic_penalty
@@ -30,6 +29,8 @@ from creepkit.inverse.initial_search import StartingEstimate, search_problem
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures, with_arrhenius
 from creepkit.inverse.search.multistart import refined
+from creepkit.inverse.selection.ranking import Ranking, rank
+from creepkit.inverse.selection.select import as_shown
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.law_search.grammar import HARDENING, SOFTENING, STRESS, Product, Sentence
@@ -52,7 +53,7 @@ MOST_RANKED, NEAR, REGISTERED_RANKED = 4, 20.0, 2
 """Sentences that are ranked at the end, their criterion above the least up to which they are, and registered laws."""
 
 
-SHARE_OF_BEAM = 0.6
+SHARE_OF_BEAM = 0.8
 """Of the budget; what is left is for the ranking."""
 
 
@@ -89,7 +90,7 @@ def search_laws(
     started, options = process_time(), LawSearchOptions().changed(changes)
     settings = settings or IdentificationSettings()
     predictor = resolve_predictors(using, tests)
-    sound, _ = sound_tests(list(tests), settings)
+    sound, left_out = sound_tests(list(tests), settings)
     registered = [with_arrhenius(one, sound) for one in candidates(sound)] if options.registered else []
     end = started + SHARE_OF_BEAM * options.budget
     search = _Search(sound, predictor, _quick(settings, registered), registered, end, progress)
@@ -99,14 +100,39 @@ def search_laws(
     best = search.best(MOST_RANKED)
     ranked = [one for one in best if search.score(one) < search.score(best[0]) + NEAR]
     ranked += [one for one in search.best(REGISTERED_RANKED, search.registered) if one not in ranked]
-    laws = [search.fits[one].law for one in ranked]
-    ranking = select(laws, tests, using, settings=settings, sums=False, progress=progress)
+    notes = (*left_out, *loading_notes(sound), *rig_notes(sound, settings))
+    ranking = _ranked([search.fits[one] for one in ranked], sound, predictor, settings, notes)
     least = min(map(search.score, search.fits))
     tried = tuple(
         SearchedLaw(fit.law, fit.rms, search.score(key) - least, key in search.registered)
         for key, fit in sorted(search.fits.items(), key=lambda pair: search.score(pair[0]))
     )
     return LawSearch(ranking, tried, options.budget, process_time() - started, search.untried)
+
+
+def _ranked(
+    fits: Sequence[Identification],
+    tests: Sequence[History],
+    predictor: Any,
+    settings: IdentificationSettings,
+    notes: Sequence[str],
+) -> Ranking:
+    """The laws identified in full, each from where its quick identification ended, and ranked as by select()."""
+    full = replace(common_rupture_times([fit.law for fit in fits], settings), weights="likelihood")
+    found, failed = list[Identification](), dict[str, str]()
+    for fit in fits:
+        start = StartingEstimate.from_identification(fit)
+        try:
+            one = identify(fit.law, tests, predictor, settings=full, start=start)
+            found.append(replace(one, notes=(*one.notes, *notes)))
+        except CreepkitError as error:
+            failed[fit.law.name] = str(error)
+    if not found:
+        raise FitError(f"no law of the search could be identified in full: {next(iter(failed.values()))}")
+    ranking = rank(found, failed=failed)
+    shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
+    laws = [replace(one, fit=as_shown(one.fit, settings, None)) if id(one) in shown else one for one in ranking.laws]
+    return replace(ranking, laws=tuple(laws))
 
 
 def _quick(settings: IdentificationSettings, registered: Sequence[CreepLaw]) -> IdentificationSettings:

@@ -212,7 +212,8 @@ class StatedConditions:
 
     def _classify(self, key: str, entry: SourceText, columns_as_labels: bool) -> None:
         """Put an entry where it belongs."""
-        name, written = self._vocabulary.synonyms.get(key, key), entry.key or key
+        meant, written = self._vocabulary.synonyms.get(key), entry.key or key
+        name = self.terms.condition(meant) if meant else key
         found = split_unit(name, self._kinds)
         word, _, rest = name.strip().partition(" ")
         base, _, suffix = name.rpartition("_")

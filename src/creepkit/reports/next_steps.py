@@ -41,7 +41,9 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
         if len(ranking.credible) > 1:
             return _test_text("separate", fit, ranking.credible[1].fit)
         if ranking.challenges:
-            return NEXT["separate otherwise"].format(first=fit.law.name, second=ranking.challenges[0].subject)
+            first = ranking.challenges[0]
+            kind = "measure" if first.kind == "unmodelled effect" else "separate otherwise"
+            return NEXT[kind].format(first=fit.law.name, second=first.subject, effect=first.subject)
     return _test_text("determine", fit, names=names) if weak else NEXT["use"]
 
 

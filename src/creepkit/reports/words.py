@@ -55,6 +55,7 @@ NEXT = {
     "noise": "state the noise of the readings in a column {column}",
     "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor} times there",
     "separate otherwise": "{first} and {second} need a test apart (creepkit design)",
+    "measure": "measure the {effect} of the tests: one that nobody modelled would make another law the better",
     "determine": "to determine {names}, test at {stress} MPa, {celsius}, for {hours} h: the rate is known least there",
     "determine otherwise": "make a test that determines {names} (creepkit design)",
     "use": "forecast (creepkit predict), or export the law to your code (creepkit export)",

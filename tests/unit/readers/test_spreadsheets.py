@@ -77,9 +77,11 @@ def pairs_under_pressure(name: str):
 
 def test_a_pressure_above_pairs_and_a_sheet_of_alloys(tmp_path: Path):
     """As a user had them: `L1-1: 40 bar` above pairs, lengths by alloy below a title; one too many is asked about."""
-    geometry = [["800 °C"], ["Alloy", "radius [mm]", "E [GPa]"], ["L1", 8, 140], ["L2", 9, 140]]
+    geometry = [["800 °C"], ["Alloy", "dimple radius [mm]", "E [GPa]"], ["L1", 8, 140], ["L2", 9, 140]]
     sheets = {"Geometry": geometry, **{name: pairs_under_pressure(name) for name in ("L1", "L2")}}
-    (tmp_path / "tests.toml").write_text('["x.xlsx"]\nspecimen = "plate-bulge"\n')
+    (tmp_path / "tests.toml").write_text(
+        '["x.xlsx"]\nspecimen = "plate-bulge"\ncolumns = {"dimple radius [mm]" = "radius [mm]"}\n'
+    )
     tests = ck.read_histories([workbook(tmp_path / "x.xlsx", sheets)])
     found = [(one.alloy, one.loading.program().values.max(), one.geometry["radius"]) for one in tests]
     assert found == [("L1", 4.0, 8.0), ("L1", 6.0, 8.0), ("L2", 4.0, 9.0), ("L2", 6.0, 9.0)]

@@ -85,7 +85,7 @@ def select(
         best = _repeated(ranking.best, using, settings, through)
         ranking = rank([best if fit is ranking.best else fit for fit in fits], criterion, failed)
     shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
-    laws = [replace(one, fit=_as_shown(one.fit, asked, through)) if id(one) in shown else one for one in ranking.laws]
+    laws = [replace(one, fit=as_shown(one.fit, asked, through)) if id(one) in shown else one for one in ranking.laws]
     return replace(ranking, laws=tuple(laws), further=tried_further)
 
 
@@ -104,7 +104,7 @@ def _repeated(fit: Identification, using: Any, settings: IdentificationSettings,
     return best
 
 
-def _as_shown(fit: Identification, asked: IdentificationSettings, through: Predictor | None) -> Identification:
+def as_shown(fit: Identification, asked: IdentificationSettings, through: Predictor | None) -> Identification:
     """What is shown of a law that may be the one: values that describe the tests, and samples where they are needed."""
     fit = describing(fit) if asked.weights != "likelihood" else fit
     return sampled_where_needed(fit, through)

@@ -307,7 +307,7 @@ def _table_of_groups(found: Sequence[ReportGroup]) -> Table:
         "materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests, of laws that fit "
         "the tests. Not in the interval: what errors common to all tests would move the rate by, such as of "
         "temperature and load (root sum of squares). Decisive: one law has more than 95 % of the weight, the tests do "
-        "not contradict it, and nothing else that was tried does as well; the verdict of each material says the rest"
+        "not contradict it, and nothing else that was tried does better; the verdict of each material says the rest"
     )
     return Table(caption, columns, rows, numeric=(2, 5, 6, 7, 8))
 
