@@ -45,7 +45,7 @@ for name, truth in planted.truth.items():
 # Screened
 # --------
 # Finite elements in the loop; few starts will do for laws of one term. The same from a shell:
-#     creepkit identify plate/tests --by alloy --compositions plate/compositions.csv --confirm --to plate/screened
+#     creepkit identify plate/tests --by alloy --compositions plate/compositions.csv --to plate/screened
 
 began = time.monotonic()
 nuisances = [ck.Nuisance("offset"), ck.Nuisance("rate")]
@@ -57,7 +57,7 @@ settings = ck.IdentificationSettings(
 plate = ck.screen(
     tests,
     compositions=compositions,
-    options=ck.ScreeningOptions(settings=settings, confirm=True, dense="combined" if arguments.dense else None),
+    options=ck.ScreeningOptions(settings=settings, dense="combined" if arguments.dense else None),
     to=arguments.to / "screened",
     progress=lambda task, done, total, note: print(f"{task}: {done} of {total} ({note})", file=sys.stderr),
 )

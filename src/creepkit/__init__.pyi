@@ -32,7 +32,6 @@ from .instruments.imposed import imposed as imposed
 from .inverse.candidates import candidates as candidates
 from .inverse.checked_identification import identify as identify
 from .inverse.checked_identification import select as select
-from .inverse.confirmation import confirm as confirm
 from .inverse.cross_validation import cross_validate as cross_validate
 from .inverse.goodness_of_fit import relative_squared_error as relative_squared_error
 from .inverse.reference_conditions import with_arrhenius as with_arrhenius

@@ -111,7 +111,8 @@ def judge(page: Page, result: ck.StudyResult, dimples: dict[str, list[PlannedDim
             page.row(f"lag of {view}, s (planted {planted:.1f})", f"{clock.lag:.2f} ({low:.2f} to {high:.2f})")
     found = {one.alloy: result.rankings.get(one.alloy) for one in truth.values()}
     page.row("alloys with a law", sum(one is not None for one in found.values()))
-    page.row("confirmed by finite elements", sum(one.confirmed for one in result.confirmations.values()))
+    errors = [one.best.numerical_error for one in found.values() if one is not None]
+    page.row("confirmed by finite elements", sum(one is not None and one.confirms for one in errors))
     right, covered = [], []
     for one in truth.values():
         ranking = found[one.alloy]

@@ -6,7 +6,7 @@
 
 Each alloy is one dimple under 8, then 10 MPa for 4 h, a frame a minute, with white noise as measured (1.5 um on D_amp,
 0.02 mm on S_d, 0.02 on S_p), its law and values drawn around the three of Fig. 7a of Chen et al. The four laws of
-Table 1 are identified with intervals, the best one is confirmed by finite elements, and Eq. (2) is fitted without
+Table 1 are identified with intervals, the best one is corrected by finite elements, and Eq. (2) is fitted without
 sparsity. "Set of laws": those that the tests cannot rule out. "Covered": planted values, of alloys whose law was found,
 inside their 95 % intervals.
 """
@@ -49,7 +49,6 @@ def screening_options(options):
             settings=replace(screening.settings, nuisances=tuple(nuisances)),
             through=surrogate if options.how == "through" else None,
             dense=None if options.no_full_law else "combined",
-            confirm=True,
         ),
         "workers": options.workers,
         "progress": lambda task, done, total, note: progress(f"{task}: {done} of {total} ({note})"),
@@ -100,22 +99,21 @@ def recovery_tables(page, plate, truth):
 
 def confirmation_table(page, plate):
     """How far finite elements are from the identified laws, and what a single law loses against Eq. (2)."""
-    confirmations = [r.confirmation for r in plate.identified if r.confirmation is not None]
+    errors = [r.best.numerical_error for r in plate.identified if r.best.numerical_error is not None]
     losses = [
         mean_relative_squared_error(r.best) / mean_relative_squared_error(r.dense_fit)
         for r in plate.identified
         if r.dense_fit is not None
     ]
     page.table("quantity", "alloys", "median", "largest")
-    distances = [c.noise_ratio for c in confirmations]
     quantities = {
-        "finite elements from the fit, over the noise": distances,
+        "finite elements from the predictor, over the noise": [one.noises for one in errors],
         "loss (Eq. 4) of the best law over that of Eq. (2)": losses,
     }
     for name, values in quantities.items():
         if values:
             page.row(name, len(values), f"{np.median(values):.3g}", f"{np.max(values):.3g}")
-    page.paragraph(f"Confirmed by finite elements: {sum(c.confirmed for c in confirmations)} of {len(confirmations)}.")
+    page.paragraph(f"Confirmed by finite elements: {sum(one.confirms for one in errors)} of {len(errors)}.")
 
 
 def cpu_seconds():

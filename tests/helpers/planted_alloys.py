@@ -1,13 +1,13 @@
 """Small planted alloys whose tests cost next to nothing: bars at several stresses, and made-up bulge histories."""
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 import creepkit as ck
 from creepkit.language import Elastic
-from creepkit.records import History, Predictor, PressureJump, Status, constant_stress
+from creepkit.records import History, Predictor, PressureJump, constant_stress
 
 TIMES = np.geomspace(60.0, 2e5, 40)
 NORTON = {"A": 2e-16, "n": 4.6}
@@ -34,22 +34,6 @@ class Deadly(Predictor):
 
     def predict_batch(self, law, theta, histories, nuisances, sensitivities):
         os._exit(3)
-
-
-@dataclass(frozen=True)
-class Doubting(Predictor):
-    """A stand-in for bars that creeps a little too much and doubts whatever it says."""
-
-    excess: float = 0.0
-    name: str = "doubting"
-    outputs: tuple[str, ...] = ("strain",)
-
-    specimen = ck.specimen("uniaxial")
-
-    def predict_batch(self, law, theta, histories, nuisances, sensitivities):
-        found = self.specimen.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
-        outside = np.full_like(found.status, int(Status.OUTSIDE_DOMAIN))
-        return replace(found, values=(1.0 + self.excess) * found.values, status=outside)
 
 
 def bulge(name="dimple", alloy="", rise=0.2, noise=0.0015, outputs=("amplitude", "width", "shape"), seed=0):

@@ -77,7 +77,7 @@ def test_init_one_edit_and_run_give_a_law_of_every_alloy(lab: Path) -> None:
             scale = math.log if name == "A" else float
             low, high, middle = (scale(getattr(found[name], end)) for end in ("low", "high", "value"))
             assert abs(scale(value) - middle) < 2.576 / 1.96 * (high - low) / 2
-        assert result.confirmations[one.alloy].confirmed
+        assert result.rankings[one.alloy].best.numerical_error.confirms
     west, east = (result.imposed[f"{view} D1"].alignment for view in ("west", "east"))
     assert result.imposed["west D2"].alignment.lag == west.lag  # one clock a camera
     assert west.lag_interval[0] < 623.4 < west.lag_interval[1]

@@ -111,13 +111,13 @@ def test_select(folder, tmp_path):
 
 def test_screen(folder, tmp_path):
     settings = ck.IdentificationSettings(starts=1, sobol_points=64, frames=14)
-    options = ck.ScreeningOptions(settings=settings, dense=None, confirm=False)
+    options = ck.ScreeningOptions(settings=settings, dense=None)
     tests = [test.replace(alloy="A") for test in ck.read_histories(folder)]
     (tmp_path / "tests").mkdir()
     for test in tests:
         ck.write_history(test, tmp_path / "tests" / f"{test.name}.csv")
     plate = ck.screen(tests, ["norton"], options=options, workers=1)
-    words = ("--law", "norton", "--dense", "none", "--no-confirm", "--workers", "1", *QUICK_WORDS)
+    words = ("--law", "norton", "--dense", "none", "--workers", "1", *QUICK_WORDS)
     command("identify", tmp_path / "tests", "--by", "alloy", "--to", tmp_path / "out", *words)
     (result,) = plate.results
     assert same(ck.load(tmp_path / "out" / "fits" / "A.json"), result.best)

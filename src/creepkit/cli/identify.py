@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -11,7 +10,7 @@ import typer
 import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.identified_folder import check_identified_folder, write_ranking
-from creepkit.cli.shared import Files, Json, Only, Reader, Workers, is_file_name, selected
+from creepkit.cli.shared import Files, Json, Only, Reader, Workers, selected
 from creepkit.errors import FitError
 from creepkit.inverse.candidate_laws import LawChanges
 from creepkit.inverse.search_options import SearchOptions
@@ -24,7 +23,6 @@ from creepkit.reports.terminal import ProgressBar, print_json, tell, tell_writte
 from creepkit.studies.candidates import by_likelihood, ranked_candidates
 
 if TYPE_CHECKING:
-    from creepkit.inverse.identification import Identification
     from creepkit.language import CreepLaw
     from creepkit.screening.screen import ScreeningOptions
 
@@ -59,9 +57,6 @@ def command(
     using: Annotated[Predictor | None, Option(help="Identify through a surrogate alone, such as dimple.")] = None,
     through: Annotated[
         Predictor | None, Option(help="Search through a surrogate, and end with the specimen itself.")
-    ] = None,
-    confirm: Annotated[
-        bool | None, Option(help="Simulate the best law by the specimen itself; a law may be a saved FIT.json.")
     ] = None,
     search_laws: Annotated[
         bool, Option(help="Search laws that nobody wrote down, beside registered ones.", flag="search")
@@ -115,17 +110,12 @@ def command(
     histories = selected(ck.read_histories(files, reader), only)
     if up_to is not None:
         histories = _truncate_at_strain(histories, up_to)
-    if law and confirm and all(is_file_name(name) for name in law):
-        _confirm([ck.load(name) for name in law], histories, using, as_json)
-        return
     if search_laws:
         _search(histories, using, to, chosen, budget, as_json)
         return
     candidates = [ck.law(name) for name in dict.fromkeys(law or CANDIDATE_LAWS)]
     if each is not None:
-        options = ck.ScreeningOptions(
-            settings=chosen, through=through, dense=dense, confirm="when in doubt" if confirm is None else confirm
-        )
+        options = ck.ScreeningOptions(settings=chosen, through=through, dense=dense)
         laws = LawChanges(temperature="none").changed(changes).applied(candidates, [])
         _screen(histories, laws, using, compositions, to, options, workers, as_json)
         return
@@ -145,8 +135,6 @@ def command(
         print_json(ranking_to_json(ranking, written))
     else:
         print_ranking(ranking, written, len(histories))
-    if confirm:
-        _confirm([ranking.best], histories, using, as_json)
     if further_tests:
         tell(ranking.further_tests(), err=as_json)
 
@@ -206,18 +194,6 @@ def _screen(
         plate.plot(to / "plate.png")
         written += [to / "fits", to / "plate.png"]
     print_screening(plate, written, as_json)
-
-
-def _confirm(fits: list[Identification], histories: list[History], using: Predictor | None, as_json: bool) -> None:
-    """Simulate identified laws for each test; using : what they were identified through."""
-    from creepkit.reports.inference import confirmation_to_json
-
-    for fit in fits:
-        found = ck.confirm(fit if using is None else replace(fit, predictor=using), histories)
-        if as_json:
-            print_json(confirmation_to_json(found))
-        else:
-            tell(found)
 
 
 def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:

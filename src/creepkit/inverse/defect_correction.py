@@ -34,6 +34,7 @@ class NumericalError:
     shift : by how much the values would differ without the correction: the largest change of an unknown, in its
         posterior standard deviations, to first order.
     incomplete : tests that the more exact predictor does not follow to their end; they are not corrected.
+    settled : whether another correction would move the values by less than half a standard deviation.
     """
 
     predictor: str
@@ -42,6 +43,12 @@ class NumericalError:
     noises: float
     shift: float
     incomplete: tuple[str, ...] = ()
+    settled: bool = True
+
+    @property
+    def confirms(self) -> bool:
+        """Whether the more exact predictor reaches the end of every test, and values stay where it has corrected."""
+        return self.settled and not self.incomplete
 
     @property
     def remaining(self) -> dict[str, float]:
@@ -57,6 +64,7 @@ class NumericalError:
             f"noises); this is corrected, and would have moved values by up to {self.shift:.2g} of their standard "
             + "deviations"
             + (f"; {', '.join(self.incomplete)} could not be corrected" if self.incomplete else "")
+            + ("; a further correction may move them again" if not self.settled else "")
         )
 
 

@@ -329,6 +329,8 @@ def _last_estimate(
         numerical_error = replace(error, shift=shift_of_values(best.problem, x, known))
         if numerical_error.shift < SMALL_SHIFT:
             break
+    else:
+        numerical_error = numerical_error and replace(numerical_error, settled=False)
     return best, numerical_error
 
 

@@ -1,18 +1,14 @@
-"""Text of what follows an identification: term selection, posterior, confirmation, cross-validation."""
+"""Text of what follows an identification: term selection, posterior, cross-validation."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import unit_text
-from creepkit.reports.blocks import aligned, number
-from creepkit.reports.json_values import finite
+from creepkit.reports.blocks import aligned
 
 if TYPE_CHECKING:
-    from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.cross_validation import CrossValidation
     from creepkit.inverse.single_values import SingleValue
     from creepkit.inverse.sparsity.result import Sparsity
@@ -65,31 +61,7 @@ def model_average_text(average: ModelAverage) -> str:
     )
 
 
-# ---- confirmation and cross-validation -------------------------------------------------------------------------------
-
-
-def confirmation_text(confirmation: Confirmation) -> str:
-    """The verdict, and chi-square of the simulation and of the fit, a row an output of a test."""
-    rows = [
-        (
-            test.name,
-            one.output,
-            number(one.simulation_errors.chi_square, 3),
-            "–" if one.fit_errors is None else number(one.fit_errors.chi_square, 3),
-            number(math.sqrt(one.simulation_errors.mean_squared_error), 3),
-            number(one.rms_difference, 3),
-        )
-        for test in confirmation.tests
-        for one in test.outputs
-    ]
-    columns = ("test", "output", "chi-square", "of the fit", "rms", "apart, noise")
-    head = f"{confirmation.law} by {confirmation.predictor_name}: {confirmation.verdict}"
-    return "\n".join([head, *(f"  {line}" for line in aligned(columns, rows, numeric=(2, 3, 4, 5)))])
-
-
-def confirmation_to_json(confirmation: Confirmation) -> dict[str, Any]:
-    """The same as JSON-able data."""
-    return {"holds": confirmation.confirmed, "verdict": confirmation.verdict, **finite(asdict(confirmation))}
+# ---- cross-validation ------------------------------------------------------------------------------------------------
 
 
 def cross_validation_text(validation: CrossValidation) -> str:

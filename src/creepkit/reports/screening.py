@@ -54,8 +54,9 @@ def summary_lines(plate: ScreeningResult) -> list[str]:
             lines.append(f"{name} ({len(plate.by_class()[name])}): {fractions}")
     lines += [f"failed: {_failure_text(alloy, reason)}" for alloy, reason in plate.failures.items()]
     for result in plate.identified:
-        if result.confirmation is not None and not result.confirmation.confirmed:
-            lines.append(f"{result.alloy}: {result.confirmation.verdict}")
+        error = result.best.numerical_error
+        if error is not None and not error.confirms:
+            lines.append(f"{result.alloy}: not confirmed: {error.sentence}")
     return [*lines, *(f"note: {note}" for note in plate.notes)]
 
 

@@ -20,7 +20,6 @@ from creepkit.files.json_documents import DocumentFormat, check_heading, read_js
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError, ValueCodec
 from creepkit.files.writing import write_text
-from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import CODEC as FIT_CODEC
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
@@ -55,7 +54,6 @@ class AlloyResult:
     equivalents: tuple[str, ...] = ()
     failure: str = ""
     dense_fit: Identification | None = None
-    confirmation: Confirmation | None = None
     notes: tuple[str, ...] = ()
     cpu_seconds: float = 0.0
     decisive: bool = False
@@ -176,14 +174,14 @@ class ScreeningResult(Presentable, Plotted):
 
 ALLOY_RESULT = DocumentFormat(
     "creepkit-alloy-result",
-    3,
+    4,
     FileKind("the result of an alloy", FitError, "remove it, and it is worked out again"),
     remedy="remove it, and it is worked out again",
 )
 
 
 CODEC = RecordCodec(
-    ranges={RankedLaw: {"chi_square": ANY_NUMBER}, ConfirmedOutput: {"rms_difference": ANY_NUMBER}, **FIT_CODEC.ranges},
+    ranges={RankedLaw: {"chi_square": ANY_NUMBER}, **FIT_CODEC.ranges},
     values={Identification: ValueCodec(identification_to_json, identification_from_json)},
 )
 """Of the result of an alloy; its identifications are documents of their own inside it."""
@@ -218,7 +216,7 @@ def result_columns(plate: ScreeningResult, result: AlloyResult) -> dict[str, str
     }
     if not result.identified:
         return {**columns, "notes": result.failure}
-    fit, confirmation, numbers = result.best, result.confirmation, dict[str, float]()
+    fit, numbers = result.best, dict[str, float]()
     columns |= {"law": fit.law.name, "weight": _number_text(result.laws[0].weight)}
     columns |= {"decisive": "yes" if result.decisive else "no", "verdict": result.verdict}
     if fit.adequacy is not None:
@@ -233,10 +231,6 @@ def result_columns(plate: ScreeningResult, result: AlloyResult) -> dict[str, str
     numbers |= {f"rse_{name}": e.relative_squared_error for name, e in fit.errors.items()}
     numbers |= {f"chi_square_{name}": e.chi_square for name, e in fit.errors.items()}
     columns |= {name: _number_text(v) for name, v in numbers.items()} | {"confirmed": confirmation_text(result)}
-    simulated: dict[str, list[float]] = {}
-    for one in (o for test in (confirmation.tests if confirmation is not None else ()) for o in test.outputs):
-        simulated.setdefault(one.output, []).append(one.simulation_errors.chi_square)
-    columns |= {f"confirmed_chi_square_{name}": _number_text(sum(v) / len(v)) for name, v in simulated.items()}
     columns["loss_reduced"] = _number_text(mean_relative_squared_error(fit))
     columns["loss_dense"] = (
         "" if result.dense_fit is None else _number_text(mean_relative_squared_error(result.dense_fit))
@@ -261,10 +255,9 @@ def write_csv(plate: ScreeningResult, path: Path) -> Path:
 
 
 def confirmation_text(result: AlloyResult) -> str:
-    """Whether the full simulation confirmed the result: yes, no, or nothing where it was not asked."""
-    if result.confirmation is None:
-        return ""
-    return "yes" if result.confirmation.confirmed else "no"
+    """Whether a more exact simulation confirms the result: yes, no, or nothing where there is none."""
+    error = result.best.numerical_error
+    return "" if error is None else "yes" if error.confirms else "no"
 
 
 def _number_text(number: float) -> str:

@@ -17,14 +17,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 from creepkit.arrays import usable_cores
 from creepkit.checked_arguments import checked
 from creepkit.errors import SAID, CreepkitError, FitError, HistoryError, restated
 from creepkit.files.writing import hashed_stem
 from creepkit.inverse.composite_predictor import CompositePredictor
-from creepkit.inverse.confirmation import Confirmation, confirm, outside_domain
 from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.identification import Identification
@@ -71,7 +70,6 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
     ranking = select(laws, alloy.tests, job.predictor, settings=job.settings, through=through, sums=False)
     best, notes = ranking.best, list(limitations(alloy, job.predictor))
     dense = None if job.dense_law is None else _fit_dense_law(job, job.dense_law, alloy, notes)
-    confirmation = _confirm_best(job, best, alloy, notes)
     return AlloyResult(
         alloy.name,
         laws=ranking.laws,
@@ -80,7 +78,6 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
         decisive=ranking.decisive,
         equivalents=tuple(str(pair) for pair in equivalent_laws(ranking)),
         dense_fit=dense,
-        confirmation=confirmation,
         notes=(*notes, *best.notes),
     )
 
@@ -95,17 +92,6 @@ def _fit_dense_law(job: ScreeningJob, dense: CreepLaw, alloy: Alloy, notes: list
         return None
 
 
-def _confirm_best(job: ScreeningJob, best: Identification, alloy: Alloy, notes: list[str]) -> Confirmation | None:
-    """The finite element run of the best law, where it is asked for or in doubt; that it failed is a note."""
-    if job.confirm is False or (job.confirm is not True and not outside_domain(best)):
-        return None
-    try:
-        return confirm(best, alloy.tests, job.predictor.specimen)
-    except CreepkitError as error:
-        notes.append(f"not confirmed: {error}")
-        return None
-
-
 FITS_FOLDER = "fits"
 """The folder of the best identifications, inside that of the results."""
 
@@ -116,7 +102,6 @@ class ScreeningJob:
 
     predictor, surrogate : `using` and `through` of identify(). dense_law : the law that is compared with the best of
         `laws`, or None.
-    confirm : True, False or "when in doubt".
     """
 
     alloys: tuple[Alloy, ...]
@@ -125,7 +110,6 @@ class ScreeningJob:
     surrogate: Predictor | None
     settings: IdentificationSettings
     dense_law: CreepLaw | None
-    confirm: bool | str
     folder: Path
     task_name: ClassVar[str] = "alloy"
 
@@ -159,7 +143,7 @@ class ScreeningJob:
             f"creepkit {version('creepkit')}",
             *(f"{law.name} {law.fingerprint} {[(n, p.bounds, p.off) for n, p in law.table.items()]}" for law in laws),
             *("none" if one is None else predictor_fingerprint(one) for one in predictors),
-            repr((self.settings, self.dense_law is None, self.confirm)),
+            repr((self.settings, self.dense_law is None)),
         ]
         return "\n".join(lines)
 
@@ -184,14 +168,11 @@ class ScreeningOptions:
     through : a surrogate in which laws of several terms are searched before the predictor gives values (see
         identify()).
     dense : the law whose misfit without sparsity is compared with the best one's (Fig. 7b), None for none.
-    confirm : whether the best law is simulated by the specimen itself: True, False, or "when in doubt", that is where
-        a surrogate says that its prediction lies outside its domain.
     """
 
     settings: IdentificationSettings = field(default_factory=IdentificationSettings)
     through: Predictor | None = None
     dense: CreepLaw | str | None = DENSE_LAW
-    confirm: bool | Literal["when in doubt"] = "when in doubt"
 
     def __post_init__(self) -> None:
         self.settings.check_by_likelihood("screen()")
@@ -218,7 +199,7 @@ def screen(
     compositions : table of what the alloys are made of, or its file; classes follow from it.
     to : folder for one JSON file an alloy, in which an interrupted call finds what is done. Alloys whose tests and
         settings are the same as there are not identified again. Its folder `fits` has the best identification of each.
-    options : settings, surrogate, law without sparsity and confirmation.
+    options : settings, surrogate and law without sparsity.
     workers : processes, by default one for each core; 1 works in this process.
     progress : called as progress(task, done, total, note).
 
@@ -237,7 +218,6 @@ def screen(
             surrogate=options.through,
             settings=options.settings,
             dense_law=None if options.dense is None else resolve_law(options.dense),
-            confirm=options.confirm,
             folder=folder,
         )
         _make_folder(folder / FITS_FOLDER)

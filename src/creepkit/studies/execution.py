@@ -217,7 +217,6 @@ StageKind = Literal[
     "record",
     "quality",
     "identification",
-    "confirmation",
     "temperature",
     "rupture",
     "forecast",

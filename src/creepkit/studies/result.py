@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from creepkit.extraction.extraction import Extraction
     from creepkit.forecasts.forecast import Forecast
     from creepkit.instruments.imposed import Imposed
-    from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.quality import DataQuality
     from creepkit.records import History
@@ -124,11 +123,6 @@ class StudyResult:
         return self._by_group("identification")
 
     @property
-    def confirmations(self) -> Mapping[str, Confirmation]:
-        """{group: its best law as the specimen itself simulates it}."""
-        return self._by_group("confirmation")
-
-    @property
     def temperature(self) -> Mapping[str, TemperatureStudy]:
         """{group: forms of temperature of its law}."""
         return self._by_group("temperature")
@@ -178,7 +172,6 @@ class StudyResult:
         rankings: Mapping[str, Any] = self.rankings
         attached, notes = self._attachments()
         notes += [f"{one.name} {one.sentence}" for one in self.stages if one.state == "left out"]
-        notes += [f"{name}: {one.verdict}".removeprefix(": ") for name, one in self.confirmations.items()]
         carried = self.identified
         if sum(len(one.text) for one in carried) > MOST_IDENTIFIED:
             folder, carried = f"{self.file.path.stem}.results/identified", ()

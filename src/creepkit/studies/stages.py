@@ -36,7 +36,6 @@ from creepkit.studies.study_file import KeyPath, StudyFile
 if TYPE_CHECKING:
     from creepkit.experiments.planned_design import Design
     from creepkit.forecasts.forecast import Forecast
-    from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.language import CreepLaw
@@ -108,9 +107,6 @@ def stages_of(study: StageInputs) -> list[Stage]:
         part = getattr(model, kind)
         groups = [] if part is None else study.groups_of((kind,), getattr(part, "group", None))
         made[kind] = [make(study, group) for group in groups]
-    part = model.identification
-    if part is not None and (part.confirm if part.confirm is not None else bool(model.camera)):
-        made["confirmation"] = [_confirmation_stage(study, group) for group in study.inputs.groups]
     made["forecast"] = [_forecast_stage(study, k) for k in range(len(model.forecast))]
     made["export"] = [
         _export_stage(study, k, group)
@@ -215,19 +211,6 @@ def _best_candidate(study: StageInputs, ranking: Ranking, group: TestGroup) -> t
     named = {fitted.name: law for law, fitted in study.laws(group)}
     fit = next((one.fit for one in ranking.laws if one.fit.law.name in named), None)
     return (next(iter(named.values())) if fit is None else named[fit.law.name]), fit
-
-
-def _confirmation_stage(study: StageInputs, group: TestGroup) -> Stage:
-    """The best law of a group, simulated by the specimen itself for each of its tests."""
-    from creepkit.reports.inference import confirmation_to_json
-
-    need = stage_name("identification", group.name)
-
-    def make(results: Results, tick: Tick) -> Confirmation:
-        return ck.confirm(results[need].best)
-
-    described = _digests(group.histories)
-    return Stage("confirmation", group.name, described, make, None, (need,), document=confirmation_to_json)
 
 
 # ---- what follows from tests and laws ------------------------------------------------------------------------------

@@ -236,12 +236,10 @@ _OF_IDENTIFICATION: Any = _keys(IdentificationSettings, LawChanges, SearchOption
 class IdentificationTable(_OF_IDENTIFICATION, TableModel):  # type: ignore[misc]
     """[identification]: candidate laws and how each is fitted, for every group of tests.
 
-    confirm : whether the best law is simulated by the specimen itself; by default where cameras gave the tests.
     nuisances : as "thickness=0.49:0.03", mean and standard deviation; "rate=none" leaves out one that is usual.
     """
 
     laws: OneOrMore
-    confirm: bool | None = None
     group_by: Text | None = None
     using: Text | None = None
     bounds: dict[Text, Bounds] = {}

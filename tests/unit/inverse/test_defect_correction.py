@@ -106,6 +106,7 @@ def test_the_planted_values_come_back_with_the_correction_and_not_without(fits):
     """An error of 0.02 mm that does not depend on the values: nothing of it is left."""
     assert deviation(fits["exact"]) < 1e-5
     assert deviation(fits["corrected"]) < 1e-4
+    assert fits["corrected"].numerical_error.confirms
     true = VALUES["A"] * 70.0 ** VALUES["n"]
     rates = {name: float(fit.rate(70.0, 1000.0)[0]) for name, fit in fits.items()}
     assert np.log(rates["corrected"] / true) == pytest.approx(0.0, abs=1e-4)

@@ -1,12 +1,9 @@
 """Laws that a surrogate does not know are identified with its specimen: alone, in a mixed list, and on the way."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.confirmation import confirm
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.select import select
 from creepkit.inverse.settings import IdentificationSettings
@@ -71,11 +68,3 @@ def test_a_mixed_list_is_ranked_on_the_same_data(tests: list[History]) -> None:
     assert fits["norton"].provenance["specimen"] == "uniaxial"
     assert fits["strain-hardening"].provenance["specimen"] == "narrow"
     assert "in the place of 'narrow'" in fits["norton"].notes[-1]
-
-
-def test_it_confirms_nothing_of_a_law_that_it_does_not_know(tests: list[History]) -> None:
-    """A loaded fit may be given any predictor; what the specimen says is then compared with what the fit reported."""
-    fit = identify(NORTON, tests, BARS, settings=settings())
-    found = confirm(replace(fit, predictor=Narrow()), tests, BARS)
-    assert found.confirmed
-    assert found.noise_ratio == pytest.approx(0.0, abs=1e-3)
