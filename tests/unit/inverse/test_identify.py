@@ -132,6 +132,17 @@ def test_scatter_of_rates_is_found_when_the_coefficient_is_fixed():
     assert fit.values["n"] == pytest.approx(4.0, abs=1e-3)
 
 
+def test_straight_lines_under_load_have_the_exponent_of_their_rates():
+    """Under load Norton's curves bend by n times strain; where none does, rates as s^4 still say 4, not the bend 1."""
+    rng, tests = np.random.default_rng(3), []
+    for stress in (80.0, 110.0, 150.0, 200.0):
+        rate = 1e-9 * (stress / 100.0) ** 4
+        times = np.linspace(0.05, 1.0, 20) * 0.02 / rate
+        strain = rate * times * np.exp(0.003 * rng.standard_normal(20))
+        tests.append(History(f"{stress:g}", times, {"strain": strain}, ck.constant_stress(stress), 900.0))
+    assert ck.identify("norton", tests).values["n"] == pytest.approx(4.0, abs=0.05)
+
+
 def test_noise_of_a_smooth_sparse_curve_is_small():
     """Primary creep t^0.1 without noise at 12 frames even in ln t: under 0.1 % of the end strain is taken for noise."""
     times = np.geomspace(1e2, 1e6, 12)

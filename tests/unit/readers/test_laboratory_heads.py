@@ -61,6 +61,12 @@ def sheet_by_temperature(title: str) -> list[list[object]]:
     return [*head, [f"{stresses[0]} MPa", None, f"{stresses[1]} MPa"], *names, *rows]
 
 
+def test_a_sheet_that_is_called_a_temperature_below_100_states_it(tmp_path: Path) -> None:
+    """A solder at 25 °C: without a title that says so, but no other words either."""
+    path = workbook(tmp_path / "SAC305.xlsx", {"25 °C": sheet_by_temperature("575°C")[4:]})
+    assert [test.condition for test in ck.read_histories(path)] == ["25 °C, 140 MPa", "25 °C, 160 MPa"]
+
+
 def test_sheets_named_by_temperature(tmp_path: Path) -> None:
     """Twelve things that a laboratory writes about its columns, and none of them is a column."""
     from openpyxl import load_workbook
