@@ -41,7 +41,7 @@ BUDGET = {
     "records": 2342,
     "registry": 608,
     "reports": 5762,
-    "rupture_assessment": 1835,
+    "rupture_assessment": 1840,
     "sampling": 960,
     "screening": 547,
     "specimens": 3203,

@@ -53,7 +53,7 @@ def unstated_loading_strain(history: History) -> QualityFlag | None:
     k = _end_of_jump(times, values)
     if k is None:
         return None
-    ratio = _ratio_to_elastic(history, float(values[k]))
+    ratio = _ratio_to_elastic(history, float(times[k]), float(values[k]))
     if history.includes_elastic and (ratio is None or ELASTIC_RANGE[0] <= ratio <= ELASTIC_RANGE[1]):
         return None
     growth = 3 ** _exponent(times, values, k, _after(times, k)) - 1
@@ -103,10 +103,10 @@ def _largest_later(times: Floats, values: Floats, start: int) -> float:
     return max(largest, _exponent(times, values, k, times.size - 1)) if k < times.size - 1 else largest
 
 
-def _ratio_to_elastic(history: History, strain: float) -> float | None:
+def _ratio_to_elastic(history: History, time: float, strain: float) -> float | None:
     if history.elastic is None:
         return None
     temperature = history.temperature
     start = float(temperature.values[0]) if isinstance(temperature, Program) else float(temperature)
-    elastic = float(history.loading.program().values[0]) / float(history.elastic.at(start).E)
+    elastic = float(history.loading.program().at(time)) / float(history.elastic.at(start).E)
     return strain / elastic if elastic else None

@@ -96,10 +96,14 @@ class RuptureTests:
 ARRAYS = ("log_time", "censored", "stress", "temperature", "tensile_strength", "minimum_rate")
 
 
+LOADING_TIME, STEADY_STRESS = 0.02, 0.02
+"""Of the time of a test, within which its load is put on; and of the stress, by which it may change after that."""
+
+
 def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTests, tuple[str, ...]]:
     """Tests whose end is known, tests with a minimum creep rate, and notes on what was left out.
 
-    HistoryError for a test without one constant stress and temperature, or when there is none to assess.
+    HistoryError for a test without a stress and one temperature, or when there is none to assess.
     """
     histories, notes = _valid(histories)
     known = [h for h in histories if h.end_known]
@@ -136,20 +140,25 @@ def rupture_tests(histories: Sequence[History]) -> tuple[RuptureTests, RuptureTe
 
 
 def _valid(histories: Sequence[History]) -> tuple[list[History], list[str]]:
-    """The tests that no label says to be invalid, and notes on those and on what broke outside its gauge length."""
-    said: dict[str, list[tuple[History, str]]] = {"invalid": [], "elsewhere": []}
+    """The tests under one stress that no label says to be invalid; notes on others and on what broke elsewhere."""
+    said: dict[str, list[tuple[History, str]]] = {"invalid": [], "elsewhere": [], "steps": []}
     for h in histories:
+        stresses = _stresses_after_loading(h) if h.loading.quantity == "stress" else np.ones(1)
+        if np.ptp(stresses) > STEADY_STRESS * stresses.max():
+            said["steps"].append((h, f"the stress changes from {stresses.min():.4g} to {stresses.max():.4g} MPa"))
+            continue
         for name, text in h.labels.items():
             if isinstance(text, str) and (kind := invalidity_said_by(text)):
                 said[kind].append((h, f"{name} says '{text}'"))
                 break
     words = {"invalid": "left out as invalid", "elsewhere": "broken elsewhere than in the gauge length, and counted"}
+    words["steps"] = "left out for steps of load"
     notes = [
         f"tests {words[kind]}: {len(found)}, such as '{found[0][0].name}', of which {found[0][1]}"
         for kind, found in said.items()
         if found
     ]
-    left_out = {id(h) for h, _ in said["invalid"]}
+    left_out = {id(h) for h, _ in (*said["invalid"], *said["steps"])}
     return [h for h in histories if id(h) not in left_out], notes
 
 
@@ -176,16 +185,18 @@ def _constant_stress(history: History) -> float:
             f"{history.origin}: its load is a {history.loading.quantity}; a rupture assessment needs tests of one "
             "constant stress"
         )
-    values = history.loading.program().values
-    stress = float(values[-1])
-    if np.ptp(values) > 1e-6 * abs(stress):
-        raise HistoryError(
-            f"{history.origin}: its stress changes from {values.min():g} to {values.max():g} MPa; leave out tests with "
-            "steps of load"
-        )
+    stress = float(np.median(_stresses_after_loading(history)))
     if not stress > 0:
         raise HistoryError(f"{history.origin}: its stress is {stress:g} MPa; a rupture test needs one above zero")
     return stress
+
+
+def _stresses_after_loading(history: History) -> Floats:
+    """(levels,) MPa, of the program once the load was put on."""
+    program = history.loading.program()
+    end = history.rupture_time or (float(history.times[-1]) if history.times.size else 0.0)
+    times = program.times[(program.times > LOADING_TIME * end) & (program.times <= end)]
+    return program.at(np.array([LOADING_TIME * end, *times]))
 
 
 def _constant_temperature(history: History) -> float:

@@ -316,6 +316,17 @@ def test_what_a_laboratory_calls_invalid_is_left_out_and_said(remark):
     assert [note.split()[1] for note in notes[:2]] == ["left", "broken"]
 
 
+def test_a_ramp_is_loading_and_a_pause_a_step_of_load() -> None:
+    """A load put on within a fiftieth of the life is that of the test; one that was taken off for a while is not."""
+    first, second = (test.rupture_time for test in TESTS[:2])
+    ramp = ck.StressSteps(((0.0, 0.5), (1e-3 * first, 120.0)), "stress")
+    pause = ck.StressSteps(((0.0, 120.0), (0.4 * second, 1.0), (0.5 * second, 120.0)), "stress")
+    known, _, notes = rupture_tests([TESTS[0].replace(loading=ramp), TESTS[1].replace(loading=pause), *TESTS[2:]])
+    assert known.stress[0] == 120.0
+    assert known.names == (TESTS[0].name, *(t.name for t in TESTS[2:]))
+    assert f"'{TESTS[1].name}', of which the stress changes from 1 to 120 MPa" in notes[0]
+
+
 def test_times_beyond_a_double_are_infinite() -> None:
     found = ck.rupture(TESTS, "larson-miller")
     assert found.rupture_time(1e-3, 20.0) == (np.inf, np.inf, np.inf)
